@@ -27,5 +27,5 @@ class Mark(Spec, WorldAction):
 
     def perform(self, stage: Stage) -> Effect:
         """Log the mark."""
-        stage.tell(Event(0, EventKind.MARK, self.name, {"note": self.note} if self.note else {}))
+        stage.record_world_event(Event(0, EventKind.MARK, self.name, {"note": self.note} if self.note else {}))
         return Effect(True, f"marked {self.name}")

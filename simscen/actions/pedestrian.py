@@ -123,10 +123,10 @@ class Pedestrian(_WalkSettings, WorldAction):
     def perform(self, stage: Stage) -> Effect:
         """Add the pedestrian; has no effect if there is no free space."""
         pose = self.pose.pose
-        if not stage.room((pose.x, pose.y), self.radius):
+        if not stage.has_room((pose.x, pose.y), self.radius):
             return Effect(False, f"there is no room for {self.name} at ({pose.x:.2f}, {pose.y:.2f})")
         goals = tuple((x, y) for x, y in self.goals)
-        stage.walk(self.to_pedestrian(stage, self.name, pose, goals, self.group))
+        stage.add_pedestrian(self.to_pedestrian(stage, self.name, pose, goals, self.group))
         return Effect(True, f"{self.name} comes at ({pose.x:.2f}, {pose.y:.2f})")
 
 
@@ -177,7 +177,7 @@ class Crowd(_WalkSettings, WorldAction):
         else:
             box = Box(*group_start, GROUP_HALF_WIDTH_M, GROUP_HALF_WIDTH_M)
         for point in box.random_points(rng):
-            if polygon_contains(corners, point) and stage.room(point, self.radius + INITIAL_CLEARANCE_M):
+            if polygon_contains(corners, point) and stage.has_room(point, self.radius + INITIAL_CLEARANCE_M):
                 return point
         return None
 
@@ -194,7 +194,7 @@ class Crowd(_WalkSettings, WorldAction):
         yaw = float(rng.uniform(-math.pi, math.pi))
         if goals:
             yaw = math.atan2(goals[0][1] - start[1], goals[0][0] - start[0])
-        stage.walk(self.to_pedestrian(stage, name, Pose2(*start, yaw), goals, group))
+        stage.add_pedestrian(self.to_pedestrian(stage, name, Pose2(*start, yaw), goals, group))
         return True
 
 
@@ -221,7 +221,9 @@ def _bounding_box(corners: Polygon) -> Box:
 def _draw_goal(stage: Stage, rng: np.random.Generator, corners: Polygon, radius: float) -> Point | None:
     """Return a point of the region that is clear of walls, or None if none was found."""
     inside = (point for point in _bounding_box(corners).random_points(rng) if polygon_contains(corners, point))
-    return next((point for point in inside if stage.room(point, radius + INITIAL_CLEARANCE_M, walls_only=True)), None)
+    return next(
+        (point for point in inside if stage.has_room(point, radius + INITIAL_CLEARANCE_M, walls_only=True)), None
+    )
 
 
 def _draw_speed(rng: np.random.Generator) -> float:

@@ -56,7 +56,7 @@ class FrictionPatch(Spec, WorldAction):
             x, y = self.at
             name, outline, where = self.name, disc_outline((x, y), self.radius), f"around ({x:g}, {y:g})"
         until = math.inf if self.for_ is None else stage.tick + stage.clock.ticks(self.for_)
-        stage.lay(name, Patch(outline, self.value, until))
+        stage.add_friction_patch(name, Patch(outline, self.value, until))
         return Effect(True, f"made the friction of the floor {where} {self.value:g}")
 
 

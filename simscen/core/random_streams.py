@@ -7,22 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LARGEST_SEED = 2**32 - 1
+MAX_SEED = 2**32 - 1
 
 
 @dataclass(frozen=True)
 class Streams:
-    """Random streams derived from (seed, name); `seed` lies in 1 … 2³²-1.
+    """Random streams derived from (seed, name); `seed` is in 1 … 2³²-1.
 
-    With several robots, `whose` is the name of the robot; its streams are independent of those of other robots.
+    `robot` is the name of one of several robots, so that their streams are independent; "" for a single robot.
     """
 
     seed: int
-    whose: str = ""
+    robot: str = ""
 
     def __post_init__(self) -> None:
-        if not 1 <= self.seed <= LARGEST_SEED:
-            raise ValueError(f"seed must lie in 1 … {LARGEST_SEED}, got {self.seed}")
+        if not 1 <= self.seed <= MAX_SEED:
+            raise ValueError(f"seed must be in 1 … {MAX_SEED}, got {self.seed}")
 
     def generator(self, name: str) -> np.random.Generator:
         """Return a new generator for the consumer `name`, e.g. "sensor.lidar" or "fault.slip"."""
@@ -33,6 +33,6 @@ class Streams:
         return self._words(name)[0] or 1
 
     def _words(self, name: str) -> list[int]:
-        whose = f"{self.whose}/" if self.whose else ""
-        digest = hashlib.sha256(f"{self.seed}/{whose}{name}".encode()).digest()
+        prefix = f"{self.robot}/" if self.robot else ""
+        digest = hashlib.sha256(f"{self.seed}/{prefix}{name}".encode()).digest()
         return [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 32, 4)]

@@ -57,7 +57,7 @@ class Situation(Protocol):
         """
         ...
 
-    def scanned(self, sensor: str | None) -> int | None:
+    def last_scan_tick(self, sensor: str | None) -> int | None:
         """Return the tick at which the stack last received a scan of this lidar (or any), or None."""
         ...
 
@@ -115,12 +115,12 @@ class Stage(Situation, Protocol):
         """Add a body to physics, ray casting and map pictures from the next tick on."""
         ...
 
-    def walk(self, walker: WalkingPedestrian) -> None:
+    def add_pedestrian(self, walker: WalkingPedestrian) -> None:
         """Add a pedestrian that walks from the next tick on."""
         ...
 
-    def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Return whether a pedestrian of `radius` m fits there without touching walls, objects, people or robots."""
+    def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
+        """Return whether a pedestrian of `radius` m fits at `place` without touching anything."""
         ...
 
     def rng(self, name: str) -> np.random.Generator:
@@ -144,7 +144,7 @@ class Stage(Situation, Protocol):
         ...
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Let a body follow a path that begins now."""
+        """Move a body along a path that starts now."""
         ...
 
     def place(self, name: str, pose: Pose2) -> None:
@@ -162,7 +162,7 @@ class Stage(Situation, Protocol):
         """
         ...
 
-    def lay(self, name: str, patch: Patch) -> None:
+    def add_friction_patch(self, name: str, patch: Patch) -> None:
         """Change the friction of a patch of floor; replaces a patch of the same name."""
         ...
 
@@ -178,10 +178,10 @@ class Stage(Situation, Protocol):
         """Send a zone command to the costmap filters of the stack; return why it had no effect, or ""."""
         ...
 
-    def tell(self, event: Event) -> None:
-        """Write an event that concerns the world to the logs of all robots."""
+    def record_world_event(self, event: Event) -> None:
+        """Add an event of the world to the events of all robots; tick 0 stands for now."""
         ...
 
-    def note(self, event: Event) -> None:
-        """Write an event to the log of this robot."""
+    def record_event(self, event: Event) -> None:
+        """Add an event of this robot; tick 0 stands for now."""
         ...

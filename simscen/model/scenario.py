@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Estimate
-from simscen.core.random_streams import LARGEST_SEED
+from simscen.core.random_streams import MAX_SEED
 from simscen.criteria.registry import AnyCriterion
 from simscen.model.navigation import Expectation, Navigation, OnReached
 from simscen.model.stack_files import AnyStack
@@ -230,7 +230,7 @@ class ScenarioSpec(Spec):
     """What the scenario tests, and why."""
     tags: Annotated[list[PlaceName], Field(max_length=50)] = []
     """Tags that `--tag` selects scenarios by."""
-    seed: Annotated[int, Field(ge=1, le=LARGEST_SEED)] = 1
+    seed: Annotated[int, Field(ge=1, le=MAX_SEED)] = 1
     """Seed of all random numbers of a run."""
     world: WorldOrFile
     """World: a `*.world.yaml` file, a ROS map `.yaml`, a Gazebo `.sdf` or `.world` file, or an inline world."""

@@ -11,12 +11,12 @@ It needs Python 3.8 or later and nothing else, neither numpy nor simscen. A mini
         ...
         step.drive(0.2, 0.0)
 
-Where simscen is not installed beside it, `sys.path.append(os.environ["SIMSCEN_PEER_PATH"])` and `import simscen_peer`
-do the same; simscen sets that variable. docs/reference/stack-protocol.md defines the protocol.
+If simscen is not installed in its environment, `sys.path.append(os.environ["SIMSCEN_PEER_PATH"])` and
+`import simscen_peer` do the same; simscen sets that variable. docs/reference/stack-protocol.md defines the protocol.
 """
 
 from .client import Message, Peer, Step
 from .goals import Goal, Goals
-from .wire import Connection, Gone, Refused
+from .wire import Connection, Disconnected, Refused
 
-__all__ = ["Connection", "Goal", "Goals", "Gone", "Message", "Peer", "Refused", "Step"]
+__all__ = ["Connection", "Disconnected", "Goal", "Goals", "Message", "Peer", "Refused", "Step"]

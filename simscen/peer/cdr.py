@@ -66,7 +66,7 @@ class Reader:
         """Return the next values of one width, e.g. "7d"."""
         layout = struct.Struct("<" + codes)
         self._align(struct.calcsize("<" + codes[-1]))
-        self._need(layout.size)
+        self._require(layout.size)
         values = layout.unpack_from(self._data, self._offset)
         self._offset += layout.size
         return values
@@ -78,7 +78,7 @@ class Reader:
 
     def blob(self, size: int) -> bytes:
         """Return the next bytes."""
-        self._need(size)
+        self._require(size)
         self._offset += size
         return self._data[self._offset - size : self._offset]
 
@@ -96,6 +96,6 @@ class Reader:
     def _align(self, width: int) -> None:
         self._offset += -(self._offset - len(HEADER)) % width
 
-    def _need(self, size: int) -> None:
+    def _require(self, size: int) -> None:
         if self._offset + size > len(self._data):
             raise ValueError("the message ends before its type does")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import messages, wire
 from .goals import Goal, Goals
-from .wire import Connection, Gone, Refused
+from .wire import Connection, Disconnected, Refused
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -70,7 +70,7 @@ class Step:
 
     def publish(self, topic: str, data: bytes) -> None:
         """Publish a message on a topic that simscen accepts; see simscen.peer.messages. Raises KeyError for others."""
-        self._published.append((self._peer.hears[topic], data))
+        self._published.append((self._peer.accepted_topics[topic], data))
 
     def log(self, text: str, level: int = 20) -> None:
         """Write a line to /rosout of the run's log; 10 debug, 20 info, 30 warning, 40 error."""
@@ -79,7 +79,7 @@ class Step:
     def _answer(self) -> bytes:
         if self.command_due or self._commanded:
             self.publish(COMMAND, messages.twist(*self._peer.command))
-        for event in self._peer.goals.take():
+        for event in self._peer.goals.take_events():
             self.publish(EVENTS, messages.string(json.dumps(event, allow_nan=False)))
         return wire.answer_frame(self.tick, self._published)
 
@@ -92,7 +92,7 @@ class Peer:
     the names of Nav2's actions; a stack with navigate_through_poses passes goals with `via` without stopping. `about`
     is kept in the run's log.
 
-    Raises wire.Malformed or Refused for protocol errors, Gone when simscen closes the connection.
+    Raises wire.Malformed or Refused for protocol errors, Disconnected when simscen closes the connection.
     """
 
     def __init__(
@@ -111,12 +111,12 @@ class Peer:
         self.command: tuple[float, float, float] = (0.0, 0.0, 0.0)
         self._connection = connection or Connection.inherited()
         self._canceled = False
-        self._farewell: dict[str, Any] = {}
+        self._bye_content: dict[str, Any] = {}
         self.hello = self._expect(wire.HELLO)
         if wire.PROTOCOL not in self.hello["protocols"]:
-            self.give_up(f"{name} speaks version {wire.PROTOCOL} of the stack protocol")
+            self.give_up(f"{name} requires version {wire.PROTOCOL} of the stack protocol")
         self._topics: dict[int, tuple[str, str]] = {t["number"]: (t["topic"], t["type"]) for t in self.hello["says"]}
-        self.hears: dict[str, int] = {topic["topic"]: topic["number"] for topic in self.hello["hears"]}
+        self.accepted_topics: dict[str, int] = {topic["topic"]: topic["number"] for topic in self.hello["hears"]}
         self._connection.send_json(
             wire.WELCOME,
             {
@@ -147,22 +147,22 @@ class Peer:
         while True:
             kind, body = self._connection.receive()
             if kind == wire.STEP:
-                header, heard = wire.from_step(body)
+                header, received = wire.from_step(body)
                 self.goals.now = header.sec + header.nanosec * 1e-9
-                step = Step(self, header, [self._message(*each) for each in heard], self._canceled)
+                step = Step(self, header, [self._message(*each) for each in received], self._canceled)
                 self._canceled = False
                 yield step
                 self._connection.send(step._answer())
             elif kind == wire.END:
-                self._connection.send_json(wire.BYE, {"about": self._farewell})
+                self._connection.send_json(wire.BYE, {"about": self._bye_content})
                 self._connection.close()
                 return
             else:
-                self._take(kind, wire.from_json(body))
+                self._process_frame(kind, wire.from_json(body))
 
     def add(self, **about: Any) -> None:
-        """Add facts about this stack for the run's log; they are sent at the end."""
-        self._farewell.update(about)
+        """Add facts about this stack to the run's log. They are sent at the end of the run."""
+        self._bye_content.update(about)
 
     def give_up(self, message: str) -> None:
         """End the run with this error message. Raises Refused with the same message."""
@@ -170,7 +170,7 @@ class Peer:
         self._connection.close()
         raise Refused(message)
 
-    def _take(self, kind: int, content: dict[str, Any]) -> None:
+    def _process_frame(self, kind: int, content: dict[str, Any]) -> None:
         if kind == wire.GOAL:
             self.task = content
             self.goals.start([Goal.of(goal) for goal in content["goals"]])
@@ -186,10 +186,10 @@ class Peer:
         return Message(*self._topics[number], data)
 
     def _expect(self, kind: int) -> dict[str, Any]:
-        got, body = self._connection.receive()
-        if got != kind:
-            raise wire.Malformed(f"a frame of kind {got} instead of {wire.KINDS[kind]}")
+        received_kind, body = self._connection.receive()
+        if received_kind != kind:
+            raise wire.Malformed(f"a frame of kind {received_kind} instead of {wire.KIND_NAMES[kind]}")
         return wire.from_json(body)
 
 
-__all__ = ["Connection", "Goal", "Goals", "Gone", "Message", "Peer", "Refused", "Step"]
+__all__ = ["Connection", "Disconnected", "Goal", "Goals", "Message", "Peer", "Refused", "Step"]

@@ -32,8 +32,8 @@ class Goal(NamedTuple):
     @classmethod
     def of(cls, content: dict[str, Any]) -> Goal:
         """Return the goal from the content of GOAL or PREEMPT."""
-        said = {"via": False, "wait": 0.0, **content}
-        return cls(*(said[name] for name in cls._fields))
+        fields = {"via": False, "wait": 0.0, **content}
+        return cls(*(fields[name] for name in cls._fields))
 
 
 class Goals:
@@ -58,11 +58,11 @@ class Goals:
         """Accept the next goal unless there is a current one; return the current goal, None if there is none yet."""
         if self.current is None and self.waiting and self.now >= self._wait_until - ROUNDING:
             self.current = self.waiting.pop(0)
-            self.say("goal.accepted", self.current.name)
+            self.report("goal.accepted", self.current.name)
         return self.current
 
     def reached(self) -> None:
-        """Report the current goal as reached, or as passed for `via`; then wait as long as it says."""
+        """Report the current goal as reached, or as passed for `via`; then wait for the time given by its `wait`."""
         goal = self.current
         self._end("goal.passed" if goal is not None and goal.via else "goal.reached")
         if goal is not None and goal.wait:
@@ -99,11 +99,11 @@ class Goals:
         if everything:
             self.waiting = []
 
-    def say(self, kind: str, name: str = "", **data: Any) -> None:
-        """Report an event with the next answer, e.g. `say("recovery.started", "spin")`."""
+    def report(self, kind: str, name: str = "", **data: Any) -> None:
+        """Report an event with the next answer, e.g. `report("recovery.started", "spin")`."""
         self._events.append({"kind": kind, "name": name, "data": data})
 
-    def take(self) -> list[dict[str, Any]]:
+    def take_events(self) -> list[dict[str, Any]]:
         """Return the events since the last call."""
         events, self._events = self._events, []
         return events
@@ -117,5 +117,5 @@ class Goals:
     def _end(self, kind: str, **data: Any) -> None:
         if self.current is None:
             raise ValueError(f"{kind} without a goal: accept it first")
-        self.say(kind, self.current.name, **data)
+        self.report(kind, self.current.name, **data)
         self.current = None

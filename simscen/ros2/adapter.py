@@ -88,7 +88,7 @@ class Adapter:
         published = [topic for topic in offered if topic.name in self._graph.publishers]
         self._readiness = Readiness(self._graph, self._barrier, published, self._senders, options)
         self._actions = MotionActions(self._graph, self._barrier)
-        self._recoveries = Recoveries(self._graph, goals.say)
+        self._recoveries = Recoveries(self._graph, goals.report)
         self._report = Nav2Report(self._graph, self._barrier) if options.nav2 else None
         self._lockstep = Lockstep(
             self._graph, self._barrier, self._actions, options.rounds, options.wait, options.answer
@@ -351,7 +351,7 @@ class Adapter:
         length = sum(math.dist(a, b) for a, b in zip(plan, plan[1:]))
         reason = "rate" if self._planned_goal is goal else "goal"
         self._planned_goal = goal
-        self._goals.say("plan.made", goal.name, reason=reason, length=round(length, 6))
+        self._goals.report("plan.made", goal.name, reason=reason, length=round(length, 6))
 
     def _due_initial_pose(self) -> List[Message]:
         """Return the initial pose once, as soon as there is a subscriber."""

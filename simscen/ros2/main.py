@@ -10,7 +10,7 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tu
 
 from simscen.peer import messages, wire
 from simscen.peer.goals import Goal, Goals
-from simscen.peer.wire import Connection, Gone
+from simscen.peer.wire import Connection, Disconnected
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.nav2_report import ROSOUT
 from simscen.ros2.options import AdapterError, Domain, Options, claim, ros_environment
@@ -34,7 +34,7 @@ def main(values: Dict[str, Any]) -> int:
         print(f"simscen ros2: {error}", file=sys.stderr)
         connection.send_json(wire.ERROR, {"message": str(error)})
         return 1
-    except Gone:
+    except Disconnected:
         return 1
     return 0
 
@@ -85,7 +85,7 @@ class AdapterRun:
             function()
 
     def serve(self, connection: Connection) -> None:
-        """Serve from HELLO to END. Raises AdapterError, and Gone when simscen hangs up."""
+        """Serve from HELLO to END. Raises AdapterError, and Disconnected when simscen closes the connection."""
         from simscen.ros2.adapter import Adapter, require_packages
         from simscen.ros2.graph import Topic
 
@@ -153,7 +153,7 @@ class AdapterRun:
     def _numbered(self, received: Sequence[Tuple[str, bytes]], answers: Dict[str, int]) -> "List[Tuple[int, bytes]]":
         """Return the messages of the stack and the events of its goals with the numbers of their topics."""
         out = [(answers[topic], data) for topic, data in received if topic in answers]
-        events = (json.dumps(event, allow_nan=False) for event in self.goals.take())
+        events = (json.dumps(event, allow_nan=False) for event in self.goals.take_events())
         return out + [(answers[EVENTS], messages.string(event)) for event in events]
 
     def _start_nodes(self) -> Optional[LaunchedCommand]:
@@ -165,7 +165,7 @@ class AdapterRun:
         self._cleanup.append(lambda: shutil.rmtree(logs, ignore_errors=True))
         os.environ.clear()
         os.environ.update(ros_environment(domain.number, logs, environment))
-        os.environ.pop(wire.DESCRIPTOR, None)  # nodes must not use the socket to simscen
+        os.environ.pop(wire.SOCKET_FD_VARIABLE, None)  # nodes must not use the socket to simscen
         return LaunchedCommand(options.launch, os.environ) if options.launch else None
 
     @staticmethod
@@ -183,4 +183,4 @@ def _is_robot_topic(topic: Dict[str, Any]) -> bool:
 
 
 def _terminate(*_: Any) -> None:
-    raise Gone("terminated by simscen")
+    raise Disconnected("terminated by simscen")

@@ -38,7 +38,7 @@ from simscen.worlds.geometry.triangulation import triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 
-def assemble(prepared: PreparedScenario, seed: int, printed: Path | None = None) -> RunSetup:
+def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = None) -> RunSetup:
     """Build everything that one run needs. The stacks are not started yet.
 
     `printed` is the file that receives the output of an external stack.
@@ -58,15 +58,15 @@ def assemble(prepared: PreparedScenario, seed: int, printed: Path | None = None)
     for region, friction in world.friction.items():
         simulation.add_friction_patch(region, Patch(world.regions[region], friction))
     scene, stages = RayScene(prepared.built.mesh), dict[str, LiveStage]()
-    walking = PedestrianSimulation(prepared.built, simulation, clock)
+    pedestrians = PedestrianSimulation(prepared.built, simulation, clock)
     agents = {
-        name: _agent(name, part, simulation, scene, seed, walking, stages, printed)
+        name: _build_robot(name, part, simulation, scene, seed, pedestrians, stages, stack_log)
         for name, part in prepared.each.items()
     }
     for name, stage in stages.items():
         for body in (*world.bodies, *(robot.body for robot in simulation.robots[name].others)):
-            stage.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, body_data(body)))
-    directors = tuple(director for director in _directors(prepared, streams, agents) if director.needed)
+            stage.record_event(Event(0, EventKind.OBJECT_SPAWNED, body.name, body_data(body)))
+    directors = tuple(director for director in _directors(prepared, streams, agents) if director.has_disturbances)
     for stage in stages.values():
         stage.is_observed = bool(directors)
     return RunSetup(
@@ -91,19 +91,19 @@ def _directors(
         return
     yield Director(spec.steps, [], streams, first.stage, first.faults)
     for name, agent in agents.items():
-        own = Streams(streams.seed, name)
-        yield Director([], prepared.robots[name].spec.faults, own, agent.stage, agent.faults)
+        robot_streams = Streams(streams.seed, name)
+        yield Director([], prepared.robots[name].spec.faults, robot_streams, agent.stage, agent.faults)
 
 
-def _agent(
+def _build_robot(
     name: str,
     prepared: PreparedScenario,
     simulation: Simulation,
     scene: RayScene,
     seed: int,
-    walking: PedestrianSimulation,
+    pedestrians: PedestrianSimulation,
     stages: dict[str, LiveStage],
-    printed: Path | None,
+    stack_log: Path | None,
 ) -> RobotUnderTest:
     """Build one robot with its sensors and its stack, and add its stage to `stages`."""
     spec, robot = prepared.spec, simulation.robots[name]
@@ -113,17 +113,17 @@ def _agent(
     truth_period = clock.period(spec.physics.truth_rate)
     control_period = clock.period(prepared.stack.controller_frequency)
     if prepared.stack.gets_ground_truth:
-        # Last, because the log takes the first odometry for the robot's own.
+        # Last, because the log treats the first odometry as that of the robot.
         sensors = (*sensors, TruthSensor(robot, control_period))
-    senses = SensorSuite(sensors, sensor_latencies(prepared, clock))
+    suite = SensorSuite(sensors, sensor_latencies(prepared, clock))
 
-    def told(belief: Belief) -> Belief:
+    def disturb_belief(belief: Belief) -> Belief:
         return faults.belief(simulation.tick, belief)
 
-    stack = _stack(prepared, clock, streams, seed, printed, told)
+    stack = _build_stack(prepared, clock, streams, seed, stack_log, disturb_belief)
     world, sent = prepared.built.world, prepared.case.sent
     filters = CostmapFilters(prepared.stack, world.regions, prepared.masks)
-    stage = LiveStage(world, simulation, robot, stack, filters, clock, sent, walking, Streams(seed), stages)
+    stage = LiveStage(world, simulation, robot, stack, filters, clock, sent, pedestrians, Streams(seed), stages)
     settings = FaultContexts(
         prepared.robot,
         clock,
@@ -133,29 +133,29 @@ def _agent(
         lambda mesh, names: LiveRayCaster(RayScene(mesh), robot, names),
     )
     link = CommandLink(control_period, clock.ticks(prepared.robot.limits.command_timeout))
-    faults = FaultInjector(spec.faults, streams, settings, link, stage.note, prepared.mapped)
+    faults = FaultInjector(spec.faults, streams, settings, link, stage.record_event, prepared.map_faults)
     return RobotUnderTest(
         robot=robot,
-        sensors=senses,
+        sensors=suite,
         stack=stack,
         faults=faults,
         stage=stage,
         end_condition=EndCondition(clock, spec.time_limit, spec.linger, idle=bool(name) and not prepared.case.goals),
         schedule=TickSchedule(
-            (truth_period, control_period, *senses.periods),
-            (*senses.arrivals, *((control_period, late) for late in command_latencies(prepared, clock))),
+            (truth_period, control_period, *suite.periods),
+            (*suite.arrivals, *((control_period, latency) for latency in command_latencies(prepared, clock))),
         ),
         truth_period=truth_period,
     )
 
 
-def _stack(
+def _build_stack(
     prepared: PreparedScenario,
     clock: Clock,
     streams: Streams,
     seed: int,
-    printed: Path | None,
-    told: Callable[[Belief], Belief],
+    stack_log: Path | None,
+    disturb_belief: Callable[[Belief], Belief],
 ) -> Stack:
     """Build the stack of a robot. Active faults change each belief of its localizer through `told`."""
     world = prepared.built.world
@@ -170,7 +170,7 @@ def _stack(
         has_imu=prepared.robot.has_imu,
     )
     if isinstance(prepared.stack, ExternalStackSpec):
-        return build_external_stack(prepared, prepared.stack, surroundings, seed, printed)
+        return build_external_stack(prepared, prepared.stack, surroundings, seed, stack_log)
     return build_stack(
         with_robot_latency(prepared.stack, prepared.robot),
         surroundings,
@@ -178,7 +178,9 @@ def _stack(
         clock,
         stop_on_failure=prepared.spec.on_goal_failure != "continue",
         mode=prepared.spec.navigation.mode,
-        wrap_localizer=lambda localizer: LocalizerWithFaults(localizer, told) if prepared.spec.faults else localizer,
+        wrap_localizer=lambda localizer: (
+            LocalizerWithFaults(localizer, disturb_belief) if prepared.spec.faults else localizer
+        ),
     )
 
 

@@ -4,7 +4,7 @@ A beat is a tick at which a sensor, a stack, or a truth sample of any robot is d
 
 1. observe: update where each robot is and which collisions happened
 2. direct: start the events and faults of the scenario whose triggers fire
-3. decide: read the sensors that are due, apply faults, and ask each stack for a command
+3. decide: read the sensors that are due, apply faults, and request a command from each stack
 4. record: append what happened to the logs
 5. drive: pass the commands to the wheels, then simulate until the next beat
 
@@ -31,9 +31,9 @@ TIME_LIMIT = "time limit"
 
 
 class EndCondition:
-    """Condition that ends a robot's part of a run: some time after its navigation task, or at the time limit.
+    """Condition that ends a robot's part of a run: `linger` after its navigation task, or at the time limit.
 
-    A goal that an event sends in the meantime withdraws the end. A run ends at a regular sample of the truth, or
+    A goal that an event sends in the meantime cancels the end. A run ends at a regular sample of the truth, or
     exactly at the time limit, where an additional sample is taken.
     """
 
@@ -42,7 +42,7 @@ class EndCondition:
         self.limit = clock.ticks(time_limit)
         """Tick of the time limit."""
         self._linger = clock.ticks(linger)
-        self._over: int | None = 0 if idle else None
+        self._end_tick: int | None = 0 if idle else None
         self.earliest_tick = self._earliest()
         """Earliest tick at which the robot's part can end."""
 
@@ -50,17 +50,17 @@ class EndCondition:
         """Update with a decision. Must be called for each decision that has events."""
         for event in decision.events:
             if event.kind == EventKind.NAVIGATION_ENDED:
-                self._over = event.tick + self._linger
+                self._end_tick = event.tick + self._linger
             elif event.kind == EventKind.GOAL_ACCEPTED:
-                self._over = None
+                self._end_tick = None
         self.earliest_tick = self._earliest()
 
     def _earliest(self) -> int:
-        return self.limit if self._over is None else min(self._over, self.limit)
+        return self.limit if self._end_tick is None else min(self._end_tick, self.limit)
 
     def reached(self, tick: int) -> Event | None:
         """Return the event that ends the robot's part at this tick, or None. The tick must have a truth sample."""
-        if self._over is not None and tick >= self._over:
+        if self._end_tick is not None and tick >= self._end_tick:
             return Event(tick, EventKind.RUN_ENDED, "navigation ended")
         if tick >= self.limit:
             return Event(tick, EventKind.RUN_ENDED, TIME_LIMIT)
@@ -118,7 +118,7 @@ class RobotUnderTest:
         else:
             self._truth = self.robot.sample(self.truth_period) if is_sampled else None
         for collision in self.robot.collisions():
-            self.stage.note(collision)
+            self.stage.record_event(collision)
 
     def decide(self, tick: int) -> None:
         """Read the sensors, apply the active faults to the readings, and let the stack choose a command."""
@@ -145,7 +145,7 @@ class RobotUnderTest:
     def drive(self) -> None:
         """Send the stack's command to the wheels, as changed by active faults."""
         command = self.moment.decision.command
-        self.robot.drive(self.faults.command(self.moment.tick, command) if self.faults.possible else command)
+        self.robot.drive(self.faults.command(self.moment.tick, command) if self.faults.has_faults else command)
 
 
 @dataclass(frozen=True)

@@ -28,23 +28,23 @@ from simscen.sim.body.outline import convex_hull, footprint, outlines_in_band
 from simscen.sim.urdf.writer import to_urdf
 from simscen.worlds.routes.shortest_paths import Z_RANGE
 
-_KNOWN: WeakKeyDictionary[PreparedScenario, LogHeader] = WeakKeyDictionary()
+_CACHE: WeakKeyDictionary[PreparedScenario, LogHeader] = WeakKeyDictionary()
 
 
 def log_header(prepared: PreparedScenario, seed: int) -> LogHeader:
     """Return the log header of a run."""
-    known = _KNOWN.get(prepared)
-    if known is None:
-        known = _KNOWN[prepared] = _of_all_runs(prepared)
-    return replace(known, seed=seed, robots={name: replace(one, seed=seed) for name, one in known.robots.items()})
+    header = _CACHE.get(prepared)
+    if header is None:
+        header = _CACHE[prepared] = _build_header(prepared)
+    return replace(header, seed=seed, robots={name: replace(part, seed=seed) for name, part in header.robots.items()})
 
 
-def _of_all_runs(prepared: PreparedScenario) -> LogHeader:
-    robots = {name: _of_one(part) for name, part in prepared.robots.items()}
-    return replace(_of_one(prepared), files={SCENERY: scenery_to_json(world_scenery(prepared))}, robots=robots)
+def _build_header(prepared: PreparedScenario) -> LogHeader:
+    robots = {name: _robot_header(part) for name, part in prepared.robots.items()}
+    return replace(_robot_header(prepared), files={SCENERY: scenery_to_json(world_scenery(prepared))}, robots=robots)
 
 
-def _of_one(prepared: PreparedScenario) -> LogHeader:
+def _robot_header(prepared: PreparedScenario) -> LogHeader:
     return LogHeader(
         name=prepared.loaded.id,
         seed=prepared.spec.seed,
@@ -61,49 +61,49 @@ def _of_one(prepared: PreparedScenario) -> LogHeader:
 def _key_facts(prepared: PreparedScenario) -> dict[str, str]:
     """Return the stack chosen on the command line, and the names of stack and variation."""
     loaded = prepared.loaded
-    told = {STACK_FACT: loaded.stack, STACK_NAME_FACT: loaded.stack_name, VARIATION_FACT: loaded.variation}
-    return {name: value for name, value in told.items() if value}
+    facts = {STACK_FACT: loaded.stack, STACK_NAME_FACT: loaded.stack_name, VARIATION_FACT: loaded.variation}
+    return {name: value for name, value in facts.items() if value}
 
 
-MILLIMETERS = 3
+DECIMALS = 3
 """Decimals of coordinates in m."""
 
 
 def world_scenery(prepared: PreparedScenario) -> Scenery:
     """Return objects, ground, regions, and the zones of all robots."""
     world, each = prepared.built.world, prepared.each
-    reach = max((2 * wheel.radius for part in each.values() for wheel in part.body.wheels), default=0.0)
+    diameter = max((2 * wheel.radius for part in each.values() for wheel in part.body.wheels), default=0.0)
     same = all(part.map is prepared.built.map for part in each.values())
     return Scenery(
         places=dict(world.places),
-        things=tuple(_thing(body, world) for body in world.bodies),
-        ground=tuple(_ground(prepared.built.mesh, reach)),
+        things=tuple(_movable_object(body, world) for body in world.bodies),
+        ground=tuple(_drivable_surfaces(prepared.built.mesh, diameter)),
         floors=tuple(FrictionRegion(name, world.regions[name], friction) for name, friction in world.friction.items()),
         zones=tuple(zone for name, part in each.items() for zone in _zones(part, name)),
         map=None if same else CompressedGrid.of(prepared.built.map),
     )
 
 
-def _thing(body: Body, world: World) -> MovableObject:
+def _movable_object(body: Body, world: World) -> MovableObject:
     outlines = outlines_in_band(body.solids, Z_RANGE) or ([footprint(body.solids)] if body.solids else [])
-    rounded = tuple(tuple((round(x, MILLIMETERS), round(y, MILLIMETERS)) for x, y in outline) for outline in outlines)
+    rounded = tuple(tuple((round(x, DECIMALS), round(y, DECIMALS)) for x, y in outline) for outline in outlines)
     closed, opened = world.doors.get(body.name, (None, None))
     return MovableObject(body.name, body.pose.plane, rounded, closed, opened, body.mass)
 
 
-def _ground(mesh: TriangleMesh, reach: float) -> Iterator[DrivableSurface]:
-    """Yield the parts of the static world on which wheels with a diameter of up to `reach` m can roll."""
-    owners = sorted(drivable_solids(mesh, reach))
+def _drivable_surfaces(mesh: TriangleMesh, diameter: float) -> Iterator[DrivableSurface]:
+    """Yield the parts of the static world on which wheels with a diameter of up to `diameter` m can roll."""
+    owners = sorted(drivable_solids(mesh, diameter))
     if not owners:
-        return  # as most worlds: normals of many thousand faces take a while
+        return  # most worlds have none, and computing the normals of many thousand faces is slow
     up, slopes = upward_faces(mesh), face_normals(mesh)
     for owner in owners:
-        own = mesh.owners == owner
-        corners = mesh.vertices[mesh.faces[own]].reshape(-1, 3)
-        normal = max(slopes[own & up].tolist(), key=lambda one: -one[2])  # its steepest part
-        uphill = (round(-normal[0] / normal[2], MILLIMETERS) + 0.0, round(-normal[1] / normal[2], MILLIMETERS) + 0.0)
-        outline = convex_hull(np.round(corners[:, :2], MILLIMETERS))
-        yield DrivableSurface(mesh.names[owner], outline, round(float(corners[:, 2].max()), MILLIMETERS), uphill)
+        selected = mesh.owners == owner
+        corners = mesh.vertices[mesh.faces[selected]].reshape(-1, 3)
+        normal = max(slopes[selected & up].tolist(), key=lambda slope: -slope[2])  # its steepest part
+        uphill = (round(-normal[0] / normal[2], DECIMALS) + 0.0, round(-normal[1] / normal[2], DECIMALS) + 0.0)
+        outline = convex_hull(np.round(corners[:, :2], DECIMALS))
+        yield DrivableSurface(mesh.names[owner], outline, round(float(corners[:, 2].max()), DECIMALS), uphill)
 
 
 def _zones(part: PreparedScenario, robot: str) -> Iterator[FilterZone]:

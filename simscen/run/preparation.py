@@ -68,7 +68,7 @@ class PreparedScenario:
     case: Case
     obstacles: TriangleMesh
     """The part of the world's mesh that blocks the robot."""
-    mapped: tuple[int, ...] = ()
+    map_faults: tuple[int, ...] = ()
     """The indices of the faults that changed the map."""
     plugins: tuple[Entry, ...] = ()
     """The plug-ins that the scenario uses."""
@@ -99,34 +99,36 @@ def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
 
 
 def prepare(
-    loaded: LoadedScenario, world_of: BuildWorld = build_world, legs: FindLegs = legs_between
+    loaded: LoadedScenario, build: BuildWorld = build_world, find_legs: FindLegs = legs_between
 ) -> PreparedScenario:
     """Build what the runs of this scenario share. Raises InvalidInput for unusable files."""
     if not loaded.robots:
-        return _prepared(loaded, world_of, legs)
+        return _prepare_robot(loaded, build, find_legs)
     parts: dict[str, PreparedScenario] = {}
-    heights: dict[float, BuiltWorld] = {}
+    built_by_height: dict[float, BuiltWorld] = {}
 
-    def known(view: LoadedScenario, height: float) -> BuiltWorld:
-        if height not in heights:
-            heights[height] = world_of(view, height)
-        return heights[height]
+    def build_once(view: LoadedScenario, height: float) -> BuiltWorld:
+        if height not in built_by_height:
+            built_by_height[height] = build(view, height)
+        return built_by_height[height]
 
     for name, view in loaded.robots.items():
-        parts[name] = _prepared(view, known, legs)
-    reach = max(part.case.clearance_range for part in parts.values())
-    parts = {name: replace(part, case=replace(part.case, clearance_range=reach)) for name, part in parts.items()}
+        parts[name] = _prepare_robot(view, build_once, find_legs)
+    clearance_range = max(part.case.clearance_range for part in parts.values())
+    parts = {
+        name: replace(part, case=replace(part.case, clearance_range=clearance_range)) for name, part in parts.items()
+    }
     return replace(next(iter(parts.values())), loaded=loaded, robots=parts, plugins=plugins_of(loaded))
 
 
-def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> PreparedScenario:
+def _prepare_robot(loaded: LoadedScenario, build: BuildWorld, find_legs: FindLegs) -> PreparedScenario:
     """Prepare the scenario of one robot."""
     spec = loaded.spec
     robot, body = load_robot(loaded)
-    built = world_of(loaded, lidar_height(robot))
+    built = build(loaded, lidar_height(robot))
     world = built.world
-    standing = blocking_solids(world.solids, body)
-    obstacles = built.mesh if standing is world.solids else merge_solids(standing)
+    blocking = blocking_solids(world.solids, body)
+    obstacles = built.mesh if blocking is world.solids else merge_solids(blocking)
     start = spec.only_robot.pose.pose
     goals = scenario_goals(spec)
     case = Case(
@@ -152,7 +154,7 @@ def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> P
         stack=effective_stack(spec),
         start=start,
         estimate=initial_estimate(spec.only_robot, start),
-        case=with_shortest_paths(case, built, obstacles, legs),
+        case=with_shortest_paths(case, built, obstacles, find_legs),
         obstacles=obstacles,
         plugins=plugins_of(loaded),
     )
@@ -163,10 +165,10 @@ def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, 
 
     If the robot is expected to fail at a goal, the path to the next goal starts where the path to this one did.
     """
-    ends, at = [], case.start
+    ends, pose = [], case.start
     for goal in case.goals:
-        ends.append((at, goal))
-        at = at if goal.name in case.expected else goal.pose
+        ends.append((pose, goal))
+        pose = pose if goal.name in case.expected else goal.pose
     legs = find_legs(replace(built, mesh=obstacles), ends, case.inscribed_radius)
     return replace(
         case,
@@ -177,10 +179,10 @@ def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, 
 
 def _clearance_range(spec: ScenarioSpec) -> float:
     """Return the largest clearance range in m that a criterion or trigger needs."""
-    asked = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
+    ranges = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
     near = (test.clearance_below for trigger in spec.triggers for test in trigger.parts())
-    asked += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]
-    return max([CLEARANCE_RANGE, *asked])
+    ranges += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]
+    return max([CLEARANCE_RANGE, *ranges])
 
 
 def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | None:
@@ -200,8 +202,8 @@ def effective_stack(spec: ScenarioSpec) -> AnyStack:
     stack = spec.stack
     if not isinstance(stack, StackSpec):
         return stack
-    unwritten = "localizer" not in stack.model_fields_set
-    if spec.map == "none" and unwritten and stack.localizer.needs_map:
+    is_default = "localizer" not in stack.model_fields_set
+    if spec.map == "none" and is_default and stack.localizer.needs_map:
         return stack.model_copy(update={"localizer": OdometryOnly(type="odometry")})
     return stack
 

@@ -19,19 +19,19 @@ def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list
     stream of its content, so that editing it changes only its own draws. The k-th of several equal entries uses the
     k-th stream of this content.
     """
-    said = [f"/{entry.name}" if entry.name is not None else f"={_written(entry)}" for entry in entries]
-    before: Counter[str] = Counter()
+    contents = [f"/{entry.name}" if entry.name is not None else f"={_content_key(entry)}" for entry in entries]
+    counts: Counter[str] = Counter()
     names = []
-    for what in said:
-        before[what] += 1
-        names.append(f"{what}#{before[what]}")
+    for content in contents:
+        counts[content] += 1
+        names.append(f"{content}#{counts[content]}")
     return names
 
 
-def _written(entry: BaseModel) -> str:
+def _content_key(entry: BaseModel) -> str:
     if any(isinstance(part, Choice) and part.narrow is not None for _, part in walk(entry)):
         return json.dumps(_plain(entry), sort_keys=True)
-    _build(entry)
+    _build_serializers(entry)
     return entry.model_dump_json(exclude_defaults=True)
 
 
@@ -47,7 +47,7 @@ def _plain(value: Any) -> Any:
         fields = {
             name: field.get_default(call_default_factory=True) for name, field in type(value).model_fields.items()
         }
-        return {name: _plain(given) for name, given in value if given != fields[name]}
+        return {name: _plain(current) for name, current in value if current != fields[name]}
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
     if isinstance(value, dict):
@@ -55,12 +55,12 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, str | int | float | None) else str(value)
 
 
-def _build(value: object) -> None:
+def _build_serializers(value: object) -> None:
     """Build the serializers of all nested models, because pydantic 2.11 does not do so for unpickled models."""
     if isinstance(value, BaseModel):
         type(value).model_rebuild()
         for _, inner in value:
-            _build(inner)
+            _build_serializers(inner)
     elif isinstance(value, list):
         for inner in value:
-            _build(inner)
+            _build_serializers(inner)

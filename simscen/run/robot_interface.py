@@ -40,8 +40,8 @@ def robot_model(body: RobotBody) -> RobotModel:
 
 def sensor_kinds(prepared: PreparedScenario) -> dict[str, str]:
     """Return the type of readings of each sensor by name, in the order in which they are read."""
-    told = {TRUTH: Odometry.__name__} if prepared.stack.gets_ground_truth else {}
-    return {name: sensor.reading_type for name, sensor in prepared.robot.sensors.items()} | told
+    truth = {TRUTH: Odometry.__name__} if prepared.stack.gets_ground_truth else {}
+    return {name: sensor.reading_type for name, sensor in prepared.robot.sensors.items()} | truth
 
 
 def sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
@@ -50,12 +50,12 @@ def sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
     return {name: mount.pose for name, mount in mounts.items() if isinstance(mount, Mount)}
 
 
-AnyStack = TypeVar("AnyStack", bound=StackBase)
+StackT = TypeVar("StackT", bound=StackBase)
 
 
-def with_robot_latency(stack: AnyStack, robot: RobotSpec) -> AnyStack:
+def with_robot_latency(stack: StackT, robot: RobotSpec) -> StackT:
     """Return the stack with `latency: robot` replaced by the latencies in the robot's file."""
-    if not _as_robot(stack):
+    if not _uses_robot_latency(stack):
         return stack
     return stack.model_copy(
         update={"latency": Latency(**{part: getattr(robot.latency, part) for part in Latency.model_fields})}
@@ -64,11 +64,11 @@ def with_robot_latency(stack: AnyStack, robot: RobotSpec) -> AnyStack:
 
 def sensor_latencies(prepared: PreparedScenario, clock: Clock) -> Mapping[str, int]:
     """Return the latency of each sensor in ticks, by name."""
-    usual = prepared.robot.latency.sensors if _as_robot(prepared.stack) else {}
-    own = {name: sensor.chosen for name, sensor in prepared.robot.sensors.items()}
+    latencies = prepared.robot.latency.sensors if _uses_robot_latency(prepared.stack) else {}
+    sensors = {name: sensor.chosen for name, sensor in prepared.robot.sensors.items()}
     return {
-        name: clock.ticks(usual.get(name, sensor.latency))
-        for name, sensor in own.items()
+        name: clock.ticks(latencies.get(name, sensor.latency))
+        for name, sensor in sensors.items()
         if isinstance(sensor, SensorSpec)
     }
 
@@ -81,7 +81,7 @@ def command_latencies(prepared: PreparedScenario, clock: Clock) -> Iterator[int]
         yield clock.ticks(stack.latency.controller) + clock.ticks(stack.latency.collision_monitor)
 
 
-def _as_robot(stack: StackBase) -> bool:
+def _uses_robot_latency(stack: StackBase) -> bool:
     return isinstance(stack, StackSpec) and stack.latency == "robot"
 
 
@@ -96,9 +96,9 @@ class SensorSuite:
         self._sensors = tuple(sensors)
         latencies = latencies or {}
         self._latencies = [latencies.get(sensor.name, 0) for sensor in self._sensors]
-        self._late: list[deque[Reading]] = [deque() for _ in self._sensors]
-        self._each = list(zip(self._sensors, self.periods, self._latencies, self._late, strict=True))
-        self._punctual = None if any(self._latencies) else list(zip(self._sensors, self.periods, strict=True))
+        self._delayed: list[deque[Reading]] = [deque() for _ in self._sensors]
+        self._with_latency = list(zip(self._sensors, self.periods, self._latencies, self._delayed, strict=True))
+        self._without_latency = None if any(self._latencies) else list(zip(self._sensors, self.periods, strict=True))
 
     @property
     def periods(self) -> tuple[int, ...]:
@@ -113,15 +113,15 @@ class SensorSuite:
 
     def read(self, tick: int) -> Readings:
         """Return the readings that arrive at this tick."""
-        if self._punctual is not None:
-            return tuple([sensor.read(tick) for sensor, period in self._punctual if tick % period == 0])
-        come: list[Reading] = []
-        for sensor, period, latency, late in self._each:
+        if self._without_latency is not None:
+            return tuple([sensor.read(tick) for sensor, period in self._without_latency if tick % period == 0])
+        readings: list[Reading] = []
+        for sensor, period, latency, delayed in self._with_latency:
             if tick % period == 0:
-                (late if latency else come).append(sensor.read(tick))
-            while late and late[0].tick + latency <= tick:
-                come.append(late.popleft())
-        return tuple(come)
+                (delayed if latency else readings).append(sensor.read(tick))
+            while delayed and delayed[0].tick + latency <= tick:
+                readings.append(delayed.popleft())
+        return tuple(readings)
 
 
 class TickSchedule:
@@ -130,11 +130,13 @@ class TickSchedule:
     Computes each tick on demand, because the least common multiple of the periods can be large.
     """
 
-    def __init__(self, periods: Iterable[int], later: Iterable[tuple[int, int]] = ()) -> None:
-        """`later`: pairs of a period and the delay after each multiple of it, in ticks."""
-        beats = {(period, 0) for period in periods} | {(period, ticks % period) for period, ticks in later}
-        first, *rest = sorted(beat for beat in beats if not any(_among(beat, other) for other in beats))
-        (self._period, self._late), self._rest = first, rest
+    def __init__(self, periods: Iterable[int], delayed: Iterable[tuple[int, int]] = ()) -> None:
+        """`delayed`: pairs of a period and the delay after each multiple of it, in ticks."""
+        offsets = {(period, 0) for period in periods} | {(period, ticks % period) for period, ticks in delayed}
+        first, *others = sorted(
+            offset for offset in offsets if not any(_is_covered_by(offset, other) for other in offsets)
+        )
+        (self._period, self._offset), self._others = first, others
 
     def due(self, tick: int) -> bool:
         """Return whether anything is due at a tick."""
@@ -142,13 +144,13 @@ class TickSchedule:
 
     def until_next(self, tick: int) -> int:
         """Return the number of ticks from `tick` to the next due tick; at least 1."""
-        until = self._period - (tick - self._late) % self._period
-        if self._rest:  # most robots have a single period left
-            return min(until, *[period - (tick - ticks) % period for period, ticks in self._rest])
-        return until
+        remaining = self._period - (tick - self._offset) % self._period
+        if self._others:  # most robots have a single period left
+            return min(remaining, *[period - (tick - ticks) % period for period, ticks in self._others])
+        return remaining
 
 
-def _among(beat: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Return whether another entry covers all ticks of this one."""
-    (period, ticks), (finer, its) = beat, other
-    return beat != other and period % finer == 0 and ticks % finer == its
+def _is_covered_by(offset: tuple[int, int], other: tuple[int, int]) -> bool:
+    """Return whether the ticks of `other` include all ticks of `offset`; both are (period, offset)."""
+    (period, ticks), (other_period, other_ticks) = offset, other
+    return offset != other and period % other_period == 0 and ticks % other_period == other_ticks

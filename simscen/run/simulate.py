@@ -30,7 +30,7 @@ from simscen.run.preparation import PreparedScenario, prepare
 from simscen.spec.registry import Entry
 
 Attach = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
-"""Receives the setup and the logs of its first robot before the first beat; what it returns listens to that, too."""
+"""Receives the setup and the logs of its first robot before the first beat; returns additional logs for that robot."""
 
 
 def simulate(
@@ -39,51 +39,51 @@ def simulate(
     *,
     log: Path | None = None,
     attach: Attach | None = None,
-    printed: Path | None = None,
+    stack_log: Path | None = None,
 ) -> Run:
     """Run a prepared scenario with a seed (default: its own) and judge it; `log` is the MCAP file to write.
 
     `printed` is the file for the output of an external stack; with several robots, each name is added to it.
 
-    *Given* the same scenario and seed *then* the same run and the same bytes in `log`, whatever ran before in this
-    process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
+    *Given* the same scenario and seed *then* the same run and the same bytes in `log`, regardless of earlier runs in
+    this process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
     """
     try:
-        return _simulated(prepared, prepared.spec.seed if seed is None else seed, log, attach, printed)
+        return _run_and_judge(prepared, prepared.spec.seed if seed is None else seed, log, attach, stack_log)
     except (RunError, InvalidInput, MemoryError):
         raise
     except Exception as error:  # plug-ins can raise any exception
-        if (whose := plugin_error(error, prepared.plugins)) is None:
+        if (plugin_failure := plugin_error(error, prepared.plugins)) is None:
             raise
-        traceback.print_exc()  # into worker.log, for the author of the plug-in
-        raise whose from error
+        traceback.print_exc()  # goes to worker.log, for the author of the plug-in
+        raise plugin_failure from error
 
 
-def _simulated(
-    prepared: PreparedScenario, seed: int, log: Path | None, attach: Attach | None, printed: Path | None = None
+def _run_and_judge(
+    prepared: PreparedScenario, seed: int, log: Path | None, attach: Attach | None, stack_log: Path | None = None
 ) -> Run:
     prepared = apply_map_faults(prepared, seed)
     clock = Clock(prepared.spec.physics.tick_rate)
-    with ExitStack() as closing:
-        recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
+    with ExitStack() as cleanup:
+        recorder = log and cleanup.enter_context(Recorder(log, clock, log_header(prepared, seed)))
         # Plug-ins could modify an array after they returned it, so logging must not be delayed.
-        waits, written = 0 if prepared.plugins else clock.ticks(MOMENT_DELAY_S), recorder.robots if recorder else {}
-        backlog = closing.enter_context(MomentBuffer(waits, next(iter(written.values()), None)))
-        kept = {name: one.thinning for name, one in written.items()}
-        builders = {name: TraceBuilder(clock, kept.get(name)) for name in prepared.each}
-        setup = assemble(prepared, seed, printed)
-        closing.callback(setup.simulation.close)
+        delay, robot_logs = 0 if prepared.plugins else clock.ticks(MOMENT_DELAY_S), recorder.robots if recorder else {}
+        backlog = cleanup.enter_context(MomentBuffer(delay, next(iter(robot_logs.values()), None)))
+        thinnings = {name: one.thinning for name, one in robot_logs.items()}
+        builders = {name: TraceBuilder(clock, thinnings.get(name)) for name in prepared.each}
+        setup = assemble(prepared, seed, stack_log)
+        cleanup.callback(setup.simulation.close)
         agents = dict(zip(prepared.each, setup.robots, strict=True))
         externals = {name: agent.stack for name, agent in agents.items() if isinstance(agent.stack, ExternalStack)}
-        closing.callback(_close, externals.values())
+        cleanup.callback(_close, externals.values())
         for name, stack in externals.items():
             stack.begin(prepared.each[name].estimate)
         for name, agent in agents.items():
             part = prepared.each[name]
             agent.stack.start(part.estimate, part.case.goals)
-        logs = [(builders[name], written[name]) if written else (builders[name],) for name in agents]
-        for agent, own in zip(setup.robots, logs, strict=True):
-            agent.logs = (backlog.sink(*own),)
+        logs = [(builders[name], robot_logs[name]) if robot_logs else (builders[name],) for name in agents]
+        for agent, robot_sinks in zip(setup.robots, logs, strict=True):
+            agent.logs = (backlog.sink(*robot_sinks),)
         setup.robots[0].logs += tuple(attach(setup, logs[0])) if attach else ()
         end = run_lockstep(setup)
         backlog.flush()
@@ -95,7 +95,7 @@ def _simulated(
         run = judge_traces(prepared, seed, {name: builder.finish(end.tick) for name, builder in builders.items()}, log)
         if recorder:
             recorder.close(end.tick, to_json(run.result), _stack_facts(externals))
-    return _with_stacks(run, {name: stack.described for name, stack in externals.items()})
+    return _with_stacks(run, {name: stack.description for name, stack in externals.items()})
 
 
 def _close(stacks: Collection[ExternalStack]) -> None:
@@ -115,10 +115,10 @@ def _stack_facts(externals: Mapping[str, ExternalStack]) -> dict[str, str]:
     }
 
 
-def _with_stacks(run: Run, said: Mapping[str, Mapping[str, Any]]) -> Run:
+def _with_stacks(run: Run, descriptions: Mapping[str, Mapping[str, Any]]) -> Run:
     """Return the run with the descriptions of the external stacks by robot."""
-    robots = {name: replace(one, stack=said.get(name, {})) for name, one in run.robots.items()}
-    return replace(run, robots=robots, stack=said.get(next(iter(robots), ROBOT_NAME), {}))
+    robots = {name: replace(one, stack=descriptions.get(name, {})) for name, one in run.robots.items()}
+    return replace(run, robots=robots, stack=descriptions.get(next(iter(robots), ROBOT_NAME), {}))
 
 
 def simulate_file(
@@ -131,13 +131,13 @@ def simulate_file(
 def judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Trace], log: Path | None = None) -> Run:
     """Judge the traces of all robots."""
     if not prepared.robots:
-        return _judged(prepared, seed, traces[ROBOT_NAME], log)
-    runs = {name: _judged(part, seed, traces[name], log) for name, part in prepared.robots.items()}
+        return _judge_robot(prepared, seed, traces[ROBOT_NAME], log)
+    runs = {name: _judge_robot(part, seed, traces[name], log) for name, part in prepared.robots.items()}
     result = combine_robots({name: run.result for name, run in runs.items()}, traces, prepared.loaded.expectation)
     return replace(next(iter(runs.values())), result=result, robots=runs)
 
 
-def _judged(prepared: PreparedScenario, seed: int, trace: Trace, log: Path | None) -> Run:
+def _judge_robot(prepared: PreparedScenario, seed: int, trace: Trace, log: Path | None) -> Run:
     """Judge the trace of one robot."""
     loaded = prepared.loaded
     places = [loaded.place_of("pass", index) for index in range(len(prepared.spec.pass_))]
@@ -158,22 +158,22 @@ def _judged(prepared: PreparedScenario, seed: int, trace: Trace, log: Path | Non
 
 def plugin_error(error: Exception, plugins: Sequence[Entry]) -> RunError | None:
     """Return a RunError that names the plug-in whose code raised the exception, or None."""
-    own = {entry.value.partition(":")[0].partition(".")[0] for entry in plugins}
+    packages = {entry.value.partition(":")[0].partition(".")[0] for entry in plugins}
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
         module = str(frame.f_globals.get("__name__", ""))
-        if module.partition(".")[0] in own:
+        if module.partition(".")[0] in packages:
             entry = _nearest(module, plugins)
             place = f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
-            told = f"{type(error).__name__}: {error}".splitlines()[0]
-            return RunError("crashed", f"{entry.group} `{entry.name}` of {entry.origin}: {told} ({place})")
+            summary = f"{type(error).__name__}: {error}".splitlines()[0]
+            return RunError("crashed", f"{entry.group} `{entry.name}` of {entry.origin}: {summary} ({place})")
     return None
 
 
 def _nearest(module: str, plugins: Sequence[Entry]) -> Entry:
     """Return the plug-in that is defined in a module, or the first of its package."""
     package = module.partition(".")[0]
-    same = [entry for entry in plugins if entry.value.partition(":")[0].partition(".")[0] == package]
-    return next((entry for entry in same if entry.value.partition(":")[0] == module), same[0])
+    candidates = [entry for entry in plugins if entry.value.partition(":")[0].partition(".")[0] == package]
+    return next((entry for entry in candidates if entry.value.partition(":")[0] == module), candidates[0])
 
 
 GC_THRESHOLD = 20_000
@@ -198,7 +198,7 @@ def execute_run(
         gc.set_threshold(GC_THRESHOLD)
     log = folder / "run.mcap"
     (folder / "scenario.yaml").write_text(log_header(prepared, seed).scenario, encoding="utf-8")
-    run = simulate(prepared, seed, log=log, attach=lambda *_: logs, printed=folder / "stack.log")
+    run = simulate(prepared, seed, log=log, attach=lambda *_: logs, stack_log=folder / "stack.log")
     (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
     for name, one in (run.robots or {ROBOT_NAME: run}).items():
         if one.stack:

@@ -40,7 +40,7 @@ class FakeStage:
     motions: dict[str, tuple[MotionPath, float]] = field(default_factory=dict)
     done: list[Any] = field(default_factory=list)
 
-    def scanned(self, sensor: str | None) -> int | None:
+    def last_scan_tick(self, sensor: str | None) -> int | None:
         """Return the tick of the newest scan of this lidar, or of any lidar."""
         return max(self.scans.values(), default=None) if sensor is None else self.scans.get(sensor)
 
@@ -77,11 +77,11 @@ class FakeStage:
         """Record the call."""
         self.done.append(("spawn", body))
 
-    def walk(self, walker: WalkingPedestrian) -> None:
+    def add_pedestrian(self, walker: WalkingPedestrian) -> None:
         """Record the call."""
-        self.done.append(("walk", walker))
+        self.done.append(("add_pedestrian", walker))
 
-    def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
+    def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
         """Return True: there is space everywhere."""
         return True
 
@@ -109,9 +109,9 @@ class FakeStage:
         """Record the call."""
         self.done.append(("push", impulse, name, seconds))
 
-    def lay(self, name: str, patch: Patch) -> None:
+    def add_friction_patch(self, name: str, patch: Patch) -> None:
         """Record the call."""
-        self.done.append(("lay", name, patch))
+        self.done.append(("add_friction_patch", name, patch))
 
     def send_goal(self, name: str) -> None:
         """Record the call."""
@@ -126,13 +126,13 @@ class FakeStage:
         self.done.append(("switch_zone", order))
         return ""
 
-    def tell(self, event: Event) -> None:
+    def record_world_event(self, event: Event) -> None:
         """Record the call."""
-        self.done.append(("tell", event))
+        self.done.append(("record_world_event", event))
 
-    def note(self, event: Event) -> None:
+    def record_event(self, event: Event) -> None:
         """Record the call."""
-        self.done.append(("note", event))
+        self.done.append(("record_event", event))
 
 
 LINEAR_SPEED, ANGULAR_SPEED = 0.3, 0.2

@@ -39,5 +39,5 @@ class ScanAge(Spec, Condition):
 
     def holds(self, now: Situation) -> bool:
         """Return whether the scan is older."""
-        last = now.scanned(self.sensor)
+        last = now.last_scan_tick(self.sensor)
         return now.tick - (0 if last is None else last) > now.clock.ticks(self.above)

@@ -148,7 +148,12 @@ def test_a_metric_that_a_run_does_not_have_says_why(run) -> None:
             "the effect `done`, but did nothing (action `mine`",
         ),
         ("action", "raise ValueError('no')", "crashed", "action `mine` of mines 0.3: ValueError: no (mine.py:"),
-        ("fault", "def reading(self, reading): return 3", "broken-component", "makes int of the Scan of a sensor"),
+        (
+            "fault",
+            "def reading(self, reading): return 3",
+            "broken-component",
+            "returned an object of type int for a Scan",
+        ),
         ("fault", "def reading(self, reading): reading.ranges[:] = 0; return reading", "crashed", "read-only"),
         ("fault", "def reading(self, reading): return 1 / 0", "crashed", "fault `mine` of mines 0.3: ZeroDivision"),
         ("sensor", "return 1 / 0", "crashed", "sensor `extra` (mine, mine:Device): ZeroDivisionError: "),
@@ -181,7 +186,10 @@ def test_an_answer_that_is_none_ends_the_run_with_its_name(run, kind, text, erro
 
 
 def test_a_command_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
-    with pytest.raises(RunError, match=r"makes Twist\(vx=nan.* of a command \(fault `mine` of mines 0.3\)"):
+    with pytest.raises(
+        RunError,
+        match=r"returned Twist\(vx=nan.* for a command, which is not a finite Twist \(fault `mine` of mines 0.3\)",
+    ):
         run("fault", "def command(self, command): return Twist(float('nan'), 0.0, 0.0)", sensor="cmd_vel")
 
 
@@ -189,11 +197,15 @@ def test_a_command_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
 @pytest.mark.parametrize(
     ("instance", "text", "why"),
     [
-        ("wheels", "def command(self, command): return None", "makes None of a command"),
-        ("lidar", "def arriving(self): return ['late']", "lets 'late' arrive, which is no reading of `lidar`"),
-        ("lidar", "def arriving(self): return None", "lets None arrive"),
-        ("localizer", "def belief(self, belief): return 'here'", "makes 'here' of a belief"),
-        ("cmd_vel", "def arriving_command(self): return 'go'", "makes 'go' of a command"),
+        ("wheels", "def command(self, command): return None", "returned None for a command"),
+        (
+            "lidar",
+            "def arriving(self): return ['late']",
+            "returned 'late' from `arriving`, which is not a reading of `lidar`",
+        ),
+        ("lidar", "def arriving(self): return None", "returned None from `arriving`"),
+        ("localizer", "def belief(self, belief): return 'here'", "returned 'here' for a belief"),
+        ("cmd_vel", "def arriving_command(self): return 'go'", "returned 'go' for a command"),
     ],
 )
 def test_what_a_fault_of_any_instance_makes_is_looked_at(run, instance: str, text: str, why: str) -> None:
@@ -202,7 +214,7 @@ def test_what_a_fault_of_any_instance_makes_is_looked_at(run, instance: str, tex
 
 
 def test_a_map_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
-    with pytest.raises(RunError, match=r"makes str of a map \(fault `mine` of mines 0.3\)"):
+    with pytest.raises(RunError, match=r"returned an object of type str for a map \(fault `mine` of mines 0.3\)"):
         run(
             "fault",
             "def map(self, grid): return 'here be dragons'",

@@ -150,7 +150,7 @@ def test_a_success_that_is_not_expected_fails(tmp_path):
 @pytest.mark.parametrize("text", [THROUGH, WAYPOINTS, MISSED % "failed"], ids=["through", "waypoints", "missed"])
 def test_a_stack_behind_the_protocol_takes_goals_in_the_same_way(tmp_path, text):
     prepared = scenario(text, tmp_path)
-    here, there = simulate(prepared), simulate(with_external_reference(prepared), printed=tmp_path / "stack.log")
+    here, there = simulate(prepared), simulate(with_external_reference(prepared), stack_log=tmp_path / "stack.log")
     assert there.result == here.result
     assert there.trace.events == here.trace.events
 

@@ -73,7 +73,7 @@ def logs(file: Path, root: Path, folder: Path) -> tuple[Said, Said]:
     """All messages of the scenario's log, with its stack in the engine and behind the protocol."""
     prepared = prepare(load_scenario(file, root))
     here = simulate(prepared, log=folder / "here.mcap")
-    there = simulate(with_external_reference(prepared), log=folder / "there.mcap", printed=folder / "stack.log")
+    there = simulate(with_external_reference(prepared), log=folder / "there.mcap", stack_log=folder / "stack.log")
     assert there.result == here.result
     assert there.trace.events == here.trace.events
     return messages(folder / "here.mcap"), messages(folder / "there.mcap")

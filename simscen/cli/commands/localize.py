@@ -14,7 +14,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Estimate
-from simscen.core.random_streams import LARGEST_SEED
+from simscen.core.random_streams import MAX_SEED
 from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import load_robot_file, load_world_file
@@ -50,7 +50,7 @@ def command(
         typer.Option(help="X,Y,YAW in m and rad, or `unknown`; default: first reference pose, else /initialpose."),
     ] = None,
     lost: Annotated[float, typer.Option(min=0.01, help="Error in meters above which the robot counts as lost.")] = 1.0,
-    seed: Annotated[int, typer.Option(min=1, max=LARGEST_SEED, help="Seed of the localizer.")] = 1,
+    seed: Annotated[int, typer.Option(min=1, max=MAX_SEED, help="Seed of the localizer.")] = 1,
     picture: Annotated[Path | None, typer.Option(help="Draw map, belief, and reference into this file (png).")] = None,
     root: Annotated[
         Path | None, typer.Option(help="Root folder; the other files may only refer to files below it.")

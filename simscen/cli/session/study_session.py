@@ -18,7 +18,7 @@ from simscen.cli.session.selection import Selection, load_all
 from simscen.cli.session.stacks import commands_of
 from simscen.cli.session.terminal import Format, Screen, screen
 from simscen.core.errors import Exit, InvalidInput, NothingSelected, Problem, UsageError
-from simscen.core.random_streams import LARGEST_SEED
+from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
 from simscen.core.records.study import ClaimStatus
@@ -122,8 +122,8 @@ class _StudySession:
         self.total = self._count_runs()
         self._base_seed = request.options.seed if request.options.seed is not None else scenario.spec.seed
         seeds = self.total if self._is_random else request.repeat
-        if self._base_seed + seeds - 1 > LARGEST_SEED:
-            raise UsageError(f"{seeds} runs from seed {self._base_seed} on exceed the largest seed, {LARGEST_SEED}")
+        if self._base_seed + seeds - 1 > MAX_SEED:
+            raise UsageError(f"{seeds} runs from seed {self._base_seed} on exceed the largest seed, {MAX_SEED}")
         self._runs = islice(self._order(), self.total)
         self._waiting = list(islice(self._runs, self._batch_size))
         return self._load([run.number for run in self._waiting])

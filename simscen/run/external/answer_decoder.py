@@ -62,88 +62,95 @@ class Answer:
     odometry: tuple[Odometry, ...] = ()
 
 
-def group_by_topic(said: Messages, answers: dict[int, str]) -> MessagesByTopic:
+def group_by_topic(messages: Messages, topic_names: dict[int, str]) -> MessagesByTopic:
     """Return the messages of an answer by topic. Raises ProtocolViolation for an unknown topic."""
     found: MessagesByTopic = {}
-    for number, data in said:
-        if number not in answers:
-            raise ProtocolViolation(f"a message on topic {number}, which there is not")
-        found.setdefault(answers[number], []).append(data)
+    for number, data in messages:
+        if number not in topic_names:
+            raise ProtocolViolation(f"a message on topic number {number}, which does not exist")
+        found.setdefault(topic_names[number], []).append(data)
     return found
 
 
 def decode_answer(
-    said: MessagesByTopic, tick: int, time: SimTime, correction: Pose2 | None, dead_reckoned: Pose2 | None
+    messages: MessagesByTopic, tick: int, time: SimTime, correction: Pose2 | None, dead_reckoned: Pose2 | None
 ) -> Answer:
     """Decode the answer at `tick`.
 
-    `correction` is the last transform from map to odom. If the stack never sent one, it is computed from the belief and
-    the pose of its filtered odometry, or `dead_reckoned`, that of the wheel odometry. Raises ProtocolViolation.
+    `correction` is the last received pose of the odom frame in the map frame. If the stack never sent one, it is
+    computed from the belief and the pose of its filtered odometry, or else from `dead_reckoned`, the pose of the wheel
+    odometry. Raises ProtocolViolation.
     """
-    if len(said.get(topics.COMMAND.name, ())) > 1:
+    if len(messages.get(topics.COMMAND.name, ())) > 1:
         raise ProtocolViolation("two commands in one answer")
-    correction = _correction(said) or correction
-    odometry = tuple(_filtered_odometry(said, time, tick))
+    correction = _correction(messages) or correction
+    odometry = tuple(_filtered_odometry(messages, time, tick))
     if odometry:
         dead_reckoned = odometry[-1].pose
     return Answer(
-        command=_last(said, topics.COMMAND.name, _twist),
-        plan=_path(said, topics.PLAN.name, tick, time),
-        local_plan=_path(said, topics.LOCAL_PLAN.name, tick, time),
-        belief=_belief(said, correction, dead_reckoned),
+        command=_decode_last(messages, topics.COMMAND.name, _twist),
+        plan=_path(messages, topics.PLAN.name, tick, time),
+        local_plan=_path(messages, topics.LOCAL_PLAN.name, tick, time),
+        belief=_belief(messages, correction, dead_reckoned),
         correction=correction,
-        events=tuple(_told(said, topics.EVENTS.name, _event)),
-        lines=tuple(_told(said, topics.ROSOUT.name, _line)),
-        costmaps=tuple(_costmaps(said)),
+        events=tuple(_decode_all(messages, topics.EVENTS.name, _event_data)),
+        lines=tuple(_decode_all(messages, topics.ROSOUT.name, _log_line)),
+        costmaps=tuple(_costmaps(messages)),
         odometry=odometry,
     )
 
 
-def _belief(said: MessagesByTopic, correction: Pose2 | None, dead_reckoned: Pose2 | None) -> Belief | None:
+def _belief(messages: MessagesByTopic, correction: Pose2 | None, dead_reckoned: Pose2 | None) -> Belief | None:
     name = topics.BELIEF.name
-    told = _last(said, name, _posed)
-    if told is None:
+    message = _decode_last(messages, name, _belief_pose)
+    if message is None:
         return None
-    exact = _last(said, name + EXACT_SUFFIX, _pose2d)
-    pose = exact if exact is not None else _ground(told)
+    exact = _decode_last(messages, name + EXACT_SUFFIX, _pose2d)
+    pose = exact if exact is not None else _to_pose2(message)
     if correction is None:
         correction = pose if dead_reckoned is None else pose.compose(dead_reckoned.inverse())
-    covariance = _taken(name, _covariance, said[name][-1])
-    particles = _last(said, topics.PARTICLES.name, _particles)
-    exactly = _last(said, topics.PARTICLES.name + EXACT_SUFFIX, lambda data: _table(data, 4))
-    cloud = exactly if exactly is not None else particles
+    covariance = _decode_message(name, _covariance, messages[name][-1])
+    particles = _decode_last(messages, topics.PARTICLES.name, _particles)
+    exact_particles = _decode_last(messages, topics.PARTICLES.name + EXACT_SUFFIX, lambda data: _table(data, 4))
+    cloud = exact_particles if exact_particles is not None else particles
     return Belief(pose, covariance, correction, cloud if cloud is not None else np.empty((0, 4)))
 
 
-def _correction(said: MessagesByTopic) -> Pose2 | None:
+def _correction(messages: MessagesByTopic) -> Pose2 | None:
     """Return the pose of the odom frame in the map frame."""
-    exact = _last(said, topics.TF.name + EXACT_SUFFIX, _pose2d)
+    exact = _decode_last(messages, topics.TF.name + EXACT_SUFFIX, _pose2d)
     if exact is not None:
         return exact
-    links = [link for part in _told(said, topics.TF.name, partial(decode_checked, decode.transforms)) for link in part]
+    links = [
+        link
+        for part in _decode_all(messages, topics.TF.name, partial(decode_checked, decode.transforms))
+        for link in part
+    ]
     found = [link for link in links if (link.frame, link.child) == (frame_names.MAP, frame_names.ODOM)]
-    return _ground(found[-1]) if found else None
+    return _to_pose2(found[-1]) if found else None
 
 
-def _filtered_odometry(said: MessagesByTopic, time: SimTime, now: int) -> Iterator[Odometry]:
+def _filtered_odometry(messages: MessagesByTopic, time: SimTime, now: int) -> Iterator[Odometry]:
     """Yield the readings of the stack's odometry filter."""
     name = topics.FILTERED_ODOMETRY.name
-    exact = _last(said, name + EXACT_SUFFIX, lambda data: _table(data, ODOMETRY_COLUMNS))
+    exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _table(data, ODOMETRY_COLUMNS))
     if exact is not None:
         rows = [(row[0], row[1:4], row[4:7], row[7:10], row[10:]) for row in exact.tolist()]
     else:
-        messages = _told(said, name, partial(read, topics.ODOMETRY_TYPE))
-        if strange := next((told.frame for told in messages if told.frame not in (frame_names.ODOM, "")), None):
-            raise ProtocolViolation(f"odometry on {name} in the frame `{strange}` instead of `{frame_names.ODOM}`")
+        readings = _decode_all(messages, name, partial(read, topics.ODOMETRY_TYPE))
+        if wrong_frame := next(
+            (message.frame for message in readings if message.frame not in (frame_names.ODOM, "")), None
+        ):
+            raise ProtocolViolation(f"odometry on {name} in the frame `{wrong_frame}` instead of `{frame_names.ODOM}`")
         rows = [
             (
-                time.tick(told.stamp[0] * NS_PER_SECOND + told.stamp[1]),
-                list(told.pose),
-                [told.vx, told.vy, told.wz],
-                [told.twist_covariance[i] for i in _PLANAR_DIAGONAL],
-                [told.pose_covariance[i] for i in _PLANAR_INDICES],
+                time.tick(message.stamp[0] * NS_PER_SECOND + message.stamp[1]),
+                list(message.pose),
+                [message.vx, message.vy, message.wz],
+                [message.twist_covariance[i] for i in _PLANAR_DIAGONAL],
+                [message.pose_covariance[i] for i in _PLANAR_INDICES],
             )
-            for told in messages
+            for message in readings
         ]
     for tick, pose, twist, variances, covariance in rows:
         if not all(map(math.isfinite, (*pose, *twist, *variances, *covariance))):
@@ -155,37 +162,41 @@ def _filtered_odometry(said: MessagesByTopic, time: SimTime, now: int) -> Iterat
         yield Odometry("", int(tick), Pose2(*pose), Twist(*twist), (vx, vy, wz), (a, b, c, d, e, f, g, h, i))
 
 
-def _path(said: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | None:
-    told = _last(said, name, partial(decode_checked, decode.path))
-    exact = _last(said, name + EXACT_SUFFIX, lambda data: _table(data, 3))
-    if told is None and exact is None:
+def _path(messages: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | None:
+    message = _decode_last(messages, name, partial(decode_checked, decode.path))
+    exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _table(data, 3))
+    if message is None and exact is None:
         return None
-    made = tick if told is None else time.tick(told.stamp)
-    points = exact if exact is not None else to_planar(told.poses) if told is not None else np.empty((0, 3))
+    plan_tick = tick if message is None else time.tick(message.stamp)
+    points = exact if exact is not None else to_planar(message.poses) if message is not None else np.empty((0, 3))
     if not np.isfinite(points).all():
         raise ProtocolViolation(f"a path on {name} that is not finite")
-    return Path(points, made)
+    return Path(points, plan_tick)
 
 
-def _costmaps(said: MessagesByTopic) -> Iterator[CostGrid]:
+def _costmaps(messages: MessagesByTopic) -> Iterator[CostGrid]:
     """Yield the newest global and local costmap."""
     for name, topic in (("global", topics.GLOBAL_COSTMAP.name), ("local", topics.LOCAL_COSTMAP.name)):
-        if said.get(topic):
-            yield _taken(topic, partial(_costmap, name), said[topic][-1])
+        if messages.get(topic):
+            yield _decode_message(topic, partial(_costmap, name), messages[topic][-1])
 
 
 def _costmap(name: str, data: bytes) -> CostGrid:
-    told = read(topics.MAP.type, data)
-    if told.frame not in (frame_names.MAP, frame_names.ODOM):
+    message = read(topics.MAP.type, data)
+    if message.frame not in (frame_names.MAP, frame_names.ODOM):
         raise ProtocolViolation(
-            f"a {name} costmap in the frame `{told.frame}` instead of `{frame_names.MAP}` or `{frame_names.ODOM}`"
+            f"a {name} costmap in the frame `{message.frame}` instead of `{frame_names.MAP}` or `{frame_names.ODOM}`"
         )
-    if not (0.0 < told.resolution < math.inf and all(map(math.isfinite, told.origin))):
-        raise ProtocolViolation(f"a {name} costmap of cells of {told.resolution:g} m at {tuple(told.origin)}")
-    if told.width * told.height != len(told.data):
-        raise ProtocolViolation(f"a {name} costmap of {told.width} x {told.height} cells with {len(told.data)} of them")
-    cells = np.array(told.data, dtype=np.int8).reshape(told.height, told.width)
-    return CostGrid(name, told.frame, OccupancyGrid(cells, told.resolution, Pose2(*told.origin)))
+    if not (0.0 < message.resolution < math.inf and all(map(math.isfinite, message.origin))):
+        raise ProtocolViolation(
+            f"a {name} costmap with a resolution of {message.resolution:g} m and the origin {tuple(message.origin)}"
+        )
+    if message.width * message.height != len(message.data):
+        raise ProtocolViolation(
+            f"a {name} costmap of {message.width} x {message.height} cells with {len(message.data)} values"
+        )
+    cells = np.array(message.data, dtype=np.int8).reshape(message.height, message.width)
+    return CostGrid(name, message.frame, OccupancyGrid(cells, message.resolution, Pose2(*message.origin)))
 
 
 def _twist(data: bytes) -> Twist:
@@ -195,15 +206,15 @@ def _twist(data: bytes) -> Twist:
     return command
 
 
-def _posed(data: bytes) -> StampedPose:
-    told = decode_checked(decode.pose_with_covariance_stamped, data)
-    if told.frame not in (frame_names.MAP, ""):
+def _belief_pose(data: bytes) -> StampedPose:
+    message = decode_checked(decode.pose_with_covariance_stamped, data)
+    if message.frame not in (frame_names.MAP, ""):
         raise ProtocolViolation(
-            f"a pose on {topics.BELIEF.name} in the frame `{told.frame}` instead of `{frame_names.MAP}`"
+            f"a pose on {topics.BELIEF.name} in the frame `{message.frame}` instead of `{frame_names.MAP}`"
         )
-    if not all(map(math.isfinite, (*told.pose, *told.covariance))):
+    if not all(map(math.isfinite, (*message.pose, *message.covariance))):
         raise ProtocolViolation(f"a pose on {topics.BELIEF.name} that is not finite")
-    return told
+    return message
 
 
 def _covariance(data: bytes) -> Array:
@@ -215,8 +226,8 @@ def _covariance(data: bytes) -> Array:
     return np.array([numbers[i] for i in _PLANAR_INDICES], dtype=np.float64).reshape(3, 3)
 
 
-def _ground(told: StampedPose) -> Pose2:
-    x, y, yaw = to_planar(np.array([told.pose]))[0].tolist()
+def _to_pose2(message: StampedPose) -> Pose2:
+    x, y, yaw = to_planar(np.array([message.pose]))[0].tolist()
     return Pose2(x, y, yaw)
 
 
@@ -226,10 +237,12 @@ def _particles(data: bytes) -> Array:
     reader.string()
     (count,) = reader.take("I")
     if count > MAX_PARTICLES:
-        raise ProtocolViolation(f"{count} particles")
+        raise ProtocolViolation(f"{count} particles on {topics.PARTICLES.name}, more than {MAX_PARTICLES}")
     poses = np.array([reader.take("8d") for _ in range(count)], dtype=np.float64).reshape(-1, 8)
     if not (np.abs(poses[:, 3:7]) <= MAX_QUATERNION_COMPONENT).all():
-        raise ProtocolViolation(f"a particle on {topics.PARTICLES.name} whose orientation is no unit quaternion")
+        raise ProtocolViolation(
+            f"a particle on {topics.PARTICLES.name} with an orientation that is not a unit quaternion"
+        )
     return np.column_stack((to_planar(poses[:, :7]), poses[:, 7]))
 
 
@@ -243,34 +256,34 @@ def _pose2d(data: bytes) -> Pose2:
 def _table(data: bytes, width: int) -> Array:
     numbers = np.array(read(FLOAT64_ARRAY, data), dtype=np.float64)
     if len(numbers) % width:
-        raise ProtocolViolation(f"{len(numbers)} numbers, which are no rows of {width}")
+        raise ProtocolViolation(f"{len(numbers)} numbers, which cannot be split into rows of {width}")
     return numbers.reshape(-1, width)
 
 
-def _event(data: bytes) -> dict[str, Any]:
+def _event_data(data: bytes) -> dict[str, Any]:
     return wire.from_json(MessageReader(data).string().encode())
 
 
-def _line(data: bytes) -> LogLine:
+def _log_line(data: bytes) -> LogLine:
     reader = Reader(data)
     reader.take("iI")
     (level,) = reader.take("B")
     return LogLine(level, reader.string(), reader.string())
 
 
-def _last(said: MessagesByTopic, name: str, take: Callable[[bytes], T]) -> T | None:
-    found = said.get(name)
-    return _taken(name, take, found[-1]) if found else None
+def _decode_last(messages: MessagesByTopic, name: str, decoder: Callable[[bytes], T]) -> T | None:
+    found = messages.get(name)
+    return _decode_message(name, decoder, found[-1]) if found else None
 
 
-def _told(said: MessagesByTopic, name: str, take: Callable[[bytes], T]) -> list[T]:
-    return [_taken(name, take, data) for data in said.get(name, ())]
+def _decode_all(messages: MessagesByTopic, name: str, decoder: Callable[[bytes], T]) -> list[T]:
+    return [_decode_message(name, decoder, data) for data in messages.get(name, ())]
 
 
-def _taken(name: str, take: Callable[[bytes], T], data: bytes) -> T:
+def _decode_message(name: str, decoder: Callable[[bytes], T], data: bytes) -> T:
     try:
-        return take(data)
+        return decoder(data)
     except ProtocolViolation:
         raise
     except (ValueError, struct.error, RecursionError) as error:
-        raise ProtocolViolation(f"a message on {name} that is no {_TYPES[name]}: {error}") from error
+        raise ProtocolViolation(f"a message on {name} that is not a valid {_TYPES[name]}: {error}") from error

@@ -21,16 +21,16 @@ from simscen.stack.protocols import Surroundings
 
 
 def build_external_stack(
-    prepared: PreparedScenario, spec: ExternalStackSpec, surroundings: Surroundings, seed: int, printed: Path | None
+    prepared: PreparedScenario, spec: ExternalStackSpec, surroundings: Surroundings, seed: int, log_file: Path | None
 ) -> ExternalStack:
-    """Build the external stack of a scenario. Its output goes to `printed`, renamed by `robot_file`.
+    """Build the external stack of a scenario. Its output goes to `log_file`, renamed by `robot_file`.
 
     Raises InvalidInput if the name of the stack is not defined.
     """
     command = prepared.loaded.runs
     if command is None:
         raise InvalidInput([problem] if (problem := undefined_stack(prepared.loaded)) else [])
-    ordered = RunParameters(
+    parameters = RunParameters(
         seed=seed,
         control_period=Clock(surroundings.tick_rate).period(spec.controller_frequency),
         sensors=sensor_kinds(prepared),
@@ -41,8 +41,8 @@ def build_external_stack(
         mode=prepared.spec.navigation.mode,
         robot_name=prepared.loaded.robot_name,
     )
-    shown = printed and robot_file(printed, ordered.robot_name)
-    return ExternalStack(spec.external, command, surroundings, ordered, shown)
+    robot_log = log_file and robot_file(log_file, parameters.robot_name)
+    return ExternalStack(spec.external, command, surroundings, parameters, robot_log)
 
 
 def robot_file(file: Path, robot: str) -> Path:
@@ -58,12 +58,12 @@ def with_external_reference(prepared: PreparedScenario) -> PreparedScenario:
         return replace(next(iter(parts.values())), loaded=loaded, robots=parts)
     stack = prepared.stack
     assert isinstance(stack, StackSpec)
-    written = stack.model_dump_json(by_alias=True, exclude_none=True)
-    argv = (sys.executable, "-I", "-m", "simscen.run.external.reference_stack", written)
+    stack_json = stack.model_dump_json(by_alias=True, exclude_none=True)
+    argv = (sys.executable, "-I", "-m", "simscen.run.external.reference_stack", stack_json)
     tolerances = {name: getattr(stack.goal_checker, name) for name in GoalTolerances.model_fields}
     shared = {name: getattr(stack, name) for name in StackBase.model_fields if name != "goal_checker"}
     external = ExternalStackSpec(
         external="reference", ground_truth=stack.gets_ground_truth, goal_checker=GoalTolerances(**tolerances), **shared
     )
-    runs = ExternalCommand(argv, clean_environment(), str(Path.cwd()))
-    return replace(prepared, stack=external, loaded=replace(prepared.loaded, runs=runs))
+    command = ExternalCommand(argv, clean_environment(), str(Path.cwd()))
+    return replace(prepared, stack=external, loaded=replace(prepared.loaded, runs=command))

@@ -14,7 +14,7 @@ from simscen.stack.tasks import Task
 
 MAX_ERROR_CODE = 65_535
 MAX_TEXT_LENGTH = 4096
-_FREE = {kind.value for kind in EventKind if kind.value.split(".")[0] in ("plan", "recovery")} | {
+_UNRESTRICTED_KINDS = {kind.value for kind in EventKind if kind.value.split(".")[0] in ("plan", "recovery")} | {
     EventKind.ROBOT_HELD.value,
     EventKind.ROBOT_RELEASED.value,
 }
@@ -44,41 +44,41 @@ class GoalTracker:
         self._drop()
         self._events += self._task.preempt(tick, goal)
 
-    def hear(self, tick: int, said: dict[str, Any]) -> None:
+    def process(self, tick: int, report: dict[str, Any]) -> None:
         """Process an event that the stack reports. Raises ProtocolViolation."""
-        kind, name, data = said.get("kind"), said.get("name", ""), said.get("data", {})
+        kind, name, data = report.get("kind"), report.get("name", ""), report.get("data", {})
         if not isinstance(kind, str) or not isinstance(name, str) or not isinstance(data, dict):
-            raise ProtocolViolation(f"an event that is none: {str(said)[:100]}")
-        if said.get("tick", tick) != tick:
-            raise ProtocolViolation(f"an event of tick {said['tick']} at tick {tick}")
+            raise ProtocolViolation(f"an invalid event: {str(report)[:100]}")
+        if report.get("tick", tick) != tick:
+            raise ProtocolViolation(f"an event of tick {report['tick']} at tick {tick}")
         match kind:
             case "goal.accepted":
                 self._accept(tick, name)
             case "goal.reached":
-                self._current(kind, name)
+                self._require_current(kind, name)
                 self._events += self._task.reached(tick)
             case "goal.passed":
-                self._current(kind, name)
+                self._require_current(kind, name)
                 if self._task.goal is not None and not self._task.goal.via:
-                    raise ProtocolViolation(f"goal.passed `{name[:60]}`, which is a goal to stop at")
+                    raise ProtocolViolation(f"goal.passed `{name[:60]}`, which is a goal without `via`")
                 self._events += self._task.passed(tick)
             case "goal.failed":
-                self._current(kind, name)
-                code, message = _code(data.get("error_code")), str(data.get("message", ""))[:MAX_TEXT_LENGTH]
+                self._require_current(kind, name)
+                code, message = _to_error_code(data.get("error_code")), str(data.get("message", ""))[:MAX_TEXT_LENGTH]
                 self._events += self._task.failed(tick, code, message)
             case "goal.canceled":
                 self._cancel(tick, name)
-            case _ if kind in _FREE:
-                self._events.append(Event(tick, EventKind(kind), name[:MAX_TEXT_LENGTH], _plain(data)))
+            case _ if kind in _UNRESTRICTED_KINDS:
+                self._events.append(Event(tick, EventKind(kind), name[:MAX_TEXT_LENGTH], _checked_data(data)))
             case _:
-                raise ProtocolViolation(f"an event `{kind[:60]}`, which is not a stack's to tell")
+                raise ProtocolViolation(f"an event `{kind[:60]}`, which a stack may not report")
 
-    def rest(self, tick: int) -> None:
+    def advance(self, tick: int) -> None:
         """Advance to a tick, which can end a wait at a goal and the task."""
         self._events += self._task.end_wait(tick)
 
-    def overdue(self, tick: int) -> bool:
-        """Fail the current goal if its timeout is over; return whether it was."""
+    def fail_if_timed_out(self, tick: int) -> bool:
+        """Fail the current goal if its timeout has passed; return whether it has."""
         goal = self._task.goal
         if goal is None or goal.timeout is None or tick - self._task.since <= goal.timeout * self._rate:
             return False
@@ -86,7 +86,7 @@ class GoalTracker:
         self._events += self._task.failed(tick, ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over")
         return True
 
-    def take(self) -> tuple[Event, ...]:
+    def take_events(self) -> tuple[Event, ...]:
         """Return the events since the last call."""
         events, self._events = tuple(self._events), []
         return events
@@ -98,43 +98,43 @@ class GoalTracker:
 
     def _accept(self, tick: int, name: str) -> None:
         if self._task.goal is not None:
-            raise ProtocolViolation(f"goal.accepted, but goal `{self._task.goal.name}` is under way")
-        self.rest(tick)
+            raise ProtocolViolation(f"goal.accepted, but goal `{self._task.goal.name}` is active")
+        self.advance(tick)
         if self._task.waits:
-            raise ProtocolViolation(f"goal.accepted `{name[:60]}`, but the robot is to stay where it is for a while")
+            raise ProtocolViolation(f"goal.accepted `{name[:60]}`, but the robot must still wait at its last goal")
         following = self._task.following
         if following is None or name not in ("", following.name):
-            waits = "none is waiting" if following is None else f"the next one is `{following.name}`"
-            raise ProtocolViolation(f"goal.accepted `{name[:60]}`, but {waits}")
+            expected = "there is no next goal" if following is None else f"the next goal is `{following.name}`"
+            raise ProtocolViolation(f"goal.accepted `{name[:60]}`, but {expected}")
         self._events += self._task.next(tick)
 
-    def _current(self, kind: str, name: str) -> None:
+    def _require_current(self, kind: str, name: str) -> None:
         goal = self._task.goal
         if goal is None or name not in ("", goal.name):
-            under_way = "none is under way" if goal is None else f"the current one is `{goal.name}`"
-            raise ProtocolViolation(f"{kind} `{name[:60]}`, but {under_way}")
+            active = "no goal is active" if goal is None else f"the current goal is `{goal.name}`"
+            raise ProtocolViolation(f"{kind} `{name[:60]}`, but {active}")
 
     def _cancel(self, tick: int, name: str) -> None:
         goal = self._task.goal
         if name in self._dropped and (goal is None or goal.name != name):
             self._dropped.discard(name)
             return
-        self._current("goal.canceled", name)
+        self._require_current("goal.canceled", name)
         self._events += self._task.cancel(tick)
 
 
-def _code(told: Any) -> ErrorCode | int:
+def _to_error_code(value: Any) -> ErrorCode | int:
     """Return Nav2's error code for a number or name; unknown numbers are kept."""
-    if told is None:
+    if value is None:
         return ErrorCode.NAVIGATE_UNKNOWN
-    if isinstance(told, str) and told in ErrorCode.__members__:
-        return ErrorCode[told]
-    if isinstance(told, int) and not isinstance(told, bool) and 0 <= told <= MAX_ERROR_CODE:
-        return error_code(told)
-    raise ProtocolViolation(f"goal.failed with the error code {str(told)[:60]!r}")
+    if isinstance(value, str) and value in ErrorCode.__members__:
+        return ErrorCode[value]
+    if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MAX_ERROR_CODE:
+        return error_code(value)
+    raise ProtocolViolation(f"goal.failed with the error code {str(value)[:60]!r}")
 
 
-def _plain(data: dict[str, Any]) -> dict[str, Value]:
+def _checked_data(data: dict[str, Any]) -> dict[str, Value]:
     """Return the data of an event, limited in size."""
     if len(str(data)) > MAX_TEXT_LENGTH:
         raise ProtocolViolation("an event with too much data")

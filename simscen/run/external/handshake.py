@@ -31,23 +31,23 @@ class RunParameters:
 
 def hello_content(
     surroundings: Surroundings,
-    ordered: RunParameters,
-    offer: TopicTable,
-    named: list[tuple[str, Topic]],
+    parameters: RunParameters,
+    topic_table: TopicTable,
+    sensor_topics: list[tuple[str, Topic]],
     answer_limit: float,
 ) -> dict[str, Any]:
     """Return the content of HELLO; `named` are the topics of each sensor."""
     masks = surroundings.masks
-    sensor_of = {topic.name: sensor for sensor, topic in named}
+    sensor_of = {topic.name: sensor for sensor, topic in sensor_topics}
     return {
         "protocols": [wire.PROTOCOL],
         "simscen": __version__,
-        "seed": ordered.seed,
+        "seed": parameters.seed,
         "tick_rate": surroundings.tick_rate,
-        "control_period": ordered.control_period,
+        "control_period": parameters.control_period,
         "answer_limit": answer_limit,
-        "mode": ordered.mode,
-        "robot_name": ordered.robot_name,
+        "mode": parameters.mode,
+        "robot_name": parameters.robot_name,
         "robot": _robot(surroundings.robot),
         "map": _grid(surroundings.map),
         "keepout": [_polygon(area) for area in surroundings.keepout],
@@ -61,22 +61,23 @@ def hello_content(
             "multiplier": masks.speed.multiplier,
         },
         "lidars": list(surroundings.lidars),
-        "sensors": {name: _sensor(name, ordered) for name in ordered.sensors},
-        "says": [_topic(topic, offer.numbers[name], sensor_of) for name, topic in offer.says.items()],
+        "sensors": {name: _sensor(name, parameters) for name in parameters.sensors},
+        "says": [_topic(topic, topic_table.numbers[name], sensor_of) for name, topic in topic_table.sent.items()],
         "hears": [
-            {"topic": name, "type": offer.hears[name].type, "number": number} for number, name in offer.answers.items()
+            {"topic": name, "type": topic_table.accepted[name].type, "number": number}
+            for number, name in topic_table.accepted_by_number.items()
         ],
     }
 
 
-def goal_content(estimate: Estimate, goals: tuple[Goal, ...], ordered: RunParameters) -> dict[str, Any]:
+def goal_content(estimate: Estimate, goals: tuple[Goal, ...], parameters: RunParameters) -> dict[str, Any]:
     """Return the content of GOAL."""
     pose = estimate.pose
     return {
         "initial_estimate": {"pose": None if pose is None else list(pose), "std": list(estimate.std)},
         "goals": [goal_data(goal) for goal in goals],
-        "on_goal_failure": "stop" if ordered.stop_on_failure else "continue",
-        "mode": ordered.mode,
+        "on_goal_failure": "stop" if parameters.stop_on_failure else "continue",
+        "mode": parameters.mode,
     }
 
 
@@ -104,9 +105,9 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
     }
 
 
-def _sensor(name: str, ordered: RunParameters) -> dict[str, Any]:
-    mount = ordered.mounts.get(name)
-    return {"says": ordered.sensors[name], "rate": ordered.rates.get(name), "mount": mount and list(mount)}
+def _sensor(name: str, parameters: RunParameters) -> dict[str, Any]:
+    mount = parameters.mounts.get(name)
+    return {"says": parameters.sensors[name], "rate": parameters.rates.get(name), "mount": mount and list(mount)}
 
 
 def _topic(topic: Topic, number: int, sensor_of: dict[str, str]) -> dict[str, Any]:
@@ -139,7 +140,7 @@ MAX_FIRST_ANSWER_S = 3700
 
 @dataclass(frozen=True)
 class Welcome:
-    """Introduction of an external stack: name, version, topics, step mode, and further information."""
+    """WELCOME of an external stack: name, version, requested topics, step mode, and further information."""
 
     name: str = ""
     version: str = ""
@@ -147,42 +148,45 @@ class Welcome:
     every_beat: bool = False
     about: dict[str, Any] = field(default_factory=dict)
     first_answer_limit: float = 0.0
-    """Wall time that the first answer may take, if the stack asks for more than the usual limit."""
+    """Wall time in seconds that the first answer may take, if the stack requests more than the usual limit."""
 
     @classmethod
-    def of(cls, kind: int, body: bytes, offer: TopicTable, mode: Mode = "navigate_to_pose") -> "Welcome":
+    def parse(cls, kind: int, body: bytes, topic_table: TopicTable, mode: Mode = "navigate_to_pose") -> "Welcome":
         """Parse the first frame of a stack. Raises Malformed or ProtocolViolation, e.g. for an unsupported `mode`."""
         if kind != wire.WELCOME:
-            raise ProtocolViolation("its first frame is no WELCOME")
-        told = wire.from_json(body)
-        if told.get("protocol") != wire.PROTOCOL:
+            raise ProtocolViolation("its first frame is not a WELCOME")
+        content = wire.from_json(body)
+        if content.get("protocol") != wire.PROTOCOL:
             raise ProtocolViolation(
-                f"it speaks version {told.get('protocol')} of the protocol, simscen {wire.PROTOCOL}"
+                f"it uses version {content.get('protocol')} of the protocol, simscen version {wire.PROTOCOL}"
             )
-        step = told.get("step", "control")
+        step = content.get("step", "control")
         if step not in ("control", "beat"):
             raise ProtocolViolation(f"`step` is {step!r}, neither `control` nor `beat`")
-        modes = told.get("modes", ["navigate_to_pose"])
+        modes = content.get("modes", ["navigate_to_pose"])
         if not isinstance(modes, list) or mode not in modes:
-            known = ", ".join(map(str, modes))[:200] if isinstance(modes, list) else "none"
+            supported = ", ".join(map(str, modes))[:200] if isinstance(modes, list) else "none"
             raise ProtocolViolation(
-                f"the scenario sends goals by {mode}, which this stack does not know; it knows {known}"
+                f"the scenario sends goals by {mode}, which this stack does not support; it supports {supported}"
             )
-        topics = told.get("topics", [])
+        topics = content.get("topics", [])
         if not isinstance(topics, list) or not all(isinstance(topic, str) for topic in topics):
-            raise ProtocolViolation("`topics` is no list of names")
-        if unknown := [topic for topic in topics if topic not in offer.says]:
+            raise ProtocolViolation("`topics` is not a list of names")
+        if unknown := [topic for topic in topics if topic not in topic_table.sent]:
             raise ProtocolViolation(
-                f"it wants `{unknown[0][:80]}`, which there is not; there are {', '.join(offer.says)}"
+                f"it requests the topic `{unknown[0][:80]}`, which does not exist; "
+                f"available: {', '.join(topic_table.sent)}"
             )
-        limit = told.get("first_answer_limit", 0.0)
+        limit = content.get("first_answer_limit", 0.0)
         if not isinstance(limit, int | float) or not 0 <= limit <= MAX_FIRST_ANSWER_S:
-            raise ProtocolViolation(f"`first_answer_limit` is no number of seconds from 0 to {MAX_FIRST_ANSWER_S}")
+            raise ProtocolViolation(f"`first_answer_limit` is not a number of seconds from 0 to {MAX_FIRST_ANSWER_S}")
         every_beat = step == "beat"
-        return cls(_text(told, "name"), _text(told, "version"), tuple(topics), every_beat, _about(told), float(limit))
+        return cls(
+            _text(content, "name"), _text(content, "version"), tuple(topics), every_beat, _about(content), float(limit)
+        )
 
-    def with_farewell(self, body: bytes) -> "Welcome":
-        """Add the information of its BYE. An invalid BYE is ignored, since the run is over."""
+    def with_bye(self, body: bytes) -> "Welcome":
+        """Return a copy with the information of BYE. An invalid BYE is ignored, since the run is over."""
         try:
             return replace(self, about=self.about | _about(wire.from_json(body)))
         except (ProtocolViolation, wire.Malformed):
@@ -195,15 +199,15 @@ class Welcome:
         return {"name": self.name, "version": self.version, "protocol": str(wire.PROTOCOL), **about}
 
 
-def _text(told: dict[str, Any], key: str) -> str:
-    text = told.get(key, "")
+def _text(content: dict[str, Any], key: str) -> str:
+    text = content.get(key, "")
     if not isinstance(text, str) or len(text) > MAX_NAME_LENGTH:
-        raise ProtocolViolation(f"`{key}` is no text of at most {MAX_NAME_LENGTH} characters")
+        raise ProtocolViolation(f"`{key}` is not a text of at most {MAX_NAME_LENGTH} characters")
     return text
 
 
-def _about(told: dict[str, Any]) -> dict[str, Any]:
-    about = told.get("about", {})
+def _about(content: dict[str, Any]) -> dict[str, Any]:
+    about = content.get("about", {})
     if not isinstance(about, dict) or len(str(about)) > MAX_ABOUT_LENGTH:
-        raise ProtocolViolation(f"`about` is no object of at most {MAX_ABOUT_LENGTH} characters")
+        raise ProtocolViolation(f"`about` is not an object of at most {MAX_ABOUT_LENGTH} characters")
     return about

@@ -32,23 +32,23 @@ _PR_SET_PDEATHSIG = 1
 def main() -> None:
     """Run one stack from start to end."""
     control, report, stream = map(int, sys.argv[1:])
-    (size,) = struct.unpack("<I", _exactly(control, 4))
-    told: dict[str, Any] = json.loads(_exactly(control, size))
+    (size,) = struct.unpack("<I", _read_exactly(control, 4))
+    order: dict[str, Any] = json.loads(_read_exactly(control, size))
     adopt_orphans()
-    _own_limits()
+    _restore_user_limits()
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # the worker ignores SIGINT, which the stack would inherit
     try:
         process = subprocess.Popen(
-            told["argv"],
-            env={**told["env"], told["variable"]: str(stream)},
-            cwd=told["cwd"],
+            order["argv"],
+            env={**order["env"], order["variable"]: str(stream)},
+            cwd=order["cwd"],
             stdin=subprocess.DEVNULL,
             pass_fds=[stream],
             start_new_session=True,
-            preexec_fn=_die_with_keeper,  # noqa: PLW1509 - this program has one thread
+            preexec_fn=_die_with_launcher,  # noqa: PLW1509 - this program has one thread
         )
     except (OSError, ValueError) as error:
-        _tell(report, {"failed": _why(error)})
+        _send_report(report, {"failed": _start_failure(error)})
         return
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.close(stream)
@@ -56,19 +56,19 @@ def main() -> None:
     _end(process, EXIT_GRACE_S if released else 0.0)
 
 
-def _why(error: Exception) -> str:
+def _start_failure(error: Exception) -> str:
     """Explain why the program could not be started."""
     if not isinstance(error, OSError) or error.strerror is None:
         return str(error)
     if error.errno == errno.ENOEXEC:
         return f"{error.strerror}: neither a program for this machine nor a script that begins with #!"
     if error.errno == errno.ENOENT and error.filename and Path(error.filename).exists():
-        return f"{error.strerror}: it is there, but not what it needs to be run, such as its dynamic linker"
+        return f"{error.strerror}: the file exists, but something that it needs does not, such as its dynamic linker"
     return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
 
 
 def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> bool:
-    """Wait for the end of the run; report the exit of the stack if it comes first.
+    """Wait for the end of the run; report the exit of the stack if that comes first.
 
     Returns False if the worker has died: then it closes the pipe without a byte.
     """
@@ -77,7 +77,7 @@ def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> boo
     while True:
         ready, _, _ = select.select(waiting, [], [])
         if pidfd in ready:
-            _tell(report, {"exit": process.wait()})
+            _send_report(report, {"exit": process.wait()})
             waiting.remove(pidfd)
         if control in ready:
             return bool(os.read(control, 1))
@@ -98,26 +98,26 @@ def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> None:
         select.select([], [], [], 0.005)
 
 
-def _own_limits() -> None:
-    """Restore the resource limits of the user, because those of the worker are meant for the engines."""
-    for what in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
-        hard = resource.getrlimit(what)[1]
-        resource.setrlimit(what, (hard, hard))
+def _restore_user_limits() -> None:
+    """Restore the resource limits of the user, because the limits of the worker are for the physics engine."""
+    for limit in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
+        hard = resource.getrlimit(limit)[1]
+        resource.setrlimit(limit, (hard, hard))
     hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     soft = MAX_OPEN_FILES if hard == resource.RLIM_INFINITY else min(MAX_OPEN_FILES, hard)
     resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
-def _die_with_keeper() -> None:
+def _die_with_launcher() -> None:
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
 
 
-def _tell(report: int, message: dict[str, Any]) -> None:
+def _send_report(report: int, message: dict[str, Any]) -> None:
     with suppress(BrokenPipeError):
         os.write(report, json.dumps(message).encode() + b"\n")
 
 
-def _exactly(pipe: int, size: int) -> bytes:
+def _read_exactly(pipe: int, size: int) -> bytes:
     data = b""
     while len(data) < size:
         if not (piece := os.read(pipe, size - len(data))):

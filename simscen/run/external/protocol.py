@@ -34,25 +34,25 @@ STACK_TOPICS = (
 
 @dataclass(frozen=True)
 class TopicTable:
-    """Numbered topics of one run: `says` are sent to the stack, `hears` are accepted from it."""
+    """Topics of one run by name, numbered from 1 in order: `sent` to the stack, and `accepted` from it."""
 
-    says: Mapping[str, Topic]
-    hears: Mapping[str, Topic]
+    sent: Mapping[str, Topic]
+    accepted: Mapping[str, Topic]
 
     @classmethod
-    def of(cls, says: Iterable[Topic]) -> "TopicTable":
-        """Return the table for these topics to the stack, and STACK_TOPICS from it."""
-        return cls({topic.name: topic for topic in says}, {topic.name: topic for topic in STACK_TOPICS})
+    def build(cls, sent: Iterable[Topic]) -> "TopicTable":
+        """Build the table of these topics to the stack, and STACK_TOPICS from it."""
+        return cls({topic.name: topic for topic in sent}, {topic.name: topic for topic in STACK_TOPICS})
 
     @property
     def numbers(self) -> dict[str, int]:
-        """The number of each topic that is sent to the stack."""
-        return {name: number for number, name in enumerate(self.says, start=1)}
+        """The topic number for the name of each topic that is sent to the stack."""
+        return {name: number for number, name in enumerate(self.sent, start=1)}
 
     @property
-    def answers(self) -> dict[int, str]:
-        """The topic of each number in an answer of the stack."""
-        return dict(enumerate(self.hears, start=1))
+    def accepted_by_number(self) -> dict[int, str]:
+        """The name of the topic for each topic number in an answer of the stack."""
+        return dict(enumerate(self.accepted, start=1))
 
 
 TIMEOUT = "stack-timeout"

@@ -34,17 +34,17 @@ class StepPublisher:
 
     def __init__(self, tick_rate: int, sensors: Mapping[str, str], mounts: Mapping[str, Pose3]) -> None:
         """`sensors` are the reading types by sensor name, `mounts` their poses on the base."""
-        self._waiting: Messages = []
+        self._queue: Messages = []
         self._numbers: dict[str, int] = {}
-        self._heard: frozenset[str] = frozenset()
-        self._listened: set[str] = set()
+        self._requested_topics: frozenset[str] = frozenset()
+        self._requested_sensors: set[str] = set()
         self._latched: list[tuple[Topic, bytes]] = []
         self._time = SimTime(tick_rate)
         self._sensors = SensorPublisher(self, self._time, Thinning(tick_rate), mounts, sensors)
-        self.named = self._sensors.declared
+        self.sensor_topics = self._sensors.declared
 
     def latch(self, grid: OccupancyGrid | None, topic: Topic) -> None:
-        """Publish a map or mask with the first step, if there is one."""
+        """Publish `grid`, a map or mask, with the first step; None publishes nothing."""
         if grid is not None:
             self._latched.append((topic, encode_arrays.occupancy_grid(frame_names.MAP, _START, grid)))
 
@@ -52,48 +52,48 @@ class StepPublisher:
         """Publish robot description and initial pose with the first step."""
         self._latched.append((topics.ROBOT_DESCRIPTION, messages.string(description)))
         if estimate.pose is not None:
-            told = encode.pose_with_covariance(frame_names.MAP).packer()
+            pack_pose = encode.pose_with_covariance(frame_names.MAP).packer()
             covariance = np.diag(np.square(estimate.std)).ravel().tolist()
-            self._latched.append((INITIAL_POSE, told(_START, Pose3.planar(estimate.pose), covariance)))
+            self._latched.append((INITIAL_POSE, pack_pose(_START, Pose3.planar(estimate.pose), covariance)))
 
-    def offer(self) -> TopicTable:
+    def topic_table(self) -> TopicTable:
         """Return the table of all topics."""
-        says: list[Topic] = []
-        for _, topic in self.named:
-            says += [topic, *_exact(topic)]
+        sent: list[Topic] = []
+        for _, topic in self.sensor_topics:
+            sent += [topic, *_exact_topics(topic)]
         known = dict.fromkeys(topic for topic, _ in self._latched)
-        return TopicTable.of([*says, topics.TF, *known])
+        return TopicTable.build([*sent, topics.TF, *known])
 
-    def want(self, offer: TopicTable, names: Collection[str]) -> None:
-        """Select the topics to collect, and publish the latched ones."""
-        self._numbers, self._heard = offer.numbers, frozenset(names)
-        self._listened = {
+    def subscribe(self, topic_table: TopicTable, names: Collection[str]) -> None:
+        """Select the topics that the stack requests, and queue the latched messages."""
+        self._numbers, self._requested_topics = topic_table.numbers, frozenset(names)
+        self._requested_sensors = {
             sensor
-            for sensor, topic in self.named
-            if self._heard.intersection((topic.name, topic.name + EXACT_SUFFIX))
-            or (topic.type == topics.ODOMETRY_TYPE and topics.TF.name in self._heard)
+            for sensor, topic in self.sensor_topics
+            if self._requested_topics.intersection((topic.name, topic.name + EXACT_SUFFIX))
+            or (topic.type == topics.ODOMETRY_TYPE and topics.TF.name in self._requested_topics)
         }
         for topic, data in self._latched:
             self.publish(topic, 0, data)
 
-    def take(self, tick: int, readings: Readings) -> None:
+    def publish_readings(self, tick: int, readings: Readings) -> None:
         """Publish the readings of a beat."""
         now = self._time.nanoseconds(tick)
         for reading in readings:
-            if reading.sensor not in self._listened:
+            if reading.sensor not in self._requested_sensors:
                 continue
             self._sensors.write(now, (reading,))
-            for name, data in self._exactly(reading):
-                self._put(name, data)
+            for name, data in self._exact_messages(reading):
+                self._enqueue(name, data)
 
     @property
-    def waiting(self) -> bool:
+    def has_messages(self) -> bool:
         """Whether there are messages to send."""
-        return bool(self._waiting)
+        return bool(self._queue)
 
     def drain(self) -> Messages:
         """Return the messages since the last call."""
-        messages, self._waiting = self._waiting, []
+        messages, self._queue = self._queue, []
         return messages
 
     def topic_writer(self, topic: Topic) -> TopicWriter:
@@ -105,30 +105,30 @@ class StepPublisher:
         return BatchWriter(self, layouts)
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Publish a message if the stack wants its topic (record's MessageSink)."""
+        """Publish a message if the stack subscribed to its topic (record's MessageSink)."""
         if topic is topics.TF_STATIC and not self._numbers:  # sensor mounts, published before topics are selected
             self._latched.append((topic, data))
-        self._put(topic.name, data)
+        self._enqueue(topic.name, data)
 
-    def _put(self, name: str, data: bytes) -> None:
-        if name in self._heard:
-            self._waiting.append((self._numbers[name], data))
+    def _enqueue(self, name: str, data: bytes) -> None:
+        if name in self._requested_topics:
+            self._queue.append((self._numbers[name], data))
 
-    def _exactly(self, reading: Reading) -> Iterator[tuple[str, bytes]]:
+    def _exact_messages(self, reading: Reading) -> Iterator[tuple[str, bytes]]:
         match reading:
             case Scan():
                 name = self._sensors.topic_of(reading).name + EXACT_SUFFIX
-                if name in self._heard:
+                if name in self._requested_topics:
                     yield name, messages.float64_array(array("d", _scan(reading).tobytes()))
             case Odometry():
                 name = self._sensors.topic_of(reading).name + EXACT_SUFFIX
-                if name in self._heard:
+                if name in self._requested_topics:
                     yield name, messages.pose2d(*reading.pose)
             case _:
                 pass
 
 
-def _exact(topic: Topic) -> list[Topic]:
+def _exact_topics(topic: Topic) -> list[Topic]:
     kinds = {topics.SCAN_TYPE: FLOAT64_ARRAY, topics.ODOMETRY_TYPE: POSE2D}
     return [Topic(topic.name + EXACT_SUFFIX, kinds[topic.type])] if topic.type in kinds else []
 

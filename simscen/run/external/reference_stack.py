@@ -34,7 +34,7 @@ from simscen.run.external.protocol import EXACT_SUFFIX, KEEPOUT_MASK, SPEED_MASK
 from simscen.stack.build import build_stack
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
 
-_NO_PIXELS = Image("", 0, np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.float32))
+_EMPTY_IMAGE = Image("", 0, np.empty((0, 0, 3), np.uint8), np.empty((0, 0), np.float32))
 
 
 class ReferenceStackPeer(Peer):
@@ -43,10 +43,10 @@ class ReferenceStackPeer(Peer):
     def __init__(self, spec: StackSpec) -> None:
         self._spec = spec
         self._stack: Stack | None = None
-        self._first: dict[str, Any] = {}
-        self._orders: list[tuple[int, dict[str, Any]]] = []
-        self._followed = False
-        self._under_way: Value = 0
+        self._goal_content: dict[str, Any] = {}
+        self._requests: list[tuple[int, dict[str, Any]]] = []
+        self._had_plan = False
+        self._goal_index: Value = 0
         super().__init__("simscen's reference stack", every_beat=True, topics=None, modes=get_args(Mode))
         self._time = SimTime(self.hello["tick_rate"])
         self._sensors = {topic["topic"]: topic.get("sensor", "") for topic in self.hello["says"]}
@@ -54,22 +54,22 @@ class ReferenceStackPeer(Peer):
     def serve(self) -> None:
         """Answer steps until the run is over."""
         for step in self:
-            stack = self._stack or self._started(step)
-            for kind, told in self._orders:
+            stack = self._stack or self._start_stack(step)
+            for kind, content in self._requests:
                 if kind == wire.PREEMPT:
-                    stack.preempt(told["tick"], _goal(Goal.of(told["goal"])))
+                    stack.preempt(content["tick"], _goal(Goal.of(content["goal"])))
                 else:
-                    stack.cancel(told["tick"])
-            self._orders.clear()
-            self._say(step, stack.decide(step.tick, tuple(self._readings(step.messages))), stack)
+                    stack.cancel(content["tick"])
+            self._requests.clear()
+            self._send_decision(step, stack.decide(step.tick, tuple(self._readings(step.messages))), stack)
 
-    def _take(self, kind: int, content: dict[str, Any]) -> None:
+    def _process_frame(self, kind: int, content: dict[str, Any]) -> None:
         if kind == wire.GOAL:
-            self._first = content
+            self._goal_content = content
         else:
-            self._orders.append((kind, content))
+            self._requests.append((kind, content))
 
-    def _started(self, step: Step) -> Stack:
+    def _start_stack(self, step: Step) -> Stack:
         hello, grids = self.hello, {m.topic: m.content for m in step.messages if m.type == topics.MAP.type}
         speed = _grid(hello["speed_mask"], grids.get(SPEED_MASK.name))
         limits = hello["speed_mask"]
@@ -86,36 +86,36 @@ class ReferenceStackPeer(Peer):
             lidars=tuple(hello["lidars"]),
             has_imu=any(sensor["says"] == "Imu" for sensor in hello["sensors"].values()),
         )
-        told, estimate = self._first, self._first["initial_estimate"]
+        task, estimate = self._goal_content, self._goal_content["initial_estimate"]
         self._stack = build_stack(
             self._spec,
             surroundings,
             Streams(hello["seed"], hello["robot_name"]),
             Clock(hello["tick_rate"]),
-            stop_on_failure=told["on_goal_failure"] == "stop",
-            mode=told["mode"],
+            stop_on_failure=task["on_goal_failure"] == "stop",
+            mode=task["mode"],
         )
         pose, std = estimate["pose"], estimate["std"]
         self._stack.start(
             Estimate(None if pose is None else Pose2(*pose), (std[0], std[1], std[2])),
-            tuple(_goal(Goal.of(goal)) for goal in told["goals"]),
+            tuple(_goal(Goal.of(goal)) for goal in task["goals"]),
         )
         return self._stack
 
-    def _readings(self, heard: list[Message]) -> Iterator[Reading]:
+    def _readings(self, received: list[Message]) -> Iterator[Reading]:
         """Yield the readings in full precision."""
-        exact = {m.topic: iter([e.content for e in heard if e.topic == m.topic + EXACT_SUFFIX]) for m in heard}
-        for message in heard:
+        exact = {m.topic: iter([e.content for e in received if e.topic == m.topic + EXACT_SUFFIX]) for m in received}
+        for message in received:
             sensor = self._sensors[message.topic]
             if not sensor or message.topic.endswith(EXACT_SUFFIX):
                 continue
-            told: Any = next(exact[message.topic], None)
+            exact_values: Any = next(exact[message.topic], None)
             match message.type:
                 case topics.SCAN_TYPE:
                     scan = message.content
-                    angle, step, least, most, x, y, yaw = told[:7]
-                    ranges = np.array(told[7:], dtype=np.float64)
-                    limits = angle, step, least, most
+                    angle, step, range_min, range_max, x, y, yaw = exact_values[:7]
+                    ranges = np.array(exact_values[7:], dtype=np.float64)
+                    limits = angle, step, range_min, range_max
                     mount = self._mount(sensor)
                     tilted = None if mount.is_level else mount
                     yield Scan(sensor, self._tick(scan.stamp), ranges, *limits, Pose2(x, y, yaw), tilted)
@@ -123,7 +123,7 @@ class ReferenceStackPeer(Peer):
                     odom = message.content
                     twist, covariance = Twist(odom.vx, odom.vy, odom.wz), odom.twist_covariance
                     variance = covariance[0], covariance[7], covariance[35]
-                    yield Odometry(sensor, self._tick(odom.stamp), Pose2(*told), twist, variance)
+                    yield Odometry(sensor, self._tick(odom.stamp), Pose2(*exact_values), twist, variance)
                 case topics.IMU_TYPE:
                     imu = message.content
                     variances = imu.angular_velocity_covariance[0], imu.linear_acceleration_covariance[0]
@@ -132,7 +132,7 @@ class ReferenceStackPeer(Peer):
                 case topics.BUMPER_TYPE:
                     yield Bump(sensor, 0, message.content)
                 case topics.IMAGE_TYPE:
-                    yield _NO_PIXELS
+                    yield _EMPTY_IMAGE
 
     def _mount(self, sensor: str) -> Pose3:
         return Pose3(*(self.hello["sensors"][sensor]["mount"] or ()))
@@ -140,7 +140,7 @@ class ReferenceStackPeer(Peer):
     def _tick(self, stamp: messages.Stamp) -> int:
         return self._time.tick(stamp[0] * NS_PER_SECOND + stamp[1])
 
-    def _say(self, step: Step, decision: Decision, stack: Stack) -> None:
+    def _send_decision(self, step: Step, decision: Decision, stack: Stack) -> None:
         vx, vy, wz = decision.command
         step.drive(vx, wz, vy)
         if decision.belief is not None:
@@ -152,12 +152,12 @@ class ReferenceStackPeer(Peer):
             if len(belief.particles):
                 step.publish(topics.PARTICLES.name + EXACT_SUFFIX, _numbers(belief.particles))
         if decision.plan is not None:
-            made = self._time.stamp(decision.plan.tick)
-            step.publish(topics.PLAN.name, messages.path(made, []))
+            stamp = self._time.stamp(decision.plan.tick)
+            step.publish(topics.PLAN.name, messages.path(stamp, []))
             step.publish(topics.PLAN.name + EXACT_SUFFIX, _numbers(decision.plan.points))
-        elif self._followed and stack.plan is None:
+        elif self._had_plan and stack.plan is None:
             step.publish(topics.PLAN.name, messages.path(step.stamp, []))
-        self._followed = stack.plan is not None
+        self._had_plan = stack.plan is not None
         if decision.local_plan is not None:
             step.publish(topics.LOCAL_PLAN.name + EXACT_SUFFIX, _numbers(decision.local_plan.points))
         for costmap in decision.costmaps:
@@ -171,12 +171,12 @@ class ReferenceStackPeer(Peer):
             step.publish(topics.FILTERED_ODOMETRY.name + EXACT_SUFFIX, _numbers(np.array(rows)))
         for event in decision.events:
             if event.kind is EventKind.GOAL_ACCEPTED:
-                self._under_way = event.data["index"]
-            if event.data.get("index", self._under_way) != self._under_way:
+                self._goal_index = event.data["index"]
+            if event.data.get("index", self._goal_index) != self._goal_index:
                 continue  # simscen derives the end of the other goals of the same drive
             if event.kind is not EventKind.NAVIGATION_ENDED:
-                said = {"kind": event.kind.value, "name": event.name, "data": dict(event.data)}
-                step.publish(EVENTS, messages.string(json.dumps(said)))
+                report = {"kind": event.kind.value, "name": event.name, "data": dict(event.data)}
+                step.publish(EVENTS, messages.string(json.dumps(report)))
 
 
 def _goal(goal: Goal) -> CoreGoal:
@@ -201,8 +201,8 @@ def _numbers(table: Array) -> bytes:
 
 def main() -> None:
     """Serve the stack given on the command line."""
-    written = json.loads(sys.argv[1]) if len(sys.argv) > 1 else {}
-    ReferenceStackPeer(StackSpec.model_validate(written, by_alias=True, by_name=False)).serve()
+    section = json.loads(sys.argv[1]) if len(sys.argv) > 1 else {}
+    ReferenceStackPeer(StackSpec.model_validate(section, by_alias=True, by_name=False)).serve()
 
 
 if __name__ == "__main__":

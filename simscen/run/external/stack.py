@@ -44,51 +44,55 @@ class ExternalStack:
         name: str,
         command: ExternalCommand,
         surroundings: Surroundings,
-        ordered: RunParameters,
-        printed: FilePath | None = None,
+        parameters: RunParameters,
+        log_file: FilePath | None = None,
     ) -> None:
-        self._name, self._command, self._printed = name, command, printed
-        self._surroundings, self._ordered = surroundings, ordered
+        self._name, self._command, self._log_file = name, command, log_file
+        self._surroundings, self._parameters = surroundings, parameters
         self._time = SimTime(surroundings.tick_rate)
-        self._goals = GoalTracker(ordered.stop_on_failure, surroundings.tick_rate, ordered.mode)
-        self._feed = StepPublisher(surroundings.tick_rate, ordered.sensors, ordered.mounts)
+        self._goals = GoalTracker(parameters.stop_on_failure, surroundings.tick_rate, parameters.mode)
+        self._publisher = StepPublisher(surroundings.tick_rate, parameters.sensors, parameters.mounts)
         self._process: StackProcess | None = None
-        self._offer = TopicTable.of(())
+        self._topic_table = TopicTable.build(())
         self._welcome = Welcome()
         self._plan: Path | None = None
-        self._held = Decision(STOP)
-        self._first = True
-        self._told, self._canceling = False, False
+        self._decision = Decision(STOP)
+        self._awaits_first_answer = True
+        self._interrupted, self._canceling = False, False
         self._correction: Pose2 | None = None
         self._odometry: Odometry | None = None
-        self._wheels = next((name for name, says in ordered.sensors.items() if says == Odometry.__name__), "")
+        self._wheel_odometry = next(
+            (name for name, kind in parameters.sensors.items() if kind == Odometry.__name__), ""
+        )
 
     def begin(self, estimate: Estimate) -> None:
         """Start the process and send HELLO."""
-        surroundings, feed = self._surroundings, self._feed
-        feed.latch(surroundings.map, topics.MAP)
-        feed.latch(surroundings.masks.keepout, KEEPOUT_MASK)
+        surroundings, publisher = self._surroundings, self._publisher
+        publisher.latch(surroundings.map, topics.MAP)
+        publisher.latch(surroundings.masks.keepout, KEEPOUT_MASK)
         speed = surroundings.masks.speed
-        feed.latch(None if speed is None else speed.grid, SPEED_MASK)
-        feed.latch_robot(self._ordered.robot_description, estimate)
-        self._offer = offer = feed.offer()
-        self._process = StackProcess(self._name, self._command, self._printed, self._ordered.robot_name)
-        told = hello_content(surroundings, self._ordered, offer, feed.named, self._command.answer_limit)
-        self._process.send(wire.json_frame(wire.HELLO, told))
+        publisher.latch(None if speed is None else speed.grid, SPEED_MASK)
+        publisher.latch_robot(self._parameters.robot_description, estimate)
+        self._topic_table = topic_table = publisher.topic_table()
+        self._process = StackProcess(self._name, self._command, self._log_file, self._parameters.robot_name)
+        hello = hello_content(
+            surroundings, self._parameters, topic_table, publisher.sensor_topics, self._command.answer_limit
+        )
+        self._process.send(wire.json_frame(wire.HELLO, hello))
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
         """Call `begin` if necessary, receive WELCOME, and send the goals."""
         if self._process is None:
             self.begin(estimate)
         assert self._process is not None
-        offer = self._offer
+        topic_table = self._topic_table
         try:
             kind, body = self._process.exchange(b"", self._command.start_limit, "answer to HELLO")
-            self._welcome = self._allowed(
-                "the answer to HELLO", lambda: Welcome.of(kind, body, offer, self._ordered.mode)
+            self._welcome = self._checked(
+                "the answer to HELLO", lambda: Welcome.parse(kind, body, topic_table, self._parameters.mode)
             )
-            self._feed.want(offer, self._welcome.topics)
-            self._process.send(wire.json_frame(wire.GOAL, goal_content(estimate, goals, self._ordered)))
+            self._publisher.subscribe(topic_table, self._welcome.topics)
+            self._process.send(wire.json_frame(wire.GOAL, goal_content(estimate, goals, self._parameters)))
         except RunError:
             self.close()
             raise
@@ -106,7 +110,7 @@ class ExternalStack:
 
     @property
     def plan(self) -> Path | None:
-        """The plan that the stack reports to follow."""
+        """The plan that the stack follows, as it reports."""
         return self._plan
 
     @property
@@ -120,33 +124,32 @@ class ExternalStack:
         return {"external": self._name, **self._welcome.facts}
 
     @property
-    def described(self) -> dict[str, Any]:
+    def description(self) -> dict[str, Any]:
         """Facts about the stack for stack.json."""
         return {**self.facts, "about": self._welcome.about}
 
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Send the readings of this beat and return the decision."""
-        self._feed.take(tick, readings)
+        self._publisher.publish_readings(tick, readings)
         self._odometry = next(
-            (r for r in readings if isinstance(r, Odometry) and r.sensor == self._wheels), self._odometry
+            (r for r in readings if isinstance(r, Odometry) and r.sensor == self._wheel_odometry), self._odometry
         )
-        due = tick % self._ordered.control_period == 0
-        if not (due or self._told or (self._welcome.every_beat and self._feed.waiting)):
-            return self._held
-        answer = self._asked(tick, due)
-        self._told = self._canceling = False
-        return self._decided(tick, answer, due)
+        due = tick % self._parameters.control_period == 0
+        if not (due or self._interrupted or (self._welcome.every_beat and self._publisher.has_messages)):
+            return self._decision
+        answer = self._request_answer(tick, due)
+        self._interrupted = self._canceling = False
+        return self._to_decision(tick, answer, due)
 
     def end(self, reason: str) -> None:
         """Send END to the stack."""
         if self._process is not None:
-            self._process.dismiss(wire.json_frame(wire.END, {"reason": reason}))
+            self._process.send_end(wire.json_frame(wire.END, {"reason": reason}))
 
     def finish(self) -> None:
         """Wait until the stack exits after END."""
         if self._process is not None:
-            farewell = self._process.farewell(END_GRACE_S)
-            self._welcome = self._welcome.with_farewell(farewell)
+            self._welcome = self._welcome.with_bye(self._process.receive_bye(END_GRACE_S))
 
     def release(self) -> None:
         """Request the end of the process without waiting for it."""
@@ -159,70 +162,74 @@ class ExternalStack:
             self._process.close()
             self._process = None
 
-    def _asked(self, tick: int, due: bool) -> Answer:
+    def _request_answer(self, tick: int, due: bool) -> Answer:
         """Send a step and return the answer."""
         assert self._process is not None
         limit = self._command.answer_limit
-        if self._first:
-            limit, self._first = max(limit, self._welcome.first_answer_limit), False
+        if self._awaits_first_answer:
+            limit, self._awaits_first_answer = max(limit, self._welcome.first_answer_limit), False
         sec, nanosec = self._time.stamp(tick)
         flags = wire.COMMAND_DUE if due else 0
         header = wire.StepHeader(tick, sec, nanosec, round(limit * 1e3), flags)
         when = f"the step of t = {tick / self._time.rate:.3f} s"
         kind, body = self._process.exchange(
-            wire.step_frame(header, self._feed.drain()), limit, f"answer to {when} (tick {tick})"
+            wire.step_frame(header, self._publisher.drain()), limit, f"answer to {when} (tick {tick})"
         )
-        return self._allowed(f"the answer to {when}", lambda: self._understood(kind, body, tick, due))
+        return self._checked(f"the answer to {when}", lambda: self._decode_answer_frame(kind, body, tick, due))
 
-    def _understood(self, kind: int, body: bytes, tick: int, due: bool) -> Answer:
+    def _decode_answer_frame(self, kind: int, body: bytes, tick: int, due: bool) -> Answer:
         if kind != wire.ANSWER:
             raise ProtocolViolation(f"a frame {_name(kind)} instead of an ANSWER")
-        answered, said = wire.from_answer(body)
-        if answered != tick:
-            raise ProtocolViolation(f"it answers tick {answered} instead of {tick}")
+        answered_tick, messages = wire.from_answer(body)
+        if answered_tick != tick:
+            raise ProtocolViolation(f"it answers tick {answered_tick} instead of {tick}")
         dead_reckoned = None if self._odometry is None else self._odometry.pose
         answer = decode_answer(
-            group_by_topic(said, self._offer.answers), tick, self._time, self._correction, dead_reckoned
+            group_by_topic(messages, self._topic_table.accepted_by_number),
+            tick,
+            self._time,
+            self._correction,
+            dead_reckoned,
         )
         self._correction = answer.correction
         if due and answer.command is None:
             raise ProtocolViolation(f"no message on {topics.COMMAND.name}, though a command is due")
         for event in answer.events:
-            self._goals.hear(tick, event)
+            self._goals.process(tick, event)
         return answer
 
-    def _decided(self, tick: int, answer: Answer, due: bool) -> Decision:
-        self._goals.rest(tick)
-        if due and self._goals.overdue(tick):
-            self._send(wire.CANCEL, {"tick": tick, "all": self._ordered.stop_on_failure, "reason": "timeout"})
-        events = self._goals.take()
+    def _to_decision(self, tick: int, answer: Answer, due: bool) -> Decision:
+        self._goals.advance(tick)
+        if due and self._goals.fail_if_timed_out(tick):
+            self._send(wire.CANCEL, {"tick": tick, "all": self._parameters.stop_on_failure, "reason": "timeout"})
+        events = self._goals.take_events()
         if any(event.kind in _GOAL_ENDS for event in events):
             self._plan = None
         if answer.plan is not None:
             self._plan = answer.plan if len(answer.plan.points) else None
-        command = answer.command if answer.command is not None else self._held.command
-        self._held = Decision(command)
+        command = answer.command if answer.command is not None else self._decision.command
+        self._decision = Decision(command)
         followed = answer.plan if answer.plan is not None and len(answer.plan.points) else None
         return Decision(
             command, answer.belief, followed, answer.local_plan, events, answer.lines, answer.costmaps, answer.odometry
         )
 
     def _interrupt(self, kind: int, content: dict[str, Any]) -> None:
-        """Send an order that the stack answers at this beat."""
-        self._told, self._plan = True, None
+        """Send a request that the stack answers in this beat."""
+        self._interrupted, self._plan = True, None
         self._send(kind, content)
 
     def _send(self, kind: int, content: dict[str, Any]) -> None:
         if self._process is not None:
             self._process.send(wire.json_frame(kind, content))
 
-    def _allowed(self, what: str, take: Callable[[], T]) -> T:
+    def _checked(self, what: str, function: Callable[[], T]) -> T:
         assert self._process is not None
         try:
-            return take()
+            return function()
         except (ProtocolViolation, wire.Malformed) as error:
             raise self._process.error(protocol.PROTOCOL, f"{what}: {error}") from error
 
 
 def _name(kind: int) -> str:
-    return wire.KINDS[kind] if 0 < kind < len(wire.KINDS) else f"of kind {kind}"
+    return wire.KIND_NAMES[kind] if 0 < kind < len(wire.KIND_NAMES) else f"of kind {kind}"

@@ -31,16 +31,16 @@ ROUNDING = 1e-9
 
 @dataclass
 class _Active:
-    """An active fault; `touched` counts the messages and commands that it changed or withheld."""
+    """An active fault; `changed_count` is the number of messages and commands that it changed or withheld."""
 
     index: int
     sensor: str
     kind: str
     disturbance: Disturbance
-    touched: int = 0
-    over: bool = False
+    changed_count: int = 0
+    has_ended: bool = False
 
-    def hears(self, reading: Reading) -> bool:
+    def affects(self, reading: Reading) -> bool:
         """Return whether the fault affects this reading. A fault of the wheels affects all wheel odometry."""
         if self.kind == WHEELS:
             return isinstance(reading, Odometry) and reading.sensor != TRUTH
@@ -56,23 +56,23 @@ class FaultInjector:
         streams: Streams,
         setting: Callable[[FaultEntry], FaultSetting],
         link: CommandLink,
-        note: Callable[[Event], None],
-        mapped: Collection[int] = (),
+        emit: Callable[[Event], None],
+        map_faults: Collection[int] = (),
     ) -> None:
-        """`note` receives a `fault.took_effect` event when a fault changes its first message or command.
+        """`emit` receives a `fault.took_effect` event when a fault changes its first message or command.
 
-        `mapped` are the indices of the faults that changed the map before the run.
+        `map_faults` are the indices of the faults that changed the map before the run.
         """
-        self._mapped = set(mapped)
-        self._faults, self._streams, self._setting, self._link, self._note = faults, streams, setting, link, note
+        self._map_faults = set(map_faults)
+        self._faults, self._streams, self._setting, self._link, self._emit = faults, streams, setting, link, emit
         self._names = stream_names(faults)
-        self.possible = bool(faults)
+        self.has_faults = bool(faults)
         """Whether the robot has any fault."""
-        self._begun: Counter[int] = Counter()
-        # By number of the fault and count of its activations: what one activation leaves behind, the next builds on.
+        self._activations: Counter[int] = Counter()
+        # By index of the fault and count of its activations, because an ended activation can still hold delayed data.
         self.active: dict[tuple[int, int], _Active] = {}
-        self._linked = False
-        self._believed: tuple[int, Belief, Belief] | None = None
+        self._affects_commands = False
+        self._last_belief: tuple[int, Belief, Belief] | None = None
 
     def begin(self, index: int) -> str:
         """Start the fault with this index. Each activation draws from a random stream of its own.
@@ -80,137 +80,145 @@ class FaultInjector:
         Returns the kind of the affected sensor or actuator.
         """
         entry = self._faults[index]
-        self._begun[index] += 1
-        rng = self._streams.generator(f"fault{self._names[index]}#{self._begun[index]}")
+        self._activations[index] += 1
+        rng = self._streams.generator(f"fault{self._names[index]}#{self._activations[index]}")
         setting = self._setting(entry)
         disturbance: object = entry.fault.begin(rng, setting)
         if not isinstance(disturbance, Disturbance):
-            self._broke(index, f"begins as {disturbance!r}, which is no Disturbance")
-        self.active[index, self._begun[index]] = _Active(index, entry.sensor, setting.kind, disturbance)
-        self._linked = self._linked or setting.kind == COMMAND
+            self._raise_invalid(index, f"returned {disturbance!r} from `begin`, which is not a Disturbance")
+        self.active[index, self._activations[index]] = _Active(index, entry.sensor, setting.kind, disturbance)
+        self._affects_commands = self._affects_commands or setting.kind == COMMAND
         return setting.kind
 
     def end(self, index: int) -> int:
         """End a fault and return how many messages and commands it changed. Delayed messages still arrive later."""
-        key = index, self._begun[index]
+        key = index, self._activations[index]
         active = self.active.pop(key)
-        if rest := active.disturbance.end():
-            self.active[key] = _Active(index, active.sensor, active.kind, rest, over=True)
-        return active.touched
+        if remaining := active.disturbance.end():
+            self.active[key] = _Active(index, active.sensor, active.kind, remaining, has_ended=True)
+        return active.changed_count
 
     def disturb(self, readings: Readings) -> Readings:
         """Return the readings as the stack receives them."""
         if not self.active:
             return readings
-        for active in self._at_work():
-            if active.index in self._mapped:
-                self._mapped.remove(active.index)
+        for active in self._in_order():
+            if active.index in self._map_faults:
+                self._map_faults.remove(active.index)
                 self._count(active)
-            late = self._late(active)
-            heard = (self._reading(active, one) if active.hears(one) else one for one in readings)
-            readings = (*late, *(one for one in heard if one is not None))
+            late = self._delayed_readings(active)
+            disturbed = (self._disturb_reading(active, one) if active.affects(one) else one for one in readings)
+            readings = (*late, *(one for one in disturbed if one is not None))
         return readings
 
     def command(self, tick: int, command: Twist) -> Twist:
         """Return the command as the wheels receive it: after faults of cmd_vel, then faults of the wheels."""
-        sends = self._link.sends(tick, command)
-        if not self._linked and not self.active:
-            if sends:
-                self._link.hear(tick, command)
+        is_sent = self._link.sends_message(tick, command)
+        if not self._affects_commands and not self.active:
+            if is_sent:
+                self._link.receive(tick, command)
             return command
-        if self._linked:
-            self._transmit(tick, command if sends else None)
-            command = self._link.driven(tick)
-        elif sends:
-            self._link.hear(tick, command)
-        for active in self._at_work():
+        if self._affects_commands:
+            self._transmit_command(tick, command if is_sent else None)
+            command = self._link.active_command(tick)
+        elif is_sent:
+            self._link.receive(tick, command)
+        for active in self._in_order():
             if active.kind == WHEELS or active.disturbance.drives:
-                command = self._commanded(active, command) or command
+                command = self._disturb_command(active, command) or command
         return command
 
     def belief(self, tick: int, belief: Belief) -> Belief:
         """Return the belief that the navigator receives."""
         if not self.active or not any(active.kind == BELIEF for active in self.active.values()):
             return belief
-        if self._believed is None or self._believed[:2] != (tick, belief):
-            told = belief
-            for active in self._at_work():
+        if self._last_belief is None or self._last_belief[:2] != (tick, belief):
+            disturbed = belief
+            for active in self._in_order():
                 if active.kind == BELIEF:
-                    told = self._told(active, told)
-            self._believed = tick, belief, told
-        return self._believed[2]
+                    disturbed = self._disturb_belief(active, disturbed)
+            self._last_belief = tick, belief, disturbed
+        return self._last_belief[2]
 
-    def _at_work(self) -> list[_Active]:
+    def _in_order(self) -> list[_Active]:
         if not self.active:
             return []
         return [active for _, active in sorted(self.active.items(), key=lambda item: item[0])]
 
-    def _late(self, active: _Active) -> Sequence[Reading]:
-        late: object = active.disturbance.arriving()
-        if not isinstance(late, list | tuple):
-            self._broke(active.index, f"lets {late!r} arrive")
-        if strange := [one for one in late if getattr(one, "sensor", None) != active.sensor]:
-            self._broke(active.index, f"lets {strange[0]!r} arrive, which is no reading of `{active.sensor}`")
-        return late
+    def _delayed_readings(self, active: _Active) -> Sequence[Reading]:
+        arriving: object = active.disturbance.arriving()
+        if not isinstance(arriving, list | tuple):
+            self._raise_invalid(
+                active.index, f"returned {arriving!r} from `arriving`, which is not a list or tuple of readings"
+            )
+        if foreign := [one for one in arriving if getattr(one, "sensor", None) != active.sensor]:
+            self._raise_invalid(
+                active.index, f"returned {foreign[0]!r} from `arriving`, which is not a reading of `{active.sensor}`"
+            )
+        return arriving
 
-    def _reading(self, active: _Active, reading: Reading) -> Reading | None:
-        disturbed = active.disturbance.reading(_kept(reading))
-        if disturbed is not None and _signed(disturbed) != _signed(reading):
-            what = f"makes {type(disturbed).__name__} of the {type(reading).__name__} of a sensor"
-            self._broke(active.index, what)
+    def _disturb_reading(self, active: _Active, reading: Reading) -> Reading | None:
+        disturbed = active.disturbance.reading(_read_only(reading))
+        if disturbed is not None and _type_and_sensor(disturbed) != _type_and_sensor(reading):
+            problem = f"returned an object of type {type(disturbed).__name__} for a {type(reading).__name__} reading"
+            self._raise_invalid(active.index, problem)
         if disturbed is None or not _equal(disturbed, reading):
             self._count(active)
         return disturbed
 
-    def _transmit(self, tick: int, command: Twist | None) -> None:
+    def _transmit_command(self, tick: int, command: Twist | None) -> None:
         """Pass the new command and delayed ones through the chain of faults; what remains reaches the base."""
-        for active in self._at_work():
+        for active in self._in_order():
             if active.kind == COMMAND:
                 late = active.disturbance.arriving_command()
                 if late is not None:
-                    self._check(active, late)
-                fresh = None if command is None else self._commanded(active, command)
-                command = late if fresh is None else fresh
+                    self._require_finite_command(active, late)
+                disturbed = None if command is None else self._disturb_command(active, command)
+                command = late if disturbed is None else disturbed
         if command is not None:
-            self._link.hear(tick, command)
+            self._link.receive(tick, command)
 
-    def _commanded(self, active: _Active, command: Twist) -> Twist | None:
+    def _disturb_command(self, active: _Active, command: Twist) -> Twist | None:
         disturbed = active.disturbance.command(command)
         if disturbed is None and active.kind == COMMAND:
             self._count(active)
             return None
-        disturbed = self._check(active, disturbed)
+        disturbed = self._require_finite_command(active, disturbed)
         if not np.allclose(disturbed, command, rtol=0.0, atol=ROUNDING):
             self._count(active)
         return disturbed
 
-    def _check(self, active: _Active, command: object) -> Twist:
+    def _require_finite_command(self, active: _Active, command: object) -> Twist:
         if not isinstance(command, Twist) or not all(map(math.isfinite, command)):
-            self._broke(active.index, f"makes {command!r} of a command")
+            self._raise_invalid(active.index, f"returned {command!r} for a command, which is not a finite Twist")
         return command
 
-    def _told(self, active: _Active, belief: Belief) -> Belief:
-        told: object = active.disturbance.belief(belief)
-        if not isinstance(told, Belief) or not all(map(math.isfinite, (*told.pose, *told.map_from_odom))):
-            self._broke(active.index, f"makes {told!r} of a belief")
-        if not np.allclose((*told.pose, *told.map_from_odom), (*belief.pose, *belief.map_from_odom), 0.0, ROUNDING):
+    def _disturb_belief(self, active: _Active, belief: Belief) -> Belief:
+        disturbed: object = active.disturbance.belief(belief)
+        if not isinstance(disturbed, Belief) or not all(
+            map(math.isfinite, (*disturbed.pose, *disturbed.map_from_odom))
+        ):
+            self._raise_invalid(active.index, f"returned {disturbed!r} for a belief, which is not a finite Belief")
+        if not np.allclose(
+            (*disturbed.pose, *disturbed.map_from_odom), (*belief.pose, *belief.map_from_odom), 0.0, ROUNDING
+        ):
             self._count(active)
-        return told
+        return disturbed
 
-    def _broke(self, index: int, what: str) -> NoReturn:
+    def _raise_invalid(self, index: int, problem: str) -> NoReturn:
         entry = self._faults[index]
-        raise RunError(BROKEN_COMPONENT, f"fault `{entry.label}` {what}{entry.added_by}")
+        raise RunError(BROKEN_COMPONENT, f"fault `{entry.label}` {problem}{entry.added_by}")
 
     def _count(self, active: _Active) -> None:
-        if active.over:
+        if active.has_ended:
             return
-        if not active.touched:
+        if not active.changed_count:
             entry = self._faults[active.index]
-            self._note(Event(0, EventKind.FAULT_TOOK_EFFECT, entry.label, {"entry": active.index}))
-        active.touched += 1
+            self._emit(Event(0, EventKind.FAULT_TOOK_EFFECT, entry.label, {"entry": active.index}))
+        active.changed_count += 1
 
 
-def _kept(reading: Reading) -> Reading:
+def _read_only(reading: Reading) -> Reading:
     """Make the arrays of a reading read-only, so that a fault cannot change them in place unnoticed."""
     for array in (getattr(reading, field.name) for field in fields(reading)):
         if isinstance(array, np.ndarray):
@@ -218,7 +226,7 @@ def _kept(reading: Reading) -> Reading:
     return reading
 
 
-def _signed(reading: object) -> tuple[type, object]:
+def _type_and_sensor(reading: object) -> tuple[type, object]:
     return type(reading), getattr(reading, "sensor", None)
 
 

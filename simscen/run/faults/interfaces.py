@@ -56,8 +56,8 @@ class FaultContexts:
 
 def _without(mesh: TriangleMesh, names: frozenset[str]) -> TriangleMesh:
     """Return the mesh without the named objects."""
-    gone = [number for number, name in enumerate(mesh.names) if name in names]
-    kept = ~np.isin(mesh.owners, gone)
+    removed = [number for number, name in enumerate(mesh.names) if name in names]
+    kept = ~np.isin(mesh.owners, removed)
     return TriangleMesh(mesh.vertices, mesh.faces[kept], mesh.owners[kept], mesh.names)
 
 
@@ -77,7 +77,7 @@ class HypotheticalSensor:
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
         """See faults.base.Sight."""
-        pose = self._view.base_pose().compose(self._placed(error))
+        pose = self._view.base_pose().compose(self._assumed_mount(error))
         angles = scan.angles()
         flat = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))
         directions = flat @ pose.rotation().T
@@ -91,12 +91,14 @@ class HypotheticalSensor:
         """See faults.base.Sight."""
         spec = self._spec
         assert isinstance(spec, Camera)
-        seen = self._view.image(self._placed(error), spec.width, spec.height, spec.field_of_view, spec.max_range)
-        return Image(self._name, self._now(), *seen)
+        captured = self._view.image(
+            self._assumed_mount(error), spec.width, spec.height, spec.field_of_view, spec.max_range
+        )
+        return Image(self._name, self._now(), *captured)
 
-    def _placed(self, error: Pose3 | None) -> Pose3:
-        thought = self._mount.pose
-        return thought if error is None else thought.compose(error)
+    def _assumed_mount(self, error: Pose3 | None) -> Pose3:
+        mount_pose = self._mount.pose
+        return mount_pose if error is None else mount_pose.compose(error)
 
 
 class CommandLink:
@@ -110,28 +112,28 @@ class CommandLink:
     def __init__(self, period: int, timeout: int) -> None:
         self._period, self._timeout = period, max(period, timeout)
         self._sent: Twist | None = None
-        self._heard, self._since = STOP, 0
+        self._received, self._received_at = STOP, 0
 
-    def sends(self, tick: int, command: Twist) -> bool:
-        """Return whether the stack sends a message at this beat."""
-        sends = tick % self._period == 0 or command != self._sent
+    def sends_message(self, tick: int, command: Twist) -> bool:
+        """Return whether the stack sends a message at this beat; call it once per beat."""
+        sent = tick % self._period == 0 or command != self._sent
         self._sent = command
-        return sends
+        return sent
 
-    def hear(self, tick: int, command: Twist) -> None:
-        """Receive a message."""
-        self._heard, self._since = command, tick
+    def receive(self, tick: int, command: Twist) -> None:
+        """Receive a message at the base."""
+        self._received, self._received_at = command, tick
 
-    def driven(self, tick: int) -> Twist:
+    def active_command(self, tick: int) -> Twist:
         """Return the command that the base executes."""
-        return self._heard if tick - self._since <= self._timeout else STOP
+        return self._received if tick - self._received_at <= self._timeout else STOP
 
 
 class LocalizerWithFaults:
     """A localizer whose published belief is changed by faults; its internal state is not affected."""
 
-    def __init__(self, inner: Localizer, told: Callable[[Belief], Belief]) -> None:
-        self._inner, self._told = inner, told
+    def __init__(self, inner: Localizer, disturb: Callable[[Belief], Belief]) -> None:
+        self._inner, self._disturb = inner, disturb
 
     def reset(self, estimate: Estimate) -> None:
         """Reset to an initial estimate."""
@@ -152,4 +154,4 @@ class LocalizerWithFaults:
     @property
     def belief(self) -> Belief:
         """The belief after the faults."""
-        return self._told(self._inner.belief)
+        return self._disturb(self._inner.belief)

@@ -18,41 +18,42 @@ from simscen.run.random_streams import stream_names
 def apply_map_faults(prepared: PreparedScenario, seed: int) -> PreparedScenario:
     """Return the scenario with the disturbed map of each robot for this seed, and the indices of the faults applied."""
     if not prepared.robots:
-        return _of_one(prepared, Streams(seed))
-    parts = {name: _of_one(part, Streams(seed, name)) for name, part in prepared.robots.items()}
+        return _apply_to_robot(prepared, Streams(seed))
+    parts = {name: _apply_to_robot(part, Streams(seed, name)) for name, part in prepared.robots.items()}
     if all(parts[name] is part for name, part in prepared.robots.items()):
-        return prepared  # and what has been worked out of it
+        return prepared  # keeps its cached results
     first = next(iter(parts.values()))
-    return replace(prepared, map=first.map, mapped=first.mapped, robots=parts)
+    return replace(prepared, map=first.map, map_faults=first.map_faults, robots=parts)
 
 
-def _of_one(prepared: PreparedScenario, streams: Streams) -> PreparedScenario:
+def _apply_to_robot(prepared: PreparedScenario, streams: Streams) -> PreparedScenario:
     faults, grid = prepared.spec.faults, prepared.map
-    mapped: list[int] = []
+    changed: list[int] = []
     for index, (entry, name) in enumerate(zip(faults, stream_names(faults), strict=True)):
         if (
             grid is not None
             and KIND_BY_INSTANCE.get(entry.sensor) == MAP
             and entry.sensor not in prepared.robot.sensors
         ):
-            disturbed = _disturbed(grid, entry, streams.generator(f"fault{name}#1"), prepared)
-            mapped += [] if _same(grid, disturbed) else [index]
+            disturbed = _disturb_map(grid, entry, streams.generator(f"fault{name}#1"), prepared)
+            changed += [] if _grids_equal(grid, disturbed) else [index]
             grid = disturbed
-    return replace(prepared, map=grid, mapped=tuple(mapped)) if mapped else prepared
+    return replace(prepared, map=grid, map_faults=tuple(changed)) if changed else prepared
 
 
-def _disturbed(
+def _disturb_map(
     grid: OccupancyGrid, entry: FaultEntry, rng: np.random.Generator, prepared: PreparedScenario
 ) -> OccupancyGrid:
     clock = Clock(prepared.spec.physics.tick_rate)
     disturbed: object = entry.fault.begin(rng, FaultSetting(clock=clock, kind=MAP)).map(grid)
     if not isinstance(disturbed, OccupancyGrid):
         raise RunError(
-            BROKEN_COMPONENT, f"fault `{entry.label}` makes {type(disturbed).__name__} of a map{entry.added_by}"
+            BROKEN_COMPONENT,
+            f"fault `{entry.label}` returned an object of type {type(disturbed).__name__} for a map{entry.added_by}",
         )
     return disturbed
 
 
-def _same(one: OccupancyGrid, other: OccupancyGrid) -> bool:
+def _grids_equal(one: OccupancyGrid, other: OccupancyGrid) -> bool:
     frames = (one.resolution, one.origin) == (other.resolution, other.origin)
     return frames and np.array_equal(one.cells, other.cells)

@@ -10,15 +10,15 @@ from simscen.model.stack_base import StackBase
 
 @dataclass
 class _Filter:
-    """Zones of one filter by region: speed limit in m/s (0 for none) and whether the zone is enabled."""
+    """State of one filter; `zones` are speed limit in m/s (0 for none) and whether it is enabled, by region."""
 
     zones: dict[str, tuple[float, bool]]
-    masked: bool
-    on: bool = True
+    has_mask: bool
+    enabled: bool = True
 
-    def holds(self, region: str) -> bool:
+    def is_enabled(self, region: str) -> bool:
         """Return whether the zone is enabled."""
-        return self.on and self.zones.get(region, (0.0, False))[1]
+        return self.enabled and self.zones.get(region, (0.0, False))[1]
 
 
 class CostmapFilters:
@@ -33,29 +33,29 @@ class CostmapFilters:
             "speed": _Filter(speed, masks.speed is not None),
         }
 
-    def refused(self, order: ZoneSwitch) -> str:
+    def rejection_reason(self, order: ZoneSwitch) -> str:
         """Return why an order has no effect, or ""."""
-        chosen, state = self._filters[order.filter], "on" if order.enabled else "off"
+        target, state = self._filters[order.filter], "on" if order.enabled else "off"
         if order.region is None:
-            if not chosen.zones and not chosen.masked:
+            if not target.zones and not target.has_mask:
                 return f"the stack's {order.filter} filter has no zone and no mask"
-            return f"the stack's {order.filter} filter was {state} already" if chosen.on == order.enabled else ""
-        if not chosen.on:
+            return f"the stack's {order.filter} filter was {state} already" if target.enabled == order.enabled else ""
+        if not target.enabled:
             return f"the stack's {order.filter} filter is off as a whole"
-        limit, on = chosen.zones.get(order.region, (0.0, False))
+        limit, on = target.zones.get(order.region, (0.0, False))
         if order.enabled and order.filter == "speed" and not (order.speed_limit or limit):
-            return f"`{order.region}` is no speed zone of the stack, and has no speed limit"
+            return f"`{order.region}` is not a speed zone of the stack and has no speed limit"
         same = order.speed_limit in (None, limit) or not order.enabled
         return f"`{order.region}` was {state} already" if on == order.enabled and same else ""
 
     def switch(self, order: ZoneSwitch) -> tuple[str, ...]:
-        """Carry out an order; return the regions that changed, "" for the mask."""
-        chosen = self._filters[order.filter]
+        """Carry out an order. Return the regions that it switches, "" for the mask."""
+        target = self._filters[order.filter]
         if order.region is None:
-            chosen.on = order.enabled
-            return (*(region for region, (_, on) in chosen.zones.items() if on), *([""] if chosen.masked else []))
-        limit = chosen.zones.get(order.region, (0.0, False))[0]
-        chosen.zones[order.region] = (order.speed_limit or limit, order.enabled)
+            target.enabled = order.enabled
+            return (*(region for region, (_, on) in target.zones.items() if on), *([""] if target.has_mask else []))
+        limit = target.zones.get(order.region, (0.0, False))[0]
+        target.zones[order.region] = (order.speed_limit or limit, order.enabled)
         return (order.region,)
 
     def limit(self, region: str) -> float:
@@ -67,7 +67,7 @@ class CostmapFilters:
         """The zones and masks that are enabled."""
         keepout, speed = self._filters["keepout"], self._filters["speed"]
         return Zones(
-            tuple(self._regions[name] for name in keepout.zones if keepout.holds(name)),
-            tuple((self._regions[name], limit) for name, (limit, _) in speed.zones.items() if speed.holds(name)),
-            FilterMasks(self._masks.keepout if keepout.on else None, self._masks.speed if speed.on else None),
+            tuple(self._regions[name] for name in keepout.zones if keepout.is_enabled(name)),
+            tuple((self._regions[name], limit) for name, (limit, _) in speed.zones.items() if speed.is_enabled(name)),
+            FilterMasks(self._masks.keepout if keepout.enabled else None, self._masks.speed if speed.enabled else None),
         )

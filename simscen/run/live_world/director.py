@@ -26,14 +26,14 @@ class Director:
         faults: list[FaultEntry],
         streams: Streams,
         stage: LiveStage,
-        rig: FaultInjector,
+        injector: FaultInjector,
     ) -> None:
-        self._stage, self._rig, self._faults = stage, rig, faults
+        self._stage, self._injector, self._faults = stage, injector, faults
         self._steps = [
             (step, TriggerState(step.when or _AT_ONCE, streams.generator(f"event{stream}")))
             for step, stream in zip(steps, stream_names([step.entry for step in steps]), strict=True)
         ]
-        self._views: dict[int, Situation] = {k: stage for k, step in enumerate(steps) if step.after is None}
+        self._situations: dict[int, Situation] = {k: stage for k, step in enumerate(steps) if step.after is None}
         self._starts = [
             TriggerState(entry.when or _AT_ONCE, streams.generator(f"fault-start{stream}"))
             for entry, stream in zip(faults, stream_names(faults), strict=True)
@@ -41,50 +41,52 @@ class Director:
         self._ends: dict[int, int | None] = {}
 
     @property
-    def needed(self) -> bool:
+    def has_disturbances(self) -> bool:
         """Whether there is any event or fault."""
         return bool(self._steps or self._starts)
 
     def direct(self) -> None:
         """Perform the events and start and end the faults that are due at this beat."""
-        for number, (step, firing) in enumerate(self._steps):
-            view = self._views.get(number)
-            for _ in range(0 if view is None or firing.spent else firing.fires(view)):
-                self._perform(number, step)
-                self._go_on(number)
+        for index, (step, trigger) in enumerate(self._steps):
+            situation = self._situations.get(index)
+            for _ in range(0 if situation is None or trigger.is_exhausted else trigger.count_firings(situation)):
+                self._perform(index, step)
+                self._observe_next_step(index)
         if self._ends:
             self._end_faults()
-        for index, firing in enumerate(self._starts):
-            if not firing.spent and firing.fires(self._stage) and index not in self._ends:
+        for index, trigger in enumerate(self._starts):
+            if not trigger.is_exhausted and trigger.count_firings(self._stage) and index not in self._ends:
                 self._begin_fault(index)
 
-    def _perform(self, number: int, step: SequenceStep) -> None:
+    def _perform(self, index: int, step: SequenceStep) -> None:
         kinds: list[Value] = [action.kind for action in step.actions]
-        self._stage.tell(Event(0, EventKind.EVENT_STARTED, step.name, {"entry": number, "actions": kinds}))
+        self._stage.record_world_event(Event(0, EventKind.EVENT_STARTED, step.name, {"entry": index, "actions": kinds}))
         effects = [action.perform(self._stage) for action in step.actions]
-        told: list[Value] = [{"happened": effect.happened, "what": effect.what} for effect in effects]
-        self._stage.tell(Event(0, EventKind.EVENT_ENDED, step.name, {"entry": number, "effects": told}))
+        effect_data: list[Value] = [{"happened": effect.happened, "what": effect.what} for effect in effects]
+        self._stage.record_world_event(
+            Event(0, EventKind.EVENT_ENDED, step.name, {"entry": index, "effects": effect_data})
+        )
 
-    def _go_on(self, number: int) -> None:
+    def _observe_next_step(self, index: int) -> None:
         """Start to evaluate the trigger of the step that follows this one."""
-        if number + 1 < len(self._steps) and self._steps[number + 1][0].after == number:
-            self._views[number + 1] = cast(Situation, RelativeSituation(self._stage))
+        if index + 1 < len(self._steps) and self._steps[index + 1][0].after == index:
+            self._situations[index + 1] = cast(Situation, RelativeSituation(self._stage))
 
     def _begin_fault(self, index: int) -> None:
         entry = self._faults[index]
-        kind = self._rig.begin(index)
-        lasts = None if entry.for_ is None else self._stage.clock.ticks(entry.for_)
-        self._ends[index] = None if lasts is None else self._stage.tick + lasts
-        about: dict[str, Value] = {"entry": index, "sensor": entry.sensor, "fault": entry.kind, "affects": kind}
-        self._stage.note(Event(0, EventKind.FAULT_STARTED, entry.label, about))
+        kind = self._injector.begin(index)
+        duration = None if entry.for_ is None else self._stage.clock.ticks(entry.for_)
+        self._ends[index] = None if duration is None else self._stage.tick + duration
+        data: dict[str, Value] = {"entry": index, "sensor": entry.sensor, "fault": entry.kind, "affects": kind}
+        self._stage.record_event(Event(0, EventKind.FAULT_STARTED, entry.label, data))
 
     def _end_faults(self) -> None:
         for index, end in sorted(self._ends.items()):
             if end is not None and self._stage.tick >= end:
                 del self._ends[index]
-                touched = self._rig.end(index)
-                about: dict[str, Value] = {"entry": index, "touched": touched}
-                self._stage.note(Event(0, EventKind.FAULT_ENDED, self._faults[index].label, about))
+                changed_count = self._injector.end(index)
+                data: dict[str, Value] = {"entry": index, "touched": changed_count}
+                self._stage.record_event(Event(0, EventKind.FAULT_ENDED, self._faults[index].label, data))
 
 
 class TriggerState:
@@ -96,30 +98,30 @@ class TriggerState:
 
     def __init__(self, trigger: Trigger, rng: np.random.Generator) -> None:
         self._trigger, self._rng = trigger, rng
-        self._watch = ConditionState(trigger)
-        self._held = False
-        self._left = trigger.times
-        self._due: list[int] = []
+        self._condition = ConditionState(trigger)
+        self._was_true = False
+        self._remaining = trigger.times
+        self._scheduled: list[int] = []
 
-    def fires(self, now: Situation) -> int:
-        """Return how often the trigger fires at this beat."""
-        if self._left and self._edge(now) and self._lucky():
-            self._left -= 1
-            self._due.append(now.tick + now.clock.ticks(self._trigger.delay))
-        ripe = sum(due <= now.tick for due in self._due)
-        self._due = self._due[ripe:]
-        return ripe
+    def count_firings(self, now: Situation) -> int:
+        """Return how often the trigger fires at this beat; 0 if it does not."""
+        if self._remaining and self._has_edge(now) and self._passes_probability():
+            self._remaining -= 1
+            self._scheduled.append(now.tick + now.clock.ticks(self._trigger.delay))
+        due = sum(scheduled <= now.tick for scheduled in self._scheduled)
+        self._scheduled = self._scheduled[due:]
+        return due
 
     @property
-    def spent(self) -> bool:
+    def is_exhausted(self) -> bool:
         """Whether the trigger can never fire again."""
-        return not self._left and not self._due
+        return not self._remaining and not self._scheduled
 
-    def _edge(self, now: Situation) -> bool:
-        before, self._held = self._held, self._watch.holds(now)
-        return self._held != before and self._held == (self._trigger.edge == "rising")
+    def _has_edge(self, now: Situation) -> bool:
+        before, self._was_true = self._was_true, self._condition.holds(now)
+        return self._was_true != before and self._was_true == (self._trigger.edge == "rising")
 
-    def _lucky(self) -> bool:
+    def _passes_probability(self) -> bool:
         return self._trigger.probability >= 1 or bool(self._rng.random() < self._trigger.probability)
 
 
@@ -128,8 +130,8 @@ class ConditionState:
 
     def __init__(self, test: AnyCondition) -> None:
         self._test = test
-        lasting = any(part.for_ is not None for inner in test.inner for part in inner.parts())
-        self._parts = [ConditionState(inner) for inner in test.inner] if lasting else []
+        has_durations = any(part.for_ is not None for inner in test.inner for part in inner.parts())
+        self._parts = [ConditionState(inner) for inner in test.inner] if has_durations else []
         self._since: int | None = None
 
     def holds(self, now: Situation) -> bool:
@@ -159,7 +161,7 @@ class RelativeSituation:
         self._now, self._others = now, {} if others is None else others
         if others is None:
             self._others |= {name: RelativeSituation(now.of(name), self._others) for name in now.robots}
-        self._start, self._way, self._past = now.tick, now.travelled, len(now.events)
+        self._start_tick, self._initial_distance, self._initial_event_count = now.tick, now.travelled, len(now.events)
 
     def of(self, robot: str) -> "RelativeSituation":
         """Return the view for another robot."""
@@ -168,22 +170,22 @@ class RelativeSituation:
     @property
     def tick(self) -> int:
         """Ticks since the start of the view."""
-        return self._now.tick - self._start
+        return self._now.tick - self._start_tick
 
     @property
     def travelled(self) -> float:
         """Distance driven in m since the start of the view."""
-        return self._now.travelled - self._way
+        return self._now.travelled - self._initial_distance
 
     @property
     def events(self) -> tuple[Event, ...]:
         """Events since the start of the view."""
-        return self._now.events[self._past :]
+        return self._now.events[self._initial_event_count :]
 
-    def scanned(self, sensor: str | None) -> int | None:
+    def last_scan_tick(self, sensor: str | None) -> int | None:
         """Return the tick of the last scan that the stack received; the start of the run if there was none."""
-        last = self._now.scanned(sensor)
-        return (0 if last is None else last) - self._start
+        last = self._now.last_scan_tick(sensor)
+        return (0 if last is None else last) - self._start_tick
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._now, name)

@@ -37,17 +37,17 @@ EVENT_KINDS = {
 
 
 class PedestrianSimulation:
-    """Steps all pedestrians of a run and passes their events to `tell`. Set up when the first one appears."""
+    """Steps all pedestrians of a run and passes their events to `listeners`. Set up when the first one appears."""
 
     def __init__(self, built: BuiltWorld, simulation: Simulation, clock: Clock) -> None:
         self._built, self._simulation = built, simulation
         self._period = max(1, int(MAX_STEP_S * clock.rate + 1e-9))
-        self._seconds = self._period / clock.rate
+        self._step_s = self._period / clock.rate
         self._behaviors: dict[str, str] = {}
         self._hulls: dict[str, Array] = {}
         self._outlines: dict[str, tuple[tuple[Solid, ...], tuple[Array, ...]]] = {}
-        self._ways: dict[float, ShortestPaths] = {}
-        self.tell: list[Callable[[Event], None]] = []
+        self._planners: dict[float, ShortestPaths] = {}
+        self.listeners: list[Callable[[Event], None]] = []
 
     @cached_property
     def _walls(self) -> WallMap:
@@ -57,81 +57,83 @@ class PedestrianSimulation:
         return WallMap(np.concatenate([cut.segments for cut in cuts]), owners, opaque)
 
     @cached_property
-    def _people(self) -> Crowd:
-        return Crowd(self._walls, self._way)
+    def _crowd(self) -> Crowd:
+        return Crowd(self._walls, self._plan_path)
 
-    def come(self, walker: WalkingPedestrian) -> Body:
+    def add(self, walker: WalkingPedestrian) -> Body:
         """Add a pedestrian and return its body."""
-        people = self._people
-        people.add(walker)
+        crowd = self._crowd
+        crowd.add(walker)
         self._behaviors[walker.name] = walker.behavior
         shape = Cylinder(walker.radius, walker.height)
         solids = (Solid(shape, Pose3(z=walker.height / 2), walker.name),)
         body = Body(walker.name, solids, Pose3.planar(walker.pose))
-        self._simulation.add_steered(body, people.top_speed(walker.name))
+        self._simulation.add_steered(body, crowd.top_speed(walker.name))
         self._simulation.call_before_steps(self._period, self._step)
         return body
 
-    def walks(self, name: str) -> bool:
+    def simulates(self, name: str) -> bool:
         """Return whether a pedestrian with this name is simulated."""
         return name in self._behaviors
 
-    def go(self, name: str) -> None:
+    def remove(self, name: str) -> None:
         """Stop simulating a pedestrian. Has no effect on other names."""
         if self._behaviors.pop(name, None) is not None:
-            self._people.remove(name)
+            self._crowd.remove(name)
 
-    def room(self, place: Point, radius: float, walls_only: bool) -> bool:
+    def has_room(self, place: Point, radius: float, walls_only: bool) -> bool:
         """Return whether a pedestrian with this radius in m fits at a place."""
         if walls_only or self._walls.gap(place) < radius:
             return self._walls.gap(place) >= radius
-        around = self._surroundings()
-        outlines = [outline for thing in around.things for outline in thing.outlines]
-        outlines += [robot.pose.apply(robot.outline) for robot in around.robots]
-        here = Pose2(*place, 0.0)
-        if any(distance_to_polygon(here, outline.tolist()) < radius for outline in outlines):
+        surroundings = self._surroundings()
+        outlines = [outline for observed in surroundings.things for outline in observed.outlines]
+        outlines += [robot.pose.apply(robot.outline) for robot in surroundings.robots]
+        position = Pose2(*place, 0.0)
+        if any(distance_to_polygon(position, outline.tolist()) < radius for outline in outlines):
             return False
-        others = [(pose, self._people.radius(name)) for name, pose in self._people.poses().items()]
-        return all(here.distance(pose) >= radius + other for pose, other in others)
+        others = [(pose, self._crowd.radius(name)) for name, pose in self._crowd.poses().items()]
+        return all(position.distance(pose) >= radius + other for pose, other in others)
 
     def _step(self) -> None:
-        people, seconds = self._people, self._seconds
-        before = people.poses()
-        deeds = people.step(self._surroundings(), seconds)
-        for name, pose in people.poses().items():
-            path = MotionPath((0.0, seconds), (before[name], pose))
-            self._simulation.follow(name, path, people.top_speed(name))
-        for deed in deeds:
-            event = self._event(deed)
-            for tell in self.tell:
-                tell(event)
+        crowd, step_s = self._crowd, self._step_s
+        before = crowd.poses()
+        actions = crowd.step(self._surroundings(), step_s)
+        for name, pose in crowd.poses().items():
+            path = MotionPath((0.0, step_s), (before[name], pose))
+            self._simulation.follow(name, path, crowd.top_speed(name))
+        for action in actions:
+            event = self._event(action)
+            for listener in self.listeners:
+                listener(event)
 
-    def _event(self, deed: PedestrianAction) -> Event:
-        data: dict[str, Value] = {"behavior": self._behaviors[deed.name], "robot": deed.about}
-        if deed.what == "reached":
-            data = {"goal": int(deed.about)}
-        return Event(self._simulation.tick, EVENT_KINDS[deed.what], deed.name, data)
+    def _event(self, action: PedestrianAction) -> Event:
+        data: dict[str, Value] = {"behavior": self._behaviors[action.name], "robot": action.about}
+        if action.what == "reached":
+            data = {"goal": int(action.about)}
+        return Event(self._simulation.tick, EVENT_KINDS[action.what], action.name, data)
 
     # Perception of the pedestrians
 
     def _surroundings(self) -> Surroundings:
-        robots = tuple(self._seen(robot) for robot in self._simulation.robots.values())
-        things = self._simulation.bodies_and_poses()
-        known = [(name, body, pose) for name, (body, pose) in things.items() if name not in self._behaviors]
-        return Surroundings(robots, tuple(ObservedObject(name, self._placed(body, pose)) for name, body, pose in known))
+        robots = tuple(self._observe_robot(robot) for robot in self._simulation.robots.values())
+        bodies = self._simulation.bodies_and_poses()
+        others = [(name, body, pose) for name, (body, pose) in bodies.items() if name not in self._behaviors]
+        return Surroundings(
+            robots, tuple(ObservedObject(name, self._world_outlines(body, pose)) for name, body, pose in others)
+        )
 
-    def _placed(self, body: Body, pose: Pose3) -> tuple[Array, ...]:
+    def _world_outlines(self, body: Body, pose: Pose3) -> tuple[Array, ...]:
         """Return the outlines of an object in the world frame."""
-        known = self._outlines.get(body.name)
-        if known is None or known[0] is not body.solids:
-            known = (
+        cached = self._outlines.get(body.name)
+        if cached is None or cached[0] is not body.solids:
+            cached = (
                 body.solids,
                 tuple(np.array(outline) for outline in outlines_in_band(body.solids, BODY_HEIGHT_RANGE_M)),
             )
-            self._outlines[body.name] = known
-        return tuple(pose.plane.apply(outline) for outline in known[1])
+            self._outlines[body.name] = cached
+        return tuple(pose.plane.apply(outline) for outline in cached[1])
 
-    def _seen(self, robot: Robot) -> ObservedRobot:
+    def _observe_robot(self, robot: Robot) -> ObservedRobot:
         if robot.name not in self._hulls:
             self._hulls[robot.name] = np.array(footprint(robot.body.solids))
         outline = self._hulls[robot.name]
@@ -139,12 +141,14 @@ class PedestrianSimulation:
         radius = float(np.hypot(outline[:, 0], outline[:, 1]).max())
         return ObservedRobot(robot.name, robot.base_pose().plane, (vx, vy), radius, outline)
 
-    def _way(self, start: Point, goal: Point, radius: float) -> list[Point]:
+    def _plan_path(self, start: Point, goal: Point, radius: float) -> list[Point]:
         """Return a path around walls, with extra clearance if possible; a straight line if there is no path."""
-        for room in (radius + PREFERRED_CLEARANCE_M, radius):
-            if room not in self._ways:
-                self._ways[room] = shortest_paths_in(self._built, (), room, BODY_HEIGHT_RANGE_M, PATH_CELL_M)
-            corners = self._ways[room].way(Pose2(*start, 0.0), Pose2(*goal, 0.0))
+        for clearance in (radius + PREFERRED_CLEARANCE_M, radius):
+            if clearance not in self._planners:
+                self._planners[clearance] = shortest_paths_in(
+                    self._built, (), clearance, BODY_HEIGHT_RANGE_M, PATH_CELL_M
+                )
+            corners = self._planners[clearance].way(Pose2(*start, 0.0), Pose2(*goal, 0.0))
             if corners is not None:
                 return [(x, y) for x, y in corners[1:].tolist()]
         return [goal]

@@ -25,53 +25,53 @@ class LiveRayCaster(RayCaster):
         self._bodies: Mapping[str, Body] | None = None
         self._meshes: dict[str, TriangleMesh] = {}
         self._extent = 0.0
-        self._near: ReachableObjects | None = None
-        self._looked: tuple[Iterable[str], Mapping[str, Pose3], Mapping[str, Pose3]] | None = None
+        self._reachable: ReachableObjects | None = None
+        self._state: tuple[Iterable[str], Mapping[str, Pose3], Mapping[str, Pose3]] | None = None
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.geometry.ray_fans.RayCaster."""
-        self._look((0.0, 0.0, 0.0), math.inf)
+        self._update_scene((0.0, 0.0, 0.0), math.inf)
         return self._scene.cast(origins, directions, reach)
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
         """See core.geometry.ray_fans.RayCaster."""
-        self._look(pose[:3], reach)
+        self._update_scene(pose[:3], reach)
         return self._scene.sweep(fan, pose, reach)
 
-    def _look(self, place: Vector, reach: float) -> None:
+    def _update_scene(self, origin: Vector, reach: float) -> None:
         """Update the poses of the moving objects that rays from a place can reach."""
-        robot, looked = self._robot, self._looked
+        robot, state = self._robot, self._state
         if robot.bodies is not self._bodies:  # the same object until a body is added or removed
-            self._meshes, self._bodies = self._surfaces(robot.bodies), robot.bodies
+            self._meshes, self._bodies = self._build_meshes(robot.bodies), robot.bodies
             self._extent = max([_extent(mesh) for mesh in self._meshes.values()], default=0.0)
-            self._near = looked = None
-        where, homes = robot.objects(), robot.rest_poses
-        names = self._names(where.predicted, place, reach) if type(where) is PosesAtTick else self._meshes
+            self._reachable = state = None
+        poses, rest_poses = robot.objects(), robot.rest_poses
+        names = self._reachable_names(poses.predicted, origin, reach) if type(poses) is PosesAtTick else self._meshes
         # Identical objects mean that nothing has moved.
-        if looked is None or names is not looked[0] or where is not looked[1] or homes is not looked[2]:
-            self._looked = names, where, homes
-            self._scene.set_moving({name: (self._meshes[name], where[name]) for name in names}, homes)
+        if state is None or names is not state[0] or poses is not state[1] or rest_poses is not state[2]:
+            self._state = names, poses, rest_poses
+            self._scene.set_moving({name: (self._meshes[name], poses[name]) for name in names}, rest_poses)
 
-    def _names(self, predicted: PredictedPoses, place: Vector, reach: float) -> Iterable[str]:
+    def _reachable_names(self, predicted: PredictedPoses, origin: Vector, reach: float) -> Iterable[str]:
         """Return the objects that can be in reach according to their scripted paths."""
-        near = self._near
-        if near is None or not near.holds(predicted, place, reach):
+        reachable = self._reachable
+        if reachable is None or not reachable.is_valid_for(predicted, origin, reach):
             # 1 % more, because rays end slightly beyond their reach.
-            far = predicted.far(place, 1.01 * (reach + REFRESH_DISTANCE_M + self._extent))
-            names = [name for name in self._meshes if name not in far]
-            near = self._near = ReachableObjects(predicted, place, reach + REFRESH_DISTANCE_M, names)
-        return near.names
+            unreachable = predicted.far(origin, 1.01 * (reach + REFRESH_DISTANCE_M + self._extent))
+            names = [name for name in self._meshes if name not in unreachable]
+            reachable = self._reachable = ReachableObjects(predicted, origin, reach + REFRESH_DISTANCE_M, names)
+        return reachable.names
 
-    def _surfaces(self, bodies: Mapping[str, Body]) -> dict[str, TriangleMesh]:
+    def _build_meshes(self, bodies: Mapping[str, Body]) -> dict[str, TriangleMesh]:
         """Return the surface of each body by name; bodies of equal shape share one mesh."""
-        before = self._bodies or {}
-        known = [(_parts(before[name]), mesh) for name, mesh in self._meshes.items()]
+        previous = self._bodies or {}
+        known = [(_parts(previous[name]), mesh) for name, mesh in self._meshes.items()]
         meshes = dict[str, TriangleMesh]()
         for name, body in bodies.items():
             if name not in self._without:
                 parts = _parts(body)
-                alike = next((surface for others, surface in known if others == parts), None)
-                meshes[name] = merge_solids(body.solids) if alike is None else alike
+                shared = next((mesh for others, mesh in known if others == parts), None)
+                meshes[name] = merge_solids(body.solids) if shared is None else shared
                 known.append((parts, meshes[name]))
         return meshes
 
@@ -80,13 +80,13 @@ class ReachableObjects(NamedTuple):
     """Moving objects that rays from a place can reach, as long as the scripted paths stay as `predicted`."""
 
     predicted: PredictedPoses
-    place: Vector
+    origin: Vector
     reach: float
     names: list[str]
 
-    def holds(self, predicted: PredictedPoses, place: Vector, reach: float) -> bool:
+    def is_valid_for(self, predicted: PredictedPoses, origin: Vector, reach: float) -> bool:
         """Return whether the list is valid for rays from another place."""
-        return predicted is self.predicted and math.dist(place, self.place) + reach <= self.reach
+        return predicted is self.predicted and math.dist(origin, self.origin) + reach <= self.reach
 
 
 def _parts(body: Body) -> list[tuple[Shape, Pose3]]:

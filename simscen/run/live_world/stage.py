@@ -42,25 +42,25 @@ class LiveStage:
         filters: CostmapFilters,
         clock: Clock,
         goals: Iterable[Goal],
-        walking: PedestrianSimulation,
+        pedestrians: PedestrianSimulation,
         streams: Streams,
-        fellows: "dict[str, LiveStage]",
+        stages: "dict[str, LiveStage]",
     ) -> None:
         """Take the parts of a run: `filters` are the costmap filters of the stack, `goals` those that events can send.
 
-        The stage adds itself to `fellows`, the stages of all robots by name.
+        The stage adds itself to `stages`, the stages of all robots by name.
         """
         self._world, self._simulation, self._robot, self._stack = world, simulation, robot, stack
         self._filters, self.clock = filters, clock
-        self._walking, self._streams = walking, streams
-        walking.tell.append(self.note)
-        self._fellows = fellows
-        fellows[robot.name] = self
+        self._pedestrians, self._streams = pedestrians, streams
+        pedestrians.listeners.append(self.record_event)
+        self._stages = stages
+        stages[robot.name] = self
         self._goals = {goal.name: goal for goal in goals}
-        self._look()
+        self._update_pose()
         self._belief: Belief | None = None
         self._clearance: float | None = None
-        self._scanned: dict[str, int] = {}
+        self._scan_ticks: dict[str, int] = {}
         self._travelled = 0.0
         self._due = True
         self.pending_orders: list[Callable[[int], None]] = []
@@ -79,9 +79,9 @@ class LiveStage:
         If the beat is due for another robot only, the stack receives orders at its own next beat.
         """
         self._due = due
-        before = self._pose
-        self._look(truth)
-        self._travelled += math.hypot(self._pose.x - before.x, self._pose.y - before.y)
+        previous = self._pose
+        self._update_pose(truth)
+        self._travelled += math.hypot(self._pose.x - previous.x, self._pose.y - previous.y)
 
     def deliver_orders(self, tick: int) -> None:
         """Deliver the pending orders to the stack."""
@@ -89,12 +89,12 @@ class LiveStage:
         for order in orders:
             order(tick)
 
-    def _order(self, order: Callable[[int], None]) -> None:
+    def _send_order(self, order: Callable[[int], None]) -> None:
         self.pending_orders.append(order)
         if self._due:
             self.deliver_orders(self.tick)
 
-    def _look(self, truth: Truth | None = None) -> None:
+    def _update_pose(self, truth: Truth | None = None) -> None:
         if truth is not None:
             self._pose, self._twist, self._clearance = truth.pose, truth.twist, truth.clearance
         else:
@@ -104,15 +104,15 @@ class LiveStage:
         """Update from the readings that the stack received and from its decision."""
         for reading in readings:
             if isinstance(reading, Scan):
-                self._scanned[reading.sensor] = self.tick
+                self._scan_ticks[reading.sensor] = self.tick
         self._belief = decision.belief or self._belief
         self._history += decision.events
 
     def take_events(self) -> tuple[Event, ...]:
         """Return the events since the last call, ordered by tick."""
-        fresh = tuple(sorted(self.new_events, key=lambda event: event.tick))
+        events = tuple(sorted(self.new_events, key=lambda event: event.tick))
         self.new_events.clear()
-        return fresh
+        return events
 
     # Observed by triggers
 
@@ -121,9 +121,9 @@ class LiveStage:
         """Distance from the robot's hull to the nearest obstacle in m, in the newest truth sample."""
         return self._clearance
 
-    def scanned(self, sensor: str | None) -> int | None:
+    def last_scan_tick(self, sensor: str | None) -> int | None:
         """Return the tick at which the stack last received a scan of this lidar, or of any lidar for None."""
-        return max(self._scanned.values(), default=None) if sensor is None else self._scanned.get(sensor)
+        return max(self._scan_ticks.values(), default=None) if sensor is None else self._scan_ticks.get(sensor)
 
     @property
     def tick(self) -> int:
@@ -133,11 +133,11 @@ class LiveStage:
     @property
     def robots(self) -> tuple[str, ...]:
         """The names of all robots; empty if there is only one."""
-        return tuple(self._fellows) if len(self._fellows) > 1 else ()
+        return tuple(self._stages) if len(self._stages) > 1 else ()
 
     def of(self, robot: str) -> "LiveStage":
         """Return the stage of another robot."""
-        return self._fellows[robot]
+        return self._stages[robot]
 
     @property
     def robot(self) -> Pose2:
@@ -190,24 +190,24 @@ class LiveStage:
         if self._simulation.object_pose(body.name):
             self.remove(body.name)
         self._simulation.spawn(body)
-        self.tell(Event(0, EventKind.OBJECT_SPAWNED, body.name, body_data(body)))
+        self.record_world_event(Event(0, EventKind.OBJECT_SPAWNED, body.name, body_data(body)))
 
     def remove(self, name: str) -> None:
         """Remove a body from the world."""
-        self._walking.go(name)
+        self._pedestrians.remove(name)
         self._simulation.remove(name)
-        self.tell(Event(0, EventKind.OBJECT_REMOVED, name))
+        self.record_world_event(Event(0, EventKind.OBJECT_REMOVED, name))
 
-    def walk(self, walker: WalkingPedestrian) -> None:
+    def add_pedestrian(self, walker: WalkingPedestrian) -> None:
         """Add a pedestrian, replacing a body of the same name."""
         if self._simulation.object_pose(walker.name):
             self.remove(walker.name)
-        about = {**body_data(self._walking.come(walker)), "person": True, "behavior": walker.behavior}
-        self.tell(Event(0, EventKind.OBJECT_SPAWNED, walker.name, about))
+        data = {**body_data(self._pedestrians.add(walker)), "person": True, "behavior": walker.behavior}
+        self.record_world_event(Event(0, EventKind.OBJECT_SPAWNED, walker.name, data))
 
-    def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
+    def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
         """Return whether a pedestrian with this radius in m fits at a place."""
-        return self._walking.room(place, radius, walls_only)
+        return self._pedestrians.has_room(place, radius, walls_only)
 
     def rng(self, name: str) -> np.random.Generator:
         """Return a new generator for the random stream of this name."""
@@ -219,15 +219,15 @@ class LiveStage:
 
     def move(self, name: str, path: MotionPath) -> None:
         """Move a body along a path that starts now."""
-        self._walking.go(name)
+        self._pedestrians.remove(name)
         self._simulation.move(name, path)
-        self.tell(Event(0, EventKind.OBJECT_MOVED, name, path_data(path)))
+        self.record_world_event(Event(0, EventKind.OBJECT_MOVED, name, path_data(path)))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
         """Return the path that an object follows and the seconds since its start, or None."""
-        here = self.object(name)
-        if here is not None and self._walking.walks(name):
-            return MotionPath((0.0, 1.0), (here, here), "loop"), 0.0  # the future path of a pedestrian is unknown
+        pose = self.object(name)
+        if pose is not None and self._pedestrians.simulates(name):
+            return MotionPath((0.0, 1.0), (pose, pose), "loop"), 0.0  # the future path of a pedestrian is unknown
         return self._simulation.motion(name)
 
     def mass(self, name: str) -> float:
@@ -236,15 +236,15 @@ class LiveStage:
 
     def place(self, name: str, pose: Pose2) -> None:
         """Place an object at a pose."""
-        self._walking.go(name)
+        self._pedestrians.remove(name)
         self._simulation.place(name, pose)
-        self.tell(Event(0, EventKind.OBJECT_PLACED, name, {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
+        self.record_world_event(Event(0, EventKind.OBJECT_PLACED, name, {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def place_robot(self, pose: Pose2) -> None:
         """Place the robot at a pose."""
         self._robot.place(pose)
-        self._look()
-        self.note(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
+        self._update_pose()
+        self.record_event(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
         """Push the robot or, if `name` is given, an object."""
@@ -254,48 +254,48 @@ class LiveStage:
             self._robot.push_for(impulse, seconds)
         else:
             self._robot.push(impulse)
-        about: dict[str, Value] = {"impulse": list(impulse), **({"seconds": seconds} if seconds else {})}
+        data: dict[str, Value] = {"impulse": list(impulse), **({"seconds": seconds} if seconds else {})}
         kind = EventKind.ROBOT_PUSHED if name is None else EventKind.OBJECT_PUSHED
-        (self.note if name is None else self.tell)(Event(0, kind, name or "", about))
+        (self.record_event if name is None else self.record_world_event)(Event(0, kind, name or "", data))
 
-    def lay(self, name: str, patch: Patch) -> None:
+    def add_friction_patch(self, name: str, patch: Patch) -> None:
         """Change the friction of a patch of floor."""
         self._simulation.add_friction_patch(name, patch)
         outline: list[Value] = [[round(x, 3), round(y, 3)] for x, y in patch.outline]
-        about: dict[str, Value] = {"outline": outline, "friction": patch.friction}
-        about |= {} if math.isinf(patch.until) else {"until": patch.until / self.clock.rate}
-        self.tell(Event(0, EventKind.FLOOR_CHANGED, name, about))
+        data: dict[str, Value] = {"outline": outline, "friction": patch.friction}
+        data |= {} if math.isinf(patch.until) else {"until": patch.until / self.clock.rate}
+        self.record_world_event(Event(0, EventKind.FLOOR_CHANGED, name, data))
 
     def send_goal(self, name: str) -> None:
         """Preempt the current goal with another one."""
         goal = self._goals[name]
-        self._order(lambda tick: self._stack.preempt(tick, goal))
+        self._send_order(lambda tick: self._stack.preempt(tick, goal))
 
     def cancel_goal(self) -> None:
         """Cancel the current goal and all later ones."""
-        self._order(self._stack.cancel)
+        self._send_order(self._stack.cancel)
 
-    def tell(self, event: Event) -> None:
+    def record_world_event(self, event: Event) -> None:
         """Add an event of the world to the events of all robots."""
-        for stage in self._fellows.values():
-            stage.note(event)
+        for stage in self._stages.values():
+            stage.record_event(event)
 
     def switch_zone(self, order: ZoneSwitch) -> str:
         """Switch a zone of a costmap filter; return why it is impossible, or ""."""
         if not isinstance(self._stack, CheckedStack) or not self._stack.can_switch_zones:
-            return "the stack cannot be told of zones that are switched"
-        if refused := self._filters.refused(order):
-            return refused
+            return "the stack does not support switching zones"
+        if reason := self._filters.rejection_reason(order):
+            return reason
         for region in self._filters.switch(order):
             limit = self._filters.limit(region) if order.filter == "speed" else 0.0
-            about: dict[str, Value] = {"filter": order.filter, "enabled": order.enabled}
-            about |= {"speed_limit": limit} if limit and order.enabled else {}
-            self.note(Event(0, EventKind.ZONE_SWITCHED, region, about))
-        zones, told = self._filters.zones, self._stack.set_zones
-        self._order(lambda tick: told(tick, zones))
+            data: dict[str, Value] = {"filter": order.filter, "enabled": order.enabled}
+            data |= {"speed_limit": limit} if limit and order.enabled else {}
+            self.record_event(Event(0, EventKind.ZONE_SWITCHED, region, data))
+        zones, set_zones = self._filters.zones, self._stack.set_zones
+        self._send_order(lambda tick: set_zones(tick, zones))
         return ""
 
-    def note(self, event: Event) -> None:
+    def record_event(self, event: Event) -> None:
         """Add an event of this robot; tick 0 stands for now."""
         stamped = event if event.tick else replace(event, tick=self.tick)
         self.new_events.append(stamped)
@@ -312,14 +312,14 @@ def path_data(path: MotionPath) -> dict[str, Value]:
 def body_data(body: Body) -> dict[str, Value]:
     """Return pose, first shape, and contact outlines (body frame) of a body as event data."""
     pose = body.pose.plane
-    place: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
+    fields: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
     outlines: list[Value] = [
         [[round(x, 3), round(y, 3)] for x, y in outline] for outline in outlines_in_band(body.solids, Z_RANGE)
     ]
-    return {**place, **_outline(body.solids[0].shape), "parts": outlines}
+    return {**fields, **_shape_data(body.solids[0].shape), "parts": outlines}
 
 
-def _outline(shape: Shape) -> dict[str, Value]:
+def _shape_data(shape: Shape) -> dict[str, Value]:
     match shape:
         case Box(size):
             return {"shape": "box", "size": list(size)}

@@ -7,7 +7,7 @@ from itertools import groupby
 from pathlib import Path
 
 from simscen.core.errors import Exit, InvalidInput, UsageError
-from simscen.core.random_streams import LARGEST_SEED
+from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import Listener, RunFinished, RunProgress, RunStarted
@@ -48,9 +48,9 @@ class SessionOptions:
 def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:
     """Return the seeds of a scenario. Raises UsageError if one exceeds the largest seed."""
     first = options.seed if options.seed is not None else scenario.spec.seed
-    if first + options.repeat - 1 > LARGEST_SEED:
+    if first + options.repeat - 1 > MAX_SEED:
         told = f"{options.repeat} runs of {scenario.title} from seed {first} on"
-        raise UsageError(f"{told} would need seeds beyond the largest, {LARGEST_SEED}")
+        raise UsageError(f"{told} would need seeds beyond the largest, {MAX_SEED}")
     return range(first, first + options.repeat)
 
 

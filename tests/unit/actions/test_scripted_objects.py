@@ -139,4 +139,4 @@ def test_teleport_sets_an_object_down_and_says_how_far():
 def test_a_mark_is_written_down():
     stage = FakeStage()
     perform(stage, mark={"name": "in the aisle", "note": "sees the rack"})
-    assert stage.done == [("tell", Event(0, EventKind.MARK, "in the aisle", {"note": "sees the rack"}))]
+    assert stage.done == [("record_world_event", Event(0, EventKind.MARK, "in the aisle", {"note": "sees the rack"}))]

@@ -164,4 +164,7 @@ def test_missing_dynamic_linker_is_reported(run, tmp_path: Path) -> None:
     subprocess.run(["gcc", linker, "-o", str(tmp_path / "nav"), str(tmp_path / "main.c")], check=True)
     ended = run("./nav")
     assert ended.code == 3
-    assert "cannot be started: No such file or directory: it is there, but not what it needs to be run" in ended.out
+    assert (
+        "cannot be started: No such file or directory: the file exists, but something that it needs does not"
+        in ended.out
+    )

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from simscen.core.random_streams import LARGEST_SEED, Streams
+from simscen.core.random_streams import MAX_SEED, Streams
 
 
 def test_the_same_seed_and_name_give_the_same_stream():
@@ -19,11 +19,11 @@ def test_another_seed_or_name_gives_another_stream(seed, name):
 def test_integers_for_engines_lie_in_their_range():
     seeds = [Streams(seed).integer("planner#1") for seed in range(1, 500)]
     assert min(seeds) >= 1
-    assert max(seeds) <= LARGEST_SEED
+    assert max(seeds) <= MAX_SEED
     assert len(set(seeds)) == len(seeds)
 
 
-@pytest.mark.parametrize("seed", [0, -1, LARGEST_SEED + 1])
+@pytest.mark.parametrize("seed", [0, -1, MAX_SEED + 1])
 def test_a_seed_out_of_range_is_refused(seed):
     with pytest.raises(ValueError, match="seed must lie in"):
         Streams(seed)

@@ -44,7 +44,7 @@ print(seen)
 kinds = []
 while True:
     kind, body = engine.receive()
-    kinds.append(wire.KINDS[kind])
+    kinds.append(wire.KIND_NAMES[kind])
     if kind == wire.ANSWER:
         tick, said = wire.from_answer(body)
         kinds.append([number for number, _ in said])

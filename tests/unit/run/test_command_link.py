@@ -9,18 +9,18 @@ GO, FAST = Twist(0.3), Twist(0.5)
 def test_the_stack_sends_at_its_rate_and_at_once_when_it_wants_something_else():
     link = CommandLink(12, 120)
     wanted = [GO] * 15 + [STOP] * 15
-    assert [tick for tick, command in enumerate(wanted) if link.sends(tick, command)] == [0, 12, 15, 24]
+    assert [tick for tick, command in enumerate(wanted) if link.sends_message(tick, command)] == [0, 12, 15, 24]
 
 
 def test_a_base_that_hears_nothing_keeps_the_last_command_and_stops_after_its_timeout():
     link = CommandLink(12, 120)
-    link.hear(24, GO)
-    assert [link.driven(tick) for tick in (24, 100, 144, 145, 500)] == [GO, GO, GO, STOP, STOP]
-    link.hear(600, FAST)
-    assert link.driven(606) == FAST
+    link.receive(24, GO)
+    assert [link.active_command(tick) for tick in (24, 100, 144, 145, 500)] == [GO, GO, GO, STOP, STOP]
+    link.receive(600, FAST)
+    assert link.active_command(606) == FAST
 
 
 def test_a_timeout_shorter_than_the_time_between_two_commands_lets_it_drive_all_the_same():
     link = CommandLink(48, 12)
-    link.hear(0, GO)
-    assert link.driven(47) == GO
+    link.receive(0, GO)
+    assert link.active_command(47) == GO

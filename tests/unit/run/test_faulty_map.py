@@ -41,5 +41,5 @@ def test_only_the_robot_whose_map_has_a_fault_gets_another(two) -> None:
     prepared = two(", faults: [{sensor: map, shift: {x: 10 cm}}]")
     run = apply_map_faults(prepared, seed=1)
     assert run.robots["a"] is prepared.robots["a"]
-    assert run.robots["b"].mapped == (0,)
+    assert run.robots["b"].map_faults == (0,)
     assert run.robots["b"].map is not prepared.robots["b"].map

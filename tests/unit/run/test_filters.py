@@ -62,7 +62,7 @@ def test_a_filter_switched_as_a_whole_takes_its_mask_along_and_gives_back_what_w
         ("`wet` was on already", "keepout", True, "wet", None),
         ("`dry` was off already", "keepout", False, "dry", None),
         ("`slow` was on already", "speed", True, "slow", 0.2),
-        ("`dry` is no speed zone of the stack, and has no speed limit", "speed", True, "dry", None),
+        ("`dry` is not a speed zone of the stack and has no speed limit", "speed", True, "dry", None),
         ("the stack's keepout filter was on already", "keepout", True, None, None),
     ],
 )

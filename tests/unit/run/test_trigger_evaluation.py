@@ -21,7 +21,7 @@ class Now:
 
 def firings(trigger: dict, travelled, seed=1):
     firing = TriggerState(Trigger.model_validate(trigger), np.random.default_rng(seed))
-    return [firing.fires(Now(24 * beat, value)) for beat, value in enumerate(travelled)]
+    return [firing.count_firings(Now(24 * beat, value)) for beat, value in enumerate(travelled)]
 
 
 def test_a_rising_trigger_fires_once_when_its_condition_becomes_true():

@@ -33,7 +33,7 @@ class Now:
     clearance: float | None = None
     scans: dict = field(default_factory=dict)
 
-    def scanned(self, sensor):
+    def last_scan_tick(self, sensor):
         return max(self.scans.values(), default=None) if sensor is None else self.scans.get(sensor)
 
     def region(self, name):

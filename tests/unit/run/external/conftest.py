@@ -68,6 +68,6 @@ def play(load: Load, tmp_path: Path) -> Play:
     """Runs the scenario in this process; the log is run.mcap, what the program prints is in stack.log."""
 
     def run(text: str, **lines):
-        return simulate(prepare(load(text, **lines)), log=tmp_path / "run.mcap", printed=tmp_path / "stack.log")
+        return simulate(prepare(load(text, **lines)), log=tmp_path / "run.mcap", stack_log=tmp_path / "stack.log")
 
     return run

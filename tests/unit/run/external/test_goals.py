@@ -81,16 +81,16 @@ def test_after_a_failure_the_other_goals_are_dropped_or_follow_as_the_scenario_s
 @pytest.mark.parametrize(
     ("events", "says"),
     [
-        ([("goal.reached", "desk")], "goal.reached `desk`, but none is under way"),
+        ([("goal.reached", "desk")], "goal.reached `desk`, but no goal is active"),
         ([("goal.accepted", "shelf")], "goal.accepted `shelf`, but the next one is `desk`"),
-        ([("goal.accepted", "desk")] * 2, "goal.accepted, but goal `desk` is under way"),
+        ([("goal.accepted", "desk")] * 2, "goal.accepted, but goal `desk` is active"),
         ([("goal.accepted", ""), ("goal.reached", "shelf")], "goal.reached `shelf`, but the current one is `desk`"),
-        ([("goal.accepted", ""), ("goal.reached", ""), ("goal.accepted", "")], "but none is waiting"),
-        ([("goal.canceled", "desk")], "goal.canceled `desk`, but none is under way"),
+        ([("goal.accepted", ""), ("goal.reached", ""), ("goal.accepted", "")], "but there is no next goal"),
+        ([("goal.canceled", "desk")], "goal.canceled `desk`, but no goal is active"),
     ],
 )
 def test_a_word_about_a_goal_that_cannot_be_is_an_error(play, events: list[tuple[str, str]], says: str) -> None:
-    said = "".join(f"    peer.goals.say({kind!r}, {name!r})\n" for kind, name in events)
+    said = "".join(f"    peer.goals.report({kind!r}, {name!r})\n" for kind, name in events)
     with pytest.raises(RunError) as error:
         play(HELLO + "for step in peer:\n" + said + STAND)
     assert error.value.kind == "stack-protocol"
@@ -144,9 +144,9 @@ def test_the_time_of_a_goal_is_kept_even_if_the_stack_does_not(play) -> None:
 def test_replans_and_recoveries_that_a_stack_tells_of_are_counted(play) -> None:
     said = (
         "    if step.tick == 12:\n"
-        "        peer.goals.say('plan.made', 'desk', reason='blocked', length=1.5)\n"
-        "        peer.goals.say('recovery.started', 'spin', error_code=208)\n"
-        "        peer.goals.say('recovery.ended', 'spin', outcome='done')\n"
+        "        peer.goals.report('plan.made', 'desk', reason='blocked', length=1.5)\n"
+        "        peer.goals.report('recovery.started', 'spin', error_code=208)\n"
+        "        peer.goals.report('recovery.ended', 'spin', outcome='done')\n"
     )
     text = HELLO + "for step in peer:\n    peer.goals.accept()\n" + said + STAND
     run = play(text, **{"pass": "[{replans: {min: 1, max: 1}}, {recoveries: {min: 1, max: 1, name: spin}}]"})

@@ -30,7 +30,7 @@ def test_a_stack_that_does_not_know_the_mode_is_told_apart_from_one_that_fails(p
     with pytest.raises(RunError) as error:
         play(OLD + DRIVE, navigation=f"{{mode: {mode}}}")
     assert error.value.kind == "stack-protocol"
-    assert f"sends goals by {mode}, which this stack does not know; it knows navigate_to_pose" in str(error.value)
+    assert f"sends goals by {mode}, which this stack does not support; it supports navigate_to_pose" in str(error.value)
 
 
 def test_a_stack_that_says_nothing_of_modes_takes_goals_one_after_the_other(play) -> None:
@@ -44,7 +44,7 @@ def test_a_stack_that_says_nothing_of_modes_takes_goals_one_after_the_other(play
         "peer =",
     )
     assert play(older + DRIVE).result.outcome is Outcome.PASSED
-    with pytest.raises(RunError, match="does not know"):
+    with pytest.raises(RunError, match="does not support"):
         play(older + DRIVE, navigation="{mode: follow_waypoints}")
 
 
@@ -95,13 +95,13 @@ def test_a_wait_is_kept_by_the_peer_and_by_the_engine(play) -> None:
 @pytest.mark.parametrize(
     ("said", "says"),
     [
-        ([("goal.accepted", "a"), ("goal.reached", "a"), ("goal.accepted", "b")], "is to stay where it is for a while"),
-        ([("goal.accepted", "a"), ("goal.passed", "a")], "which is a goal to stop at"),
-        ([("goal.passed", "a")], "none is under way"),
+        ([("goal.accepted", "a"), ("goal.reached", "a"), ("goal.accepted", "b")], "must still wait at its last goal"),
+        ([("goal.accepted", "a"), ("goal.passed", "a")], "which is a goal without `via`"),
+        ([("goal.passed", "a")], "no goal is active"),
     ],
 )
 def test_a_word_that_cannot_be_is_an_error(play, said, says: str) -> None:
-    lines = "".join(f"    peer.goals.say({kind!r}, {name!r})\n" for kind, name in said)
+    lines = "".join(f"    peer.goals.report({kind!r}, {name!r})\n" for kind, name in said)
     goals = "[{name: a, pose: {x: 1, y: 1}, on_reached: {wait: 0.5}}, {name: b, pose: {x: 2, y: 1}}]"
     with pytest.raises(RunError, match=says) as error:
         play(KNOWS + "for step in peer:\n" + lines + "    step.drive(0.0, 0.0)\n", goals=goals)

@@ -83,7 +83,7 @@ def test_each_is_told_whose_it_is_and_leaves_what_it_printed_and_said(fleet, tmp
 def test_an_error_names_the_robot_and_leaves_no_other_stack_behind(fleet, tmp_path, does, kind, told) -> None:
     steps = "for step in peer:\n    step.drive(0, 0)\n    if step.tick and peer.robot_name == 'right': "
     with pytest.raises(RunError) as raised:
-        simulate(fleet(HELLO + steps + does, answer_limit=2.0), printed=tmp_path / "stack.log")
+        simulate(fleet(HELLO + steps + does, answer_limit=2.0), stack_log=tmp_path / "stack.log")
     assert (raised.value.kind, told in str(raised.value)) == (kind, True), str(raised.value)
     assert_gone(tmp_path)
 
@@ -91,7 +91,7 @@ def test_an_error_names_the_robot_and_leaves_no_other_stack_behind(fleet, tmp_pa
 def test_one_that_never_answers_hello_is_told_and_the_other_is_ended(fleet, tmp_path: Path) -> None:
     silent = NOTED + RIGHT + "time.sleep(60)\n"
     with pytest.raises(RunError, match=r"stack mine of robot `right`: no answer to HELLO within 1 s") as raised:
-        simulate(fleet(silent + HELLO + DRIVE, start_limit=1.0), printed=tmp_path / "stack.log")
+        simulate(fleet(silent + HELLO + DRIVE, start_limit=1.0), stack_log=tmp_path / "stack.log")
     assert raised.value.kind == "stack-timeout"
     assert_gone(tmp_path)
 
@@ -108,7 +108,7 @@ def test_both_are_told_the_end_before_either_is_waited_for(fleet, tmp_path: Path
         "peer._connection.send_json = meet\n"
     )
     drive = HELLO + meets + "for step in peer: step.drive(0, 0)\n"
-    assert simulate(fleet(drive), printed=tmp_path / "stack.log").result.outcome is Outcome.PASSED
+    assert simulate(fleet(drive), stack_log=tmp_path / "stack.log").result.outcome is Outcome.PASSED
     assert [(tmp_path / f"stack.{name}.log").read_text().split()[-1] for name in ("left", "right")] == ["met", "met"]
 
 
@@ -135,5 +135,5 @@ def test_a_robot_of_its_own_has_no_name(load, tmp_path: Path, monkeypatch: pytes
     monkeypatch.setenv("SIMSCEN_ROBOT", "somebody")
     told = "print(repr(peer.robot_name), 'SIMSCEN_ROBOT' in os.environ)\n"
     loaded = load('peer = Peer("mine", topics=["/odom"])\n' + told + DRIVE)
-    simulate(prepare(loaded), printed=tmp_path / "stack.log")
+    simulate(prepare(loaded), stack_log=tmp_path / "stack.log")
     assert (tmp_path / "stack.log").read_text().split() == ["''", "False"]

@@ -124,8 +124,8 @@ def test_an_event_of_any_kind_is_heard_or_refused_and_can_be_logged(said) -> Non
     goals = GoalTracker(True, 240)
     with suppress(ProtocolViolation):
         for event in understand(**{"/simscen/events": messages.string(json.dumps(said))}).events:
-            goals.hear(240, event)
-    for event in goals.take():
+            goals.process(240, event)
+    for event in goals.take_events():
         string(to_json(event))
         log((1, 0), 20, "simscen", sentence(event))
         assert json.loads(to_json(event), parse_constant=pytest.fail)
@@ -135,7 +135,7 @@ def test_an_event_of_any_kind_is_heard_or_refused_and_can_be_logged(said) -> Non
 def test_any_welcome_is_taken_or_refused_and_can_be_logged(told) -> None:
     told.setdefault("protocol", 1)
     with suppress(ProtocolViolation, wire.Malformed):
-        welcome = Welcome.of(wire.WELCOME, json.dumps(told).encode(), TopicTable.of([]))
+        welcome = Welcome.parse(wire.WELCOME, json.dumps(told).encode(), TopicTable.build([]))
         assert all(text.encode() is not None for text in welcome.facts.values())
 
 
@@ -163,10 +163,10 @@ def test_any_answer_is_read_or_malformed(body: bytes) -> None:
 def test_an_event_that_no_log_takes_is_refused(said: str) -> None:
     with pytest.raises(ProtocolViolation):
         for event in understand(**{"/simscen/events": messages.string(said)}).events:
-            GoalTracker(True, 240).hear(240, event)
+            GoalTracker(True, 240).process(240, event)
 
 
 @pytest.mark.parametrize("told", ['{"protocol": 1, "name": "\\ud800"}', '{"protocol": 1, "about": {"x": NaN}}'])
 def test_a_welcome_that_no_log_takes_is_refused(told: str) -> None:
     with pytest.raises((ProtocolViolation, wire.Malformed)):
-        Welcome.of(wire.WELCOME, told.encode(), TopicTable.of([]))
+        Welcome.parse(wire.WELCOME, told.encode(), TopicTable.build([]))
