@@ -13,7 +13,7 @@ CellIndices = npt.NDArray[np.int64]
 EIGHT_NEIGHBORS = tuple((a, b) for a in range(-1, 2) for b in range(-1, 2) if (a, b) != (0, 0))
 """Moves (rows, columns) to the eight neighbors: paths are at most 8.2 % longer than a straight line."""
 SIXTEEN_NEIGHBORS = tuple((a, b) for a in range(-2, 3) for b in range(-2, 3) if math.gcd(a, b) == 1)
-"""These and knight's moves: paths are at most 2.8 % longer than a straight line."""
+"""Moves to the eight neighbors and knight's moves: paths are at most 2.8 % longer than a straight line."""
 
 
 class GridGraph:
@@ -36,59 +36,59 @@ class GridGraph:
         self._width: int = free.shape[1]
         flat = inner.ravel()
         self._cells = np.flatnonzero(flat)
-        self._number: npt.NDArray[np.int32] = np.full(flat.size, -1, dtype=np.int32)
-        self._number[self._cells] = np.arange(len(self._cells), dtype=np.int32)
+        self._node_of_cell: npt.NDArray[np.int32] = np.full(flat.size, -1, dtype=np.int32)
+        self._node_of_cell[self._cells] = np.arange(len(self._cells), dtype=np.int32)
         possible = np.empty((len(self._cells), len(moves)), dtype=np.bool_)
         for k, move in enumerate(moves):
             possible[:, k] = flat[self._cells + self._step(move)]
-            for passed in _passed(move):
-                possible[:, k] &= flat[self._cells + self._step(passed)]
-        targets = self._number[self._cells[:, None] + np.array([self._step(move) for move in moves])]
+            for crossed in _crossed_cells(move):
+                possible[:, k] &= flat[self._cells + self._step(crossed)]
+        targets = self._node_of_cell[self._cells[:, None] + np.array([self._step(move) for move in moves])]
         lengths: npt.NDArray[np.floating] = np.array([math.hypot(*move) for move in moves])
         if prices is not None:
             price = prices.ravel()[self._cells]
             lengths = 0.5 * (price[:, None] + price[targets]) * lengths
-        begins: npt.NDArray[np.int32] = np.zeros(len(self._cells) + 1, dtype=np.int32)
-        np.cumsum(possible.sum(axis=1), out=begins[1:])
+        row_starts: npt.NDArray[np.int32] = np.zeros(len(self._cells) + 1, dtype=np.int32)
+        np.cumsum(possible.sum(axis=1), out=row_starts[1:])
         data = np.broadcast_to(lengths, possible.shape)[possible]
-        self._graph = csr_array((data, targets[possible], begins), shape=(len(self._cells),) * 2)
+        self._graph = csr_array((data, targets[possible], row_starts), shape=(len(self._cells),) * 2)
 
-    def way(self, start: tuple[int, int], goal: tuple[int, int]) -> CellIndices | None:
+    def shortest_path(self, start: tuple[int, int], goal: tuple[int, int]) -> CellIndices | None:
         """Return the cells (n, 2) of a shortest path between two free cells (row, column), or None."""
         from scipy.sparse.csgraph import dijkstra
 
         first, last = self._index(start), self._index(goal)
         if first < 0 or last < 0:
             return None
-        lengths, before = dijkstra(self._graph, indices=np.array([first]), return_predecessors=True)
+        lengths, predecessors = dijkstra(self._graph, indices=np.array([first]), return_predecessors=True)
         if not np.isfinite(lengths[0, last]):
             return None
-        way = [last]
-        while way[-1] != first:
-            way.append(int(before[0, way[-1]]))
-        return np.column_stack(np.divmod(self._cells[way[::-1]], self._width))
+        path = [last]
+        while path[-1] != first:
+            path.append(int(predecessors[0, path[-1]]))
+        return np.column_stack(np.divmod(self._cells[path[::-1]], self._width))
 
-    def joined(self, cells: Sequence[tuple[int, int] | None]) -> CellIndices:
+    def connected_cells(self, cells: Sequence[tuple[int, int] | None]) -> CellIndices:
         """Return the free cells (n, 2) that are connected with one of `cells`."""
         from scipy.sparse.csgraph import connected_components
 
         _, labels = connected_components(self._graph, directed=False)
-        wanted = [labels[self._index(cell)] for cell in cells if cell is not None and self._index(cell) >= 0]
-        return np.column_stack(np.divmod(self._cells[np.isin(labels, wanted)], self._width))
+        reachable_labels = [labels[self._index(cell)] for cell in cells if cell is not None and self._index(cell) >= 0]
+        return np.column_stack(np.divmod(self._cells[np.isin(labels, reachable_labels)], self._width))
 
     def is_free(self, cells: CellIndices) -> CellMask:
         """Return which of the cells (n, 2) are free."""
-        free: CellMask = self._number[cells[:, 0] * self._width + cells[:, 1]] >= 0
+        free: CellMask = self._node_of_cell[cells[:, 0] * self._width + cells[:, 1]] >= 0
         return free
 
     def _step(self, move: tuple[int, int]) -> int:
         return move[0] * self._width + move[1]
 
     def _index(self, cell: tuple[int, int]) -> int:
-        return int(self._number[self._step(cell)])
+        return int(self._node_of_cell[self._step(cell)])
 
 
-def _passed(move: tuple[int, int]) -> list[tuple[int, int]]:
+def _crossed_cells(move: tuple[int, int]) -> list[tuple[int, int]]:
     """Return the cells that a move crosses besides its ends."""
     a, b = move
     if abs(a) == 2:
@@ -98,11 +98,11 @@ def _passed(move: tuple[int, int]) -> list[tuple[int, int]]:
     return [(a, 0), (0, b)] if a and b else []
 
 
-def resample_polyline(way: Array, spacing: float, least: int = 1) -> Array:
-    """Return a polyline (n, 2) with evenly spaced points, at most `spacing` m apart, in at least `least` segments."""
-    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
-    wanted = np.linspace(0.0, along[-1], max(least, math.ceil(along[-1] / spacing)) + 1)
-    return np.column_stack((np.interp(wanted, along, way[:, 0]), np.interp(wanted, along, way[:, 1])))
+def resample_polyline(points: Array, spacing: float, min_segments: int = 1) -> Array:
+    """Return a polyline (n, 2) of at least `min_segments` equally long segments of at most `spacing` m."""
+    distances = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    samples = np.linspace(0.0, distances[-1], max(min_segments, math.ceil(distances[-1] / spacing)) + 1)
+    return np.column_stack((np.interp(samples, distances, points[:, 0]), np.interp(samples, distances, points[:, 1])))
 
 
 def polyline_length(points: Array) -> float:

@@ -1,10 +1,10 @@
-"""Everything that an author of plug-ins imports, from one place that stays: `from simscen.plugin import PlannerSpec`.
+"""Stable interface for plug-in authors: `from simscen.plugin import PlannerSpec`.
 
 SI units throughout: meters, seconds, radians, m/s, rad/s. The map frame is that of the robot's map; the base frame has
-x forward and y to the left, and yaw turns anticlockwise. Arrays are numpy's, float64 unless something else is said.
+x forward and y to the left, and yaw is counterclockwise. Arrays are numpy's, float64 unless stated otherwise.
 
-Each name is imported when it is asked for: a specification imports no engine, and validating a scenario imports no more
-than specifications. What is not here may change without notice.
+Each name is imported on first use, so that a specification does not import an engine, and validating a scenario imports
+only specifications. Names that are not listed here can change without notice.
 """
 
 from __future__ import annotations
@@ -213,8 +213,8 @@ __all__ = [
     "wrap",
 ]
 
-_WHERE = {
-    # What a specification is made of.
+_NAMES_BY_MODULE = {
+    # Parts of specifications.
     "simscen.spec.base": (
         "Spec",
         "Value",
@@ -251,7 +251,7 @@ _WHERE = {
         "PoseSpec",
         "RegionName",
     ),
-    # What a specification is: one base for each kind.
+    # Base classes of specifications.
     "simscen.model.stack": ("InProcessStack",),
     "simscen.model.recovery": ("BehaviorSpec",),
     "simscen.model.checkers": ("GoalCheckerSpec",),
@@ -273,7 +273,7 @@ _WHERE = {
     ),
     "simscen.triggers.base": ("Condition",),
     "simscen.actions.base": ("Action",),
-    # What a component promises, and what it is installed in.
+    # Interfaces of components, and their environment.
     "simscen.stack.protocols": (
         "Behavior",
         "Controller",
@@ -299,7 +299,7 @@ _WHERE = {
         "SensorSetting",
         "SensorView",
     ),
-    # What a criterion measures and says.
+    # Measurements and findings of criteria.
     "simscen.criteria.findings": (
         "at_least",
         "at_most",
@@ -316,7 +316,7 @@ _WHERE = {
         "truth",
         "turn_rate",
     ),
-    # The words that all speak.
+    # Shared data types.
     "simscen.core.records.case": ("Case",),
     "simscen.core.random_streams": ("Streams",),
     "simscen.core.records.events": (
@@ -378,7 +378,7 @@ _WHERE = {
         "Zones",
     ),
 }
-_MODULE_OF = {name: module for module, names in _WHERE.items() for name in names}
+_MODULE_OF = {name: module for module, names in _NAMES_BY_MODULE.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:

@@ -1,1 +1,1 @@
-"""The files that worlds and robots are made of: one reader of XML, one way to find what they name, one fence."""
+"""Files of worlds and robots: XML parser, URI resolution, and the restriction to allowed folders."""

@@ -1,4 +1,4 @@
-"""The only door to the disk for what a world or a robot names: all of it lies in the folders that the user allowed."""
+"""Access to the files that worlds and robots refer to, restricted to the folders that the user allowed."""
 
 import errno
 import os
@@ -19,11 +19,11 @@ from simscen.assets.uris import (
 )
 from simscen.core.files import record_read_file
 
-LONGEST_PATH = 1000
+MAX_PATH_LENGTH = 1000
 
 
 class UnusableFile(Exception):
-    """Why a file cannot be had, and what helps; never says anything about its content."""
+    """A file cannot be used: the reason and a hint. The message never contains content of the file."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.hint = hint
@@ -31,14 +31,14 @@ class UnusableFile(Exception):
 
 
 class NoSuchFile(UnusableFile):
-    """There is nothing in the folders that it could mean."""
+    """No file in the allowed folders matches."""
 
 
 @dataclass(frozen=True)
 class AllowedFolders:
-    """The folders that files must lie in, absolute and with links followed: the scenarios' root, and others.
+    """Absolute real paths of the folders that files must be in: the root of the scenarios first, then the world paths.
 
-    `packages` are ROS packages by name that need not be looked for.
+    `packages` are the known folders of ROS packages by name, which are used without a search.
     """
 
     roots: tuple[Path, ...]
@@ -46,27 +46,27 @@ class AllowedFolders:
 
     @classmethod
     def of(cls, roots: Sequence[Path], packages: Mapping[str, Path] | None = None) -> Self:
-        """As given by the caller."""
+        """Return the allowed folders with symbolic links resolved."""
         return cls(tuple(Path(os.path.realpath(root)) for root in roots), packages or {})
 
     @property
     def search(self) -> tuple[Path, ...]:
-        """The folders besides the root: what is not beside the file that names it is looked for in them."""
+        """The folders besides the root, in which files are searched that are not next to the referring file."""
         return self.roots[1:]
 
     def shown(self, path: Path) -> str:
         """Return the path of a file for messages: relative to the root if it is below it, otherwise absolute."""
         return path.relative_to(self.roots[0]).as_posix() if path.is_relative_to(self.roots[0]) else str(path)
 
-    def find(self, uri: str, beside: Path, *, absolute: bool = False) -> Path:
-        """Return the real path of a URI or path in a file in the folder `beside`; see addresses.places.
+    def find(self, uri: str, base: Path, *, absolute: bool = False) -> Path:
+        """Return the real path of a URI or path in a file of the folder `base`; see `uris.candidate_paths`.
 
         `absolute`: accept absolute paths, which xacro creates from `$(find package)` and which Gazebo saves in worlds.
         Raises UnusableFile, or NoSuchFile if the file does not exist.
         """
         if not uri or not uri.isprintable():
             raise UnusableFile("control character in the uri" if uri else "the uri is empty")
-        if len(uri) > LONGEST_PATH:
+        if len(uri) > MAX_PATH_LENGTH:
             raise UnusableFile("not a usable path")
         if "://" in uri and not uri.startswith(SCHEMES) and parse_fuel_uri(uri) is None:
             raise UnusableFile("only model://, package://, file://, Fuel and relative paths are read",
@@ -75,19 +75,20 @@ class AllowedFolders:
             raise UnusableFile("the name of a model is missing")
         if not absolute and PurePosixPath(uri.removeprefix("file://")).is_absolute():
             raise UnusableFile("absolute paths are not read", "write it relative to this file")
-        here, tried = Path(os.path.realpath(beside)), []
-        for folder, candidate in candidate_paths(uri, here, self.roots, self.packages):
-            if folder in (here, *self.search):  # others may be links to where nobody is to be told what there is
+        real_base, tried = Path(os.path.realpath(base)), []
+        for folder, candidate in candidate_paths(uri, real_base, self.roots, self.packages):
+            # Other folders could be links, and hints must not reveal their content.
+            if folder in (real_base, *self.search):
                 tried.append((folder, candidate))
             try:
                 return self.resolve(candidate)
             except NoSuchFile:
                 continue
-        raise NoSuchFile(_ABSENT, self._hint(uri, tried))
+        raise NoSuchFile(_NOT_FOUND, self._hint(uri, tried))
 
     @staticmethod
     def named(path: Path) -> Path:
-        """Return the path of a file without resolving links of its folder; the file itself must not lead out."""
+        """Return the path of a file with the links of its folder resolved, but not a link in its last component."""
         return Path(os.path.realpath(path.parent)) / path.name
 
     def package(self, name: str, near: Path) -> Path:
@@ -98,22 +99,22 @@ class AllowedFolders:
             raise UnusableFile(f"{name[:60]!r} is not the name of a package")
         for folder in (*(folder / name for folder in self.search), *package_folder_candidates(name, near, self.roots)):
             real = Path(os.path.realpath(folder))
-            if self._holds(real) and real.is_dir():
+            if self._contains(real) and real.is_dir():
                 return real
-        hint = f"put a folder {name} beside the robot's package, name the one that holds it with --world-path, or say "
+        hint = f"put a folder {name} next to the robot's package, pass its parent folder with --world-path, or set "
         raise NoSuchFile(f"there is no package {name!r}", hint + f"`packages: {{{name}: path}}` in the *.robot.yaml")
 
     def resolve(self, path: Path) -> Path:
         """Return the real path of an existing file in the allowed folders; raises UnusableFile or NoSuchFile."""
-        if len(str(path)) > LONGEST_PATH or "\0" in str(path):
+        if len(str(path)) > MAX_PATH_LENGTH or "\0" in str(path):
             raise UnusableFile("not a usable path")
-        # First by the letters alone, so that nothing outside is even asked whether it exists.
-        self._contain(Path(os.path.normpath(path)))
+        # Check the path without access to the disk first, so that it does not reveal whether files outside exist.
+        self._require_inside(Path(os.path.normpath(path)))
         try:
             real = Path(os.path.realpath(path, strict=True))
         except OSError as error:
-            raise _trouble(error) from error
-        self._contain(real)
+            raise _to_unusable_file(error) from error
+        self._require_inside(real)
         return real
 
     def check(self, path: Path, limit: int) -> Path:
@@ -125,7 +126,7 @@ class AllowedFolders:
         try:
             status = real.stat()
         except OSError as error:
-            raise _trouble(error) from error
+            raise _to_unusable_file(error) from error
         if not stat.S_ISREG(status.st_mode):
             raise UnusableFile("not a regular file")
         if status.st_size > limit:
@@ -139,31 +140,31 @@ class AllowedFolders:
         try:
             return real, real.read_bytes()
         except OSError as error:
-            raise _trouble(error) from error
+            raise _to_unusable_file(error) from error
 
-    def _holds(self, path: Path) -> bool:
+    def _contains(self, path: Path) -> bool:
         return any(path.is_relative_to(folder) for folder in self.roots)
 
-    def _contain(self, path: Path) -> None:
-        if not self._holds(path):
+    def _require_inside(self, path: Path) -> None:
+        if not self._contains(path):
             raise UnusableFile("outside the scenario root and the world paths")
 
     def _hint(self, uri: str, tried: list[tuple[Path, Path]]) -> str:
-        near = next((found for folder, path in tried if (found := find_similar_name(folder, path))), None)
-        if near:
-            return f"did you mean `{near}`?"
+        similar = next((found for folder, path in tried if (found := find_similar_name(folder, path))), None)
+        if similar:
+            return f"did you mean `{similar}`?"
         if parse_fuel_uri(uri) and not self.search:
             return "allow Fuel's cache with --world-path ~/.gz/fuel, or a folder that holds the downloaded model"
-        looked = ", ".join(dict.fromkeys(self.shown(folder) or "." for folder, _ in tried)) or "no folder"
-        return f"looked in {looked}; allow its folder with --world-path"
+        searched = ", ".join(dict.fromkeys(self.shown(folder) or "." for folder, _ in tried)) or "no folder"
+        return f"looked in {searched}; allow its folder with --world-path"
 
 
-_ABSENT = "no such file or directory"
+_NOT_FOUND = "no such file or directory"
 
 
-def _trouble(error: OSError) -> UnusableFile:
+def _to_unusable_file(error: OSError) -> UnusableFile:
     if error.errno in (errno.ENOENT, errno.ENOTDIR):
-        return NoSuchFile(_ABSENT)
+        return NoSuchFile(_NOT_FOUND)
     reasons = {
         errno.ELOOP: "symbolic link loop",
         errno.EACCES: "permission denied",
@@ -172,7 +173,7 @@ def _trouble(error: OSError) -> UnusableFile:
     return UnusableFile(reasons.get(error.errno or 0, error.strerror or "cannot be read"))
 
 
-MESHES = (".dae", ".stl", ".obj")
+MESH_SUFFIXES = (".dae", ".stl", ".obj")
 """Suffixes that published files confuse with each other."""
 
 
@@ -181,16 +182,16 @@ def find_similar_name(folder: Path, path: Path) -> str | None:
 
     Symbolic links are not followed, so that messages do not reveal names outside the folder.
     """
-    here, parts = folder, path.relative_to(folder).parts if path.is_relative_to(folder) else ("..",)
+    current, parts = folder, path.relative_to(folder).parts if path.is_relative_to(folder) else ("..",)
     for part in parts:
-        found = None if part == ".." else _spelled(here, part)
-        if found is None or (here / found).is_symlink():
+        found = None if part == ".." else _match_entry(current, part)
+        if found is None or (current / found).is_symlink():
             return None
-        here /= found
-    return here.relative_to(folder).as_posix()
+        current /= found
+    return current.relative_to(folder).as_posix()
 
 
-def _spelled(folder: Path, name: str) -> str | None:
+def _match_entry(folder: Path, name: str) -> str | None:
     """Return the entry of a folder with this name, or with other capitalization, or the mesh in another format."""
     try:
         entries = sorted(entry.name for entry in folder.iterdir())
@@ -198,8 +199,8 @@ def _spelled(folder: Path, name: str) -> str | None:
         return None
     if name in entries:
         return name
-    wanted = PurePath(name.casefold())
-    meant = [wanted.name]
-    if wanted.suffix in MESHES:
-        meant += [wanted.with_suffix(suffix).name for suffix in MESHES]
-    return next((entry for spelling in meant for entry in entries if entry.casefold() == spelling), None)
+    requested = PurePath(name.casefold())
+    spellings = [requested.name]
+    if requested.suffix in MESH_SUFFIXES:
+        spellings += [requested.with_suffix(suffix).name for suffix in MESH_SUFFIXES]
+    return next((entry for spelling in spellings for entry in entries if entry.casefold() == spelling), None)

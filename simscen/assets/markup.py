@@ -1,7 +1,7 @@
-"""XML with positions, and nothing of XML that reaches outside the file.
+"""XML parser that keeps line numbers and rejects everything that refers to data outside the file.
 
 The standard library's ElementTree forgets line numbers, so the tree is built here from expat's events. A document
-type declaration is refused, which rules out entity bombs and external entities at once (CWE-776, CWE-611).
+type declaration is rejected, which prevents entity bombs and external entities (CWE-776, CWE-611).
 """
 
 import re
@@ -12,16 +12,16 @@ from xml.parsers import expat
 
 from typing_extensions import Self
 
-DEEPEST = 100
-MOST_ELEMENTS = 200_000
-"""BARN's worlds have 13 000; twenty megabytes of `<a/>` would otherwise take gigabytes."""
-LONGEST_SHOWN_LINE = 300
+MAX_DEPTH = 100
+MAX_ELEMENTS = 200_000
+"""Worlds of BARN have 13,000 elements. The limit prevents that 20 MB of `<a/>` take gigabytes of memory."""
+MAX_SHOWN_LINE_BYTES = 300
 _COMMENT = re.compile(rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)|<!--(?P<text>.*?)(?:-->|\Z)", re.DOTALL)
 """A comment; CDATA sections and processing instructions match too, so that no comment is found inside them."""
 
 
 class MalformedXml(Exception):
-    """Why a text is not XML that is read, at which line and column of it, both from 1."""
+    """A text is not well-formed or not allowed XML: the reason, and its line and column, both from 1."""
 
     def __init__(self, message: str, line: int, col: int, source: str = "", hint: str = "") -> None:
         self.message, self.line, self.col, self.source, self.hint = message, line, col, source, hint
@@ -30,7 +30,7 @@ class MalformedXml(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A file that was read: its name as shown to users and the folder that its relative paths start from."""
+    """A file that was read: its name for messages, and the folder to which its relative paths refer."""
 
     name: str
     folder: str = ""
@@ -38,18 +38,18 @@ class Source:
 
     @classmethod
     def of(cls, data: bytes, name: str, folder: str = "") -> "Source":
-        """With its lines, which messages show."""
+        """Return the source with its lines, which messages show."""
         return cls(name, folder, tuple(data.split(b"\n")))
 
     def line(self, number: int) -> str:
         """Return the text of a line for a message with a caret; empty if it is too long."""
         text = self.lines[number - 1] if 0 < number <= len(self.lines) else b""
-        return text.decode("utf-8", "replace").rstrip("\r") if len(text) <= LONGEST_SHOWN_LINE else ""
+        return text.decode("utf-8", "replace").rstrip("\r") if len(text) <= MAX_SHOWN_LINE_BYTES else ""
 
 
 @dataclass(eq=False, slots=True)
 class Element:
-    """An element with its place in the file; `children` keep document order, `pieces` are of its own text."""
+    """An element with its position in the file. `children` are in document order; `text_parts` form its own text."""
 
     tag: str
     attributes: dict[str, str]
@@ -58,11 +58,11 @@ class Element:
     col: int
     parent: Self | None = None
     children: list[Self] = field(default_factory=list)
-    pieces: list[str] = field(default_factory=list)
+    text_parts: list[str] = field(default_factory=list)
 
     @property
     def name(self) -> str:
-        """Its name attribute, or nothing."""
+        """The `name` attribute, or ""."""
         return self.attributes.get("name", "")
 
     def child(self, tag: str) -> Self | None:
@@ -78,12 +78,12 @@ E = TypeVar("E", bound=Element)
 
 
 def refuse_doctype(data: bytes) -> None:
-    """Read through XML that another library will parse; raises Broken if it has a DOCTYPE or is not well-formed."""
+    """Check XML that another library will parse. Raises MalformedXml if it has a DOCTYPE or is not well-formed."""
     _run(expat.ParserCreate(), data, Source(""))
 
 
 def parse(data: bytes, source: Source, kind: type[E]) -> E:
-    """Parse an XML text into elements of a class, and return the root; raises Broken."""
+    """Parse an XML text into elements of the class `kind` and return the root. Raises MalformedXml."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
     root: list[E] = []
@@ -98,16 +98,16 @@ def parse(data: bytes, source: Source, kind: type[E]) -> E:
         element = kind(tag, attributes, source, line, col, parent)
         (parent.children if parent else root).append(element)
         open_elements.append(element)
-        if len(open_elements) > DEEPEST:
-            raise MalformedXml(f"nested deeper than {DEEPEST}", line, col)
-        if count > MOST_ELEMENTS:
-            raise MalformedXml(f"more than {MOST_ELEMENTS} elements", line, col)
+        if len(open_elements) > MAX_DEPTH:
+            raise MalformedXml(f"nested deeper than {MAX_DEPTH}", line, col)
+        if count > MAX_ELEMENTS:
+            raise MalformedXml(f"more than {MAX_ELEMENTS} elements", line, col)
 
     def end(_: str) -> None:
         open_elements.pop()
 
     def characters(text: str) -> None:
-        open_elements[-1].pieces.append(text)
+        open_elements[-1].text_parts.append(text)
 
     parser.StartElementHandler = start
     parser.EndElementHandler = end

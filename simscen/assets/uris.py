@@ -1,4 +1,4 @@
-"""What the uris of Gazebo and ROS mean: which names to look for in which folders."""
+"""Resolution of Gazebo and ROS URIs: the paths at which a file may be found."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,18 +7,18 @@ from pathlib import Path
 from urllib.parse import unquote
 
 PACKAGE_SCHEMES = ("package://", "model://")
-"""ROS and Gazebo name the same folder so."""
+"""Schemes of ROS and Gazebo for a folder of a package or model."""
 SCHEMES = (*PACKAGE_SCHEMES, "file://")
 _FUEL = re.compile(
     r"https?://(?P<server>(?:fuel|app|api)\.(?:gazebosim|ignitionrobotics)\.org)/(?:\d+\.\d+/)?"
     r"(?P<owner>[^/]+)/(?P<kind>models|worlds)/(?P<name>[^/]+)(?:/(?P<version>\d+|tip))?(?:/(?:files/)?(?P<rest>.*))?"
 )
-_STANDARD = {"sun", "ground_plane"}
+_BUILTIN_MODELS = {"sun", "ground_plane"}
 
 
 @dataclass(frozen=True)
 class FuelUri:
-    """A model on Gazebo Fuel, which is never asked: what of it lies in a folder is used, as its cache has it."""
+    """URI of a model on Gazebo Fuel. Only local copies are used; simscen never connects to the server."""
 
     server: str
     owner: str
@@ -27,8 +27,8 @@ class FuelUri:
     version: str
     rest: str
 
-    def places(self, folder: Path) -> Iterator[Path]:
-        """Where it can be inside a folder: as in Fuel's cache (~/.gz/fuel), newest version first, or by its name."""
+    def candidate_paths_in(self, folder: Path) -> Iterator[Path]:
+        """Yield its possible paths in a folder: as in Fuel's cache (~/.gz/fuel), newest version first, or by name."""
         spellings = [self.name, self.name.lower()]
         for name in dict.fromkeys([*spellings, *(name.replace(" ", "_") for name in spellings)]):
             for owner in dict.fromkeys((self.owner, self.owner.lower())):
@@ -63,30 +63,30 @@ def builtin_model_name(uri: str) -> str | None:
     else:
         name = address.name if address.owner.lower().replace(" ", "") == "openrobotics" and not address.rest else ""
     name = name.lower().replace(" ", "_")
-    return name if name in _STANDARD else None
+    return name if name in _BUILTIN_MODELS else None
 
 
 def candidate_paths(
-    uri: str, beside: Path, roots: Sequence[Path], packages: Mapping[str, Path]
+    uri: str, base: Path, roots: Sequence[Path], packages: Mapping[str, Path]
 ) -> Iterator[tuple[Path, Path]]:
-    """Pairs of an allowed folder and a path in it, in the order in which a uri is looked up.
+    """Yield pairs of an allowed folder and a path in it, in the order in which they are tried for a URI.
 
-    model:// and package:// mean one of `packages`; else they start at the `roots` but the first, and then at what may
-    be a package of this name around `beside` or below the roots. file:// and bare paths start beside the file that
-    names them, then at the roots but the first, whose own name may stand first (`file://models/crate` in a folder
-    called `models`).
+    `base` is the folder of the file that refers to the URI. model:// and package:// refer to one of `packages`;
+    otherwise to all `roots` but the first, and then to possible packages of this name around `base` or below the roots.
+    file:// and bare paths are relative to `base`, then to the roots but the first, whose own name may come first
+    (`file://models/crate` in a folder called `models`).
     """
     address, search = parse_fuel_uri(uri), roots[1:]
     if address is not None:
         for folder in search:
-            yield from ((folder, place) for place in address.places(folder))
+            yield from ((folder, place) for place in address.candidate_paths_in(folder))
         return
     scheme = next((scheme for scheme in SCHEMES if uri.startswith(scheme)), "")
     rest = uri.removeprefix(scheme)
     if scheme in PACKAGE_SCHEMES:
-        yield from _in_packages(rest.lstrip("/"), beside, roots, packages)
+        yield from _in_packages(rest.lstrip("/"), base, roots, packages)
         return
-    yield beside, beside / rest
+    yield base, base / rest
     first, _, below = rest.partition("/")
     for folder in search:
         yield folder, folder / rest
@@ -95,7 +95,7 @@ def candidate_paths(
 
 
 def _in_packages(
-    path: str, beside: Path, roots: Sequence[Path], packages: Mapping[str, Path]
+    path: str, base: Path, roots: Sequence[Path], packages: Mapping[str, Path]
 ) -> Iterator[tuple[Path, Path]]:
     name, _, below = path.partition("/")
     if name in packages:
@@ -103,7 +103,7 @@ def _in_packages(
         return
     yield from ((folder, folder / path) for folder in roots[1:])
     if is_package_name(name):
-        yield from ((folder, folder / below.lstrip("/")) for folder in package_folder_candidates(name, beside, roots))
+        yield from ((folder, folder / below.lstrip("/")) for folder in package_folder_candidates(name, base, roots))
 
 
 MAX_MANIFEST_BYTES = 1 << 16
@@ -116,9 +116,9 @@ def is_package_name(name: str) -> bool:
 
 
 def package_folder_candidates(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
-    """Folders that may be the package, for a file in the folder `near`: around it, in the roots, up to two below them.
+    """Yield possible folders of a package, for a file in `near`: around it, in the roots, and up to two levels below.
 
-    A workspace holds repositories, and these hold packages, perhaps in a folder for some that belong together.
+    A workspace contains repositories, which contain packages, possibly in a folder that groups them.
     """
     for folder in (near, *near.parents):
         if folder.name == name:
@@ -134,7 +134,7 @@ def package_folder_candidates(name: str, near: Path, roots: Sequence[Path]) -> I
 
 
 def _folders_by_manifest(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
-    """Yield folders whose package.xml gives this package name; a folder may be called otherwise."""
+    """Yield folders whose package.xml contains this package name; the folder name may differ."""
     for folder in (near, *near.parents):
         if not any(folder.is_relative_to(root) for root in roots):
             break
@@ -146,7 +146,7 @@ def _folders_by_manifest(name: str, near: Path, roots: Sequence[Path]) -> Iterat
 
 
 def _manifest_name(path: Path) -> str:
-    """Return the package name in a package.xml; empty for symbolic links and for what cannot be read."""
+    """Return the package name in a package.xml; "" for symbolic links and unreadable files."""
     if path.is_symlink() or path.parent.is_symlink() or not path.is_file():
         return ""
     try:

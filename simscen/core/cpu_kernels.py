@@ -1,8 +1,8 @@
 """Choice of the CPU kernels of NumPy and OpenBLAS, so that all processors with AVX2 compute the same last bits.
 
 Both libraries choose kernels by the processor when they are loaded. The results differ in their last bits, and after
-some seconds a run differs, too. On processors with AVX2 and FMA, also on those with AVX-512, simscen uses the kernels
-for AVX2. Variables that the user has set are not changed.
+some seconds the whole run differs. On processors with AVX2 and FMA, also on those with AVX-512, simscen uses the
+kernels for AVX2. Variables that the user has set are not changed.
 """
 
 import os

@@ -55,7 +55,7 @@ Result = TypeVar("Result")
 def cached_on_instance(
     compute: Callable[Concatenate[Instance, Args], Result],
 ) -> Callable[Concatenate[Instance, Args], Result]:
-    """Return `compute` with its results cached on the instance, by the further arguments.
+    """Return `compute` with its results cached on the instance, keyed by the other arguments.
 
     Callers must not modify the result. A result that refers to the instance keeps both alive until garbage collection.
     """

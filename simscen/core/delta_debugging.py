@@ -5,7 +5,7 @@ from typing import TypeVar
 
 Part = TypeVar("Part")
 FirstFailing = Callable[[Sequence[Sequence[Part]]], int | None]
-"""Returns the index of the first candidate that still has the property, None if there is none."""
+"""Returns the index of the first candidate that still has the property, or None."""
 
 
 def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[Part]:
@@ -14,19 +14,19 @@ def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[P
     `first_failing` gets candidates, each a subset of the parts, in the order in which they are preferred. (Zeller and
     Hildebrandt: Simplifying and Isolating Failure-Inducing Input, 2002; with complements only.)
     """
-    left = list(parts)
-    if not left or first_failing([[]]) is not None:
+    remaining = list(parts)
+    if not remaining or first_failing([[]]) is not None:
         return []
-    pieces = 2
-    while len(left) > 1:
-        size = -(-len(left) // pieces)
-        starts = range(0, len(left), size)
-        complements = [[*left[:start], *left[start + size :]] for start in starts]
-        found = first_failing(complements)
-        if found is not None:
-            left, pieces = complements[found], max(2, pieces - 1)
+    chunks = 2
+    while len(remaining) > 1:
+        size = -(-len(remaining) // chunks)
+        starts = range(0, len(remaining), size)
+        complements = [[*remaining[:start], *remaining[start + size :]] for start in starts]
+        index = first_failing(complements)
+        if index is not None:
+            remaining, chunks = complements[index], max(2, chunks - 1)
         elif size == 1:
             break
         else:
-            pieces = min(len(left), 2 * pieces)
-    return left
+            chunks = min(len(remaining), 2 * chunks)
+    return remaining

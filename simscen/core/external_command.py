@@ -11,7 +11,7 @@ ANSWER_TIMEOUT_S = 10.0
 
 @dataclass(frozen=True)
 class ExternalCommand:
-    """Program that speaks the stack protocol: its arguments, its whole environment, and its working folder.
+    """Program that implements the stack protocol: its arguments, its whole environment, and its working folder.
 
     `start_limit` is the wall time in s until the program has subscribed, and `answer_limit` the wall time of each
     answer after that. The program is searched in the PATH of `env`, like in a shell. `digest` changes with the

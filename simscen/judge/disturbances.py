@@ -38,19 +38,19 @@ def missing_disturbances(
     seen = Counter(verdict.id for verdict in others)
     found = []
     for one in lacking:
-        name = one.ordered.name
+        name = one.disturbance.name
         seen[name] += 1
         unique = name if seen[name] == 1 else f"{name}#{seen[name]}"
-        found.append((Verdict(DISTURBANCE, unique, "fail", (_finding(trace, one),)), one.ordered.line))
+        found.append((Verdict(DISTURBANCE, unique, "fail", (_finding(trace, one),)), one.disturbance.line))
     return tuple(found)
 
 
 def _excused(one: DisturbanceOutcome, happened: Sequence[DisturbanceOutcome]) -> bool:
     """Return whether the step waited for an earlier step of its sequence that already has a verdict."""
-    after = one.ordered.after
+    after = one.disturbance.after
     if after is None or one.fired:
         return False
-    before = [other for other in happened if other.ordered.kind == "event"][after]
+    before = [other for other in happened if other.disturbance.kind == "event"][after]
     return not before.fired and (before.missing or _excused(before, happened))
 
 
@@ -63,7 +63,7 @@ def _numbered(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance
 
 
 def _finding(trace: Trace, one: DisturbanceOutcome) -> Finding:
-    told = f"{one.ordered.name} ({one.ordered.trigger})"
+    told = f"{one.disturbance.name} ({one.disturbance.trigger})"
     if not has_ended(trace):
         because = f"{told}, until the log stops at t = {trace.seconds(trace.end):.2f} s"
         return undecided(WHAT, because, detail=(one.effect,))

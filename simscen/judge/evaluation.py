@@ -64,7 +64,7 @@ def missing_evidence_finding(entry: AnyCriterion, coverage: LogCoverage) -> Find
     lacking = coverage.lacking(required_evidence(entry))
     if not lacking:
         return None
-    because = f"the log does not say {' nor '.join(evidence.value for evidence in lacking)}"
+    because = f"the log lacks {' and '.join(evidence.value for evidence in lacking)}"
     reasons = dict.fromkeys(reason for evidence in lacking if (reason := coverage.missing[evidence]))
     return Finding(Status.INCONCLUSIVE, entry.kind, because, "", detail=tuple(reasons))
 

@@ -96,7 +96,7 @@ def _error_data(error: RunFailure) -> dict[str, Any]:
 
 def _happening_data(one: DisturbanceOutcome, tick_rate: int) -> dict[str, Any]:
     return {
-        **asdict(one.ordered),
+        **asdict(one.disturbance),
         "fired": list(one.fired),
         "times": [tick / tick_rate for tick in one.fired],
         "happened": one.happened,

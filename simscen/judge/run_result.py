@@ -95,7 +95,7 @@ def combine_robots(
     metric `success` also exists for the run. `expected` says that the run is expected to fail.
     """
     first = next(iter(results.values()))
-    shared = {one.ordered.name for one in first.disturbances if one.ordered.kind == "event"}
+    shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
     told = [(verdict, line) for verdict, line in _lined(first) if _of_the_world(verdict, shared)]
     for name, result in results.items():
         own = ((verdict, line) for verdict, line in _lined(result) if not _of_the_world(verdict, shared))
@@ -161,12 +161,12 @@ def _shared(event: Event) -> bool:
 
 
 def _happenings(result: RunResult, kind: str) -> list[DisturbanceOutcome]:
-    return [one for one in result.disturbances if one.ordered.kind == kind]
+    return [one for one in result.disturbances if one.disturbance.kind == kind]
 
 
 def _faults(results: Mapping[str, RunResult]) -> list[DisturbanceOutcome]:
     return [
-        replace(one, ordered=replace(one.ordered, name=f"{name}/{one.ordered.name}"))
+        replace(one, disturbance=replace(one.disturbance, name=f"{name}/{one.disturbance.name}"))
         for name, result in results.items()
         for one in _happenings(result, "fault")
     ]

@@ -1,7 +1,7 @@
-"""The part of the pytest plug-in that is about scenarios: `pytest --simscen scenarios/`, and the fixture `simscen`.
+"""pytest plug-in for scenarios: `pytest --simscen scenarios/`, and the fixture `simscen`.
 
-It is loaded by every pytest in an environment where simscen is installed, so it imports nothing and collects nothing
-until it is asked: by --simscen, by `simscen_paths` in the configuration, or by a scenario's file on the command line.
+Every pytest in an environment with simscen loads this plug-in, so it imports and collects nothing unless requested by
+--simscen, by `simscen_paths` in the configuration, or by a scenario file on the command line.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Collect a scenario file if it was requested."""
-    if not file_path.name.endswith(SUFFIXES) or not _asked(file_path, parent):
+    if not file_path.name.endswith(SUFFIXES) or not _is_requested(file_path, parent):
         return None
     from simscen.pytesting.scenario_items import ScenarioFile
 
@@ -73,7 +73,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     return collected
 
 
-def _asked(file: Path, parent: pytest.Collector) -> bool:
+def _is_requested(file: Path, parent: pytest.Collector) -> bool:
     config = parent.config
     if config.getoption("--simscen") or parent.session.isinitpath(file):
         return True

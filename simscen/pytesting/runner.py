@@ -37,7 +37,7 @@ class Runner:
         """Run a scenario and return its result."""
         key = scenario.key(seed)
         job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT_S, ReplayMode.FAILED)
-        ends = [one.end for one in self._supervisor.run([job], plugins_of(scenario)) if isinstance(one, Ended)]
+        ends = [update.end for update in self._supervisor.run([job], plugins_of(scenario)) if isinstance(update, Ended)]
         return finished_run(job, ends[0])
 
     def close(self) -> None:
@@ -50,16 +50,16 @@ _RUNNER: pytest.StashKey[Runner] = pytest.StashKey()
 
 def runner_of(config: pytest.Config) -> Runner:
     """Return the runner of this process. A worker of xdist gets its folder from the controller."""
-    if (known := config.stash.get(_RUNNER, None)) is None:
-        known = config.stash[_RUNNER] = Runner(_folder(config))
-        config.add_cleanup(known.close)
-    return known
+    if (runner := config.stash.get(_RUNNER, None)) is None:
+        runner = config.stash[_RUNNER] = Runner(_folder(config))
+        config.add_cleanup(runner.close)
+    return runner
 
 
 def _folder(config: pytest.Config) -> Path:
-    told = getattr(config, "workerinput", {}).get(OUT_OPTION)
-    if told is not None:
-        return Path(told)
+    controller_folder = getattr(config, "workerinput", {}).get(OUT_OPTION)
+    if controller_folder is not None:
+        return Path(controller_folder)
     home = Path(config.getoption("--simscen-out") or config.getini(OUT_OPTION) or DEFAULT_FOLDER)
     return home / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}-pytest"
 

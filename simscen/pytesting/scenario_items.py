@@ -59,7 +59,7 @@ class ScenarioFile(pytest.File):
                 loaded = scenario.having(several_stacks=len(checks.choices) > 1)
                 for seed in scenario_seeds(loaded, options):
                     every_seed = options.repeat > 1
-                    yield ScenarioRun.made(self, loaded, seed, every_seed)
+                    yield ScenarioRun.create(self, loaded, seed, every_seed)
 
 
 class ScenarioRun(pytest.Item):
@@ -71,7 +71,7 @@ class ScenarioRun(pytest.Item):
         self._scenario, self._seed = scenario, seed
 
     @classmethod
-    def made(cls, parent: ScenarioFile, scenario: LoadedScenario, seed: int, every_seed: bool) -> ScenarioRun:
+    def create(cls, parent: ScenarioFile, scenario: LoadedScenario, seed: int, every_seed: bool) -> ScenarioRun:
         """Create an item with the scenario's tags as markers."""
         folder = scenario.id.rpartition("/")[0]
         name = short_run_name(scenario.key(seed), every_seed, f"{folder}/" if folder else "")
@@ -116,12 +116,12 @@ def _raise_errors(problems: list[Problem]) -> None:
 def _seed(config: pytest.Config) -> int | None:
     """Return the seed from the command line or the configuration. Raises UsageError."""
     given = config.getoption("--simscen-seed")
-    written = config.getini("simscen_seed")
-    if given is not None or not written:
+    setting = config.getini("simscen_seed")
+    if given is not None or not setting:
         return None if given is None else int(given)
-    if not (written.isascii() and written.isdecimal()):
-        raise UsageError(f"simscen_seed: {written!r} is not a whole number")
-    return int(written)
+    if not (setting.isascii() and setting.isdecimal()):
+        raise UsageError(f"simscen_seed: {setting!r} is not a whole number")
+    return int(setting)
 
 
 def _properties(run: RunFinished) -> list[tuple[str, object]]:
@@ -141,7 +141,7 @@ class ScenarioFailed(AssertionError):
 
 
 def failure_representation(run: RunFinished) -> Any:
-    """Return what the command line prints below a failed run.
+    """Return the lines that the command line prints below a failed run.
 
     This is the only form in which xdist transfers a failure from worker to controller; it is not public in pytest.
     """

@@ -140,7 +140,7 @@ class JournaledSession:
         """All planned runs; those that were not finished have an error."""
         if len(self.finished) == len(self.planned):
             indices = (self.finished.index(run.key) for run in self.planned)
-            return self.finished.store.picked(index for index in indices if index is not None)
+            return self.finished.store.select(index for index in indices if index is not None)
         return RunStore(self.finished.get(run.key) or self._unfinished(run) for run in self.planned)
 
     def start_event(self, folder: Path) -> SessionStarted:

@@ -242,7 +242,7 @@ def _output(run: RunFinished) -> str:
     lines = [f"{source_location(run, warning.line)}: warning: {warning.message}" for warning in warnings]
     files = (run.artifacts.picture, run.artifacts.replay, run.artifacts.mcap, run.artifacts.result)
     for each in run.result.disturbances:
-        lines.append(one_line(f"{each.ordered.kind} {disturbance_line(each, run.result.tick_rate)}"))
+        lines.append(one_line(f"{each.disturbance.kind} {disturbance_line(each, run.result.tick_rate)}"))
     escaped = [line.replace("[[ATTACHMENT|", "[ [ATTACHMENT|") for line in lines]  # user text must not attach files
     return "\n".join([*escaped, *(f"[[ATTACHMENT|{one_line(file)}]]" for file in files if file)])
 

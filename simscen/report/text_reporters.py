@@ -87,7 +87,7 @@ class SessionFormatter:
             return
         if event.comparison is not None:
             yield from comparison_lines(event.comparison, self.naming.prefix, self._columns())
-        done = self._runs.picked(index for index, run in enumerate(self._runs) if _error_kind(run) != NOT_RUN)
+        done = self._runs.select(index for index, run in enumerate(self._runs) if _error_kind(run) != NOT_RUN)
         slow = [] if self._slow is None else list(slowest_runs(done, self._slow, self._name))
         sections = [section for section in (slow, list(failed_runs(done, self._name))) if section]
         for section in sections:

@@ -1,8 +1,8 @@
-"""The ROS graph as a stack: gets the graph ready, publishes sensor data, sends goals, returns commands.
+"""Adapter that makes a ROS graph a stack: it prepares the graph, publishes sensor data, sends goals, returns commands.
 
 **Getting ready.** Nodes such as Nav2's become active only while time advances and sensor data arrive: a costmap waits
 for odom -> base_link, a planner for the pose on the map. The first step brings the readings of the robot at its start.
-If the graph is not complete by then, the adapter publishes these readings again and again with advancing time while the
+If the graph is not complete by then, the adapter publishes these readings repeatedly with advancing time while the
 simulation waits, until nothing is missing. So the time of the graph is ahead of the run's time (`Graph.offset_ns`).
 """
 
@@ -207,7 +207,7 @@ class Adapter:
                 package = topic.type.partition("/")[0]
                 raise AdapterError(
                     f"{end.node} subscribes to {self._graph.names(topic.name)}, which cannot be published: "
-                    f"{sys.executable} has no {package}; install it, or tell simscen not to publish the topic: "
+                    f"{sys.executable} has no {package}; install it, or do not publish the topic: "
                     f"--without {topic.name}"
                 )
 
@@ -242,8 +242,8 @@ class Adapter:
         if not self._ready:
             self._latest.update(messages)
         if not warming_up and not self._ready:
-            left = self._options.ready - (0.0 if self._options.warm_up else time.monotonic() - self._started_at)
-            self._wait_until_ready(now, max(0.5, min(left, STEP_SHARE * limit_s)))
+            remaining = self._options.ready - (0.0 if self._options.warm_up else time.monotonic() - self._started_at)
+            self._wait_until_ready(now, max(0.5, min(remaining, STEP_SHARE * limit_s)))
             messages = [message for message in messages if message[0] not in LATCHED]
             self._begin()
         messages = [*messages, *self._due_initial_pose()]
@@ -258,19 +258,19 @@ class Adapter:
             answers.append((COMMAND, write_twist(self._velocity)))
         if self._ready:
             if isinstance(self._sender, ActionSender):
-                self._recoveries.counted(self._sender.recoveries)
+                self._recoveries.update_count(self._sender.recoveries)
             self._recoveries.report_clearing(now)
             self._report_outcomes(now)
         return answers
 
     def take_lines(self) -> List[Line]:
-        """Return what Nav2 has reported since the last call, for /rosout of the run's log."""
+        """Return the lines that Nav2 has reported since the last call, for /rosout of the run's log."""
         return [] if self._report is None else self._report.take_lines()
 
     def _lacks_scan(self, now: int, messages: Sequence[Message]) -> bool:
         """Return whether the run waits to be ready and a lidar has not measured yet, for example a delayed one.
 
-        AMCL publishes map -> odom only with scans, so that waiting with the readings of this step would be in vain.
+        AMCL publishes map -> odom only with scans, so waiting with the readings of this step cannot succeed.
         """
         if not self._options.nav2 or self._ready or now >= FIRST_SCAN_S * NANOSECONDS:
             return False
@@ -306,12 +306,12 @@ class Adapter:
     def _next_batch(self) -> List[Goal]:
         """Return the goals for one action: all remaining ones, or up to where the robot must stop or wait.
 
-        The waiting time of a waypoint follower is its own parameter; so it gets a new action after each wait.
+        A waypoint follower has its own waiting time, so a new action is sent after each wait.
         """
         assert self._goals.current is not None
-        left = [self._goals.current, *self._goals.waiting]
-        stops = (k for k, goal in enumerate(left) if goal.wait or (self.mode == THROUGH_POSES and not goal.via))
-        return left[: next(stops, len(left)) + 1]
+        remaining = [self._goals.current, *self._goals.waiting]
+        stops = (k for k, goal in enumerate(remaining) if goal.wait or (self.mode == THROUGH_POSES and not goal.via))
+        return remaining[: next(stops, len(remaining)) + 1]
 
     def _report_outcomes(self, now: int) -> None:
         """Report reached and failed goals."""
@@ -344,7 +344,7 @@ class Adapter:
         return [(message.topic, message.data)] if relevant else []
 
     def _report_plan(self) -> None:
-        """Report each plan as an event; the graph does not tell why it was made."""
+        """Report each plan as an event; the graph does not contain the reason."""
         goal, plan = self._goals.current, self._estimate.plan
         if goal is None or not plan:
             return
@@ -375,7 +375,7 @@ class Adapter:
         return bytes(serialize_message(message))
 
     def end(self) -> None:
-        """Leave the graph and end what was launched."""
+        """Leave the graph and end the launched command."""
         self._graph.close()
         if self._launched is not None:
             self._launched.end()
@@ -401,9 +401,9 @@ def require_packages(options: Options) -> None:
     needed = ["lifecycle_msgs/srv/GetState"]
     needed += [] if {"/tf", "/tf_static"} <= set(options.without) else ["tf2_msgs/msg/TFMessage"]
     needed += [] if options.goals == "goal_pose" else [ACTIONS["navigate_to_pose"]]
-    lacking = [name.partition("/")[0] for name in needed if find_type(name) is None]
-    if lacking:
+    missing_packages = [name.partition("/")[0] for name in needed if find_type(name) is None]
+    if missing_packages:
         raise AdapterError(
-            f"{sys.executable} has no {', '.join(lacking)}, which Nav2 needs: install the packages "
+            f"{sys.executable} has no {', '.join(missing_packages)}, which Nav2 needs: install the packages "
             "(ros-$ROS_DISTRO-… of apt), or name another Python with --python"
         )

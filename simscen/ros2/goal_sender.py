@@ -51,9 +51,9 @@ class StackState(NamedTuple):
 class GoalPoseSender:
     """Publishes a pose on /goal_pose, as RViz does.
 
-    The stack does not report the end of such a goal. It counts as reported reached when the command has been zero for
-    STANDSTILL_NS while the stack's own estimate is within the tolerances of the goal. Standing elsewhere means nothing;
-    the timeout of the goal ends that.
+    The stack does not report the end of such a goal. It counts as reached when the command has been zero for
+    STANDSTILL_NS while the stack's own estimate is within the tolerances of the goal. A stop elsewhere has no effect;
+    the goal then ends by its timeout.
     """
 
     one_by_one = True
@@ -83,7 +83,7 @@ class GoalPoseSender:
         return None
 
     def outcomes(self, state: StackState) -> List[Outcome]:
-        """Return whether the robot stands at the goal."""
+        """Return Reached if the robot has stopped at the goal."""
         if self._goal is None:
             return []
         if not (state.stopped and state.pose is not None and _within_tolerance(self._goal, state.pose)):
@@ -177,9 +177,9 @@ class ActionSender:
         if answer.status == SUCCEEDED:
             missed = self._missed_waypoints(result)
             return [missed.get(index, Reached()) for index in range(self._reported, len(self._goals))]
-        said = {CANCELED: "was canceled by the stack", ABORTED: "was aborted"}.get(answer.status, "ended")
+        ending = {CANCELED: "was canceled by the stack", ABORTED: "was aborted"}.get(answer.status, "ended")
         code = getattr(result, "error_code", 0) or UNKNOWN
-        message = getattr(result, "error_msg", "") or f"{self.name} {said}"
+        message = getattr(result, "error_msg", "") or f"{self.name} {ending}"
         # Goals that were not attempted fail with the current one.
         return [*self._passed_goals(state), *[Failed(code, message)] * (len(self._goals) - self._passed)]
 
@@ -192,7 +192,7 @@ class ActionSender:
         return missed
 
     def _passed_goals(self, state: StackState) -> List[Outcome]:
-        """Return the outcomes of the goals that the feedback has left behind since the last call.
+        """Return the outcomes of the goals that were passed since the last call, by the feedback.
 
         The feedback of FollowWaypoints does not distinguish reached goals from missed ones.
         """
@@ -207,7 +207,7 @@ class ActionSender:
         return found
 
     def cancel(self, state: StackState, barrier: NodeBarrier) -> None:
-        """Cancel what was sent."""
+        """Cancel the goals that were sent."""
         if self._handle is not None:
             barrier.wait(self._handle.cancel_goal_async(), f"{self.name} has not answered to a cancel")
             self._handle = None
@@ -251,5 +251,5 @@ def pose_stamped(goal: Goal, now: int) -> Any:
 
 
 def _within_tolerance(goal: Goal, pose: Pose) -> bool:
-    near = math.hypot(pose[0] - goal.x, pose[1] - goal.y) <= goal.xy_tolerance
-    return near and abs(wrap_angle(pose[2] - goal.yaw)) <= goal.yaw_tolerance
+    is_near = math.hypot(pose[0] - goal.x, pose[1] - goal.y) <= goal.xy_tolerance
+    return is_near and abs(wrap_angle(pose[2] - goal.yaw)) <= goal.yaw_tolerance

@@ -1,4 +1,4 @@
-"""simscen's node in the ROS graph: it publishes and receives CDR bytes, and sees which other nodes there are.
+"""simscen's node in the ROS graph: it publishes and receives CDR bytes, and lists the other nodes.
 
 Time in the graph may be ahead of the time of the run, because it advances while the run waits for the graph to become
 ready. `Graph.offset_ns` is the difference; stamps are converted in both directions here.
@@ -54,7 +54,7 @@ STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 
 
 class Graph:
-    """One node in one ROS domain. `watch` is called while waiting and may raise."""
+    """simscen's node in one ROS domain. `watch` is called while waiting and may raise an exception."""
 
     def __init__(self, names: TopicNames, watch: Callable[[], None]) -> None:
         self.names, self._watch = names, watch
@@ -93,26 +93,26 @@ class Graph:
     def subscribe(self, topic: str, type_name: str) -> None:
         """Keep all messages of a topic in `inbox`, with a quality of service that its publishers offer."""
         message_type = find_type(type_name)
-        known = self._subscriptions.get(topic)
-        if message_type is None or (known is not None and known[0] == type_name):
+        existing = self._subscriptions.get(topic)
+        if message_type is None or (existing is not None and existing[0] == type_name):
             return
-        if known is not None:
-            self.node.destroy_subscription(known[1])
+        if existing is not None:
+            self.node.destroy_subscription(existing[1])
 
-        def keep(data: bytes) -> None:
+        def callback(data: bytes) -> None:
             self.inbox.append(Received(topic, type_name, shift_stamps(type_name, bytes(data), -self.offset_ns)))
 
         profile = self.subscription_profile(self.names(topic))
-        made = self.node.create_subscription(message_type, self.names(topic), keep, profile, raw=True)
-        self._subscriptions[topic] = (type_name, made)
+        subscription = self.node.create_subscription(message_type, self.names(topic), callback, profile, raw=True)
+        self._subscriptions[topic] = (type_name, subscription)
 
-    def follow_action(self, action: str, keep: Callable[[Any], None]) -> Optional[str]:
-        """Call `keep` with each status of an action (GoalStatusArray); return the node of its server, or None."""
+    def follow_action(self, action: str, callback: Callable[[Any], None]) -> Optional[str]:
+        """Call `callback` with each status of an action (GoalStatusArray); return the node of its server, or None."""
         status_type, topic = find_type(STATUS_TYPE), self.names(f"/{action}/_action/status")
         servers = self.publishers_of(topic)
         if status_type is None or len(servers) != 1:
             return None
-        self.node.create_subscription(status_type, topic, keep, self.subscription_profile(topic))
+        self.node.create_subscription(status_type, topic, callback, self.subscription_profile(topic))
         return servers[0].node
 
     def subscription_profile(self, name: str) -> QoSProfile:
@@ -135,10 +135,10 @@ class Graph:
         """Handle events until `done`; return False if that takes longer than `seconds` of wall time."""
         end = time.monotonic() + seconds
         while not done():
-            left = end - time.monotonic()
-            if left <= 0:
+            remaining = end - time.monotonic()
+            if remaining <= 0:
                 return False
-            self.spin_once(min(left, 0.1))
+            self.spin_once(min(remaining, 0.1))
             self._watch()
         return True
 
@@ -165,8 +165,8 @@ class Graph:
             services = self.node.get_service_names_and_types_by_node(*node)
         except rclpy.node.NodeNameNonExistentError:
             return None
-        wanted = f"{full_name(node)}/{name}"
-        return next((types[0] for found, types in services if found == wanted), None)
+        service = f"{full_name(node)}/{name}"
+        return next((types[0] for found, types in services if found == service), None)
 
     def close(self) -> None:
         """Leave the graph."""

@@ -1,4 +1,4 @@
-"""The user's launch command: runs it, and ends everything that it started even if the adapter is killed.
+"""Run the user's launch command, and end everything that it started even if the adapter is killed.
 
 As a program, `python launch.py COMMAND` runs the command in a shell and a process group of its own. When standard input
 closes or the command ends, all of its descendants get SIGINT, as from Ctrl-C, then SIGTERM, then SIGKILL.
@@ -17,7 +17,7 @@ from typing import Dict, List, Mapping, Optional
 
 PR_SET_CHILD_SUBREAPER = 36
 GRACE_S = ((signal.SIGINT, 4.0), (signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))
-"""Signals, and how long to wait after each."""
+"""Signals, and the seconds to wait after each."""
 
 
 class LaunchedCommand:
@@ -51,9 +51,9 @@ def descendants(parent: int) -> List[int]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             with contextlib.suppress(OSError):
-                state, above = (entry / "stat").read_text().rpartition(")")[2].split()[:2]
+                state, parent_pid = (entry / "stat").read_text().rpartition(")")[2].split()[:2]
                 if state != "Z":
-                    children.setdefault(int(above), []).append(int(entry.name))
+                    children.setdefault(int(parent_pid), []).append(int(entry.name))
     found, new = [], [parent]
     while new:
         new = [child for one in new for child in children.get(one, ())]
@@ -82,12 +82,12 @@ def main() -> int:
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: None)
-    started = subprocess.Popen(sys.argv[1], shell=True, stdin=subprocess.DEVNULL, start_new_session=True)
-    while started.poll() is None:
+    command = subprocess.Popen(sys.argv[1], shell=True, stdin=subprocess.DEVNULL, start_new_session=True)
+    while command.poll() is None:
         if select.select([0], [], [], 0.05)[0] and not os.read(0, 1):
             break
     end_descendants()
-    code = started.wait()
+    code = command.wait()
     return code if code >= 0 else 128 - code
 
 

@@ -1,9 +1,9 @@
 """Synchronization of one control period: publish sensor data, advance time, and collect the command.
 
-**Lockstep.** While the simulation waits, a period with a due command goes like this:
+**Lockstep.** While the simulation waits, a period with a due command consists of these steps:
 
-1. Everything measured since the last period is published, message by message. After each message with a subscriber
-   follows a round of the node barrier, because a node may take two simultaneous messages in any order.
+1. Everything measured since the last period is published, message by message. After each message with a subscriber,
+   a round of the node barrier follows, because a node may take two simultaneous messages in any order.
 2. /clock publishes the time of the period.
 3. At least two rounds follow. In the first, the nodes take the new time; in the second, the timers that became due have
    run. While there is no command, one more round per node follows, so that a command can pass through filters.
@@ -46,7 +46,7 @@ class Lockstep:
     def step(self, now: int, messages: Sequence[Message], due: bool, driving: bool) -> List[Received]:
         """Return the messages of the stack since the last step; `now` in nanoseconds, `driving` to a goal.
 
-        Raises AdapterError naming a node that owes a command.
+        Raises AdapterError that names a node whose command is overdue.
         """
         graph, barrier = self._graph, self._barrier
         for topic, data in messages:
@@ -62,26 +62,28 @@ class Lockstep:
                 break
         if driving:
             graph.spin_until(lambda: _last_command(graph.inbox[start:]) is not None, self._wait)
-            self._wait_for_owed(now, start)
+            self._wait_for_due_command(now, start)
         self._count(now, _last_command(graph.inbox[start:]))
         return _take_inbox(graph)
 
-    def _wait_for_owed(self, now: int, start: int) -> None:
+    def _wait_for_due_command(self, now: int, start: int) -> None:
         def is_settled() -> bool:
-            return _last_command(self._graph.inbox[start:]) is not None or self._actions.owed(now) is None
+            return _last_command(self._graph.inbox[start:]) is not None or self._actions.overdue_command(now) is None
 
         if not self._graph.spin_until(is_settled, self._limit):
-            owed = self._actions.owed(now)
-            if owed is not None:
-                reason = f"has sent no command for {self._limit:g} s of wall time, although it executes {owed.action}"
-                raise AdapterError(f"{owed.node} {reason}")
+            overdue = self._actions.overdue_command(now)
+            if overdue is not None:
+                reason = (
+                    f"has sent no command for {self._limit:g} s of wall time, although it executes {overdue.action}"
+                )
+                raise AdapterError(f"{overdue.node} {reason}")
 
     def _count(self, now: int, command: Optional[Received]) -> None:
         self.counters["beats"] += 1
         if command is None:
             self.counters["without_command"] += 1
             return
-        self._actions.commanded(now)
+        self._actions.record_command(now)
         if command.type == TWIST_STAMPED and read_header(command.data)[0] < now:
             self.counters["late_commands"] += 1
 
@@ -117,5 +119,5 @@ def _last_command(received: Sequence[Received]) -> Optional[Received]:
 
 
 def _take_inbox(graph: Graph) -> List[Received]:
-    taken, graph.inbox[:] = list(graph.inbox), []
-    return taken
+    received, graph.inbox[:] = list(graph.inbox), []
+    return received

@@ -1,4 +1,4 @@
-"""The adapter's side of the stack protocol: handshake, get the graph ready, answer steps until the run ends."""
+"""Adapter side of the stack protocol: perform the handshake, prepare the graph, and answer steps until the run ends."""
 
 import json
 import os
@@ -13,13 +13,13 @@ from simscen.peer.goals import Goal, Goals
 from simscen.peer.wire import Connection, Disconnected
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.nav2_report import ROSOUT
-from simscen.ros2.options import AdapterError, Domain, Options, claim, ros_environment
+from simscen.ros2.options import AdapterError, Domain, Options, claim_domain, ros_environment
 
 EVENTS = "/simscen/events"
 DEFAULT_MODE = "navigate_to_pose"
 MODES = (DEFAULT_MODE, "navigate_through_poses", "follow_waypoints")
 READY_MARGIN_S = 15.0
-"""Time that the first answer may take beyond `--ready`: the check that is running, and the first period."""
+"""Time that the first answer may take beyond `--ready`: for the check in progress and the first period."""
 
 
 def main(values: Dict[str, Any]) -> int:
@@ -40,11 +40,11 @@ def main(values: Dict[str, Any]) -> int:
 
 
 class Hello(NamedTuple):
-    """What the adapter uses of HELLO."""
+    """Content of HELLO that the adapter uses."""
 
     topics: Dict[int, Tuple[str, str]]
     """Name and type of the topics of a robot, by number."""
-    answers: Dict[str, int]
+    stack_topics: Dict[str, int]
     """Numbers of the topics of the stack."""
     period_s: float
     """Control period."""
@@ -58,17 +58,17 @@ class Hello(NamedTuple):
             raise AdapterError(f"a frame of kind {kind} instead of HELLO")
         hello = wire.from_json(body)
         if wire.PROTOCOL not in hello["protocols"]:
-            raise AdapterError(f"simscen ros2 speaks version {wire.PROTOCOL} of the stack protocol")
+            raise AdapterError(f"simscen ros2 requires version {wire.PROTOCOL} of the stack protocol")
         return cls(
-            {one["number"]: (one["topic"], one["type"]) for one in hello["says"] if _is_robot_topic(one)},
-            {one["topic"]: one["number"] for one in hello["hears"]},
+            {topic["number"]: (topic["topic"], topic["type"]) for topic in hello["says"] if _is_robot_topic(topic)},
+            {topic["topic"]: topic["number"] for topic in hello["hears"]},
             hello["control_period"] / hello["tick_rate"],
             hello.get("mode", DEFAULT_MODE),
         )
 
 
 class AdapterRun:
-    """The domain, nodes and adapter of one run; everything is ended and removed on exit."""
+    """Domain, nodes, and adapter of one run. Leaving the context ends and removes them."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
@@ -125,23 +125,23 @@ class AdapterRun:
                 received = adapter.step(now, published, due, header.deadline * 1e-3)
                 stamp = header.sec, header.nanosec
                 received += [(ROSOUT, messages.log(stamp, *line)) for line in adapter.take_lines()]
-                connection.send(wire.answer_frame(header.tick, self._numbered(received, hello.answers)))
+                connection.send(wire.answer_frame(header.tick, self._number_messages(received, hello.stack_topics)))
             elif kind == wire.END:
                 connection.send_json(wire.BYE, {"about": adapter.about()})
                 return
             else:
-                self._take(kind, wire.from_json(body), adapter, now)
+                self._process_frame(kind, wire.from_json(body), adapter, now)
 
     def _options_for(self, mode: str) -> Options:
         """Return the options with the scenario's action. Raises AdapterError if `--goals` names another one."""
-        wanted = self._options.goals
-        if mode in (DEFAULT_MODE, wanted):
+        requested = self._options.goals
+        if mode in (DEFAULT_MODE, requested):
             return self._options
-        if wanted != "auto":
-            raise AdapterError(f"the scenario sends goals by {mode}, and --goals says {wanted}")
+        if requested != "auto":
+            raise AdapterError(f"the scenario sends goals by {mode}, but --goals is {requested}")
         return self._options._replace(goals=mode)
 
-    def _take(self, kind: int, content: Dict[str, Any], adapter: Any, now: int) -> None:
+    def _process_frame(self, kind: int, content: Dict[str, Any], adapter: Any, now: int) -> None:
         if kind == wire.GOAL:
             adapter.start([Goal.of(goal) for goal in content["goals"]], content["on_goal_failure"] == "continue")
             adapter.mode = content.get("mode", DEFAULT_MODE)
@@ -150,11 +150,13 @@ class AdapterRun:
         elif kind == wire.CANCEL:
             adapter.cancel(now, content["all"])
 
-    def _numbered(self, received: Sequence[Tuple[str, bytes]], answers: Dict[str, int]) -> "List[Tuple[int, bytes]]":
+    def _number_messages(
+        self, received: Sequence[Tuple[str, bytes]], stack_topics: Dict[str, int]
+    ) -> "List[Tuple[int, bytes]]":
         """Return the messages of the stack and the events of its goals with the numbers of their topics."""
-        out = [(answers[topic], data) for topic, data in received if topic in answers]
+        out = [(stack_topics[topic], data) for topic, data in received if topic in stack_topics]
         events = (json.dumps(event, allow_nan=False) for event in self.goals.take_events())
-        return out + [(answers[EVENTS], messages.string(event)) for event in events]
+        return out + [(stack_topics[EVENTS], messages.string(event)) for event in events]
 
     def _start_nodes(self) -> Optional[LaunchedCommand]:
         """Claim a domain, set the environment, and start the user's command."""
@@ -172,8 +174,8 @@ class AdapterRun:
     def _claim_domain(options: Options, environment: Dict[str, str]) -> Domain:
         """Claim a free domain for launched nodes, or the domain of nodes that the user started."""
         if options.domain is not None or options.launch:
-            return claim(options.domain, environment)
-        return claim(int(environment.get("ROS_DOMAIN_ID") or 0), environment)
+            return claim_domain(options.domain, environment)
+        return claim_domain(int(environment.get("ROS_DOMAIN_ID") or 0), environment)
 
 
 def _is_robot_topic(topic: Dict[str, Any]) -> bool:

@@ -1,4 +1,4 @@
-"""Which node owes a command: the servers of Nav2 whose actions move the robot, while they execute a goal.
+"""Detection of overdue commands: a server of Nav2 whose action moves the robot must send commands while it executes it.
 
 The loops of Nav2 up to Jazzy run on wall time. Without waiting for them, the simulation would run ahead of a controller
 that takes longer than a control period, for example MPPI on a slow machine.
@@ -26,8 +26,8 @@ RATE_PARAMETERS = {
 """Actions that move the robot, and the parameter of their server with the rate of its commands in Hz."""
 
 
-class Owed(NamedTuple):
-    """A command that has not come: the node that owes it, and the action that it executes."""
+class OverdueCommand(NamedTuple):
+    """A due command that was not received: the node that must send it, and the action that it executes."""
 
     node: str
     action: str
@@ -39,7 +39,7 @@ class _Server(NamedTuple):
 
 
 class MotionActions:
-    """Knows by their status topics which actions are being executed."""
+    """Tracks which actions are being executed, by their status topics."""
 
     def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
         self._graph, self._barrier = graph, barrier
@@ -48,9 +48,9 @@ class MotionActions:
         self._last_command: int | None = None
 
     def subscribe(self) -> None:
-        """Follow the actions that the graph has now."""
+        """Subscribe to the status of the actions that exist in the graph now."""
         for action, parameter in RATE_PARAMETERS.items():
-            node = self._graph.follow_action(action, partial(self._take, action))
+            node = self._graph.follow_action(action, partial(self._process_status, action))
             rate = None if node is None else self._rate(node, parameter)
             if node is not None and rate is not None and rate > 0.0:
                 self._servers[action] = _Server(node, NANOSECONDS / rate)
@@ -65,17 +65,17 @@ class MotionActions:
         values = [] if answer is None else answer.values
         return float(values[0].double_value) if values else None
 
-    def _take(self, action: str, message: Any) -> None:
+    def _process_status(self, action: str, message: Any) -> None:
         self._executing[action] = any(goal.status == EXECUTING for goal in message.status_list)
 
-    def commanded(self, now: int) -> None:
-        """Note that a command has come at `now` nanoseconds."""
+    def record_command(self, now: int) -> None:
+        """Record that a command was received at `now` nanoseconds."""
         self._last_command = now
 
-    def owed(self, now: int) -> Owed | None:
-        """Return the command that is due at `now` nanoseconds, or None. Slower loops owe one less often."""
+    def overdue_command(self, now: int) -> OverdueCommand | None:
+        """Return the command that is due at `now` nanoseconds, or None. Slower control loops are due less often."""
         for action, server in self._servers.items():
             since = server.period_ns if self._last_command is None else now - self._last_command
             if self._executing.get(action) and since >= server.period_ns:
-                return Owed(server.node, action)
+                return OverdueCommand(server.node, action)
         return None

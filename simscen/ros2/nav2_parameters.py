@@ -9,7 +9,7 @@ MAP, ODOM = "map", "odom"
 
 
 class Finding(NamedTuple):
-    """A wrong parameter of a node, and why. `severe` findings prevent Nav2 from working."""
+    """A wrong parameter of a node, and the reason. `severe` findings prevent Nav2 from working."""
 
     node: str
     parameter: str
@@ -33,17 +33,17 @@ COSTMAPS = {"local_costmap": ODOM, "global_costmap": MAP}
 
 def check(nodes: Mapping[str, Parameters], offer: Offer) -> List[Finding]:
     """Return all findings in the parameters of Nav2's nodes; keys of `nodes` are node names without namespace."""
-    found: List[Finding] = []
+    findings: List[Finding] = []
     for name in sorted(nodes):
-        node = _Node(name, nodes[name], offer, found)
+        node = _Node(name, nodes[name], offer, findings)
         if node.get("use_sim_time") is False:
-            node.note("use_sim_time", "is false: the node would use wall time", severe=False)
+            node.add_finding("use_sim_time", "is false: the node would use wall time", severe=False)
         if name in RULES:
             RULES[name](node)
-    return found
+    return findings
 
 
-def wanted(name: str, known: Iterable[str]) -> List[str]:
+def relevant_parameters(name: str, known: Iterable[str]) -> List[str]:
     """Return those of the `known` parameters of a node that the rules use."""
     if name in COSTMAPS:
         ends: Tuple[str, ...] = (".observation_sources", ".topic", ".data_type", ".enabled")
@@ -63,33 +63,33 @@ _FRAMES = frozenset(
 class _Node:
     """The parameters of one node, with functions that check them and add findings."""
 
-    def __init__(self, name: str, parameters: Parameters, offer: Offer, found: List[Finding]) -> None:
+    def __init__(self, name: str, parameters: Parameters, offer: Offer, findings: List[Finding]) -> None:
         self.name, self.offer = name, offer
-        self._parameters, self._found = parameters, found
+        self._parameters, self._findings = parameters, findings
 
     def get(self, key: str) -> Optional[Any]:
         return self._parameters.get(key)
 
-    def note(self, key: str, message: str, severe: bool = True) -> None:
-        self._found.append(Finding(self.name, key, f"{key} {message}", severe))
+    def add_finding(self, key: str, message: str, severe: bool = True) -> None:
+        self._findings.append(Finding(self.name, key, f"{key} {message}", severe))
 
     def base(self, key: str) -> None:
         """Check a frame that must be the robot's base."""
         value = self.get(key)
         if value is not None and value not in self.offer.bases:
-            hint = f"--base-frame {value} gives it that name, too"
-            self.note(key, f"is {value!r}; simscen's base frame is {self.offer.bases[0]!r}: {hint}")
+            hint = f"--base-frame {value} also gives it that name"
+            self.add_finding(key, f"is {value!r}; simscen's base frame is {self.offer.bases[0]!r}: {hint}")
 
     def frame(self, key: str, *frames: str) -> None:
         value = self.get(key)
         if value is not None and value not in frames:
-            self.note(key, f"is {value!r}; expected {' or '.join(map(repr, frames))}")
+            self.add_finding(key, f"is {value!r}; expected {' or '.join(map(repr, frames))}")
 
     def topic(self, key: str, topics: Sequence[str], what: str) -> None:
         value = self.get(key)
         if isinstance(value, str) and "/" + value.lstrip("/") not in topics:
-            there = ", ".join(topics) or "none"
-            self.note(key, f"is {value!r}, which no node publishes; simscen's {what}: {there}")
+            available = ", ".join(topics) or "none"
+            self.add_finding(key, f"is {value!r}, which no node publishes; simscen's {what}: {available}")
 
 
 def _amcl(node: _Node) -> None:
@@ -115,7 +115,7 @@ def _source(node: _Node, source: str) -> None:
         node.topic(f"{source}.topic", node.offer.scans, "scans")
     elif node.get(f"{source}.enabled") is not False:
         key = f"{source}.data_type" if node.get(f"{source}.data_type") else f"{source}.type"
-        node.note(key, f"is {kind!r}: simscen publishes scans only", severe=False)
+        node.add_finding(key, f"is {kind!r}: simscen publishes scans only", severe=False)
 
 
 def _navigator(node: _Node) -> None:
@@ -155,12 +155,12 @@ NODES = ("amcl", "bt_navigator", "controller_server", "planner_server", "behavio
 """The nodes that a run needs; another localizer that publishes map -> odom may replace `amcl`."""
 
 
-def flat(tree: Mapping[str, Any], prefix: str = "") -> Dict[str, Any]:
+def flatten(tree: Mapping[str, Any], prefix: str = "") -> Dict[str, Any]:
     """Return nested parameters with dotted keys."""
-    found: Dict[str, Any] = {}
+    parameters: Dict[str, Any] = {}
     for key, value in tree.items():
         if isinstance(value, Mapping):
-            found.update(flat(value, f"{prefix}{key}."))
+            parameters.update(flatten(value, f"{prefix}{key}."))
         else:
-            found[f"{prefix}{key}"] = value
-    return found
+            parameters[f"{prefix}{key}"] = value
+    return parameters

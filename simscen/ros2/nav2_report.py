@@ -1,4 +1,4 @@
-"""What Nav2 reports about itself, for the log of the run: its behavior tree, its warnings, and its parameters."""
+"""Reports of Nav2 for the log of the run: behavior tree transitions, warnings, and parameters."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NODES = (
 )
 """Names of the nodes whose parameters are recorded."""
 OMITTED = ("use_sim_time", "qos_overrides.")
-"""Beginnings of the names of parameters that say nothing about navigation."""
+"""Prefixes of the names of parameters that do not affect navigation."""
 
 
 class Line(NamedTuple):

@@ -2,12 +2,12 @@
 
 Executors of rclcpp and rclpy serve timers, subscriptions and services in this order, and every node serves its
 parameters in the executor that also calls its other callbacks. So a node that answers a request for a parameter has
-processed the messages that had reached it before. What such a message causes, for example a timer that a new /clock
-makes due, has been processed before the answer to the next request. One *round* asks all nodes at once and waits for
+processed the messages that had reached it before. Consequences of such a message, for example a timer that a new
+/clock makes due, are processed before the answer to the next request. One *round* asks all nodes at once and waits for
 all answers.
 
 Nodes that answered while the run waited to be ready are *in step*. Others are left out of the rounds, for example
-client nodes that Nav2's behavior tree spins only now and then.
+client nodes that Nav2's behavior tree spins only occasionally.
 """
 
 import time
@@ -45,10 +45,10 @@ class ServicePoll:
 
     def track(self, nodes: Iterable[Node]) -> None:
         """Ask exactly these nodes from now on."""
-        wanted = set(nodes)
-        for node in [node for node in self.clients if node not in wanted]:
+        tracked = set(nodes)
+        for node in [node for node in self.clients if node not in tracked]:
             self.forget(node)
-        for node in sorted(wanted - set(self.clients)):
+        for node in sorted(tracked - set(self.clients)):
             self.clients[node] = self._graph.node.create_client(self._type, f"{full_name(node)}/{self._service}")
 
     def forget(self, node: Node) -> None:
@@ -58,7 +58,7 @@ class ServicePoll:
         self.answers.pop(node, None)
 
     def ask(self, timeout_s: float) -> None:
-        """Ask the nodes that do not owe an answer, and wait for all answers, at most this long."""
+        """Send a request to each node without a pending one, and wait up to `timeout_s` for all answers."""
         for node, client in self.clients.items():
             waiting = self._waiting.get(node, _Request(None, time.monotonic()))
             if waiting.future is None and client.service_is_ready():
@@ -87,7 +87,7 @@ class NodeBarrier:
         self._poll = ServicePoll(graph, PARAMETER_SERVICE, "get_parameters", names=["use_sim_time"])
         self.required: Callable[[], Set[str]] = set
         self.without_parameters: List[str] = []
-        """Nodes that do not serve their parameters, so that nothing tells when they have finished."""
+        """Nodes that do not serve their parameters, so that the barrier cannot determine when they have finished."""
         self.left_out: List[str] = []
         """Nodes that do not answer, although they serve their parameters."""
 
@@ -102,7 +102,7 @@ class NodeBarrier:
         return sorted([*self.without_parameters, *self.left_out])
 
     def poll(self) -> List[str]:
-        """Ask all nodes of the graph; return the reasons to go on waiting.
+        """Ask all nodes of the graph; return the reasons why the run must still wait.
 
         A node that is not required and does not answer for SILENT_AFTER_S is no reason.
         """
@@ -138,7 +138,7 @@ class NodeBarrier:
             self._poll.forget(node)
 
     def round(self) -> None:
-        """Wait until every node has processed what it was sent.
+        """Wait until every node has processed the messages sent to it.
 
         Raises AdapterError naming required nodes that do not answer; leaves out others.
         """

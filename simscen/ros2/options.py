@@ -86,10 +86,10 @@ class Domain:
         self._lock.close()
 
 
-def claim(wanted: Optional[int], environment: Mapping[str, str]) -> Domain:
+def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Domain:
     """Claim the domain `wanted`, or the first free one. Raises AdapterError if there is none."""
     folder = _lock_folder(environment)
-    for number in DOMAINS if wanted is None else (wanted,):
+    for number in DOMAINS if requested is None else (requested,):
         lock = (folder / f"{number}.lock").open("a+")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -97,15 +97,15 @@ def claim(wanted: Optional[int], environment: Mapping[str, str]) -> Domain:
             lock.close()
             continue
         return Domain(number, lock)
-    if wanted is None:
+    if requested is None:
         raise AdapterError(f"all ROS domains from {DOMAINS[0]} to {DOMAINS[-1]} are in use by other runs")
     if environment.get(ROBOT_VARIABLE):
         raise AdapterError(
-            f"another robot or run is using ROS domain {wanted}: with several robots, each has a ROS graph of its own; "
-            "with --launch each has nodes and a domain of its own"
+            f"another robot or run is using ROS domain {requested}: with several robots, each has "
+            "a ROS graph of its own; with --launch each has nodes and a domain of its own"
         )
     raise AdapterError(
-        f"another run is using ROS domain {wanted}: nodes that you start yourself serve one run at a time "
+        f"another run is using ROS domain {requested}: nodes that you start yourself serve one run at a time "
         "(simscen run --jobs 1); with --launch each run has nodes and a domain of its own"
     )
 

@@ -12,7 +12,7 @@ PLAN = "/plan"
 
 
 class PoseEstimate:
-    """Estimate from what the stack publishes.
+    """Pose estimate from the messages of the stack.
 
     Sources, in this order: map -> odom of /tf composed with odometry; /amcl_pose; the initial pose composed with
     odometry.

@@ -21,7 +21,7 @@ SHARED_TOPICS = ("/tf", "/tf_static", "/initialpose", GOAL_POSE)
 
 
 class Readiness:
-    """Checks the graph again and again until nothing is missing. `topics` are those that simscen publishes."""
+    """Checks the graph repeatedly until nothing is missing. `topics` are those that simscen publishes."""
 
     def __init__(
         self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], senders: GoalSenders, options: Options
@@ -215,10 +215,10 @@ class Nav2Readiness:
         known = self._call(list_type, f"{path}/list_parameters", list_type.Request())
         if known is None:
             return {}
-        names = nav2_parameters.wanted(name, known.result.names)
+        names = nav2_parameters.relevant_parameters(name, known.result.names)
         get_type: Any = find_type("rcl_interfaces/srv/GetParameters")
-        got = self._call(get_type, f"{path}/get_parameters", get_type.Request(names=names))
-        return {} if got is None else {key: _parameter_value(value) for key, value in zip(names, got.values)}
+        values = self._call(get_type, f"{path}/get_parameters", get_type.Request(names=names))
+        return {} if values is None else {key: _parameter_value(value) for key, value in zip(names, values.values)}
 
     def _call(self, service_type: Any, name: str, request: Any) -> Any:
         client = self._graph.node.create_client(service_type, name)

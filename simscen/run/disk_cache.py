@@ -26,23 +26,23 @@ def cache_folder(environment: Mapping[str, str]) -> Path | None:
 
     Returns None for $SIMSCEN_CACHE_DIR=off and if there is no home folder.
     """
-    if (own := environment.get(CACHE_DIR_VARIABLE)) is not None:
-        return Path(own) / CACHE_FORMAT if own != CACHE_OFF and Path(own).is_absolute() else None
-    for base, inside in ((environment.get("XDG_CACHE_HOME", ""), ""), (environment.get("HOME", ""), ".cache")):
+    if (configured := environment.get(CACHE_DIR_VARIABLE)) is not None:
+        return Path(configured) / CACHE_FORMAT if configured != CACHE_OFF and Path(configured).is_absolute() else None
+    for base, subfolder in ((environment.get("XDG_CACHE_HOME", ""), ""), (environment.get("HOME", ""), ".cache")):
         if Path(base).is_absolute():
-            return Path(base, inside, "simscen", CACHE_FORMAT)
+            return Path(base, subfolder, "simscen", CACHE_FORMAT)
     return None
 
 
 class DiskCache:
     """Cache with one file per key, a hexadecimal number. Concurrent sessions can share the folder."""
 
-    def __init__(self, folder: Path | None, most_bytes: int = MAX_CACHE_BYTES) -> None:
-        self._folder, self._most = folder, most_bytes
-        self._room: int | None = None
+    def __init__(self, folder: Path | None, max_bytes: int = MAX_CACHE_BYTES) -> None:
+        self._folder, self._max_bytes = folder, max_bytes
+        self._remaining_bytes: int | None = None
 
     @property
-    def on(self) -> bool:
+    def is_enabled(self) -> bool:
         """Whether the cache is enabled."""
         return self._folder is not None
 
@@ -53,8 +53,8 @@ class DiskCache:
         try:
             descriptor = os.open(self._folder / key, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
             with os.fdopen(descriptor, "rb") as file:
-                found = os.fstat(descriptor)
-                if not stat.S_ISREG(found.st_mode) or found.st_size > MAX_ENTRY_BYTES:
+                status = os.fstat(descriptor)
+                if not stat.S_ISREG(status.st_mode) or status.st_size > MAX_ENTRY_BYTES:
                     return None
                 data = file.read(MAX_ENTRY_BYTES)
                 os.utime(descriptor)
@@ -66,7 +66,7 @@ class DiskCache:
     def put(self, key: str, content: bytes) -> None:
         """Store an entry if it fits and the folder belongs to this user alone."""
         data = hashlib.sha256(key.encode() + content).digest() + content
-        if self._folder is None or len(data) > min(MAX_ENTRY_BYTES, self._most):
+        if self._folder is None or len(data) > min(MAX_ENTRY_BYTES, self._max_bytes):
             return
         # A full disk or a read-only home must not fail the session.
         with contextlib.suppress(OSError):
@@ -75,9 +75,9 @@ class DiskCache:
                 self._write(self._folder, key, data)
 
     def _write(self, folder: Path, key: str, data: bytes) -> None:
-        if self._room is None or self._room < len(data):
-            self._room = self._most - _pruned(folder, self._most - len(data))
-        self._room -= len(data)
+        if self._remaining_bytes is None or self._remaining_bytes < len(data):
+            self._remaining_bytes = self._max_bytes - _prune(folder, self._max_bytes - len(data))
+        self._remaining_bytes -= len(data)
         descriptor, part = tempfile.mkstemp(prefix=".", suffix=".part", dir=folder)
         try:
             with os.fdopen(descriptor, "wb") as file:
@@ -91,10 +91,10 @@ class DiskCache:
 def is_private_folder(folder: Path) -> bool:
     """Return whether a folder belongs to this user and no other user can write to it."""
     try:
-        found = folder.lstat()
+        status = folder.lstat()
     except OSError:
         return False
-    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o022
 
 
 def disk_usage(folder: Path) -> tuple[int, int]:
@@ -103,12 +103,12 @@ def disk_usage(folder: Path) -> tuple[int, int]:
     return len(sizes), sum(sizes)
 
 
-def _pruned(folder: Path, most: int) -> int:
+def _prune(folder: Path, max_bytes: int) -> int:
     """Delete the least recently used files until at most `most` bytes remain; return the remaining size."""
     files = sorted(_files(folder))
     total = sum(size for _, size, _ in files)
     for _, size, name in files:
-        if total <= most:
+        if total <= max_bytes:
             break
         (folder / name).unlink(missing_ok=True)
         total -= size
@@ -117,11 +117,11 @@ def _pruned(folder: Path, most: int) -> int:
 
 def _files(folder: Path) -> list[tuple[int, int, str]]:
     """Return time of last use (ns), size (bytes), and name of each file."""
-    found = []
+    files = []
     with os.scandir(folder) as entries:
         for entry in entries:
             with contextlib.suppress(FileNotFoundError):  # deleted by another session
-                about = entry.stat(follow_symlinks=False)
-                if stat.S_ISREG(about.st_mode):
-                    found.append((about.st_mtime_ns, about.st_size, entry.name))
-    return found
+                status = entry.stat(follow_symlinks=False)
+                if stat.S_ISREG(status.st_mode):
+                    files.append((status.st_mtime_ns, status.st_size, entry.name))
+    return files

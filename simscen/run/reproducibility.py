@@ -25,7 +25,7 @@ PACKAGES = (
     *("pillow", "mcap", "zstandard", "pydantic", "pyyaml"),
 )
 """Packages that affect results or the bytes of a log."""
-_LAST_BITS = frozenset({"fma", "avx", "avx2", "avx512f", "sse4_2"})
+_RELEVANT_CPU_FLAGS = frozenset({"fma", "avx", "avx2", "avx512f", "sse4_2"})
 """Instruction sets that affect the last bits of a result."""
 
 
@@ -41,7 +41,7 @@ def cpu_flags() -> list[str]:
     except OSError:
         return []
     flags = next((line.split(":", 1)[1].split() for line in lines if line.startswith("flags")), [])
-    return sorted(_LAST_BITS.intersection(flags))
+    return sorted(_RELEVANT_CPU_FLAGS.intersection(flags))
 
 
 @cache
@@ -56,13 +56,18 @@ def arithmetic_fingerprints() -> dict[str, str]:
     functions = (math.sin, math.cos, math.tan, math.atan, math.sqrt, lambda x: math.exp(-x / 1e5), math.log)
     libm = [function(number) for function in functions for number in numbers]
     array = np.array(numbers)
-    told = [np.sin(array), np.exp(-array / 1e5), np.arctan2(array, array[::-1]), np.outer(array, array) @ array]
+    array_results = [
+        np.sin(array),
+        np.exp(-array / 1e5),
+        np.arctan2(array, array[::-1]),
+        np.outer(array, array) @ array,
+    ]
     square = np.sin(np.arange(8100.0)).reshape(90, 90) + 90 * np.eye(90)
     blas = [function(square[:k, :k]) for k in (3, 16, 90) for function in (_squared, np.linalg.inv, np.linalg.cholesky)]
     return {
         "blas": hashlib.sha256(b"".join(part.tobytes() for part in blas)).hexdigest()[:16],
         "libm": hashlib.sha256(repr(libm).encode()).hexdigest()[:16],
-        "numpy": hashlib.sha256(b"".join(part.tobytes() for part in told)).hexdigest()[:16],
+        "numpy": hashlib.sha256(b"".join(part.tobytes() for part in array_results)).hexdigest()[:16],
         "numpy_dispatch": " ".join(sorted(name for name, used in _numpy_features().items() if used)),
     }
 
@@ -127,7 +132,7 @@ def _files_digest(value: str) -> str:
 
 @lru_cache(maxsize=64)
 def _digest_of_files(files: tuple[tuple[str, Path, int, int], ...]) -> str:
-    """Return the SHA-256 of files; time of change and size are only there to read changed files again."""
+    """Return the SHA-256 of files; modification time and size are arguments so that changed files are read again."""
     sha = hashlib.sha256()
     for name, file, _, _ in files:
         data = file.read_bytes()
@@ -178,10 +183,12 @@ def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
     depend on where files are, nor on comments in the scenario.
     """
     texts = {name: text.encode() for name, text in sorted(loaded.sources.items())}
-    files = {_name(file, loaded): file.read_bytes() for file in sorted({*referenced_files(loaded), *loaded.read})}
-    run = hashlib.sha256(json.dumps(_circumstances(loaded), sort_keys=True).encode())
+    files = {
+        _portable_name(file, loaded): file.read_bytes() for file in sorted({*referenced_files(loaded), *loaded.read})
+    }
+    run = hashlib.sha256(json.dumps(_run_inputs(loaded), sort_keys=True).encode())
     for name, data in (*texts.items(), *files.items()):
-        _take(run, name, data)
+        _hash_file(run, name, data)
     defining = {name: data for name, data in texts.items() if name.endswith(WORLD_AND_ROBOT_FILES)} | files
     # Only the names of files, because the shipped robots are installed elsewhere on another machine.
     contents = sorted((PurePath(name).name, hashlib.sha256(data).hexdigest()) for name, data in defining.items())
@@ -211,7 +218,7 @@ WORLD_AND_ROBOT_FILES = (".world.yaml", ".robot.yaml", ".sdf", ".world")
 """Endings of the files, besides those that they refer to, that define a scenario."""
 
 
-def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
+def _run_inputs(loaded: LoadedScenario) -> dict[str, object]:
     """Return everything besides files that affects a run. The seed is not included: it is part of the run's key."""
     return {
         "versions": software_versions(),
@@ -245,12 +252,12 @@ def referenced_files(loaded: LoadedScenario) -> list[Path]:
     ]
 
 
-def _name(file: Path, loaded: LoadedScenario) -> str:
+def _portable_name(file: Path, loaded: LoadedScenario) -> str:
     """Return the path relative to the root, so that moving a whole project does not change the digest."""
     return file.relative_to(loaded.root).as_posix() if file.is_relative_to(loaded.root) else str(file)
 
 
-def _take(sha: "hashlib._Hash", name: str, data: bytes) -> None:
+def _hash_file(sha: "hashlib._Hash", name: str, data: bytes) -> None:
     sha.update(f"{name}\0{len(data)}\0".encode())
     sha.update(data)
 
@@ -277,5 +284,5 @@ def scenario_files(loaded: LoadedScenario) -> set[Path]:
 def _program(loaded: LoadedScenario) -> list[Path]:
     """Return the files among the arguments of an external stack's command."""
     assert loaded.runs is not None
-    words = [Path(loaded.runs.cwd, word) for word in loaded.runs.argv]
-    return [word for word in words if word.is_file()]
+    paths = [Path(loaded.runs.cwd, argument) for argument in loaded.runs.argv]
+    return [path for path in paths if path.is_file()]

@@ -45,53 +45,53 @@ class CachedWorldBuilder:
 
     def build(self, world: World, lidar_height: float) -> BuiltWorld:
         """See built_world.build_world_and_map."""
-        if not self._files.on:
+        if not self._files.is_enabled:
             return build_world_and_map(world, lidar_height)
         mesh = merge_solids(world.solids)
         places = [tuple(pose) for pose in world.places.values()]
         grid = world.grid and (world.grid.cells, world.grid.resolution, world.grid.origin)
         key = cache_key("map", _surface(mesh), world.bounds, places, grid, lidar_height, MAP_RESOLUTION_M)
-        known = _map_of_bytes(self._files.get(key))
-        if known is None:
-            known = draw_map(world, mesh, lidar_height)
-            self._files.put(key, _map_to_bytes(known))
-        return BuiltWorld(world, mesh, known)
+        cached = _map_from_bytes(self._files.get(key))
+        if cached is None:
+            cached = draw_map(world, mesh, lidar_height)
+            self._files.put(key, _map_to_bytes(cached))
+        return BuiltWorld(world, mesh, cached)
 
     def legs(self, built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float) -> list[Leg]:
-        """See worlds.shortest.legs_between."""
-        if not self._files.on or not ends:
+        """See worlds.routes.shortest_paths.legs_between."""
+        if not self._files.is_enabled or not ends:
             return legs_between(built, ends, radius)
-        told = [(start, goal.name, goal.pose) for start, goal in ends]
-        around = built.world.bounds, built.map.shape, built.map.resolution, built.map.origin
-        key = cache_key("legs", _surface(built.mesh), built.mesh.owners, built.mesh.names, around, told, radius)
-        known = _legs_of_bytes(self._files.get(key), len(ends))
-        if known is None:
-            known = legs_between(built, ends, radius)
-            self._files.put(key, to_json(known, inf_nan_mode="strings"))
-        return known
+        goals = [(start, goal.name, goal.pose) for start, goal in ends]
+        map_frame = built.world.bounds, built.map.shape, built.map.resolution, built.map.origin
+        key = cache_key("legs", _surface(built.mesh), built.mesh.owners, built.mesh.names, map_frame, goals, radius)
+        cached = _legs_from_bytes(self._files.get(key), len(ends))
+        if cached is None:
+            cached = legs_between(built, ends, radius)
+            self._files.put(key, to_json(cached, inf_nan_mode="strings"))
+        return cached
 
 
 def cache_key(*parts: object) -> str:
     """Return the cache key of a result that depends on these numbers, strings, arrays, and sequences of them."""
-    sha = hashlib.sha256(_circumstances())
-    _take(sha, parts)
+    sha = hashlib.sha256(_environment_key())
+    _update_hash(sha, parts)
     return sha.hexdigest()
 
 
 @cache
-def _circumstances() -> bytes:
+def _environment_key() -> bytes:
     """Return the versions, code, and arithmetic that affect the last bit of a result."""
     return repr((software_versions(), source_digest(*_PACKAGES), arithmetic_fingerprints())).encode()
 
 
-def _take(sha: "hashlib._Hash", part: object) -> None:
+def _update_hash(sha: "hashlib._Hash", part: object) -> None:
     if isinstance(part, np.ndarray):
         sha.update(f"{part.dtype.str}{part.shape}".encode())
         sha.update(np.ascontiguousarray(part).data)
     elif isinstance(part, list | tuple):
         sha.update(f"({len(part)}".encode())
-        for one in part:
-            _take(sha, one)
+        for item in part:
+            _update_hash(sha, item)
     else:
         sha.update(f"{part!r}\0".encode())
 
@@ -100,7 +100,7 @@ def _surface(mesh: TriangleMesh) -> tuple[object, object]:
     return mesh.vertices, mesh.faces
 
 
-def _legs_of_bytes(data: bytes | None, count: int) -> list[Leg] | None:
+def _legs_from_bytes(data: bytes | None, count: int) -> list[Leg] | None:
     try:
         legs = None if data is None else _LEGS.validate_json(data)
     except ValidationError:
@@ -112,7 +112,7 @@ def _map_to_bytes(grid: OccupancyGrid) -> bytes:
     return _MAP.pack(*grid.shape, grid.resolution, *grid.origin) + grid.cells.astype(np.int8).tobytes()
 
 
-def _map_of_bytes(data: bytes | None) -> OccupancyGrid | None:
+def _map_from_bytes(data: bytes | None) -> OccupancyGrid | None:
     if data is None or len(data) < _MAP.size:
         return None
     rows, columns, resolution, x, y, yaw = _MAP.unpack_from(data)
@@ -129,21 +129,21 @@ MAX_SCENARIOS = 100
 class ScenarioCache:
     """Prepares each scenario and builds each world once. Workers inherit its content from the fork server."""
 
-    def __init__(self, kept: CachedWorldBuilder) -> None:
-        """`kept` uses the disk cache of earlier sessions."""
-        self._kept = kept
+    def __init__(self, builder: CachedWorldBuilder) -> None:
+        """`builder` uses the disk cache of earlier sessions."""
+        self._builder = builder
         self._worlds: dict[str, BuiltWorld] = {}
         self._scenarios: dict[tuple[str, str, str], PreparedScenario] = {}
 
     def prepared(self, loaded: LoadedScenario) -> PreparedScenario:
         """Return the prepared scenario. Raises InvalidInput."""
         name = loaded.id, loaded.variation, loaded.stack_name
-        known = self._scenarios.get(name)
-        if known is None or known.loaded != loaded:
-            if known is None and len(self._scenarios) == MAX_SCENARIOS:
+        cached = self._scenarios.get(name)
+        if cached is None or cached.loaded != loaded:
+            if cached is None and len(self._scenarios) == MAX_SCENARIOS:
                 del self._scenarios[next(iter(self._scenarios))]
-            known = self._scenarios[name] = prepare(loaded, self._world, self._kept.legs)
-        return known
+            cached = self._scenarios[name] = prepare(loaded, self._world, self._builder.legs)
+        return cached
 
     def clear(self) -> None:
         """Remove all entries."""
@@ -153,5 +153,5 @@ class ScenarioCache:
     def _world(self, loaded: LoadedScenario, height: float) -> BuiltWorld:
         key = hashlib.sha256(pickle.dumps((replace(loaded.world, tree=None), height))).hexdigest()
         if key not in self._worlds:
-            self._worlds[key] = self._kept.build(load_world(loaded), height)
+            self._worlds[key] = self._builder.build(load_world(loaded), height)
         return self._worlds[key]

@@ -15,17 +15,17 @@ from simscen.sim.single_robot import SingleRobotSimulation
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 TICK_RATE = 240
-PERIOD = TICK_RATE // FIRMWARE_RATE_HZ
-"""Ticks between two commands; each is reached before the next one."""
-RESTING, SETTLING = 240, 60
+COMMAND_PERIOD = TICK_RATE // FIRMWARE_RATE_HZ
+"""Ticks between two commands; the robot reaches each velocity before the next command."""
+REST_TICKS, SETTLING_TICKS = 240, 60
 """Ticks at rest before the first trial and after each leg."""
-LINE, SIDE = 2.0, 1.0
-"""Length of the straight line and of a side of the square, in m."""
-SPEED, TURN = 0.5, 1.0
-"""Largest speeds in m/s and rad/s; at most SHARE of the robot's limits."""
-SHARE, EFFORT = 0.8, 0.5
-"""Fraction of the robot's limits of speed and of acceleration."""
-WIDER = 1.05
+LINE_LENGTH_M, SQUARE_SIDE_M = 2.0, 1.0
+"""Lengths of the straight line and of a side of the square."""
+MAX_SPEED_M_S, MAX_TURN_RATE_RAD_S = 0.5, 1.0
+"""Largest speeds in m/s and rad/s; at most SPEED_FRACTION of the robot's limits."""
+SPEED_FRACTION, ACCELERATION_FRACTION = 0.8, 0.5
+"""Fractions of the robot's limits of speed and of acceleration."""
+CIRCLE_RADIUS_FACTOR = 1.05
 """Radius of a car's circle relative to its smallest one, so that the steering can still correct."""
 
 
@@ -59,11 +59,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class RestingState:
-    """State after a second at rest: `tilt` in rad, `height` of the base frame and drift `crept` in m."""
+    """State after a second at rest: `tilt` in rad, `height` of the base frame and `drift` in m."""
 
     tilt: float
     height: float
-    crept: float
+    drift: float
 
 
 @dataclass(frozen=True)
@@ -91,61 +91,76 @@ def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
 def _trials(body: RobotBody) -> dict[str, list[_Leg]]:
     radius = 0.0
     if isinstance(body.drive, Ackermann):
-        radius = WIDER * body.drive.wheel_base / math.tan(body.drive.max_steering)
+        radius = CIRCLE_RADIUS_FACTOR * body.drive.wheel_base / math.tan(body.drive.max_steering)
     circle, corner = (_Leg(turn * radius, 0.0, turn) for turn in (2 * math.pi, math.pi / 2))
-    trials = {"line": [_Leg(LINE)], "circle" if radius else "turn": [circle], "square": [_Leg(SIDE), corner] * 4}
-    return trials | ({"sideways": [_Leg(0.0, LINE)]} if robot_model(body).holonomic else {})
+    trials = {
+        "line": [_Leg(LINE_LENGTH_M)],
+        "circle" if radius else "turn": [circle],
+        "square": [_Leg(SQUARE_SIDE_M), corner] * 4,
+    }
+    return trials | ({"sideways": [_Leg(0.0, LINE_LENGTH_M)]} if robot_model(body).holonomic else {})
 
 
 def _rest(simulation: SingleRobotSimulation) -> RestingState:
     begin = simulation.base_pose()
-    simulation.step(RESTING)
+    simulation.step(REST_TICKS)
     end = simulation.base_pose()
     return RestingState(_tilt(end, Pose3()), end.z, math.hypot(end.x - begin.x, end.y - begin.y))
 
 
 def _trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: list[_Leg]) -> Trial:
     simulation.place_robot(Pose2(0.0, 0.0, 0.0))
-    simulation.step(SETTLING)
+    simulation.step(SETTLING_TICKS)
     motion, level = kinematics_of(body.drive), simulation.base_pose()
-    rolled, start, most = simulation.encoders(), level.plane, 0.0
-    told, reckoned, true = _Way(), _Way(), _Way()
+    encoders, start, max_tilt = simulation.encoders(), level.plane, 0.0
+    commanded, odometry, truth = _MotionRecorder(), _MotionRecorder(), _MotionRecorder()
     for twist in (twist for leg in legs for twist in _commands(leg, body)):
         simulation.drive(twist)
-        simulation.step(PERIOD)
-        told.to(told.last.compose(integrate_arc(Twist(*(part / FIRMWARE_RATE_HZ for part in twist)))))
-        now = simulation.encoders()
-        step = motion(tuple(b - a for a, b in zip(rolled, now, strict=True)))
-        rolled = now
-        reckoned.to(reckoned.last.compose(integrate_arc(step)))
+        simulation.step(COMMAND_PERIOD)
+        commanded.append(commanded.last.compose(integrate_arc(Twist(*(part / FIRMWARE_RATE_HZ for part in twist)))))
+        new_encoders = simulation.encoders()
+        step = motion(tuple(b - a for a, b in zip(encoders, new_encoders, strict=True)))
+        encoders = new_encoders
+        odometry.append(odometry.last.compose(integrate_arc(step)))
         pose = simulation.base_pose()
-        true.to(start.between(pose.plane))
-        most = max(most, _tilt(pose, level))
+        truth.append(start.between(pose.plane))
+        max_tilt = max(max_tilt, _tilt(pose, level))
     simulation.truth()  # raises RunError if the simulation became unstable
-    return Trial(name, told.motion, reckoned.motion, true.motion, most)
+    return Trial(name, commanded.motion, odometry.motion, truth.motion, max_tilt)
 
 
 def _commands(leg: _Leg, body: RobotBody) -> Iterator[Twist]:
     """Yield a trapezoidal velocity profile for a leg, then a stop."""
     model = robot_model(body)
     spans = [
-        (leg.forward, min(SPEED, SHARE * model.max_linear), min(model.linear_acceleration, model.linear_deceleration)),
-        (leg.left, min(SPEED, SHARE * model.max_lateral), min(model.linear_acceleration, model.linear_deceleration)),
-        (leg.turn, min(TURN, SHARE * model.max_angular), model.angular_acceleration),
+        (
+            leg.forward,
+            min(MAX_SPEED_M_S, SPEED_FRACTION * model.max_linear),
+            min(model.linear_acceleration, model.linear_deceleration),
+        ),
+        (
+            leg.left,
+            min(MAX_SPEED_M_S, SPEED_FRACTION * model.max_lateral),
+            min(model.linear_acceleration, model.linear_deceleration),
+        ),
+        (leg.turn, min(MAX_TURN_RATE_RAD_S, SPEED_FRACTION * model.max_angular), model.angular_acceleration),
     ]
     rate = min(speed / abs(span) for span, speed, _ in spans if span)
-    gain = min(EFFORT * most / abs(span) for span, _, most in spans if span) / FIRMWARE_RATE_HZ
+    gain = (
+        min(ACCELERATION_FRACTION * acceleration / abs(span) for span, _, acceleration in spans if span)
+        / FIRMWARE_RATE_HZ
+    )
     ramp = [gain * k for k in range(1, math.ceil(rate / gain))]
-    rest = 1.0 - 2 * sum(ramp) / FIRMWARE_RATE_HZ
-    while rest < 0:
-        rest += 2 * ramp.pop() / FIRMWARE_RATE_HZ
-    cruising = math.ceil(rest * FIRMWARE_RATE_HZ / rate)
-    rates = [*ramp, *[rest * FIRMWARE_RATE_HZ / max(1, cruising)] * cruising, *reversed(ramp)]
+    remaining = 1.0 - 2 * sum(ramp) / FIRMWARE_RATE_HZ
+    while remaining < 0:
+        remaining += 2 * ramp.pop() / FIRMWARE_RATE_HZ
+    cruising = math.ceil(remaining * FIRMWARE_RATE_HZ / rate)
+    rates = [*ramp, *[remaining * FIRMWARE_RATE_HZ / max(1, cruising)] * cruising, *reversed(ramp)]
     yield from (Twist(leg.forward * r, leg.left * r, leg.turn * r) for r in rates)
-    yield from [STOP] * (SETTLING // PERIOD)
+    yield from [STOP] * (SETTLING_TICKS // COMMAND_PERIOD)
 
 
-class _Way:
+class _MotionRecorder:
     """Recorder of a motion."""
 
     def __init__(self) -> None:
@@ -155,7 +170,7 @@ class _Way:
     def last(self) -> Pose2:
         return self._path[-1]
 
-    def to(self, pose: Pose2) -> None:
+    def append(self, pose: Pose2) -> None:
         self._driven += self.last.distance(pose)
         self._turned += wrap(pose.yaw - self.last.yaw)
         self._path.append(pose)

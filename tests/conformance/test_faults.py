@@ -47,7 +47,7 @@ CASES = [
         r"^stopped after 1[0-3] s of wall time, in spin \(\w+.py:\d+\)",
     ),
     Case(57, "deaf to SIGTERM", "deaf.at.0", "timeout", r"^stopped after 1[0-4] s of wall time, in be_deaf"),
-    Case(58, "memory in Python", "memory.at.0", "out-of-memory", "more memory than it may"),
+    Case(58, "memory in Python", "memory.at.0", "out-of-memory", "exceeded its memory limit"),
     Case(58, "memory in C", "swell.at.0", "crashed", r"^crashed: SIGABRT, in swell .*peak memory \d+ MiB of 4096 MiB"),
     Case(59, "a grandchild", "grandchild.at.0", "crashed", "left a process behind"),
     Case(59, "a daemon", "daemon.at.0", "crashed", "left a process behind"),

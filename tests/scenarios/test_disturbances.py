@@ -29,7 +29,7 @@ def run(text: str, folder: Path) -> tuple[RunResult, dict[str, str]]:
     file = folder / "own.scenario.yaml"
     file.write_text(HEAD + text)
     result = simulate(prepare(load_scenario(file, folder))).result
-    return result, {one.ordered.name: f"{'-+'[one.happened]} {one.effect}" for one in result.disturbances}
+    return result, {one.disturbance.name: f"{'-+'[one.happened]} {one.effect}" for one in result.disturbances}
 
 
 def complaints(result: RunResult) -> dict[str, int]:

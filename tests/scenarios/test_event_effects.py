@@ -62,7 +62,7 @@ def at(trace, name, seconds):
 
 def test_everything_happened_but_what_could_not(run):
     done, _ = run
-    happened = {one.ordered.name: one for one in done.result.disturbances}
+    happened = {one.disturbance.name: one for one in done.result.disturbances}
     assert {name for name, one in happened.items() if not one.happened} == {"gone", "stood"}
     assert happened["gone"].effect == "crate has no mass or is moved by a script, so it cannot be pushed"
     assert happened["stood"].effect == "cart was not moving"
@@ -126,5 +126,5 @@ events:
 pass: [{{collisions: {{max: 5}}}}]
 """)
         done = simulate(prepare(load_scenario(file, tmp_path)))
-        assert {one.ordered.name: one.happened for one in done.result.disturbances}["stands"]
+        assert {one.disturbance.name: one.happened for one in done.result.disturbances}["stands"]
         assert 2.3 < done.trace.objects["anna"].values[-1][0] < 2.9, "two seconds would have led her on"

@@ -244,5 +244,5 @@ time_limit: 5 s
 
 def test_each_of_several_robots_has_faults_of_its_own(tmp_path):
     run, _ = play("", tmp_path, TWO)
-    told = {one.ordered.name: one.happened for one in run.result.disturbances}
+    told = {one.disturbance.name: one.happened for one in run.result.disturbances}
     assert told == dict.fromkeys(("a/cmd_vel.delay", "b/map.shift", "b/lidar.glass", "b/localizer.jump"), True)

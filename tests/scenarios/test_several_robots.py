@@ -88,7 +88,7 @@ def test_verdicts_metrics_and_faults_are_each_robots_and_events_are_the_worlds(r
         "a/goals_reached", "a/collisions", "a/replans", "b/goals_reached", "b/collisions"
     ]  # fmt: skip
     assert result.outcome is Outcome.PASSED
-    assert [one.ordered.name for one in result.disturbances] == ["crate", "a/lidar.off"]
+    assert [one.disturbance.name for one in result.disturbances] == ["crate", "a/lidar.off"]
     assert result.metrics["a/path_length"] > 1.5 > result.metrics["b/path_length"]
     assert result.metrics["success"] == 1.0
     assert result.events["object.spawned"] == 1

@@ -20,16 +20,16 @@ def length(way):
 def test_ways_along_its_sixteen_directions_are_exact_and_others_three_percent_longer_at_most():
     lattice = GridGraph(np.ones((60, 60), dtype=bool))
     for goal in ((10, 50), (50, 10), (50, 50), (30, 50)):
-        assert length(lattice.way((10, 10), goal)) == pytest.approx(math.dist((10, 10), goal))
+        assert length(lattice.shortest_path((10, 10), goal)) == pytest.approx(math.dist((10, 10), goal))
     for goal in np.random.default_rng(0).integers(4, 56, (50, 2)).tolist():
         straight = math.dist((10, 10), goal)
-        assert straight <= length(lattice.way((10, 10), tuple(goal))) + 1e-9 <= 1.028 * straight + 1e-9
+        assert straight <= length(lattice.shortest_path((10, 10), tuple(goal))) + 1e-9 <= 1.028 * straight + 1e-9
 
 
 def test_no_move_cuts_a_corner_or_jumps_over_a_cell():
     free = np.random.default_rng(1).random((40, 40)) > 0.25
     free[2:5, 2:5] = free[35:38, 35:38] = True
-    way = GridGraph(free).way((3, 3), (36, 36))
+    way = GridGraph(free).shortest_path((3, 3), (36, 36))
     assert free[way[:, 0], way[:, 1]].all()
     for (r, c), (to_r, to_c) in zip(way[:-1].tolist(), way[1:].tolist(), strict=True):
         for t in np.linspace(0.0, 1.0, 31):
@@ -41,6 +41,6 @@ def test_no_move_cuts_a_corner_or_jumps_over_a_cell():
 
 def test_a_wall_has_no_way_through_and_ends_must_be_free():
     lattice = GridGraph(blocked((20, 20), (slice(None), 10)))
-    assert lattice.way((5, 5), (5, 15)) is None
-    assert lattice.way((5, 10), (5, 15)) is None
-    assert lattice.way((5, 5), (5, 5)).tolist() == [[5, 5]]
+    assert lattice.shortest_path((5, 5), (5, 15)) is None
+    assert lattice.shortest_path((5, 10), (5, 15)) is None
+    assert lattice.shortest_path((5, 5), (5, 5)).tolist() == [[5, 5]]

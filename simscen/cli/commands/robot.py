@@ -114,9 +114,9 @@ def _row(trial: "Trial") -> str:
 
 
 def _line(check: "DriveCheck") -> str:
-    verdict = "ok" if check.held else "FAILED"
+    verdict = "ok" if check.passed else "FAILED"
     line = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
-    return line if check.held or not check.advice else f"{line}\n          {check.advice}"
+    return line if check.passed or not check.advice else f"{line}\n          {check.advice}"
 
 
 def as_data(body: "RobotBody", checked: "RobotCheckResult") -> dict[str, Any]:
@@ -128,7 +128,7 @@ def as_data(body: "RobotBody", checked: "RobotCheckResult") -> dict[str, Any]:
         "climb": {"slope": checked.climb.slope, "step": checked.climb.step},
         "rest": asdict(checked.rest),
         "trials": [_trial(trial) for trial in checked.trials],
-        "checks": [{**asdict(check), "held": check.held} for check in checked.checks],
+        "checks": [{**asdict(check), "held": check.passed} for check in checked.checks],
     }
 
 

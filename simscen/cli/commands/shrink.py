@@ -30,7 +30,7 @@ from simscen.loading.scenario import ChangedScenario
 from simscen.loading.yaml.tree import MappingNode, Node, child
 from simscen.report.journal_reader import JOURNAL_FILE, PlannedRun, read_journal
 from simscen.run.sessions.output_folder import RUNS_FOLDER, write_atomically
-from simscen.run.sessions.results import shown
+from simscen.run.sessions.results import display_path
 from simscen.run.sessions.run_session import SessionOptions
 
 
@@ -212,4 +212,4 @@ def _print_summary(shrinking: Shrinking, before: MappingNode, target: Path, stac
     spent = "" if shrinking.is_complete else ", which did not suffice to try everything; see --runs"
     print_text(f"{_size(shrinking.tree)} values left after {shrinking.runs.runs} runs{spent}")
     option = "" if stack is None else f" --stack {escaped(stack)}"
-    print_text(f"wrote {escaped(str(target))}; try: simscen run {escaped(shown(target))}{option}")
+    print_text(f"wrote {escaped(str(target))}; try: simscen run {escaped(display_path(target))}{option}")

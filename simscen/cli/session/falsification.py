@@ -36,7 +36,7 @@ from simscen.report.journal_reader import PlannedRun
 from simscen.run.process.backend import Backend
 from simscen.run.process.jobs import Job
 from simscen.run.sessions.output_folder import run_folder, write_atomically
-from simscen.run.sessions.results import shown
+from simscen.run.sessions.results import display_path
 from simscen.run.sessions.run_session import SessionOptions, run_session
 from simscen.run.sessions.search import Point, Search, SearchMethod, make_search
 
@@ -254,7 +254,7 @@ def signature(result: RunResult) -> Signature:
     place = None if finding is None or finding.place is None else finding.place
     square = None if place is None else (math.floor(place[0] / PLACE_M), math.floor(place[1] / PLACE_M))
     kinds = tuple(sorted({verdict.id for verdict in failed})) or ((result.error.kind,) if result.error else ())
-    happened = frozenset(one.ordered.name for one in result.disturbances if one.fired)
+    happened = frozenset(one.disturbance.name for one in result.disturbances if one.fired)
     return kinds, happened, square
 
 
@@ -269,9 +269,9 @@ def summary_lines(falsification: Falsification) -> list[str]:
     lines = []
     for one in falsification.found:
         values = ", ".join(f"{path} = {value_text(value)}" for path, value in one.values.items())
-        lines += [f"failure: {shown(one.file)}", f"with {values}"]
+        lines += [f"failure: {display_path(one.file)}", f"with {values}"]
         lines += [f"replay: {one.run.artifacts.replay}"] if one.run.artifacts.replay else []
-        lines += [f"smaller: simscen shrink {shown(one.file)}", ""]
+        lines += [f"smaller: simscen shrink {display_path(one.file)}", ""]
     number = len(falsification.found)
     if number:
         lines.append(f"found {number} {'failure' if number == 1 else 'different failures'} in {runs} runs")

@@ -16,7 +16,7 @@ from simscen.report.journal_reader import PlannedRun, last_failed, read_journal
 from simscen.run.process.jobs import Job
 from simscen.run.reproducibility import ScenarioDigests, scenario_digests
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER
-from simscen.run.sessions.results import repeat_command, shown
+from simscen.run.sessions.results import display_path, repeat_command
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
 SAME_IN_LOG = ("scenario", "seed", "variation", "stack_name", "simulated_seconds", "verdicts")
@@ -87,7 +87,7 @@ def write_kept(journal: Journal, kept: Sequence[RunFinished]) -> None:
 def _planned(job: Job, digests: ScenarioDigests) -> PlannedRun:
     scenario = job.scenario
     again = repeat_command(scenario, job.key.seed)
-    file, stack = shown(scenario.file), scenario.stack
+    file, stack = display_path(scenario.file), scenario.stack
     return PlannedRun(job.key, scenario.path, digests.run, again, file, stack, digests.definition, scenario.varied)
 
 

@@ -69,7 +69,7 @@ def _finish(prepared: PreparedScenario, run: Run, folder: Path, replay: ReplayMo
     scene = Scene(run.trace, run.case, prepared.built.map, run.result, world_scenery(prepared))
     robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
     write_picture(scene_with_robots(scene, robots), folder / "map.png")
-    if replay.wants(run.result.outcome) and run.log is not None:
+    if replay.includes(run.result.outcome) and run.log is not None:
         from simscen.report.replay import write_replay
 
         write_replay(folder / "replay.html", [(read_run(run.log, with_sensors=True), run.result)])

@@ -35,7 +35,7 @@ class SpeedLimits:
     multiplier: float
 
     @property
-    def limiting(self) -> bool:
+    def has_limits(self) -> bool:
         """Whether any cell limits the speed."""
         return any(self.of(int(value), 1.0) is not None for value in np.unique(self.grid.cells))
 
@@ -121,8 +121,8 @@ def mask_blocks(grid: OccupancyGrid) -> MaskBlocks:
         if 0 < row < len(grid.cells) and np.array_equal(grid.cells[row], grid.cells[row - 1]):
             continue
         runs = _runs(grid.cells[row]) if row < len(grid.cells) else []
-        here = set(runs)
-        for run in [run for run in first_row if run not in here]:
+        current_runs = set(runs)
+        for run in [run for run in first_row if run not in current_runs]:
             column, width, value = run
             blocks.append((column, first_row[run], width, row - first_row.pop(run), value))
         for run in runs:

@@ -37,14 +37,14 @@ class OccupancyGrid:
         """(height, width) in cells."""
         return self.cells.shape[0], self.cells.shape[1]
 
-    def refined(self, finest: float) -> OccupancyGrid:
-        """Return the map with its cells split into equal parts, at most `finest` m wide if MAX_CELLS allows it.
+    def refined(self, max_cell_size: float) -> OccupancyGrid:
+        """Return the map with its cells split into equal parts, at most `max_cell_size` m wide if MAX_CELLS allows it.
 
         Cells as large as a robot are too coarse for goals and for the position of walls.
         """
         rows, columns = self.shape
-        most = math.isqrt(MAX_CELLS // max(1, rows * columns))
-        parts = min(most, math.ceil(self.resolution / finest - 1e-6))
+        max_parts = math.isqrt(MAX_CELLS // max(1, rows * columns))
+        parts = min(max_parts, math.ceil(self.resolution / max_cell_size - 1e-6))
         return self if parts <= 1 else _split(self, parts)
 
     def cell_of(self, points: Array) -> npt.NDArray[np.int64]:

@@ -43,7 +43,7 @@ def level_scan(scan: Scan) -> Scan:
 
 
 def imu_in_base_frame(imu: Imu) -> Imu:
-    """Return the reading along the axes of the base; centripetal accelerations at the sensor's place stay in it."""
+    """Return the reading along the axes of the base; it keeps the centripetal acceleration at the sensor."""
     if imu.mount == AT_BASE:
         return imu
     quaternion = imu.mount.quaternion

@@ -17,7 +17,7 @@ RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup", "retrace"]
 
 ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate"]
 """Reason for a new plan to the same goal: the old one is blocked, the robot left it, an obstacle is too close to it, a
-better one is free, the rolling window moved, a recovery ended, or the planning period is over."""
+better one is free, the rolling window moved, a recovery ended, or the planning period has passed."""
 
 
 class ErrorCode(IntEnum):
@@ -143,9 +143,9 @@ LOOP_NAME = re.compile(r"(.+)#[0-9]+")
 """Name of a goal in a loop after the first."""
 
 
-def matches_goal_name(name: str, asked: str | None) -> bool:
+def matches_goal_name(name: str, requested: str | None) -> bool:
     """Return whether a goal matches a name: `shelf` matches in every loop, `shelf#2` only in the second."""
-    if asked is None or name == asked:
+    if requested is None or name == requested:
         return True
     loop = LOOP_NAME.fullmatch(name)
-    return loop is not None and loop[1] == asked
+    return loop is not None and loop[1] == requested

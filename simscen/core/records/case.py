@@ -42,7 +42,7 @@ class Passage:
         return (ax + bx) / 2, (ay + by) / 2
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Description such as "the passage of 0.90 m between `wall 3` and `wall 4` at (9.00, 5.75)"."""
         one, other = self.between
         between = f" between `{one}` and `{other}`" if one and other and one != other else ""
@@ -50,14 +50,14 @@ class Passage:
 
 
 ROBOT_NAME = ""
-"""Name of a robot that is the only one."""
+"""Name of a single robot."""
 CLEARANCE_RANGE = 2.0
 """Distance in m around the robot within which clearance is always measured."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """The parts of a scenario that judging needs. They are stored in the log, so that it can be judged alone.
+    """The parts of a scenario that judging needs. They are stored in the log, so that no other file is needed.
 
     Attributes:
         shortest: For each goal name, the length in m of the shortest path from the previous goal (or the start) through
@@ -110,10 +110,12 @@ class Run:
 
     def __repr__(self) -> str:
         """Return a description with the reasons of a failure, which `assert run.passed` shows."""
-        broken = [(v.id, v.tightest) for v in self.result.verdicts if v.status is not Status.PASS]
-        why = [f"{name} {finding.measured} ({finding.limit})" for name, finding in broken if finding is not None]
-        told = f"<Run of {self.result.key.test}, seed {self.result.key.seed}: {self.result.outcome.value}"
-        return f"{told}{''.join(f'; {each}' for each in why)}>"
+        unsatisfied = [(v.id, v.tightest) for v in self.result.verdicts if v.status is not Status.PASS]
+        reasons = [
+            f"{name} {finding.measured} ({finding.limit})" for name, finding in unsatisfied if finding is not None
+        ]
+        summary = f"<Run of {self.result.key.test}, seed {self.result.key.seed}: {self.result.outcome.value}"
+        return f"{summary}{''.join(f'; {each}' for each in reasons)}>"
 
     @property
     def passed(self) -> bool:

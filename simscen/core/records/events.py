@@ -9,7 +9,7 @@ Value = str | int | float | bool | None | list["Value"] | dict[str, "Value"]
 
 
 class EventKind(str, Enum):
-    """All that can happen. Beside each kind: what the event's name names, and what its data holds."""
+    """Kinds of events. The comment of each kind explains the name of the event; its data follow after the semicolon."""
 
     GOAL_ACCEPTED = "goal.accepted"  # goal; x, y, yaw
     GOAL_REACHED = "goal.reached"  # goal; index
@@ -33,26 +33,26 @@ class EventKind(str, Enum):
     OBJECT_SPAWNED = "object.spawned"  # object; its pose, shape, parts (outlines in its own frame), person
     OBJECT_REMOVED = "object.removed"  # object
     OBJECT_MOVED = "object.moved"  # object; waypoints (x, y, yaw), times, repeat, ease, start, phase
-    OBJECT_PLACED = "object.placed"  # object; x, y, yaw: set down there, and moved by no script any more
-    OBJECT_PUSHED = "object.pushed"  # object; impulse (N s), seconds it is spread over
+    OBJECT_PLACED = "object.placed"  # object; x, y, yaw; its script has ended
+    OBJECT_PUSHED = "object.pushed"  # object; impulse (N s), duration in seconds
     PEDESTRIAN_REACHED = "pedestrian.reached"  # pedestrian; goal (its number, from 1)
-    PEDESTRIAN_REACTED = "pedestrian.reacted"  # pedestrian; behavior, robot ("" where there is but one)
+    PEDESTRIAN_REACTED = "pedestrian.reacted"  # pedestrian; behavior, robot ("" for a single one)
     PEDESTRIAN_CALMED = "pedestrian.calmed"  # pedestrian; behavior, robot: the reaction is over
     ROBOT_PLACED = "robot.placed"  # x, y, yaw
-    ROBOT_PUSHED = "robot.pushed"  # impulse (N s); seconds it is spread over, where it is no blow
+    ROBOT_PUSHED = "robot.pushed"  # impulse (N s), duration in seconds unless it is instantaneous
     ZONE_SWITCHED = "zone.switched"  # region, or "" for a mask; filter (keepout, speed), enabled, speed_limit (m/s)
-    FLOOR_CHANGED = "floor.changed"  # region or patch; outline, friction, until (s; absent for good)
+    FLOOR_CHANGED = "floor.changed"  # region or patch; outline, friction, until (s; absent if permanent)
     MARK = "mark"  # the mark; note
     RUN_ENDED = "run.ended"  # why: navigation ended, time limit
 
     def __str__(self) -> str:
-        """As it is written in logs."""
+        """Return the value, as written in logs."""
         return self.value
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at `tick`, to the thing called `name`, with `data` that JSON can hold."""
+    """Event at `tick`; EventKind defines the meaning of `name` and `data`, which is JSON data."""
 
     tick: int
     kind: EventKind
@@ -62,11 +62,11 @@ class Event:
 
 @dataclass(frozen=True)
 class Disturbance:
-    """An event or a fault as the scenario orders it.
+    """Event or fault that a scenario schedules.
 
-    `when` is its trigger as written, "" for a fault from the start. `required` says that the run fails unless it
-    happens. `line` is where the entry stands in the scenario's own file; 0 = unknown. `after` is the number, among the
-    events, of the one after which it is waited for: it is a step of a story.
+    `when` is its trigger as written, "" for a fault from the start. If `required`, the run fails unless it happens.
+    `line` is the line in the scenario file; 0 if unknown. For a step of a sequence, `after` is the index of the event
+    before it.
     """
 
     name: str
@@ -78,7 +78,7 @@ class Disturbance:
 
     @property
     def trigger(self) -> str:
-        """The trigger in words: "when time: 10 s"."""
+        """Description of the trigger, e.g. "when time: 10 s"."""
         if self.after is not None:
             return f"then when {self.when}" if self.when else "then at once"
         return f"when {self.when}" if self.when else "from the start"
@@ -86,12 +86,13 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class DisturbanceOutcome:
-    """What became of a disturbance: the ticks at which it `fired`, and whether it changed anything at any of them.
+    """Outcome of a disturbance: the ticks at which it `fired`, and whether it changed anything at any of them.
 
-    `effect` tells in a line what it changed, or why nothing; `tick` is the first at which it did, or tried to.
+    `effect` describes in one line what it changed, or why it had no effect; `tick` is the first at which it did, or
+    tried to.
     """
 
-    ordered: Disturbance
+    disturbance: Disturbance
     fired: tuple[int, ...]
     happened: bool
     effect: str
@@ -100,20 +101,20 @@ class DisturbanceOutcome:
     @property
     def missing(self) -> bool:
         """Whether it had to happen and did not."""
-        return self.ordered.required and not self.happened
+        return self.disturbance.required and not self.happened
 
 
 READING_KINDS = ("Scan", "Odometry", "Imu", "Bump", "Image")
-"""The classes of core.sensing."""
+"""The classes of core.messages.sensor_data."""
 COMMAND = "Command"
-"""The kind of cmd_vel: velocity commands on their way to the base."""
+"""Kind of `cmd_vel`: velocity commands from the stack to the base."""
 WHEELS = "Wheels"
-"""The kind of wheels: what the motors make of a command, and what odometry counts of it."""
+"""Kind of `wheels`: the motion that the motors execute for a command, and the motion that odometry measures."""
 BELIEF = "Belief"
-"""The kind of the localizer: where the navigator is told that the robot is."""
+"""Kind of `localizer`: the believed pose that the navigator receives."""
 MAP = "Map"
-"""The kind of the map that the stack is given."""
+"""Kind of `map`: the map that the stack receives."""
 KIND_BY_INSTANCE = {"cmd_vel": COMMAND, "wheels": WHEELS, "localizer": BELIEF, "map": MAP}
-"""What faults affect besides sensors, by the name that scenarios have for it; a sensor of that name goes before."""
+"""Kinds of the targets of faults besides sensors, by name in a scenario; a sensor of the same name takes precedence."""
 FAULT_TARGET_KINDS = (*READING_KINDS, *KIND_BY_INSTANCE.values())
-"""All that `affects` of a fault may name."""
+"""All values of `affects` of a fault."""

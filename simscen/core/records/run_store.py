@@ -9,13 +9,13 @@ from typing import overload
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunFinished
 
-MAX_PLAIN = 2000
-"""Number of results that are kept as they are, for speed."""
+MAX_UNCOMPRESSED = 2000
+"""Number of results that are kept uncompressed, for speed."""
 
 
 class RunStore(Sequence[RunFinished]):
-    """Results of runs; those after the first MAX_PLAIN are compressed, to about 1 kB each, and restored when they are
-    read.
+    """Results of runs. Those after the first MAX_UNCOMPRESSED are compressed to about 1 kB each, and decompressed when
+    they are read.
 
     Iterate over it instead of making a list of it.
     """
@@ -32,7 +32,7 @@ class RunStore(Sequence[RunFinished]):
         self._order.append(
             (sys.intern(run.result.path), sys.intern(key.scenario), key.variation, key.seed, sys.intern(key.stack_name))
         )
-        self._entries.append(run if len(self._entries) < MAX_PLAIN else self._compressed(run))
+        self._entries.append(run if len(self._entries) < MAX_UNCOMPRESSED else self._compress(run))
 
     def extend(self, runs: Iterable[RunFinished]) -> None:
         """Add results at the end."""
@@ -41,10 +41,10 @@ class RunStore(Sequence[RunFinished]):
 
     def in_order(self) -> "RunStore":
         """Return the same results sorted by file, scenario, variation, seed, and stack."""
-        return self.picked(sorted(range(len(self)), key=self._order.__getitem__))
+        return self.select(sorted(range(len(self)), key=self._order.__getitem__))
 
-    def picked(self, indices: Iterable[int]) -> "RunStore":
-        """Return the results with these indices, without restoring them."""
+    def select(self, indices: Iterable[int]) -> "RunStore":
+        """Return the results with these indices, without decompressing them."""
         found = RunStore()
         found._sample = self._sample
         for index in indices:
@@ -63,19 +63,19 @@ class RunStore(Sequence[RunFinished]):
 
     def __getitem__(self, index: int | slice) -> "RunFinished | RunStore":
         if isinstance(index, slice):
-            return self.picked(range(*index.indices(len(self))))
-        return self._restored(self._entries[index])
+            return self.select(range(*index.indices(len(self))))
+        return self._restore(self._entries[index])
 
     def __iter__(self) -> Iterator[RunFinished]:
-        return map(self._restored, self._entries)
+        return map(self._restore, self._entries)
 
-    def _compressed(self, run: RunFinished) -> bytes:
+    def _compress(self, run: RunFinished) -> bytes:
         data = pickle.dumps(run, pickle.HIGHEST_PROTOCOL)
         self._sample = self._sample or data
-        packer = zlib.compressobj(1, zdict=self._sample)  # other results share most of their words with the sample
-        return packer.compress(data) + packer.flush()
+        compressor = zlib.compressobj(1, zdict=self._sample)  # other results share most of their words with the sample
+        return compressor.compress(data) + compressor.flush()
 
-    def _restored(self, entry: RunFinished | bytes) -> RunFinished:
+    def _restore(self, entry: RunFinished | bytes) -> RunFinished:
         if isinstance(entry, RunFinished):
             return entry
         run = pickle.loads(zlib.decompressobj(zdict=self._sample).decompress(entry))

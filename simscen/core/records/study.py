@@ -9,7 +9,7 @@ from simscen.core.records.run_result import RunKey
 
 
 class ClaimStatus(str, Enum):
-    """Outcome of a claim. BLOCKED: runs with errors of simscen leave it open, whatever the others say."""
+    """Outcome of a claim. BLOCKED: errors of simscen in some runs prevent a decision."""
 
     HELD = "held"
     REFUTED = "refuted"

@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Status(str, Enum):
-    """What a criterion says: inconclusive means that the trace is too short to decide."""
+    """Status of a verdict. INCONCLUSIVE: the trace does not contain what is needed to decide."""
 
     PASS = "pass"
     FAIL = "fail"
@@ -16,10 +16,10 @@ class Status(str, Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One bound that was checked: what was measured, against what, when and where it was tightest.
+    """One checked bound: the measured value, its limit, and the time and place with the smallest margin.
 
-    `margin` > 0 holds, < 0 is violated, in `unit`; None where a margin makes no sense. `what` is a phrase such as
-    "path_length" or "goal shelf"; `detail` explains a failure in one line each.
+    `margin` is in `unit`, and negative if the limit is violated; None if the bound has no margin. `what` is a phrase
+    such as "path_length" or "goal shelf"; `detail` explains a failure in one line each.
     """
 
     status: Status
@@ -36,7 +36,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A criterion's answer: its worst finding decides, its tightest finding is shown on a pass."""
+    """Result of a criterion. The worst finding decides; reports show the tightest finding of a pass."""
 
     criterion: str
     id: str
@@ -45,22 +45,22 @@ class Verdict:
 
     @property
     def status(self) -> Status:
-        """The worst of the findings; a criterion that found nothing to check is an error, never a pass."""
+        """The worst status of the findings; ERROR if there are none, since then nothing was checked."""
         order = [Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS]
         return min((f.status for f in self.findings), key=order.index, default=Status.ERROR)
 
     @property
     def tightest(self) -> Finding | None:
-        """The finding that decides: among those with the verdict's status the one with the least margin."""
+        """The deciding finding: the one with the smallest margin among those with the status of the verdict."""
         deciding = [f for f in self.findings if f.status is self.status]
         return min(deciding, key=lambda f: f.margin if f.margin is not None else float("inf"), default=None)
 
 
 @dataclass(frozen=True)
 class ExpectedFailure:
-    """Why a run is expected to fail; `criteria` are the ids of the verdicts that do, () = whichever.
+    """Reason why a run is expected to fail; `criteria` are the ids of the verdicts that fail, () for any.
 
-    `line` is where that is written in the scenario's own file; 0 = unknown.
+    `line` is the line in the scenario file; 0 if unknown.
     """
 
     reason: str
@@ -69,34 +69,34 @@ class ExpectedFailure:
 
 
 class Evidence(str, Enum):
-    """A kind of information about a run, in words that end the sentence "the log does not say …"."""
+    """Kind of information about a run. The value completes the message "the log lacks …"."""
 
-    TRUTH = "where the robot truly was"
-    VELOCITY = "how fast the robot truly went"
-    CLEARANCE = "how near obstacles truly were"
-    CONTACTS = "what the robot touched"
-    BELIEF = "where the robot believed to be"
-    COVARIANCE = "how sure it was of that"
-    SCANS = "when scans came"
-    COMMANDS = "which velocities were commanded"
-    PLANS = "which plans were made"
-    NAVIGATION = "what became of goals"
-    ERROR_CODES = "the navigation's error codes"
-    PLANNING = "why plans were made"
-    RECOVERIES = "which recoveries there were"
-    OBJECTS = "where things that move were"
-    DISTURBANCES = "when faults and events happened"
-    ALIGNMENT = "how the truth lies on the map"
-    FOOTPRINT = "how much ground the robot covers"
+    TRUTH = "the true pose of the robot"
+    VELOCITY = "the true velocity of the robot"
+    CLEARANCE = "the clearance"
+    CONTACTS = "the collisions of the robot"
+    BELIEF = "the believed pose"
+    COVARIANCE = "the covariance of the believed pose"
+    SCANS = "the times of the scans"
+    COMMANDS = "the commanded velocities"
+    PLANS = "the plans"
+    NAVIGATION = "the outcomes of the goals"
+    ERROR_CODES = "the error codes of the navigation"
+    PLANNING = "the reasons for the plans"
+    RECOVERIES = "the recoveries"
+    OBJECTS = "the poses of moving objects"
+    DISTURBANCES = "the times of faults and events"
+    ALIGNMENT = "the transform from the true poses to the map"
+    FOOTPRINT = "the footprint of the robot"
 
 
 POSITION = frozenset({Evidence.TRUTH, Evidence.ALIGNMENT})
-"""What is needed to compare the true position with places of the map."""
+"""Evidence for comparing the true position with places on the map."""
 
 
 @dataclass(frozen=True)
 class LogCoverage:
-    """Evidence that a log lacks, each with the reason: `missing` altogether, or for a part of the time (`partial`).
+    """Evidence that a log lacks, each with the reason: `missing` completely, or `partial` for a part of the time.
 
     `recorded_by_simscen` is False for the log of another recorder, whose signals may be irregular or not finite. In a
     log of simscen's own, that means that the simulation or the log is broken.
@@ -106,12 +106,12 @@ class LogCoverage:
     partial: Mapping[Evidence, str] = field(default_factory=dict)
     recorded_by_simscen: bool = True
 
-    def lacking(self, wanted: Set[Evidence]) -> list[Evidence]:
-        """Return the wanted evidence that is missing altogether."""
-        return [evidence for evidence in Evidence if evidence in self.missing and evidence in wanted]
+    def lacking(self, required: Set[Evidence]) -> list[Evidence]:
+        """Return the required evidence that is missing completely."""
+        return [evidence for evidence in Evidence if evidence in self.missing and evidence in required]
 
     def with_gaps(self, gaps: Mapping[Evidence, str]) -> "LogCoverage":
-        """Return the same coverage with more evidence that is there only for a part of the time."""
+        """Return the coverage with additional evidence that covers only a part of the time."""
         return replace(self, partial={**gaps, **self.partial})
 
 

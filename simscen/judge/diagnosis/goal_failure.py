@@ -55,7 +55,7 @@ def _walled_in(case: Case, goal: Goal) -> list[str]:
         return []
     needed = 2 * case.inscribed_radius
     narrow = [passage for passage in case.passages if passage.goal == goal.name and passage.width < needed]
-    where = f": the widest is {narrow[0].told}" if narrow else ""
+    where = f": the widest is {narrow[0].description}" if narrow else ""
     return [f"the world itself leaves a robot of {needed:.2f} m no way to goal {goal.name}{where}"]
 
 
@@ -151,7 +151,7 @@ def diagnose_blocked_path(
     verb = "closes" if left < needed else "narrows"
     named = " and ".join(thing.told(trace) for thing in guilty)
     text = (
-        f"{named} {verb if len(guilty) == 1 else verb[:-1]} {passage.told} on the shortest way: "
+        f"{named} {verb if len(guilty) == 1 else verb[:-1]} {passage.description} on the shortest way: "
         f"{f'{left:.2f} m are' if left >= NEGLIGIBLE_WIDTH_M else 'nothing is'} left, the robot is {needed:.2f} m wide"
     )
     return [text], {thing.event for thing in guilty}

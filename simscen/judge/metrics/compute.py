@@ -95,7 +95,7 @@ def _lacking(name: str, coverage: LogCoverage) -> str:
     """Return which evidence of a metric the log lacks, in words; "" if it has all of it."""
     wanted = METRICS[name].evidence
     if lacking := coverage.lacking(wanted):
-        return f"the log does not say {' nor '.join(evidence.value for evidence in lacking)}"
+        return f"the log lacks {' and '.join(evidence.value for evidence in lacking)}"
     return "; ".join(dict.fromkeys(reason for evidence, reason in coverage.partial.items() if evidence in wanted))
 
 
@@ -243,7 +243,7 @@ def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -
     wanted = entry.measure.evidence
     lacking = coverage.lacking(frozenset(Evidence) if wanted is None else wanted)
     if lacking:
-        return f"the log does not say {' nor '.join(one.value for one in lacking)}"
+        return f"the log lacks {' and '.join(one.value for one in lacking)}"
     try:
         found = entry.measure.measure(trace, case)
     except MissingEvidence as missing:

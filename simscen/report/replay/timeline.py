@@ -142,20 +142,20 @@ def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[d
     data, numbers = [], {"event": 0, "fault": 0}
     first = next(iter(lines.values()))
     for one in result.disturbances:
-        number = numbers[one.ordered.kind]
-        numbers[one.ordered.kind] += 1
-        known = first.events if one.ordered.kind == "event" else first.faults
+        number = numbers[one.disturbance.kind]
+        numbers[one.disturbance.kind] += 1
+        known = first.events if one.disturbance.kind == "event" else first.faults
         data.append(
             {
-                "kind": one.ordered.kind,
-                "name": one_line(one.ordered.name),
-                "ordered": one_line(one.ordered.trigger),
+                "kind": one.disturbance.kind,
+                "name": one_line(one.disturbance.name),
+                "ordered": one_line(one.disturbance.trigger),
                 "when": one_line(disturbance_times(one, result.tick_rate)),
                 "fired": list(one.fired),
                 "happened": one.happened,
                 "missing": one.missing,
                 "effect": one_line(one.effect),
-                "line": known.get(number, one.ordered.line) if len(lines) == 1 else one.ordered.line,
+                "line": known.get(number, one.disturbance.line) if len(lines) == 1 else one.disturbance.line,
             }
         )
     return data
@@ -180,7 +180,7 @@ def _disturbance_line(verdict: Verdict, name: str, result: RunResult) -> int:
     """Return the line of the event or fault of a verdict on a missing disturbance."""
     if verdict.criterion != DISTURBANCE:
         return 0
-    ordered = [one.ordered for one in result.disturbances]
+    ordered = [one.disturbance for one in result.disturbances]
     return next((one.line for one in ordered if one.name in (name, name.rpartition("#")[0])), 0)
 
 

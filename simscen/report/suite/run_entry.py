@@ -138,7 +138,7 @@ def _disturbance_table(run: RunFinished) -> str:
     """Return a table of events and faults with their times and effects."""
     rows = "".join(
         f'<tr class="{"bad" if one.missing else ""}"><td>{"happened" if one.happened else "did not happen"}</td>'
-        f"<td>{html_text(one.ordered.name)}</td><td>{html_text(one.ordered.trigger)}</td>"
+        f"<td>{html_text(one.disturbance.name)}</td><td>{html_text(one.disturbance.trigger)}</td>"
         f"<td>{html_text(disturbance_times(one, run.result.tick_rate))}</td><td>{html_text(one.effect)}</td></tr>"
         for one in run.result.disturbances
     )

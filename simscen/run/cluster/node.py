@@ -1,4 +1,4 @@
-"""What runs on the nodes of a cluster: the runner of a node, and the queue from which all runners take their jobs.
+"""Code that runs on the nodes of a cluster: the runner of a node, and the queue from which all runners take jobs.
 
 Both are plain classes; the backend makes Ray actors of them.
 """
@@ -124,7 +124,7 @@ class NodeRunner:
 
 
 class _JobsOfQueue:
-    """Iterator over the jobs of the queue. At its end, it may go on later, with jobs that were added meanwhile."""
+    """Iterator over the jobs of the queue. After its end, it can continue with jobs that were added later."""
 
     def __init__(self, take: Callable[[], PackedJob | None], unpack: Callable[[PackedJob], Job]) -> None:
         self._take, self._unpack = take, unpack
@@ -152,9 +152,9 @@ def _files(job: Job) -> Iterator[FilePiece]:
 
 def _same_plugin(entry: Entry) -> Entry:
     """Return the same plug-in as installed on this node. Raises UsageError if it is missing or another version."""
-    here = find(entry.group, entry.name)
-    wanted = requirement_of(entry)
-    if here is None or requirement_of(here) != wanted:
-        found = "it is not installed" if here is None else f"{requirement_of(here)} is installed"
-        raise UsageError(f"the scenarios need {entry.group} `{entry.name}` of {wanted}, but {found}")
-    return here
+    installed = find(entry.group, entry.name)
+    required = requirement_of(entry)
+    if installed is None or requirement_of(installed) != required:
+        found = "it is not installed" if installed is None else f"{requirement_of(installed)} is installed"
+        raise UsageError(f"the scenarios need {entry.group} `{entry.name}` of {required}, but {found}")
+    return installed

@@ -1,4 +1,4 @@
-"""Jobs on their way to another machine: the scenario, and the files that it was made from, by content."""
+"""Transfer of jobs to other machines: the scenario, and the content of the files from which it was loaded."""
 
 import hashlib
 import io
@@ -13,7 +13,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.run.process.jobs import Job
 
 PACKAGE_FOLDER = Path(__file__).parents[2]
-"""Folder of the installed package, which may be another one on each machine."""
+"""Folder of the installed package, which can differ between machines."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class PackedJob:
 
 
 def pack(job: Job, send: Callable[[Path], SentFile]) -> PackedJob:
-    """Return a job without its output folder, which is another one there. `send` is called for each input file."""
+    """Return a job without its output folder, which is different there. `send` is called for each input file."""
     buffer = io.BytesIO()
     pickler = _Pickler(buffer)
     pickler.dump(replace(job, folder=Path()))
@@ -43,14 +43,14 @@ def pack(job: Job, send: Callable[[Path], SentFile]) -> PackedJob:
 
 
 def _input_files(scenario: LoadedScenario) -> Iterable[Path]:
-    known = {path for each in (scenario, *scenario.robots.values()) for path in (*each.files.values(), *each.read)}
-    return (path for path in known if path.is_file() and not path.is_relative_to(PACKAGE_FOLDER))
+    paths = {path for view in (scenario, *scenario.robots.values()) for path in (*view.files.values(), *view.read)}
+    return (path for path in paths if path.is_file() and not path.is_relative_to(PACKAGE_FOLDER))
 
 
 class Unpacker:
     """Restores packed jobs. If this machine lacks one of the input files, they are written below `folder`.
 
-    Files that are there with the same content, as in a shared folder, are used where they are.
+    Files that exist at the same path with the same content, as in a shared folder, are not copied.
     """
 
     def __init__(self, folder: Path, receive: Callable[[Any], bytes]) -> None:
@@ -73,10 +73,10 @@ class Unpacker:
         """Return whether a file with this content is at the same path on this machine."""
         if (path, digest) not in self._is_here:
             try:
-                there = digest_of(Path(path).read_bytes())
+                local_digest = digest_of(Path(path).read_bytes())
             except OSError:
-                there = ""
-            self._is_here[path, digest] = there == digest
+                local_digest = ""
+            self._is_here[path, digest] = local_digest == digest
         return self._is_here[path, digest]
 
     def _write(self, target: Path, file: SentFile) -> None:

@@ -28,11 +28,11 @@ from simscen.spec.registry import Entry
 MAX_ATTEMPTS = 2
 """A job whose runner or node is lost is tried once more."""
 
-WAITING_PER_WORKER = 2
+QUEUED_JOBS_PER_WORKER = 2
 """Jobs that wait in the queue for each worker, so that no node waits for a job to be packed."""
 
-LOOK_FOR_NODES_S = 5.0
-"""Time between two looks for nodes that have joined the cluster."""
+NODE_SEARCH_PERIOD_S = 5.0
+"""Time between two searches for nodes that have joined the cluster."""
 
 CONNECT_S = 5.0
 START_LIMIT_S = 120.0
@@ -44,7 +44,7 @@ UNSENT_UPDATES = 64
 
 @dataclass
 class _Runner:
-    """A runner: its id, the node, its actor, its workers, and its current call, which returns what `is_ready` says."""
+    """A runner: its id, node, actor, workers, and current call, which is `software` until `is_ready`, then `run`."""
 
     name: str
     node: str
@@ -70,7 +70,7 @@ class RayBackend:
         self._contents: dict[str, SentFile] = {}
         self._queue: Any = None
         self._next_name = 0
-        self._last_look = 0.0
+        self._last_search = 0.0
 
     def __enter__(self) -> "RayBackend":
         """Connect to the cluster. Raises UsageError."""
@@ -89,48 +89,48 @@ class RayBackend:
         ray.shutdown()
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), go_on: Callable[[], bool] = always
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
     ) -> Iterator[JobUpdate]:
         """Run jobs and yield their updates, as described in Backend. Raises UsageError for an unusable cluster."""
-        batch, begun = _Batch(jobs, go_on), time.monotonic()
+        batch, start_time = _Batch(jobs, should_continue), time.monotonic()
         try:
-            while batch.is_going_on():
-                self._look_for_nodes()
+            while batch.is_unfinished():
+                self._add_runners()
                 self._send(batch)
                 calls = {runner.call: runner for runner in self._runners if runner.call is not None}
                 ready, _ = ray.wait(list(calls), timeout=POLL_S) if calls else ([], [])
                 for call in ready:
-                    yield from self._hear(calls[call], batch, plugins)
+                    yield from self._process_reply(calls[call], batch, plugins)
                 for runner in self._runners:
                     if runner.is_ready and runner.call is None and batch.sent:
                         self._start(runner, plugins)
-                self._require_free_cpus(begun)
-        except SystemError as error:  # what Ray makes of an exception that a signal handler raised
+                self._require_free_cpus(start_time)
+        except SystemError as error:  # Ray wraps an exception that a signal handler raised
             raise error.__cause__ or error from None
         finally:
             if batch.running or batch.sent:
-                self._abandon()
+                self._kill_runners()
             ray.get(self._queue.clear.remote())
         self._finish_calls()
 
-    def _look_for_nodes(self) -> None:
+    def _add_runners(self) -> None:
         """Start a runner on each node that has none. Raises UsageError if there is no node."""
-        if self._runners and time.monotonic() < self._last_look + LOOK_FOR_NODES_S:
+        if self._runners and time.monotonic() < self._last_search + NODE_SEARCH_PERIOD_S:
             return
-        self._last_look = time.monotonic()
+        self._last_search = time.monotonic()
         nodes = [node for node in _nodes() if node["Alive"] and node["Resources"].get("CPU", 0) >= 1]
         if not nodes:
             raise UsageError(f"no node of the Ray cluster at {self._address} has a CPU")
         used = {runner.node for runner in self._runners}
         for node in sorted(nodes, key=lambda node: str(node["NodeID"])):
-            left = self._workers - sum(one.workers for one in self._runners)
-            workers = min(int(node["Resources"]["CPU"]), left)
+            remaining = self._workers - sum(one.workers for one in self._runners)
+            workers = min(int(node["Resources"]["CPU"]), remaining)
             if node["NodeID"] not in used and workers > 0:
                 self._runners.append(self._new_runner(node["NodeID"], node["NodeManagerAddress"], workers))
 
-    def _require_free_cpus(self, begun: float) -> None:
+    def _require_free_cpus(self, start_time: float) -> None:
         """Raise UsageError if no runner has started for too long: Ray waits until a node has enough free CPUs."""
-        if time.monotonic() > begun + START_LIMIT_S and not any(runner.is_ready for runner in self._runners):
+        if time.monotonic() > start_time + START_LIMIT_S and not any(runner.is_ready for runner in self._runners):
             raise UsageError(
                 f"no node of the Ray cluster at {self._address} has become free in {START_LIMIT_S:g} s: other programs "
                 "use its CPUs; wait, or use fewer with --jobs"
@@ -149,8 +149,8 @@ class RayBackend:
 
     def _send(self, batch: "_Batch") -> None:
         """Put jobs into the queue until enough of them wait."""
-        most = WAITING_PER_WORKER * sum(runner.workers for runner in self._runners)
-        while len(batch.sent) < most and (job := batch.next()) is not None:
+        limit = QUEUED_JOBS_PER_WORKER * sum(runner.workers for runner in self._runners)
+        while len(batch.sent) < limit and (job := batch.next()) is not None:
             batch.sent[job.number] = job
             ray.get(self._queue.add.remote(pack(job, self._sent_file)))
 
@@ -164,8 +164,8 @@ class RayBackend:
             self._files[path] = self._contents[digest]
         return self._files[path]
 
-    def _hear(self, runner: _Runner, batch: "_Batch", plugins: Sequence[Entry]) -> Iterator[JobUpdate]:
-        """Handle what a runner answers. Raises UsageError."""
+    def _process_reply(self, runner: _Runner, batch: "_Batch", plugins: Sequence[Entry]) -> Iterator[JobUpdate]:
+        """Process the next reply of a runner. Raises UsageError."""
         try:
             if not runner.is_ready:
                 self._require_same_software(runner, ray.get(runner.call))
@@ -176,7 +176,7 @@ class RayBackend:
         except StopIteration:  # it found no job in the queue
             runner.call = None
         except RayActorError:
-            yield from self._lost(runner, batch)
+            yield from self._remove_lost_runner(runner, batch)
         except RayTaskError as error:
             if isinstance(error.cause, UsageError):
                 raise UsageError(f"node {runner.address}: {error.cause}") from error
@@ -191,13 +191,13 @@ class RayBackend:
                 f"{PACKAGE_FOLDER}; install the same version on all nodes"
             )
 
-    def _lost(self, runner: _Runner, batch: "_Batch") -> Iterator[JobUpdate]:
+    def _remove_lost_runner(self, runner: _Runner, batch: "_Batch") -> Iterator[JobUpdate]:
         """Forget a runner that has died, and repeat its jobs, once each."""
         self._runners.remove(runner)
         ray.kill(runner.actor)  # it may only be unreachable
-        self._last_look = 0.0
+        self._last_search = 0.0
         for number in ray.get(self._queue.taken_by.remote(runner.name)):
-            yield from batch.lost(number, runner.address)
+            yield from batch.retry_or_fail(number, runner.address)
 
     def _finish_calls(self) -> None:
         """Read the calls of all runners to their ends, which come at once, because the queue is empty."""
@@ -208,7 +208,7 @@ class RayBackend:
             except RayActorError:
                 self._runners.remove(runner)
 
-    def _abandon(self) -> None:
+    def _kill_runners(self) -> None:
         """Kill all runners with their processes."""
         for runner in self._runners:
             ray.kill(runner.actor)
@@ -253,32 +253,32 @@ def _nodes() -> list[dict[str, Any]]:
 class _Batch:
     """The jobs of one call of `run`: those that are `sent` to the cluster and those that are `running`, by number."""
 
-    def __init__(self, jobs: Iterable[Job], go_on: Callable[[], bool]) -> None:
-        self._jobs, self._go_on = iter(jobs), go_on
-        self._again = deque[Job]()
+    def __init__(self, jobs: Iterable[Job], should_continue: Callable[[], bool]) -> None:
+        self._jobs, self._should_continue = iter(jobs), should_continue
+        self._retries = deque[Job]()
         self._attempts: dict[int, int] = {}
-        self._ahead: Job | None = None
+        self._next_job: Job | None = None
         self.sent: dict[int, Job] = {}
         self.running: dict[int, Job] = {}
 
     def next(self) -> Job | None:
         """Return the next job to send, or None."""
-        if not self._go_on():
+        if not self._should_continue():
             return None
-        job, self._ahead = self._ahead, None
+        job, self._next_job = self._next_job, None
         if job is None:
-            job = self._again.popleft() if self._again else next(self._jobs, None)
+            job = self._retries.popleft() if self._retries else next(self._jobs, None)
         return job
 
-    def is_going_on(self) -> bool:
+    def is_unfinished(self) -> bool:
         """Return whether a job runs or has yet to start."""
         if self.running:
             return True
-        if not self._go_on():
+        if not self._should_continue():
             return False
-        if not self.sent and self._ahead is None:
-            self._ahead = self.next()
-        return bool(self.sent) or self._ahead is not None
+        if not self.sent and self._next_job is None:
+            self._next_job = self.next()
+        return bool(self.sent) or self._next_job is not None
 
     def updates(self, update: NodeUpdate) -> Iterator[JobUpdate]:
         """Write the files of a job, and yield its updates."""
@@ -300,14 +300,14 @@ class _Batch:
                 job = self.running.pop(number, None) or self.sent.pop(number)
                 yield Ended(job, end)
 
-    def lost(self, number: int, address: str) -> Iterator[JobUpdate]:
+    def retry_or_fail(self, number: int, address: str) -> Iterator[JobUpdate]:
         """Queue a job of a lost runner again, or report it as ended if it was lost too often."""
         job = self.running.pop(number, None) or self.sent.pop(number, None)
         if job is None:
             return
         self._attempts[number] = self._attempts.get(number, 1) + 1
         if self._attempts[number] <= MAX_ATTEMPTS:
-            self._again.append(job)
+            self._retries.append(job)
             return
-        how = f"was lost with its node {address}, as before on another node"
-        yield Ended(job, ForkServerDeath(how, False, False, ""))
+        description = f"was lost with its node {address}, as before on another node"
+        yield Ended(job, ForkServerDeath(description, False, False, ""))

@@ -129,7 +129,7 @@ class StackProcess:
     def error(self, kind: str, message: str) -> RunError:
         """Return an error of this stack, with the end of its output."""
         self._pump(lambda: False, 0.0)
-        output = self._log.last(TAIL_BYTES).decode(errors="replace")
+        output = self._log.tail(TAIL_BYTES).decode(errors="replace")
         return RunError(kind, f"stack {self._name}: {message}", output_tail(output), by_stack=True)
 
     def release(self) -> None:
@@ -207,7 +207,7 @@ class StackProcess:
 
     def _read_output(self) -> bool:
         data = os.read(self._output, READ_BYTES)
-        self._log.take(data)
+        self._log.append(data)
         return bool(data)
 
     def _has_frame(self) -> bool:

@@ -47,11 +47,11 @@ class Backend(Protocol):
     def __exit__(self, *_: object) -> None: ...
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), go_on: Callable[[], bool] = always
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
     ) -> Iterator[JobUpdate]:
         """Execute jobs, several at a time, and yield their updates: exactly one Ended for each that was started.
 
-        `plugins` are those that the jobs use. `go_on` is called before each job; no job starts once it returns False.
-        If the consumer stops early or an exception passes through, all running processes are killed.
+        `plugins` are those that the jobs use. `should_continue` is called before each job; no job starts once it
+        returns False. If the consumer stops early or an exception passes through, all running processes are killed.
         """
         ...

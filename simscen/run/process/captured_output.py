@@ -12,13 +12,13 @@ READ_BYTES = 1 << 20
 class CappedLog:
     """Log file with the first MAX_HEAD_BYTES and the last MAX_TAIL_BYTES of the output of a process.
 
-    Without a writable file, `last` still returns the end of the output.
+    Without a writable file, `tail` still returns the end of the output.
     """
 
     def __init__(self, path: Path | None) -> None:
-        self._room, self._left_out = MAX_HEAD_BYTES, 0
-        self._end = bytearray()  # the last MAX_TAIL_BYTES of the output
-        self._waiting = 0  # how many of these are not in the file yet
+        self._head_bytes_left, self._omitted_bytes = MAX_HEAD_BYTES, 0
+        self._tail = bytearray()  # the last MAX_TAIL_BYTES of the output
+        self._unwritten_bytes = 0  # how many of these are not yet in the file
         self._file: int | None = None
         if path is None:
             return
@@ -26,30 +26,30 @@ class CappedLog:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)
         except OSError:
-            self._room = 0  # the run reports the unusable folder itself
+            self._head_bytes_left = 0  # the run reports the unusable folder itself
 
-    def take(self, data: bytes) -> None:
+    def append(self, data: bytes) -> None:
         """Add output."""
-        head = data[: self._room]
-        self._room -= len(head)
+        head = data[: self._head_bytes_left]
+        self._head_bytes_left -= len(head)
         self._write(head)
-        self._waiting += len(data) - len(head)
-        self._end += data
-        if len(self._end) > MAX_TAIL_BYTES:
-            del self._end[:-MAX_TAIL_BYTES]
-        self._left_out += max(0, self._waiting - MAX_TAIL_BYTES)
-        self._waiting = min(self._waiting, MAX_TAIL_BYTES)
+        self._unwritten_bytes += len(data) - len(head)
+        self._tail += data
+        if len(self._tail) > MAX_TAIL_BYTES:
+            del self._tail[:-MAX_TAIL_BYTES]
+        self._omitted_bytes += max(0, self._unwritten_bytes - MAX_TAIL_BYTES)
+        self._unwritten_bytes = min(self._unwritten_bytes, MAX_TAIL_BYTES)
 
-    def last(self, most: int) -> bytes:
-        """Return the last bytes of the output."""
-        return bytes(self._end[-most:])
+    def tail(self, size: int) -> bytes:
+        """Return at most the last `size` bytes of the output."""
+        return bytes(self._tail[-size:])
 
     def close(self) -> None:
         """Write the remaining output to the file."""
-        if self._left_out:
-            self._write(f"\n… simscen left out {self._left_out} bytes here …\n".encode())
-        if self._waiting:
-            self._write(bytes(self._end[-self._waiting :]))
+        if self._omitted_bytes:
+            self._write(f"\n… simscen omitted {self._omitted_bytes} bytes here …\n".encode())
+        if self._unwritten_bytes:
+            self._write(bytes(self._tail[-self._unwritten_bytes :]))
         if self._file is not None:
             os.close(self._file)
             self._file = None
@@ -65,21 +65,21 @@ class CappedLog:
 
 
 TAIL_LINES = 20
-_HEAD = re.compile(r"^(Current thread|Thread|Stack) .*\(most recent call first\):$", re.MULTILINE)
-_FRAME = re.compile(r'^  File "(?P<file>.*)", line (?P<line>\d+) in (?P<name>\S+)$', re.MULTILINE)
+_DUMP_HEADER = re.compile(r"^(Current thread|Thread|Stack) .*\(most recent call first\):$", re.MULTILINE)
+_DUMP_FRAME = re.compile(r'^  File "(?P<file>.*)", line (?P<line>\d+) in (?P<name>\S+)$', re.MULTILINE)
 
 
-def innermost_frame(printed: str) -> str:
+def innermost_frame(output: str) -> str:
     """Return the innermost frame of a dumped stack, e.g. "step (simulation.py:88)"; "" without a dump."""
-    heads = list(_HEAD.finditer(printed))
-    frame = _FRAME.search(printed, heads[-1].end()) if heads else None
+    heads = list(_DUMP_HEADER.finditer(output))
+    frame = _DUMP_FRAME.search(output, heads[-1].end()) if heads else None
     return f"{frame['name']} ({PurePath(frame['file']).name}:{frame['line']})" if frame else ""
 
 
-def output_tail(printed: str) -> str:
+def output_tail(output: str) -> str:
     """Return the last lines of the output, or the first lines of a dumped stack."""
-    heads = list(_HEAD.finditer(printed))
+    heads = list(_DUMP_HEADER.finditer(output))
     if heads:
-        before = printed[: heads[-1].start()].splitlines()[-3:]
-        return "\n".join([*before, *printed[heads[-1].start() :].splitlines()[: TAIL_LINES - len(before)]])
-    return "\n".join(printed.splitlines()[-TAIL_LINES:])
+        before = output[: heads[-1].start()].splitlines()[-3:]
+        return "\n".join([*before, *output[heads[-1].start() :].splitlines()[: TAIL_LINES - len(before)]])
+    return "\n".join(output.splitlines()[-TAIL_LINES:])

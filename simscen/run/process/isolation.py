@@ -18,8 +18,8 @@ MAX_MEMORY_BYTES = 4 << 30
 MAX_FILE_BYTES = 2 << 30
 MAX_OPEN_FILES = 256
 _PR_SET_PDEATHSIG = 1
-_PASSED_ON = {"PATH", "HOME", "LANG", "TMPDIR", "XDG_CACHE_HOME", "SIMSCEN_CACHE_DIR"}
-_ARITHMETIC = {
+_INHERITED_VARIABLES = {"PATH", "HOME", "LANG", "TMPDIR", "XDG_CACHE_HOME", "SIMSCEN_CACHE_DIR"}
+_ARITHMETIC_VARIABLES = {
     *("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE"),
     *("NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES", "GLIBC_TUNABLES"),
 }
@@ -38,9 +38,9 @@ def die_with_parent(parent: int) -> None:
 
 def limit_memory() -> None:
     """Limit the memory of this process and its children, and disable core dumps."""
-    for what, most in ((resource.RLIMIT_AS, MAX_MEMORY_BYTES), (resource.RLIMIT_CORE, 0)):
-        hard = resource.getrlimit(what)[1]
-        resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    for limit, maximum in ((resource.RLIMIT_AS, MAX_MEMORY_BYTES), (resource.RLIMIT_CORE, 0)):
+        hard = resource.getrlimit(limit)[1]
+        resource.setrlimit(limit, (maximum if hard == resource.RLIM_INFINITY else min(maximum, hard), hard))
 
 
 def prefer_for_oom_kill() -> None:
@@ -54,22 +54,24 @@ def limit_resources() -> None:
 
     The hard limits stay, so that an external stack can have its original limits restored.
     """
-    for what, most in (
+    for limit, maximum in (
         (resource.RLIMIT_AS, MAX_MEMORY_BYTES),
         (resource.RLIMIT_FSIZE, MAX_FILE_BYTES),
         (resource.RLIMIT_NOFILE, MAX_OPEN_FILES),
         (resource.RLIMIT_CORE, 0),
     ):
-        hard = resource.getrlimit(what)[1]
-        bound = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(what, (bound, hard))
+        hard = resource.getrlimit(limit)[1]
+        bound = maximum if hard == resource.RLIM_INFINITY else min(maximum, hard)
+        resource.setrlimit(limit, (bound, hard))
 
 
 def clean_environment() -> dict[str, str]:
     """Return the environment of worker processes: no secrets, fixed CPU kernels and hash seed, one BLAS thread."""
-    kept = {k: v for k, v in os.environ.items() if k in _PASSED_ON | _ARITHMETIC or k.startswith("LC_")}
+    inherited = {
+        k: v for k, v in os.environ.items() if k in _INHERITED_VARIABLES | _ARITHMETIC_VARIABLES or k.startswith("LC_")
+    }
     one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "TBB")}
-    return {**kernel_variables(), **kept, **one_thread, "PYTHONHASHSEED": "0"}
+    return {**kernel_variables(), **inherited, **one_thread, "PYTHONHASHSEED": "0"}
 
 
 _PR_SET_CHILD_SUBREAPER = 36
@@ -98,28 +100,28 @@ def kill_children_except(known: Iterable[int]) -> bool:
 
     Returns whether there were any.
     """
-    found, spared = False, set(known)
-    while strangers := _children_except(spared):
+    found, excluded = False, set(known)
+    while unknown := _children_except(excluded):
         found = True
-        for pid in strangers:
+        for pid in unknown:
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
     return found
 
 
-def _children_except(spared: Collection[int]) -> list[int]:
-    """Return the children of this process that are not `spared`, including zombies.
+def _children_except(excluded: Collection[int]) -> list[int]:
+    """Return the children of this process that are not `excluded`, including zombies.
 
-    The kernel's list of children may lack some while others exit (proc(5)). An empty answer is therefore confirmed by
+    The kernel's list of children may lack some while others exit (proc(5)). An empty list is therefore confirmed by
     the list of all processes.
     """
     own = os.getpid()
     with suppress(FileNotFoundError):  # a kernel without CONFIG_PROC_CHILDREN
         listed = map(int, Path(f"/proc/{own}/task/{own}/children").read_text().split())
-        if found := [pid for pid in listed if pid not in spared]:
+        if found := [pid for pid in listed if pid not in excluded]:
             return found
     everything = (int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit())
-    return [pid for pid in everything if pid not in spared and _parent(pid) == own]
+    return [pid for pid in everything if pid not in excluded and _parent(pid) == own]
 
 
 def _parent(pid: int) -> int:
@@ -135,26 +137,28 @@ def plugin_path_arguments(plugins: Iterable[Entry]) -> tuple[str, ...]:
     used = sorted({(entry.distribution, entry.folder) for entry in plugins})
     if not used:
         return ()
-    own = site.getusersitepackages() if site.ENABLE_USER_SITE else ""
+    user_site = site.getusersitepackages() if site.ENABLE_USER_SITE else ""
     return (
-        json.dumps({"path": [str(Path(folder).absolute()) for folder in search_path()], "user": own, "used": used}),
+        json.dumps(
+            {"path": [str(Path(folder).absolute()) for folder in search_path()], "user": user_site, "used": used}
+        ),
     )
 
 
-def apply_plugin_path(told: str) -> None:
+def apply_plugin_path(argument: str) -> None:
     """Extend sys.path in the fork server, so that it finds the same plug-ins as its parent.
 
     New folders come last, so that the engine does not change. A folder comes first only if another version of a used
     package would be found otherwise.
     """
-    wanted = json.loads(told)
-    for folder in wanted["path"]:
+    configuration = json.loads(argument)
+    for folder in configuration["path"]:
         if folder not in sys.path:
             # addsitedir reads .pth files, which are used by editable installations.
-            site.addsitedir(folder) if folder == wanted["user"] else sys.path.append(folder)
+            site.addsitedir(folder) if folder == configuration["user"] else sys.path.append(folder)
     from importlib.metadata import PackageNotFoundError, distribution
 
-    for name, folder in wanted["used"]:
+    for name, folder in configuration["used"]:
         try:
             found = str(distribution(name).locate_file(""))
         except PackageNotFoundError:  # its runs report the missing package

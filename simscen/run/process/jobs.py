@@ -29,7 +29,7 @@ class ReplayMode(str, Enum):
     FAILED = "failed"
     ALL = "all"
 
-    def wants(self, outcome: Outcome) -> bool:
+    def includes(self, outcome: Outcome) -> bool:
         """Return whether a run with this outcome gets a replay page."""
         return self is ReplayMode.ALL or (self is ReplayMode.FAILED and not outcome.good)
 
@@ -48,34 +48,31 @@ class Job:
 
 @dataclass(frozen=True)
 class ProcessEnd:
-    """How a worker process ended. `last_word` is its final message, or None.
-
-    `printed` is the end of its output.
-    """
+    """How a worker process ended, with its final message and the end of its output. Times in s."""
 
     number: int
     code: int | None
     signal: int | None
     killed_for: str | None
-    last_word: dict[str, Any] | None
+    final_message: dict[str, Any] | None
     wall: float
     cpu: float
     peak_bytes: int
     left_processes: bool
-    printed: str
+    output: str
 
 
 @dataclass(frozen=True)
 class ForkServerDeath:
     """The fork server died while a job was running, or was killed because it did not respond.
 
-    `how` says so in words; `at_fault` = it was preparing this very job; `printed` is the end of its output.
+    `was_preparing` means that it was preparing this job; `output` is the end of its output.
     """
 
-    how: str
-    at_fault: bool
+    description: str
+    was_preparing: bool
     timed_out: bool
-    printed: str
+    output: str
 
 
 def pack_job(job: Job) -> bytes:
@@ -86,11 +83,11 @@ def pack_job(job: Job) -> bytes:
 
 def receive_job(pipe: int) -> Job | None:
     """Read one job; None at the end of the stream. Reads no further bytes, so that `select` reports the next job."""
-    head = _exactly(pipe, _LENGTH.size)
+    head = _read_exactly(pipe, _LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
     (length,) = _LENGTH.unpack(head)
-    data = _exactly(pipe, length)
+    data = _read_exactly(pipe, length)
     if len(data) < length:
         return None
     job = pickle.loads(data)
@@ -98,7 +95,7 @@ def receive_job(pipe: int) -> Job | None:
     return job
 
 
-def _exactly(pipe: int, size: int) -> bytes:
+def _read_exactly(pipe: int, size: int) -> bytes:
     data = bytearray()
     while len(data) < size and (piece := os.read(pipe, size - len(data))):
         data += piece

@@ -43,13 +43,13 @@ class Supervisor:
         self._plugins: frozenset[Entry] = frozenset()
         self._server: ForkServerProcess | None = None
         self._jobs: Iterator[Job] = iter(())
-        self._go_on: Callable[[], bool] = always
-        self._again, self._suspects = deque[Job](), deque[Job]()
+        self._should_continue: Callable[[], bool] = always
+        self._retries, self._suspects = deque[Job](), deque[Job]()
         self._running: dict[int, Job] = {}
         self._preparing: Job | None = None
-        self._begun: set[int] = set()
-        self._tried: set[int] = set()
-        self._alive = False
+        self._reported: set[int] = set()
+        self._suspect_numbers: set[int] = set()
+        self._responded = False
 
     def __enter__(self) -> "Supervisor":
         return self
@@ -58,17 +58,17 @@ class Supervisor:
         self.close()
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), go_on: Callable[[], bool] = always
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
     ) -> Iterator[JobUpdate]:
         """Run jobs and yield their updates, as described in Backend. Takes a job only when it can start."""
         if not self._plugins.issuperset(plugins):
             self.close()
             self._plugins |= frozenset(plugins)
-        self._jobs, self._go_on = iter(jobs), go_on
-        self._begun, self._tried = set(), set()
+        self._jobs, self._should_continue = iter(jobs), should_continue
+        self._reported, self._suspect_numbers = set(), set()
         try:
             while (job := self._next()) is not None:
-                yield from self._converse(self._started(), job)
+                yield from self._run_jobs(self._ensure_server(), job)
         finally:
             if self._running:
                 self.close()
@@ -76,19 +76,19 @@ class Supervisor:
     def close(self) -> None:
         """Kill all workers and end the fork server."""
         if self._server is not None:
-            self._server.leave()
+            self._server.close()
         self._server, self._preparing = None, None
-        for jobs in (self._running, self._again, self._suspects):
+        for jobs in (self._running, self._retries, self._suspects):
             jobs.clear()
 
-    def _started(self) -> ForkServerProcess:
+    def _ensure_server(self) -> ForkServerProcess:
         """Return the fork server; start it if it does not run."""
         if self._server is None:
-            self._alive = False
+            self._responded = False
             self._server = ForkServerProcess((*self._entry, *plugin_path_arguments(self._plugins)))
         return self._server
 
-    def _converse(self, server: ForkServerProcess, first: Job) -> Iterator[JobUpdate]:
+    def _run_jobs(self, server: ForkServerProcess, first: Job) -> Iterator[JobUpdate]:
         """Run `first` and further jobs until none runs, or until the fork server dies."""
         job: Job | None = first
         try:
@@ -99,41 +99,41 @@ class Supervisor:
                     job = self._next()
                 if not self._running:
                     return
-                update = self._understood(server.hear(self._patience()))
+                update = self._process_message(server.receive_line(self._message_timeout()))
                 if update is not None:
                     yield update
                 job = self._next()
         except (EOFError, Unresponsive) as error:
-            silent = isinstance(error, Unresponsive)
-            if silent:
+            unresponsive = isinstance(error, Unresponsive)
+            if unresponsive:
                 server.abort()
-            death = server.autopsy()
+            death = server.collect_death()
             self._server = None
-            server.leave()
-        yield from self._after_death(death, silent)
+            server.close()
+        yield from self._after_death(death, unresponsive)
 
     def _next(self) -> Job | None:
         """Return the job to start now, or None. A suspect runs alone."""
-        if not self._go_on():
+        if not self._should_continue():
             return None
-        suspected = self._tried & self._running.keys()
+        running_suspects = self._suspect_numbers & self._running.keys()
         if self._suspects and not self._running:
             return self._suspects.popleft()
-        if self._suspects or suspected or len(self._running) >= self._workers:
+        if self._suspects or running_suspects or len(self._running) >= self._workers:
             return None
-        return self._again.popleft() if self._again else next(self._jobs, None)
+        return self._retries.popleft() if self._retries else next(self._jobs, None)
 
-    def _patience(self) -> float:
+    def _message_timeout(self) -> float:
         """Return how long to wait for a message. Preparing a job may take its wall limit, without heartbeats."""
         return MAX_SILENCE_S + (self._preparing.wall_limit if self._preparing else 0.0)
 
-    def _understood(self, text: bytes) -> JobUpdate | None:
+    def _process_message(self, text: bytes) -> JobUpdate | None:
         message: dict[str, Any] = json.loads(text)
         match message:
             case {"started": number}:
                 self._preparing = self._running[number]
-                if number not in self._begun:
-                    self._begun.add(number)
+                if number not in self._reported:
+                    self._reported.add(number)
                     return Started(self._running[number])
             case {"prepared": _}:
                 self._preparing = None
@@ -143,26 +143,28 @@ class Supervisor:
                 del message["exit"]
                 return Ended(self._running.pop(number), ProcessEnd(number=number, **message))
             case _:
-                self._alive = True
+                self._responded = True
         return None
 
-    def _after_death(self, death: ProcessDeath, silent: bool) -> Iterator[JobUpdate]:
+    def _after_death(self, death: ProcessDeath, unresponsive: bool) -> Iterator[JobUpdate]:
         """Report the jobs that caused the death as ended, and queue the others again."""
-        under_way, prepared = list(self._running.values()), self._preparing
+        running, prepared = list(self._running.values()), self._preparing
         self._running.clear()
         self._preparing = None
         # A SIGKILL comes from outside, perhaps from another job; other exits are caused by the fork server itself.
-        culprit = prepared if silent or death.code != -signal.SIGKILL or len(under_way) == 1 else None
-        how = f"did not answer and {death.how}" if silent else death.how
-        if not self._alive:  # it cannot even start
-            under_way += [*self._suspects, *self._again, *self._jobs]
+        culprit = prepared if unresponsive or death.code != -signal.SIGKILL or len(running) == 1 else None
+        description = f"did not respond and {death.description}" if unresponsive else death.description
+        if not self._responded:  # it could not start
+            running += [*self._suspects, *self._retries, *self._jobs]
             self._suspects.clear()
-            self._again.clear()
-        for job in under_way:
-            if job is culprit or job.number in self._tried or not self._alive:
-                yield Ended(job, ForkServerDeath(how, job is prepared, silent and job is culprit, death.printed))
+            self._retries.clear()
+        for job in running:
+            if job is culprit or job.number in self._suspect_numbers or not self._responded:
+                yield Ended(
+                    job, ForkServerDeath(description, job is prepared, unresponsive and job is culprit, death.output)
+                )
             elif culprit is not None:
-                self._again.appendleft(job)
+                self._retries.appendleft(job)
             else:
-                self._tried.add(job.number)
+                self._suspect_numbers.add(job.number)
                 self._suspects.append(job)

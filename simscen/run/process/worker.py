@@ -30,17 +30,17 @@ ExecuteJob = Callable[[Job, Callable[[float], None]], dict[str, Any]]
 
 
 _DISK_FULL_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT})
-_OUT_OF_MEMORY = {"error": "out-of-memory", "message": "the run used more memory than it may"}
+_OUT_OF_MEMORY = {"error": "out-of-memory", "message": "the run exceeded its memory limit"}
 
 
 class WorkerPipes(NamedTuple):
     """File descriptors for messages and for output of a worker."""
 
     report: int
-    printed: int
+    output: int
 
 
-def run_worker(job: Job, parent: int, pipes: WorkerPipes, perform: ExecuteJob) -> NoReturn:
+def run_worker(job: Job, parent: int, pipes: WorkerPipes, execute: ExecuteJob) -> NoReturn:
     """Run the job, send the end record, and exit.
 
     Uses `os._exit`, because the worker is a copy of the fork server and must not return into its code, and to suppress
@@ -48,8 +48,8 @@ def run_worker(job: Job, parent: int, pipes: WorkerPipes, perform: ExecuteJob) -
     """
     code = 1
     try:
-        _settle(parent, pipes.printed)
-        end = _end_record(job, pipes.report, perform)
+        _set_up_process(parent, pipes.output)
+        end = _end_record(job, pipes.report, execute)
         os.write(pipes.report, json_line({"end": end, "left_processes": has_descendants()}))
         code = 0
         sys.stdout.flush()
@@ -60,32 +60,32 @@ def run_worker(job: Job, parent: int, pipes: WorkerPipes, perform: ExecuteJob) -
         os._exit(code)
 
 
-def _settle(parent: int, printed: int) -> None:
+def _set_up_process(parent: int, output: int) -> None:
     """Set up session, signals, output, resource limits, and the fault handler."""
     os.setsid()
     die_with_parent(parent)
     adopt_orphans()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _redirect_output(printed)
+    _redirect_output(output)
     faulthandler.enable()
     faulthandler.register(signal.SIGUSR1)
     prefer_for_oom_kill()
     limit_resources()
 
 
-def _end_record(job: Job, report: int, perform: ExecuteJob) -> dict[str, Any]:
+def _end_record(job: Job, report: int, execute: ExecuteJob) -> dict[str, Any]:
     try:
         job.folder.mkdir(parents=True, exist_ok=True)
-        return perform(job, lambda seconds: _tell(report, seconds))
+        return execute(job, lambda seconds: _send_progress(report, seconds))
     except RunError as error:
         return {"error": error.kind, "message": str(error), "tail": error.tail, "by_stack": error.by_stack}
     except InvalidInput as error:
         return {"error": "invalid", "message": str(error)}
     except MemoryError:
         return _OUT_OF_MEMORY
-    except SystemExit as left:
-        return {"error": "crashed", "message": f"exited {left.code} by itself ({_innermost(left)})"}
+    except SystemExit as error:
+        return {"error": "crashed", "message": f"exited {error.code} by itself ({_innermost_frame(error)})"}
     except OSError as error:
         if error.errno == errno.ENOMEM:
             return _OUT_OF_MEMORY
@@ -95,33 +95,33 @@ def _end_record(job: Job, report: int, perform: ExecuteJob) -> dict[str, Any]:
     except Exception as error:
         # The boundary of the process: any exception becomes the error of this run.
         traceback.print_exc()
-        return {"error": "crashed", "message": f"{type(error).__name__}: {error} ({_innermost(error)})"}
+        return {"error": "crashed", "message": f"{type(error).__name__}: {error} ({_innermost_frame(error)})"}
 
 
-def _innermost(error: BaseException) -> str:
+def _innermost_frame(error: BaseException) -> str:
     frame = traceback.extract_tb(error.__traceback__)[-1]
     return f"{Path(frame.filename).name}:{frame.lineno}"
 
 
-def _tell(report: int, seconds: float) -> None:
+def _send_progress(report: int, seconds: float) -> None:
     os.write(report, json.dumps({"seconds": seconds}).encode() + b"\n")
 
 
-def _redirect_output(printed: int) -> None:
+def _redirect_output(output: int) -> None:
     """Redirect standard output and error, also of C libraries, to the log of the run."""
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.dup2(printed, 1)
-    os.dup2(printed, 2)
-    os.close(nothing)
-    os.close(printed)
+    null = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(null, 0)
+    os.dup2(output, 1)
+    os.dup2(output, 2)
+    os.close(null)
+    os.close(output)
 
 
 class ProgressReporter:
     """A log that reports the progress of a run."""
 
-    def __init__(self, tick_rate: int, tell: Callable[[float], None]) -> None:
-        self._rate, self._tell = tick_rate, tell
+    def __init__(self, tick_rate: int, send: Callable[[float], None]) -> None:
+        self._rate, self._send = tick_rate, send
         self._next = 0.0
 
     def append(self, moment: Moment) -> None:
@@ -129,4 +129,4 @@ class ProgressReporter:
         seconds = moment.tick / self._rate
         if seconds >= self._next:
             self._next = seconds + PROGRESS_INTERVAL_S
-            self._tell(seconds)
+            self._send(seconds)

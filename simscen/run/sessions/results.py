@@ -26,9 +26,9 @@ MAX_RECOVER_BYTES = 64 << 20
 def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
     """Return the result of a run; an error unless its process exited with status 0 and a final message."""
     failure = _with_log(_failure(end), job.folder)
-    printed = output_tail(end.printed)
+    output = output_tail(end.output)
     result = (
-        _result(job, printed)
+        _result(job, output)
         if failure is None
         else error_result(job.key, job.scenario.path, failure, job.scenario.stack)
     )
@@ -37,7 +37,7 @@ def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
         wall=end.wall if isinstance(end, ProcessEnd) else 0.0,
         artifacts=_artifacts(job.folder),
         again=repeat_command(job.scenario, job.key.seed),
-        file=shown(job.scenario.file),
+        file=display_path(job.scenario.file),
         tags=tuple(job.scenario.spec.tags),
         warnings=_stack_warnings(job.folder),
     )
@@ -46,27 +46,27 @@ def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
 def unfinished_run(job: Job, failure: RunFailure) -> RunFinished:
     """Return the result of a run that did not finish or did not start."""
     result = error_result(job.key, job.scenario.path, failure, job.scenario.stack)
-    return _told(job, result)
+    return _result_without_log(job, result)
 
 
 def skipped_run(job: Job, reason: str) -> RunFinished:
     """Return the result of a run whose scenario has `skip`."""
     result = skipped_result(job.key, job.scenario.path, reason, job.scenario.stack)
-    return _told(job, result)
+    return _result_without_log(job, result)
 
 
-def _told(job: Job, result: RunResult) -> RunFinished:
+def _result_without_log(job: Job, result: RunResult) -> RunFinished:
     """Return the result of a run without a log."""
-    again, file = repeat_command(job.scenario, job.key.seed), shown(job.scenario.file)
+    again, file = repeat_command(job.scenario, job.key.seed), display_path(job.scenario.file)
     return RunFinished(result, again=again, file=file, tags=tuple(job.scenario.spec.tags))
 
 
-def _result(job: Job, said: str) -> RunResult:
+def _result(job: Job, output: str) -> RunResult:
     """Read result.json of a run. The key is replaced, since the second run of a pair stores the key of the first."""
     try:
         return replace(from_json((job.folder / "result.json").read_text(encoding="utf-8")), key=job.key)
     except (OSError, ValueError) as error:
-        failure = RunFailure("crashed", f"its result cannot be read: {error}", said)
+        failure = RunFailure("crashed", f"its result cannot be read: {error}", output)
         return error_result(job.key, job.scenario.path, failure, job.scenario.stack)
 
 
@@ -81,17 +81,19 @@ def _stack_warnings(folder: Path) -> tuple[str, ...]:
     """Return the `warnings` that external stacks gave about themselves."""
     warnings: dict[str, None] = {}
     for file in sorted(folder.glob("stack*.json")):
-        said = json.loads(file.read_text(encoding="utf-8")).get("about", {}).get("warnings", [])
-        warnings.update(dict.fromkeys(text for text in said if isinstance(text, str)) if isinstance(said, list) else {})
+        given = json.loads(file.read_text(encoding="utf-8")).get("about", {}).get("warnings", [])
+        warnings.update(
+            dict.fromkeys(text for text in given if isinstance(text, str)) if isinstance(given, list) else {}
+        )
     return tuple(warnings)
 
 
 def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
     if isinstance(end, ForkServerDeath):
-        when = "while it prepared this one" if end.at_fault else "while this run was under way"
+        when = "while it prepared this one" if end.was_preparing else "during this run"
         kind = "timeout" if end.timed_out else "crashed"
         return RunFailure(
-            kind, f"the process that prepares runs {end.how} {when}{_place(end)}", output_tail(end.printed)
+            kind, f"the process that prepares runs {end.description} {when}{_place(end)}", output_tail(end.output)
         )
     peak = f"peak memory {end.peak_bytes / 2**20:.0f} MiB of {MAX_MEMORY_BYTES / 2**20:.0f} MiB"
     if end.killed_for == "timeout":
@@ -102,12 +104,12 @@ def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
         return _fault(end, f"crashed: {signal.Signals(end.signal).name}{_place(end)} ({peak})")
     if end.code != 0:
         return _fault(end, f"exited {end.code} ({peak})")
-    if end.last_word is None:
+    if end.final_message is None:
         return _fault(end, "exited 0 without a result")
-    if "error" in end.last_word:
-        printed = end.last_word.get("tail") or output_tail(end.printed)
-        by_stack = end.last_word.get("by_stack", False)
-        return RunFailure(end.last_word["error"], end.last_word["message"], printed, by_stack)
+    if "error" in end.final_message:
+        output = end.final_message.get("tail") or output_tail(end.output)
+        by_stack = end.final_message.get("by_stack", False)
+        return RunFailure(end.final_message["error"], end.final_message["message"], output, by_stack)
     if end.left_processes:
         return _fault(end, "left a process behind, which was killed")
     return None
@@ -120,45 +122,45 @@ def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
         return failure
     from simscen.record.log_reader.read import recover
 
-    how = ""
+    note = ""
     if log.stat().st_size > MAX_RECOVER_BYTES:
-        how = ", which `simscen log recover` makes whole"
+        note = ", which `simscen log recover` can recover"
     else:
         try:
             recover(log)
         except (InvalidInput, RunError) as error:
-            how = f" ({error})"
-    return replace(failure, message=f"{failure.message}; its log until then is {log.name}{how}")
+            note = f" ({error})"
+    return replace(failure, message=f"{failure.message}; its log until then is {log.name}{note}")
 
 
 def _fault(end: ProcessEnd, message: str, kind: str = "crashed") -> RunFailure:
-    return RunFailure(kind, message, output_tail(end.printed))
+    return RunFailure(kind, message, output_tail(end.output))
 
 
 def _place(end: ProcessEnd | ForkServerDeath) -> str:
     """Return the innermost Python frame, if a stack was dumped."""
-    place = innermost_frame(end.printed)
+    place = innermost_frame(end.output)
     return f", in {place}" if place else ""
 
 
 def repeat_command(scenario: LoadedScenario, seed: int) -> str:
     """Return the command that repeats a run from the working folder, with only the necessary options."""
-    words = ["simscen", "run", shown(scenario.file), "--seed", str(seed)]
+    words = ["simscen", "run", display_path(scenario.file), "--seed", str(seed)]
     if scenario.variation:
         words += ["--variation", scenario.variation]
     if scenario.root != default_root([scenario.file]):
-        words += ["--root", shown(scenario.root)]
+        words += ["--root", display_path(scenario.root)]
     for folder in scenario.world_path:
-        words += ["--world-path", shown(folder)]
+        words += ["--world-path", display_path(folder)]
     if scenario.choice is not None:
-        words += ["--stack", _seen_from_here(scenario.choice)]
+        words += ["--stack", _stack_option(scenario.choice)]
     return shlex.join([*words, *(["--lenient"] if scenario.lenient else [])])
 
 
-def _seen_from_here(choice: StackChoice) -> str:
-    return choice.written if choice.file is None else f"{choice.name}={shown(choice.file)}"
+def _stack_option(choice: StackChoice) -> str:
+    return choice.written if choice.file is None else f"{choice.name}={display_path(choice.file)}"
 
 
-def shown(path: Path) -> str:
+def display_path(path: Path) -> str:
     """Return a path relative to the working folder, or the absolute path if it is shorter."""
     return min(os.path.relpath(path), str(path), key=len)

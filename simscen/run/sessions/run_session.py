@@ -49,8 +49,8 @@ def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:
     """Return the seeds of a scenario. Raises UsageError if one exceeds the largest seed."""
     first = options.seed if options.seed is not None else scenario.spec.seed
     if first + options.repeat - 1 > MAX_SEED:
-        told = f"{options.repeat} runs of {scenario.title} from seed {first} on"
-        raise UsageError(f"{told} would need seeds beyond the largest, {MAX_SEED}")
+        runs = f"{options.repeat} runs of {scenario.title} from seed {first} on"
+        raise UsageError(f"{runs} need seeds above the largest seed, {MAX_SEED}")
     return range(first, first + options.repeat)
 
 
@@ -66,9 +66,9 @@ def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out:
                 key = scenario.key(seed)
                 if options.only is not None and key not in options.only:
                     continue
-                for each in (key, key.twin) if options.twice else (key,):
+                for run_key in (key, key.twin) if options.twice else (key,):
                     jobs.append(
-                        Job(len(jobs), scenario, each, run_folder(out, each), options.wall_limit, options.replay)
+                        Job(len(jobs), scenario, run_key, run_folder(out, run_key), options.wall_limit, options.replay)
                     )
     # Once each and after all others, because twins are identified by their job numbers.
     for scenario in skipped if options.only is None else ():
@@ -91,50 +91,50 @@ def run_session(
 
     Returns the results, and the exit code if the session was interrupted.
     """
-    answers, places = RunStore(), dict[int, int]()
-    begun: set[int] = set()
+    results, positions = RunStore(), dict[int, int]()
+    started: set[int] = set()
     stopped: Exit | None = None
     all_good = True
 
-    def answer(job: Job, run: RunFinished) -> None:
+    def report(job: Job, run: RunFinished) -> None:
         nonlocal all_good
         all_good = all_good and run.outcome.good
-        places[job.number] = len(answers)
-        answers.append(run)
+        positions[job.number] = len(results)
+        results.append(run)
         listen(run)
 
     for job in jobs:
         if job.scenario.spec.skip is not None:
-            answer(job, skipped_run(job, job.scenario.spec.skip))
-    jobs_to_do = [job for job in jobs if job.number not in places]
+            report(job, skipped_run(job, job.scenario.spec.skip))
+    pending = [job for job in jobs if job.number not in positions]
     try:
-        plugins = plugins_of_all([job.scenario for job in jobs_to_do])
-        for happening in backend.run(jobs_to_do, plugins, lambda: all_good or not options.fail_fast):
-            job = happening.job
-            match happening:
+        plugins = plugins_of_all([job.scenario for job in pending])
+        for update in backend.run(pending, plugins, lambda: all_good or not options.fail_fast):
+            job = update.job
+            match update:
                 case Started():
-                    begun.add(job.number)
+                    started.add(job.number)
                     listen(RunStarted(job.key, job.scenario.path, job.scenario.spec.time_limit))
                 case Progressed(seconds=seconds):
                     listen(RunProgress(job.key, seconds))
                 case Ended(end=end):
-                    has_twin = options.twice and job.number ^ 1 in places
-                    twin = answers[places[job.number ^ 1]] if has_twin else None
+                    has_twin = options.twice and job.number ^ 1 in positions
+                    twin = results[positions[job.number ^ 1]] if has_twin else None
                     run = compare_twins(finished_run(job, end), twin)
                     if options.against is not None:
                         run = compare_with_session(run, options.against)
                     if options.keep_logs is KeptLogs.FAILED and run.outcome.good:
-                        run = without_log(run)
-                    answer(job, run)
+                        run = delete_log(run)
+                    report(job, run)
     except Interrupted as interrupted:
         stopped = Exit(128 + interrupted.number)
     for job in jobs:
-        if job.number not in places:
-            answer(job, unfinished_run(job, _why_not_done(job.number in begun, stopped)))
-    return answers, stopped
+        if job.number not in positions:
+            report(job, unfinished_run(job, _unfinished_reason(job.number in started, stopped)))
+    return results, stopped
 
 
-def without_log(run: RunFinished) -> RunFinished:
+def delete_log(run: RunFinished) -> RunFinished:
     """Delete the log, the picture, and all other files of a run but its result."""
     kept = Path(run.artifacts.result)
     for file in Path(run.artifacts.folder).iterdir():
@@ -154,16 +154,16 @@ def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
 
     logs = [read_log(Path(path)) for path in (twin.artifacts.mcap, run.artifacts.mcap)]
     pairs = zip(*(log.traces for log in logs), strict=False)
-    where = (
-        next((told for pair in pairs if (told := first_difference(*pair))), "")
+    difference = (
+        next((text for pair in pairs if (text := first_difference(*pair))), "")
         or "the logs differ in something that is not part of the trace"
     )
-    failure = RunFailure("nondeterministic", f"two runs with the same seed differ: {where}")
+    failure = RunFailure("nondeterministic", f"two runs with the same seed differ: {difference}")
     return replace(run, result=replace(run.result, outcome=Outcome.ERROR, error=failure))
 
 
-def _why_not_done(begun: bool, stopped: Exit | None) -> RunFailure:
-    if begun:
+def _unfinished_reason(started: bool, stopped: Exit | None) -> RunFailure:
+    if started:
         return RunFailure("interrupted", "interrupted before it was finished")
     return RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")
 
@@ -176,18 +176,18 @@ def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
     """
     if run.result.outcome is Outcome.ERROR or not run.artifacts.mcap:
         return run
-    there = _folder(run, earlier) / "run.mcap"
+    earlier_log = _folder(run, earlier) / "run.mcap"
     try:
-        if there.read_bytes() == Path(run.artifacts.mcap).read_bytes():
+        if earlier_log.read_bytes() == Path(run.artifacts.mcap).read_bytes():
             return run
-        why = _disagreement(Path(run.artifacts.mcap), there)
+        difference = _disagreement(Path(run.artifacts.mcap), earlier_log)
     except OSError as error:
-        why = f"{there}: {error.strerror}"
+        difference = f"{earlier_log}: {error.strerror}"
     except InvalidInput as error:
-        why = str(error)
-    if why is None:
+        difference = str(error)
+    if difference is None:
         return run
-    failure = RunFailure("nondeterministic", f"not as in {earlier}: {why}")
+    failure = RunFailure("nondeterministic", f"not as in {earlier}: {difference}")
     return replace(run, result=replace(run.result, outcome=Outcome.ERROR, error=failure))
 
 
@@ -198,19 +198,21 @@ def _folder(run: RunFinished, earlier: Path) -> Path:
     return labeled if not run.key.first.stack_name and labeled.is_dir() else run_folder(earlier, run.key.first)
 
 
-def _disagreement(here: Path, there: Path) -> str | None:
+def _disagreement(new_path: Path, earlier_path: Path) -> str | None:
     """Describe the first difference of two logs, or return None. Raises InvalidInput for an unreadable log."""
     from simscen.record.log_reader.read import read_log
     from simscen.record.trace_difference import first_disagreement
 
-    now, then = read_log(here), read_log(there)
-    if not then.result or not now.result:
-        return f"{there}: the run broke off"
-    said, was = (_statuses(from_json(log.result)) for log in (now, then))
-    changed = [name for name in {**was, **said} if said.get(name) != was.get(name)]
-    told = [f"{name}: {said.get(name, 'absent')} instead of {was.get(name, 'absent')}" for name in changed]
-    pairs = zip(now.traces, then.traces, strict=False)
-    return "; ".join(told) or next((parts for pair in pairs if (parts := first_disagreement(*pair))), None)
+    new_log, earlier_log = read_log(new_path), read_log(earlier_path)
+    if not earlier_log.result or not new_log.result:
+        return f"{earlier_path}: the run did not finish"
+    statuses, earlier_statuses = (_statuses(from_json(log.result)) for log in (new_log, earlier_log))
+    changed = [name for name in {**earlier_statuses, **statuses} if statuses.get(name) != earlier_statuses.get(name)]
+    differences = [
+        f"{name}: {statuses.get(name, 'absent')} instead of {earlier_statuses.get(name, 'absent')}" for name in changed
+    ]
+    pairs = zip(new_log.traces, earlier_log.traces, strict=False)
+    return "; ".join(differences) or next((parts for pair in pairs if (parts := first_disagreement(*pair))), None)
 
 
 def _statuses(result: RunResult) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """Search methods for failures: each proposes points of the unit cube, and learns from the margins of their runs.
 
-Points are asked for and answered in batches of a fixed size, so that a search does not depend on the number of workers.
+Points are proposed and evaluated in batches of a fixed size, so that a search does not depend on the number of workers.
 """
 
 import math
@@ -35,7 +35,7 @@ class Search(Protocol):
         ...
 
     def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
-        """Learn from the margins of points that were asked for, in the same order. nan: nothing is known."""
+        """Learn from the margins of the points of the last `ask`, in the same order; nan if a margin is unknown."""
         ...
 
 
@@ -64,7 +64,7 @@ class RandomSearch:
 
     def ask(self, count: int) -> list[Point]:
         """Return random points."""
-        return [tuple(_inside(u) for u in row) for row in self._rng.random((count, self._dimensions)).tolist()]
+        return [tuple(_clip(u) for u in row) for row in self._rng.random((count, self._dimensions)).tolist()]
 
     def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
         """Ignore the margins."""
@@ -82,7 +82,7 @@ class SobolSearch:
     def ask(self, count: int) -> list[Point]:
         """Return the next points of the sequence."""
         rows = (np.concatenate([self._sequence.random(1) for _ in range(count)]) + self._shift) % 1.0
-        return [tuple(_inside(u) for u in row) for row in rows.tolist()]
+        return [tuple(_clip(u) for u in row) for row in rows.tolist()]
 
     def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
         """Ignore the margins."""
@@ -126,11 +126,10 @@ class TpeSearch:
     def _point(self, parameters: dict[str, Any]) -> Point:
         values = (parameters[f"x{index}"] for index in range(len(self._choices)))
         return tuple(
-            (value + 0.5) / count if count else _inside(value)
-            for value, count in zip(values, self._choices, strict=True)
+            (value + 0.5) / count if count else _clip(value) for value, count in zip(values, self._choices, strict=True)
         )
 
 
-def _inside(u: float) -> float:
-    """Return a number that is neither 0 nor 1."""
+def _clip(u: float) -> float:
+    """Return `u` limited to the open interval from 0 to 1."""
     return min(max(u, 2.0**-53), 1 - 2.0**-53)

@@ -78,7 +78,7 @@ class GridPlanner:
             tuple(int((point[axis] - rates.origin[axis]) / rates.resolution) + BORDER_CELLS for axis in (1, 0))
             for point in (ends.start, ends.goal)
         )
-        cells = lattice.way((first[0], first[1]), (last[0], last[1]))
+        cells = lattice.shortest_path((first[0], first[1]), (last[0], last[1]))
         if cells is None:
             raise NavigationFailure(ErrorCode.NO_VALID_PATH, "no way over the cells of the costmap")
         middles: Array = (cells[:, ::-1] - BORDER_CELLS + 0.5) * rates.resolution + np.array(rates.origin)

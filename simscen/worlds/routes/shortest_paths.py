@@ -98,7 +98,7 @@ class ShortestPaths:
         if self._too_small:
             return True
         first, last = (self._free_cell(self._optimistic_graph, np.array(end[:2])) for end in (start, goal))
-        return not first or not last or self._optimistic_graph.way(first, last) is not None
+        return not first or not last or self._optimistic_graph.shortest_path(first, last) is not None
 
     def may_come_to(self, starts: Sequence[Pose2], arrived: Callable[[Pose2], float]) -> bool:
         """Return whether the disc may get from one of the starts to a pose for which `arrived` returns 0.
@@ -108,7 +108,7 @@ class ShortestPaths:
         if self._too_small:
             return True
         grid = self._field.grid
-        cells = self._optimistic_graph.joined(
+        cells = self._optimistic_graph.connected_cells(
             [self._free_cell(self._optimistic_graph, np.array(start[:2])) for start in starts]
         )
         slack = HALF_DIAGONAL_CELLS * grid.resolution
@@ -127,7 +127,7 @@ class ShortestPaths:
     def _search(self, lattice: GridGraph, ends: Array) -> Array | None:
         """Return the tightened path (n, 2) over a graph; None if there is none."""
         first, last = (self._free_cell(lattice, end) for end in ends)
-        cells = lattice.way(first, last) if first and last else None
+        cells = lattice.shortest_path(first, last) if first and last else None
         if cells is None:
             return None
         inner = self._field.grid.center_of(cells)

@@ -23,7 +23,7 @@ class Element(markup.Element):
     @property
     def text(self) -> str:
         """Text of the element, without the text of its children."""
-        return "".join(self.pieces).strip()
+        return "".join(self.text_parts).strip()
 
     @property
     def path(self) -> str:

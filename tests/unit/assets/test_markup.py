@@ -27,7 +27,7 @@ def test_worlds_and_robots_refuse_alike(
     monkeypatch: pytest.MonkeyPatch, data: bytes, line: int, col: int, message: str
 ) -> None:
     if "elements" in message:
-        monkeypatch.setattr(markup, "MOST_ELEMENTS", 10)
+        monkeypatch.setattr(markup, "MAX_ELEMENTS", 10)
     with pytest.raises(UnusableElement) as world:
         parse_sdf(data, "x.sdf", "")
     with pytest.raises(InvalidInput) as robot:

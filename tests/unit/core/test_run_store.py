@@ -27,7 +27,7 @@ RUNS = [run(seed, path) for path in ("b.scenario.yaml", "a.scenario.yaml") for s
 @pytest.fixture(params=[0, 3, 100])
 def store(request, monkeypatch) -> RunStore:
     """Return a store of RUNS; how many results are not compressed is the parameter."""
-    monkeypatch.setattr(run_store, "MAX_PLAIN", request.param)
+    monkeypatch.setattr(run_store, "MAX_UNCOMPRESSED", request.param)
     return RunStore(RUNS)
 
 
@@ -43,11 +43,11 @@ def test_a_store_is_a_sequence_of_what_was_added(store: RunStore) -> None:
 
 def test_order_is_that_of_file_and_key(store: RunStore) -> None:
     assert list(store.in_order()) == sorted(RUNS, key=lambda run: (run.result.path, run.key))
-    assert list(store.picked([4, 1])) == [RUNS[4], RUNS[1]]
+    assert list(store.select([4, 1])) == [RUNS[4], RUNS[1]]
 
 
 def test_results_that_are_added_to_a_part_are_kept(store: RunStore) -> None:
-    part = store.picked([7])
+    part = store.select([7])
     part.append(run(9))
     assert list(part) == [RUNS[7], run(9)]
 

@@ -112,7 +112,7 @@ def test_every_action_of_an_event_has_to_take_effect_but_not_each_time():
 def test_entries_of_one_name_are_told_apart():
     trace = synthetic_trace({**WORDS, "events": fault(3, 3, 4, 10, entry=1)})
     case = synthetic_case({"disturbances": [FAULT, EVENT, {**FAULT, "line": 10}]})
-    assert [(one.ordered.line, one.happened) for one in disturbance_outcomes(trace, case)] == [
+    assert [(one.disturbance.line, one.happened) for one in disturbance_outcomes(trace, case)] == [
         (9, False),
         (7, False),
         (10, True),
@@ -124,7 +124,7 @@ def test_entries_of_one_name_are_told_apart():
 def test_disturbances_survive_their_file():
     result = judged([*event(3), *fault(3)], EVENT, {**FAULT, "when": "", "required": False})
     assert from_json(to_json(result)) == result
-    assert result.disturbances[1].ordered == Disturbance("lidar.off", "fault", required=False, line=9)
+    assert result.disturbances[1].disturbance == Disturbance("lidar.off", "fault", required=False, line=9)
 
 
 def test_in_a_file_that_does_not_hold_the_criteria_it_has_no_line_either():

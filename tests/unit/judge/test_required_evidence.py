@@ -87,7 +87,7 @@ def test_what_a_log_lacks_leaves_these_metrics_out_and_no_others(lacking, left_o
     whole = compute_metrics(trace, synthetic_case({}))
     for coverage in (LogCoverage({lacking: ""}), LogCoverage(partial={lacking: "not after t = 1 s"})):
         found = compute_metrics(trace, synthetic_case({}), coverage)
-        reasons = {f"the log does not say {lacking.value}", "not after t = 1 s"}
+        reasons = {f"the log lacks {lacking.value}", "not after t = 1 s"}
         assert {name for name, reason in found.undefined.items() if reason in reasons} == left_out
         assert all(found.values[name] is None for name in left_out)
         assert all(found.values[name] == whole.values[name] for name in METRICS if name not in left_out)

@@ -42,5 +42,5 @@ def test_a_metric_that_the_log_cannot_tell_is_none_and_says_so(lacking):
     assert list(measures.values) == list(METRICS)
     assert {name for name, value in measures.values.items() if value is None} == set(measures.undefined)
     if lacking is Evidence.CONTACTS:
-        assert measures.undefined["collisions"] == measures.undefined["spl"] == f"the log does not say {lacking.value}"
+        assert measures.undefined["collisions"] == measures.undefined["spl"] == f"the log lacks {lacking.value}"
     assert measures.values["path_length"] is None or lacking is not Evidence.TRUTH

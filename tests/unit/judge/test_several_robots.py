@@ -101,7 +101,7 @@ def test_a_missing_event_of_the_world_is_reported_once_and_a_fault_for_its_robot
     assert [one.findings[0].measured for one in whole.verdicts] == [
         "cart never came", "1 m", "b/lidar.off never began", "1 m",
     ]  # fmt: skip
-    assert [one.ordered.name for one in whole.disturbances] == ["cart", "b/lidar.off"]
+    assert [one.disturbance.name for one in whole.disturbances] == ["cart", "b/lidar.off"]
 
 
 def test_events_of_the_world_count_once_and_those_of_robots_each() -> None:

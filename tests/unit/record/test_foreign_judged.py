@@ -156,9 +156,9 @@ def test_without_a_truth_what_asks_for_it_is_inconclusive_and_says_so(simscen, l
     file = limits("speed: {max: 9 m/s}", "collisions: {max: 9}", "replans: {max: 99}", "result: {status: SUCCEEDED}")
     ended = simscen("drive.mcap", "--scenario", file)
     assert ended.code == 1
-    assert "speed: inconclusive: the log does not say where the robot truly was nor how fast" in ended.out
+    assert "speed: inconclusive: the log lacks the true pose of the robot and the true velocity" in ended.out
     assert "name a topic or two frames with --truth; topics with poses: /amcl_pose, /mocap, /odom" in ended.out
-    assert "collisions: inconclusive: the log does not say what the robot touched" in ended.out
+    assert "collisions: inconclusive: the log lacks the collisions of the robot" in ended.out
     assert ended.out.count("inconclusive") == 4
 
 
@@ -184,7 +184,7 @@ def test_a_folder_of_old_logs_gives_a_table_of_margins(simscen, limits, tmp_path
     assert rows[2] == ["✗", "old/late.mcap", "-0.05", "m", "+0.10", "m/s"]
     assert rows[3] == ["✗", "old/lost.mcap", "?", "?"]
     assert rows[4] == ["✓", "old/monday/bag", "+0.05", "m", "+0.10", "m/s"]
-    assert "? fast: the log does not say where the robot truly was" in ended.out
+    assert "? fast: the log lacks the true pose of the robot" in ended.out
     assert ended.out.splitlines()[-1] == "1 passed, 2 failed, 1 could not be judged"
 
 
@@ -228,7 +228,7 @@ def test_signals_are_judged_where_the_log_has_them(simscen, limits, tmp_path: Pa
     ended = simscen("drive.mcap", "--scenario", file, "--truth", "/mocap")
     assert ended.code == 1
     assert ended.out.count("inconclusive") == 1
-    assert "the log does not say what the robot touched" in ended.out
+    assert "the log lacks the collisions of the robot" in ended.out
 
 
 def test_what_is_odd_about_a_log_is_noted_and_a_cut_one_passes_nothing(simscen, limits, tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ NEVER = DisturbanceOutcome(Disturbance("<b>::error::", "fault", "time: 90 s", li
 @pytest.fixture
 def disturbed(failed):
     finding = Finding(Status.FAIL, "disturbance did not happen", "<b>::error:: (when time: 90 s)", "")
-    verdict = Verdict("disturbance", NEVER.ordered.name, "fail", (finding,))
+    verdict = Verdict("disturbance", NEVER.disturbance.name, "fail", (finding,))
     result = failed.result
     return replace(failed, result=replace(
         result,

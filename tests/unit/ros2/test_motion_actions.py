@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from simscen.ros2 import motion_actions
-from simscen.ros2.motion_actions import MotionActions, Owed
+from simscen.ros2.motion_actions import MotionActions, OverdueCommand
 
 MS = 1_000_000
 
@@ -44,15 +44,15 @@ def test_a_controller_owes_a_command_in_each_of_its_periods_while_it_executes_a_
     graph = FakeGraph({"follow_path": "/robot1/controller_server"}, {"/robot1/controller_server": 10.0})
     actions = MotionActions(graph, graph)  # type: ignore[arg-type]
     actions.subscribe()
-    assert actions.owed(0) is None
+    assert actions.overdue_command(0) is None
     graph.report("follow_path", 4, 2)
-    owed = Owed("/robot1/controller_server", "follow_path")
-    assert actions.owed(50 * MS) == owed
-    actions.commanded(50 * MS)
-    assert actions.owed(100 * MS) is None  # the loop is slower than the control period
-    assert actions.owed(150 * MS) == owed
+    overdue_command = OverdueCommand("/robot1/controller_server", "follow_path")
+    assert actions.overdue_command(50 * MS) == overdue_command
+    actions.record_command(50 * MS)
+    assert actions.overdue_command(100 * MS) is None  # the loop is slower than the control period
+    assert actions.overdue_command(150 * MS) == overdue_command
     graph.report("follow_path", 4, 4)
-    assert actions.owed(150 * MS) is None
+    assert actions.overdue_command(150 * MS) is None
 
 
 @pytest.mark.usefixtures("types")
@@ -62,4 +62,4 @@ def test_servers_without_a_rate_or_without_a_status_owe_nothing() -> None:
     actions.subscribe()
     graph.report("spin", 2)
     graph.report("follow_path", 2)
-    assert actions.owed(0) is None
+    assert actions.overdue_command(0) is None

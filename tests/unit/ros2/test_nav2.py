@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
-from simscen.ros2.nav2_parameters import Finding, Offer, check, wanted
+from simscen.ros2.nav2_parameters import Finding, Offer, check, relevant_parameters
 
 OFFER = Offer(["/scan", "/rear/scan"], "/odom", ["base_link"])
 FITS = """\
@@ -86,8 +86,13 @@ def test_wall_time_is_a_warning_because_a_launch_file_may_set_it() -> None:
 
 def test_only_parameters_of_the_rules_are_requested() -> None:
     known = ["plugins", "o.observation_sources", "o.scan.topic", "resolution", "robot_base_frame", "alpha1"]
-    assert wanted("local_costmap", known) == ["plugins", "o.observation_sources", "o.scan.topic", "robot_base_frame"]
-    assert wanted("amcl", ["alpha1", "scan_topic"]) == ["scan_topic"]
+    assert relevant_parameters("local_costmap", known) == [
+        "plugins",
+        "o.observation_sources",
+        "o.scan.topic",
+        "robot_base_frame",
+    ]
+    assert relevant_parameters("amcl", ["alpha1", "scan_topic"]) == ["scan_topic"]
 
 
 def called(folder: Path, text: str, *options: str) -> tuple[int, str]:

@@ -15,7 +15,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.peer import messages as peer_messages
 from simscen.record.messages import encode
 from simscen.ros2 import messages
-from simscen.ros2.options import AdapterError, TopicNames, claim, ros_environment
+from simscen.ros2.options import AdapterError, TopicNames, claim_domain, ros_environment
 
 FOLDER = Path(simscen.ros2.__file__).parent
 
@@ -56,25 +56,28 @@ def test_an_invalid_remapping_is_an_error(text: str) -> None:
 
 def test_two_runs_get_different_domains(tmp_path: Path) -> None:
     environment = {"XDG_RUNTIME_DIR": str(tmp_path)}
-    first, second = claim(None, environment), claim(None, environment)
+    first, second = claim_domain(None, environment), claim_domain(None, environment)
     assert (first.number, second.number) == (1, 2)
     first.release()
-    assert claim(None, environment).number == 1
+    assert claim_domain(None, environment).number == 1
 
 
 def test_a_domain_in_use_cannot_be_claimed_by_number(tmp_path: Path) -> None:
     environment = {"XDG_RUNTIME_DIR": str(tmp_path)}
-    held = claim(42, environment)
+    held = claim_domain(42, environment)
     with pytest.raises(AdapterError, match=r"another run is using ROS domain 42: .* --jobs 1"):
-        claim(42, environment)
+        claim_domain(42, environment)
     with pytest.raises(AdapterError, match=r"another robot or run is using ROS domain 42: with several robots"):
-        claim(42, {**environment, "SIMSCEN_ROBOT": "b"})
+        claim_domain(42, {**environment, "SIMSCEN_ROBOT": "b"})
     held.release()
-    assert claim(42, environment).number == 42
+    assert claim_domain(42, environment).number == 42
 
 
 def test_the_lock_of_a_domain_ends_with_its_process(tmp_path: Path) -> None:
-    code = "import os; from simscen.ros2.options import claim; held = claim(7, os.environ); print(flush=True); input()"
+    code = (
+        "import os; from simscen.ros2.options import claim_domain; "
+        "held = claim_domain(7, os.environ); print(flush=True); input()"
+    )
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}
     holder = subprocess.Popen(
         [sys.executable, "-c", code], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
@@ -82,10 +85,10 @@ def test_the_lock_of_a_domain_ends_with_its_process(tmp_path: Path) -> None:
     assert holder.stdout is not None
     holder.stdout.readline()
     with pytest.raises(AdapterError):
-        claim(7, environment)
+        claim_domain(7, environment)
     holder.kill()
     holder.wait()
-    assert claim(7, environment).number == 7
+    assert claim_domain(7, environment).number == 7
 
 
 @pytest.mark.parametrize(("distro", "old"), [("humble", "1"), ("jazzy", None), ("", None)])

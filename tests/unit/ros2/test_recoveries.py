@@ -67,20 +67,20 @@ def test_a_behavior_of_which_only_the_end_was_seen_has_both_events(graph, events
 
 def test_counted_recoveries_that_are_no_behavior_are_costmap_clearing(graph, events, followed) -> None:
     followed.begin_goal()
-    followed.counted(1)
+    followed.update_count(1)
     followed.report_clearing(0)
     assert events == []  # the status of a behavior may still come
     followed.report_clearing(1 * S)
     clearing = [("recovery.started", "clear_costmap"), ("recovery.ended", "clear_costmap", "succeeded")]
     assert events == clearing
-    followed.counted(1)
+    followed.update_count(1)
     followed.report_clearing(3 * S)
     assert events == clearing
 
 
 def test_a_counted_behavior_is_not_reported_twice(graph, events, followed) -> None:
     followed.begin_goal()
-    followed.counted(1)  # the feedback comes before the status
+    followed.update_count(1)  # the feedback comes before the status
     followed.report_clearing(0)
     graph.report("backup", (1, 2))
     followed.report_clearing(2 * S)
@@ -90,7 +90,7 @@ def test_a_counted_behavior_is_not_reported_twice(graph, events, followed) -> No
 def test_each_goal_counts_from_zero(graph, events, followed) -> None:
     for now in (0, 10 * S):
         followed.begin_goal()
-        followed.counted(2)
+        followed.update_count(2)
         followed.report_clearing(now)
         followed.report_clearing(now + S)
     assert [event[0] for event in events].count("recovery.started") == 4

@@ -74,7 +74,7 @@ def test_a_folder_into_which_others_may_write_is_left_alone(tmp_path: Path) -> N
 
 def test_what_was_not_used_for_longest_goes_first(tmp_path: Path) -> None:
     keys = [f"{number:064x}" for number in range(6)]
-    kept = DiskCache(tmp_path, most_bytes=500)
+    kept = DiskCache(tmp_path, max_bytes=500)
     for number, key in enumerate(keys[:4]):
         kept.put(key, bytes(68))
         os.utime(tmp_path / key, (number, number))

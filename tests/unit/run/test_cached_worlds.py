@@ -78,7 +78,7 @@ def test_another_world_another_goal_and_another_robot_have_ways_of_their_own(tmp
 
 def test_results_of_other_code_are_not_used(monkeypatch) -> None:
     before = scenario_cache.cache_key("map", 1.0)
-    scenario_cache._circumstances.cache_clear()
+    scenario_cache._environment_key.cache_clear()
     monkeypatch.setattr(scenario_cache, "source_digest", lambda *parts: "of another version")
     assert scenario_cache.cache_key("map", 1.0) != before
-    scenario_cache._circumstances.cache_clear()
+    scenario_cache._environment_key.cache_clear()

@@ -21,7 +21,7 @@ def filters(masks=None, **stack):
 
 def order(filters, what, enabled, region=None, limit=None):
     told = ZoneSwitch(what, enabled, region, limit)
-    return filters.refused(told) or filters.switch(told)
+    return filters.rejection_reason(told) or filters.switch(told)
 
 
 def test_zones_come_in_the_order_in_which_they_were_named():

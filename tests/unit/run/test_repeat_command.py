@@ -4,7 +4,7 @@ import shlex
 from dataclasses import replace
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.sessions.results import repeat_command, shown
+from simscen.run.sessions.results import display_path, repeat_command
 
 TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 0, y: 0}}\npass: [{collisions: {}}]\n"
 
@@ -31,5 +31,5 @@ def test_from_far_away_the_absolute_path_is_shorter(tmp_path, monkeypatch):
     deep.mkdir(parents=True)
     monkeypatch.chdir(deep)
     (deep / "near").touch()
-    assert shown(deep / "near") == "near"
-    assert shown(tmp_path / "far") == str(tmp_path / "far") or len(str(tmp_path)) > 3 * 26
+    assert display_path(deep / "near") == "near"
+    assert display_path(tmp_path / "far") == str(tmp_path / "far") or len(str(tmp_path)) > 3 * 26

@@ -74,11 +74,11 @@ def test_an_exception_makes_the_run_an_error() -> None:
 
 def test_missing_evidence_is_a_reason_if_the_metric_needs_it() -> None:
     coverage = LogCoverage({Evidence.SCANS: "", Evidence.TRUTH: ""})
-    reason = "the log does not say where the robot truly was nor when scans came"
+    reason = "the log lacks the true pose of the robot and the times of the scans"
     assert added(Measured(1.0, None), coverage).undefined["mine"] == reason
     assert added(Measured(1.0, frozenset({Evidence.COMMANDS})), coverage).values["mine"] == 1.0
     only = added(Measured(1.0, frozenset({Evidence.SCANS})), coverage).undefined["mine"]
-    assert only == "the log does not say when scans came"
+    assert only == "the log lacks the times of the scans"
 
 
 def zones(monkeypatch: pytest.MonkeyPatch, gaps: list[float], trace: Trace = TRACE) -> dict[str, float | str]:

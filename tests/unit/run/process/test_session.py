@@ -64,14 +64,14 @@ def test_a_run_that_ends_well_is_answered_with_its_result(session):
         ("exit-0", "crashed", "exited 0 without a result"),
         ("sys-exit", "crashed", "exited 0"),
         ("exception", "crashed", "ZeroDivisionError: the controller divided by zero (faulty_zygote.py:"),
-        ("memory", "out-of-memory", "more memory than it may"),
+        ("memory", "out-of-memory", "exceeded its memory limit"),
         ("garbled", "crashed", "its result cannot be read"),
         ("grandchild", "crashed", "left a process behind"),
         ("daemon", "crashed", "left a process behind"),
         ("daemon-crash", "crashed", "crashed: SIGSEGV"),
         ("prepare-segfault", "crashed", "was killed (SIGSEGV) while it prepared this one, in string_at (__init__.py:"),
         ("prepare-exit", "crashed", "exited 0"),
-        ("prepare-memory", "out-of-memory", "more memory than it may"),
+        ("prepare-memory", "out-of-memory", "exceeded its memory limit"),
     ],
 )
 def test_a_fault_is_an_error_that_says_what_happened_and_leaves_its_neighbors_alone(session, fault, kind, told):
@@ -112,7 +112,7 @@ def test_of_a_flood_the_log_keeps_the_beginning_and_the_end(session, tmp_path, c
     assert len(text) < 2 << 20
     assert text.startswith(b"the beginning\nxxx")
     assert text.endswith(b"xxx\nthe end\n")
-    assert re.search(rb"simscen left out \d+ bytes here", text)
+    assert re.search(rb"simscen omitted \d+ bytes here", text)
     assert capfd.readouterr().out == ""
 
 

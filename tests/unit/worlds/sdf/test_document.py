@@ -46,7 +46,7 @@ def test_binary_files_are_refused(tmp_path):
 
 
 def test_the_number_of_elements_is_limited(refuse, monkeypatch):
-    monkeypatch.setattr(markup, "MOST_ELEMENTS", 1000)
+    monkeypatch.setattr(markup, "MAX_ELEMENTS", 1000)
     (problem,) = refuse("<sdf version='1.9'>" + "<a/>" * 1000)
     assert "more than 1000 elements" in problem.message
 
