@@ -21,7 +21,7 @@ WheelValues = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class MecanumWheels:
-    """Four mecanum wheels of `radius`, at `half_base` before and behind and `half_track` beside the center (m).
+    """Four mecanum wheels of `radius`, at `half_base` before and behind and `half_track` left and right of the center (m).
 
     `slant` is the cotangent of the angle between roller and wheel axle: 1 for 45 degrees. Seen from above, the upper
     rollers point to the center, and the lower ones form an O. Kinematics of Taheri, Qiao and Ghaeminezhad, "Kinematic
@@ -40,12 +40,12 @@ class MecanumWheels:
 
     def speeds(self, motion: Twist) -> WheelValues:
         """Return the wheel rotations in rad (or rad/s) for a motion of the base in m and rad (or per second)."""
-        ahead, left, turn = motion.vx, self.slant * motion.vy, self.lever * motion.wz
+        forward, left, turn = motion.vx, self.slant * motion.vy, self.lever * motion.wz
         return (
-            (ahead - left - turn) / self.radius,
-            (ahead + left + turn) / self.radius,
-            (ahead + left - turn) / self.radius,
-            (ahead - left + turn) / self.radius,
+            (forward - left - turn) / self.radius,
+            (forward + left + turn) / self.radius,
+            (forward + left - turn) / self.radius,
+            (forward - left + turn) / self.radius,
         )
 
     def motion(self, speeds: WheelValues) -> Twist:

@@ -40,8 +40,8 @@ def submesh_between_heights(vertices: Array, faces: Faces, heights: tuple[float,
     """Return the faces that are partly between two heights, with the vertices that they use."""
     low, high = heights
     below, above = (outside[faces] for outside in (vertices[:, 2] < low, vertices[:, 2] > high))
-    beside = (below[:, 0] & below[:, 1] & below[:, 2]) | (above[:, 0] & above[:, 1] & above[:, 2])
-    return submesh(vertices, faces[~beside])
+    outside_range = (below[:, 0] & below[:, 1] & below[:, 2]) | (above[:, 0] & above[:, 1] & above[:, 2])
+    return submesh(vertices, faces[~outside_range])
 
 
 def is_convex(mesh: Mesh) -> bool:
@@ -106,14 +106,14 @@ Owners = frozenset[int]
 def face_normals(mesh: TriangleMesh) -> Array:
     """Return the unit normals (n, 3) of the faces of a mesh; zeros for faces without area."""
     a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
-    across = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(across, axis=1, keepdims=True)
-    unit: Array = across / np.where(lengths > 0, lengths, 1.0)
+    crosses = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(crosses, axis=1, keepdims=True)
+    unit: Array = crosses / np.where(lengths > 0, lengths, 1.0)
     return unit
 
 
 def upward_faces(mesh: TriangleMesh, max_slope: float = MAX_SLOPE_RAD) -> Mask:
-    """Return which faces are above FLOOR_HEIGHT_M, face upwards, and are at most `steepest` rad steep."""
+    """Return which faces are above FLOOR_HEIGHT_M, face upwards, and are at most `max_slope` rad steep."""
     top = mesh.vertices[mesh.faces, 2].max(axis=1, initial=-math.inf)
     found: Mask = (face_normals(mesh)[:, 2] >= math.cos(max_slope)) & (top > FLOOR_HEIGHT_M)
     return found
@@ -131,17 +131,17 @@ def drivable_solids(mesh: TriangleMesh, reach: float) -> Owners:
     bottom = corners[:, :, 2].min(axis=1)
     if not (bottom <= reach).any():
         return frozenset()
-    owners, number = np.unique(mesh.owners[faces], return_inverse=True)
+    owners, solid = np.unique(mesh.owners[faces], return_inverse=True)
     low, high = np.full((len(owners), 3), math.inf), np.full((len(owners), 3), -math.inf)
-    np.minimum.at(low, number, corners.min(axis=1))
-    np.maximum.at(high, number, corners.max(axis=1))
+    np.minimum.at(low, solid, corners.min(axis=1))
+    np.maximum.at(high, solid, corners.max(axis=1))
     reached = low[:, 2] <= reach
-    fresh: Mask = reached
-    while fresh.any():
-        leads = np.zeros(len(owners), dtype=np.bool_)
-        for some in np.array_split(np.flatnonzero(fresh), 1 + fresh.sum() // SOLIDS_PER_BATCH):
-            apart = (low[:, None] > high[some] + reach) | (high[:, None] + reach < low[some])
-            leads |= np.any(~np.any(apart, axis=2), axis=1)
-        fresh = leads & ~reached
-        reached = reached | leads
+    newly_reached: Mask = reached
+    while newly_reached.any():
+        adjacent = np.zeros(len(owners), dtype=np.bool_)
+        for batch in np.array_split(np.flatnonzero(newly_reached), 1 + newly_reached.sum() // SOLIDS_PER_BATCH):
+            apart = (low[:, None] > high[batch] + reach) | (high[:, None] + reach < low[batch])
+            adjacent |= np.any(~np.any(apart, axis=2), axis=1)
+        newly_reached = adjacent & ~reached
+        reached = reached | adjacent
     return frozenset(owners[reached].tolist())

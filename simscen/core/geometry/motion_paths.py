@@ -125,9 +125,15 @@ def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
         laps = 2 + int(seconds / lap)
         lengths, durations = lengths * laps, durations * laps
     times = list(itertools.accumulate(durations, initial=0.0))
-    ways = list(itertools.accumulate(lengths, initial=0.0))
-    after = (_interpolate(time + seconds, times, ways) - way for time, way in zip(times, ways, strict=True))
-    before = (way - _interpolate(time - seconds, times, ways) for time, way in zip(times, ways, strict=True))
+    distances = list(itertools.accumulate(lengths, initial=0.0))
+    after = (
+        _interpolate(time + seconds, times, distances) - distance
+        for time, distance in zip(times, distances, strict=True)
+    )
+    before = (
+        distance - _interpolate(time - seconds, times, distances)
+        for time, distance in zip(times, distances, strict=True)
+    )
     return max(*after, *before)
 
 
@@ -179,7 +185,7 @@ def _speed(path: MotionPath, leg: int, reach: float) -> float:
     if path.ease == "spline":
         # The velocity along a cubic curve is a quadratic Bézier curve, which lies within its control points.
         before, after = _velocity(path, leg), _velocity(path, leg + 1)
-        middle = [3.0 * way / seconds - a - b for way, a, b in zip(step, before, after, strict=True)]
+        middle = [3.0 * displacement / seconds - a - b for displacement, a, b in zip(step, before, after, strict=True)]
         return max(_meters(velocity, reach) for velocity in (before, (middle[0], middle[1], middle[2]), after))
     meters = _meters(step, reach)
     if meters == 0:
@@ -190,11 +196,11 @@ def _speed(path: MotionPath, leg: int, reach: float) -> float:
 def _on_curve(path: MotionPath, leg: int, part: float) -> Pose2:
     begin, end = path.poses[leg], path.poses[leg + 1]
     duration = path.times[leg + 1] - path.times[leg]
-    risen = part * part * (3.0 - 2.0 * part)
+    smooth_part = part * part * (3.0 - 2.0 * part)
     leaving, arriving = part * (1.0 - part) ** 2 * duration, -(part**2) * (1.0 - part) * duration
     x, y, yaw = (
-        here + risen * way + leaving * before + arriving * after
-        for here, way, before, after in zip(
+        start + smooth_part * displacement + leaving * before + arriving * after
+        for start, displacement, before, after in zip(
             begin, _step(begin, end), _velocity(path, leg), _velocity(path, leg + 1), strict=True
         )
     )

@@ -77,7 +77,7 @@ class RayFan:
     def __init__(self, first: float, increment: float, count: int) -> None:
         """Ray k points at `first` + k `increment` rad in the x-y plane. The rays cover at most a full turn."""
         self.rays = RayPackets(count)
-        """Rays as set by `begin`, `turn` and `end`; the last packet is filled up with copies of the last ray."""
+        """Rays as set by the methods below; copies of the last ray fill the last packet."""
         angles = first + increment * np.minimum(np.arange(PACKET_SIZE * len(self.rays.ends)), count - 1)
         self._first, self._increment, self._count = first, increment, count
         self._full = 2 * math.pi / increment
@@ -88,36 +88,36 @@ class RayFan:
 
     def at(self, pose: Pose3) -> tuple[Array, Array]:
         """Return origins (n, 3) and unit directions (n, 3) of the rays of a fan with its frame at `pose`."""
-        (x, y), turn = self._flat[:, : self._count], pose.rotation()
-        return np.repeat([pose.position], self._count, axis=0), np.column_stack((x, y, np.zeros_like(x))) @ turn.T
+        (x, y), rotation = self._flat[:, : self._count], pose.rotation()
+        return np.repeat([pose.position], self._count, axis=0), np.column_stack((x, y, np.zeros_like(x))) @ rotation.T
 
-    def begin(self, x: float, y: float, z: float, packets: slice = ALL_PACKETS) -> None:
+    def set_origin(self, x: float, y: float, z: float, packets: slice = ALL_PACKETS) -> None:
         """Set the origin of the rays in some `packets`."""
         self.rays.starts[packets] = np.array(((x,), (y,), (z,)), dtype=np.float32)
 
-    def turn(self, ahead: Vector, left: Vector, packets: slice = ALL_PACKETS) -> None:
-        """Compute the directions in some `packets`, with the x and y axes of the fan along `ahead` and `left`."""
+    def set_directions(self, forward: Vector, left: Vector, packets: slice = ALL_PACKETS) -> None:
+        """Compute the directions in some `packets`, with the x and y axes of the fan along `forward` and `left`."""
         directions = self.rays.directions[packets]
         flat = (
             self._flat
             if packets is ALL_PACKETS
             else self._flat[:, packets.start * PACKET_SIZE : packets.stop * PACKET_SIZE]
         )
-        turned = np.array((ahead, left)).T.dot(flat)
+        turned = np.array((forward, left)).T.dot(flat)
         turned[np.abs(turned) < MIN_DIRECTION_COMPONENT] = 0.0
         directions[:] = turned.reshape(3, -1, PACKET_SIZE).swapaxes(0, 1)
 
-    def end(self, reach: float) -> None:
+    def set_length(self, reach: float) -> None:
         """Limit the length of all rays."""
         self.rays.ends[:] = reach
 
-    def towards(self, x: float, y: float, least: float) -> list[slice]:
-        """Return the ranges of rays whose dot product with (x, y) is at least `least`, and some neighbors."""
+    def towards(self, x: float, y: float, min_dot: float) -> list[slice]:
+        """Return the ranges of rays whose dot product with (x, y) is at least `min_dot`, and some neighbors."""
         far = math.hypot(x, y)
-        if least > far:
+        if min_dot > far:
             return []
         count, full = self._count, self._full
-        half = math.acos(max(-1.0, least / far)) / self._increment if far > 0 else math.inf
+        half = math.acos(max(-1.0, min_dot / far)) / self._increment if far > 0 else math.inf
         if 2 * half >= full:
             return [slice(0, count)]
         middle = (math.atan2(y, x) - self._first) % (2 * math.pi) / self._increment
@@ -137,7 +137,7 @@ class RayCaster(Protocol):
 
         The distance is inf if nothing is hit within `reach` m; a shorter reach is faster.
 
-        *Given* the same geometry *then* the same distances, bit for bit, whatever was asked before.
+        *Given* the same geometry *then* the same distances, bit for bit, regardless of earlier calls.
         """
         ...
 

@@ -24,11 +24,13 @@ class PredictedPoses:
         """Return the poses at a tick, or None outside of `ticks`."""
         return PosesAtTick(self, self.ticks.index(tick)) if tick in self.ticks else None
 
-    def far(self, point: Vector, distance: float) -> set[str]:
+    def farther_than(self, point: Vector, distance: float) -> set[str]:
         """Return the moving objects that stay more than `distance` m away from a point."""
         offsets = self.table[:, :, :3] - point
         nearest = (offsets * offsets).sum(axis=2).min(axis=0)
-        return {name for name, far in zip(self.names, (nearest > distance * distance).tolist(), strict=True) if far}
+        return {
+            name for name, is_far in zip(self.names, (nearest > distance * distance).tolist(), strict=True) if is_far
+        }
 
     @cached_property
     def columns(self) -> dict[str, int]:
@@ -57,9 +59,13 @@ class PosesAtTick(Mapping[str, Pose3]):
         return row
 
     def __getitem__(self, name: str) -> Pose3:
-        seen = self.predicted
-        column = seen.columns.get(name)
-        return seen.everything[name] if column is None else _new_pose(Pose3, seen.table[self.row, column].tolist())
+        predicted = self.predicted
+        column = predicted.columns.get(name)
+        return (
+            predicted.everything[name]
+            if column is None
+            else _new_pose(Pose3, predicted.table[self.row, column].tolist())
+        )
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.predicted.everything)
@@ -75,24 +81,24 @@ class BatchPathSampler:
     segments have a constant heading.
     """
 
-    def __init__(self, each: Sequence[tuple[MotionPath, float]]) -> None:
-        self._tracks = [PathSampler(*one) for one in each]
-        self._z = np.array([z for _, z in each])
-        paths = [path for path, _ in each]
+    def __init__(self, paths_and_heights: Sequence[tuple[MotionPath, float]]) -> None:
+        self._tracks = [PathSampler(*pair) for pair in paths_and_heights]
+        self._z = np.array([z for _, z in paths_and_heights])
+        paths = [path for path, _ in paths_and_heights]
         self._start, self._phase, self._first, self._last = np.array(
             [(path.start, path.phase, path.times[0], path.times[-1]) for path in paths]
         ).T
-        self._lasts = self._last - self._first
-        self._once = np.array([path.mode == "once" for path in paths]) | (self._lasts <= 0)
+        self._durations = self._last - self._first
+        self._once = np.array([path.mode == "once" for path in paths]) | (self._durations <= 0)
         self._returns = np.array([path.mode == "back_and_forth" for path in paths])
-        self._period = np.where(self._once, 1.0, np.where(self._returns, 2 * self._lasts, self._lasts))
+        self._period = np.where(self._once, 1.0, np.where(self._returns, 2 * self._durations, self._durations))
         # Segments of all paths in one list; `inner` are the times at which paths of several segments switch.
         legs, self._numbers, self._inner = list[PathSegment](), list[int](), list[tuple[int, Array]]()
         for column, path in enumerate(paths):
             self._numbers.append(len(legs))
-            legs += [PathSegment.of(path, number) for number in range(len(path.times) - 1)] or [_UNEVEN]
+            legs += [PathSegment.of(path, number) for number in range(len(path.times) - 1)] or [_PLACEHOLDER]
             if path.ease != "linear":
-                legs[self._numbers[-1] :] = [_UNEVEN]
+                legs[self._numbers[-1] :] = [_PLACEHOLDER]
             elif len(path.times) > 2:
                 self._inner.append((column, np.array(path.times[1:-1])))
         self._legs = np.array(legs).T.copy()
@@ -103,15 +109,15 @@ class BatchPathSampler:
         running = seconds - self._start
         local = self._phase + np.where(running > 0, running, 0.0)
         since = local - self._first
-        into = np.fmod(since, self._period)
-        into = np.where(self._returns & (into > self._lasts), 2 * self._lasts - into, into)
-        local = np.where(self._once | (since <= 0), local, self._first + into)
+        folded = np.fmod(since, self._period)
+        folded = np.where(self._returns & (folded > self._durations), 2 * self._durations - folded, folded)
+        local = np.where(self._once | (since <= 0), local, self._first + folded)
         local = np.minimum(np.maximum(local, self._first), self._last)
         legs = np.tile(self._numbers, (len(local), 1))
         for column, times in self._inner:
             legs[:, column] += times.searchsorted(local[:, column], "right")
-        begin, lasts, x, y, _, dx, dy, _, qz, qw = self._legs[:, legs]
-        part = np.where(lasts > 0, (local - begin) / np.where(lasts > 0, lasts, 1.0), 1.0)
+        begin, durations, x, y, _, dx, dy, _, qz, qw = self._legs[:, legs]
+        part = np.where(durations > 0, (local - begin) / np.where(durations > 0, durations, 1.0), 1.0)
         poses = np.zeros((*local.shape, 7))
         poses[..., 0], poses[..., 1], poses[..., 2] = x + part * dx, y + part * dy, self._z
         poses[..., 5], poses[..., 6] = qz, qw
@@ -120,5 +126,5 @@ class BatchPathSampler:
         return poses
 
 
-_UNEVEN = PathSegment(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+_PLACEHOLDER = PathSegment(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
 """Placeholder of paths that are sampled one by one."""

@@ -135,7 +135,7 @@ class MotionPath:
         """Return the path time `seconds` after the start of the path, before folding of repetitions."""
         return self.phase + max(0.0, seconds - self.start)
 
-    def over(self, seconds: float) -> bool:
+    def has_ended(self, seconds: float) -> bool:
         """Return whether the motion has ended `seconds` after the start of the path."""
         return self.mode == "once" and self.elapsed(seconds) >= self.times[-1]
 

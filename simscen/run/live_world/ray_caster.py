@@ -57,7 +57,7 @@ class LiveRayCaster(RayCaster):
         reachable = self._reachable
         if reachable is None or not reachable.is_valid_for(predicted, origin, reach):
             # 1 % more, because rays end slightly beyond their reach.
-            unreachable = predicted.far(origin, 1.01 * (reach + REFRESH_DISTANCE_M + self._extent))
+            unreachable = predicted.farther_than(origin, 1.01 * (reach + REFRESH_DISTANCE_M + self._extent))
             names = [name for name in self._meshes if name not in unreachable]
             reachable = self._reachable = ReachableObjects(predicted, origin, reach + REFRESH_DISTANCE_M, names)
         return reachable.names

@@ -74,7 +74,7 @@ class Actor:
         """Return whether its path, `elapsed` seconds after its start, has no motion within `horizon` seconds."""
         if self.path is None or self.is_steered:
             return False
-        return self.path.over(elapsed) or elapsed + horizon < self.path.start
+        return self.path.has_ended(elapsed) or elapsed + horizon < self.path.start
 
     def follow(self, path: MotionPath, max_speed: float, tick: int) -> None:
         """Follow another path from `tick` on."""

@@ -224,7 +224,7 @@ class Actors:
         if actor is None or actor.path is None:
             return None
         elapsed = (tick - actor.path_start_tick) / self._tick_rate
-        return None if actor.path.over(elapsed) else (actor.path, elapsed)
+        return None if actor.path.has_ended(elapsed) else (actor.path, elapsed)
 
     # Pushing and sleeping
 

@@ -133,7 +133,7 @@ class MeshScene:
     def sweep(self, fan: RayFan, place: Vector, packets: slice = ALL_PACKETS) -> None:
         """Shorten some `packets` of a fan's rays, which start at `place` with their present directions."""
         (x, y, z), (mx, my, mz) = place, self.center
-        fan.begin(x - mx, y - my, z - mz, packets)
+        fan.set_origin(x - mx, y - my, z - mz, packets)
         self._scene.shorten(fan.rays, packets)
 
 
@@ -187,7 +187,7 @@ class MovingMesh:
     def _sweep_packets(self, fan: RayFan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
         (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
         back = -i, -j, -k, w
-        fan.turn(rotated(back, ahead), rotated(back, left), packets)
+        fan.set_directions(rotated(back, ahead), rotated(back, left), packets)
         self.part.sweep(fan, rotated(back, (px - x, py - y, pz - z)), packets)
 
 

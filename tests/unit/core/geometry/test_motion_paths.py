@@ -112,9 +112,9 @@ def test_phase_is_how_far_into_the_path_it_begins_and_start_when_it_goes_on():
     late = MotionPath((0.0, 2.0, 3.0), THERE, "back_and_forth", start=1.5, phase=4.0)
     assert pose_at(late, 0.0) == pose_at(late, 1.5) == pose_at(whole, 4.0)
     assert pose_at(late, 2.5) == pose_at(whole, 5.0)
-    assert not late.over(1e9)
-    assert MotionPath((0.0, 2.0, 3.0), THERE, start=1.0, phase=1.0).over(3.0)
-    assert not MotionPath((0.0, 2.0, 3.0), THERE, start=1.0, phase=1.0).over(2.9)
+    assert not late.has_ended(1e9)
+    assert MotionPath((0.0, 2.0, 3.0), THERE, start=1.0, phase=1.0).has_ended(3.0)
+    assert not MotionPath((0.0, 2.0, 3.0), THERE, start=1.0, phase=1.0).has_ended(2.9)
 
 
 @pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])

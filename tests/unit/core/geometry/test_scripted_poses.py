@@ -16,7 +16,7 @@ def test_those_are_far_that_are_so_at_each_of_the_ticks(distance: float) -> None
     predicted = PredictedPoses(range(20), names, table, {name: Pose3() for name in ("shelf", *names)})
     place = (3.0, -2.0, 0.5)
     nearest = {name: min(math.dist(predicted.at(tick)[name][:3], place) for tick in range(20)) for name in names}
-    far = predicted.far(place, distance)
+    far = predicted.farther_than(place, distance)
     assert far == {name for name, away in nearest.items() if away > distance}
     assert (len(far) > 0) == (distance < math.inf)
     assert (len(far) < 40) == (distance > 0.5)
