@@ -87,7 +87,7 @@ class Domain:
 
 
 def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Domain:
-    """Claim the domain `wanted`, or the first free one. Raises AdapterError if there is none."""
+    """Claim the domain `requested`, or the first free one. Raises AdapterError if there is none."""
     folder = _lock_folder(environment)
     for number in DOMAINS if requested is None else (requested,):
         lock = (folder / f"{number}.lock").open("a+")

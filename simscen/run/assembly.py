@@ -157,7 +157,7 @@ def _build_stack(
     stack_log: Path | None,
     disturb_belief: Callable[[Belief], Belief],
 ) -> Stack:
-    """Build the stack of a robot. Active faults change each belief of its localizer through `told`."""
+    """Build the stack of a robot. Active faults change each belief of its localizer through `disturb_belief`."""
     world = prepared.built.world
     surroundings = Surroundings(
         robot=robot_model(prepared.body),

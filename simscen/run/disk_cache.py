@@ -104,7 +104,7 @@ def disk_usage(folder: Path) -> tuple[int, int]:
 
 
 def _prune(folder: Path, max_bytes: int) -> int:
-    """Delete the least recently used files until at most `most` bytes remain; return the remaining size."""
+    """Delete the least recently used files until at most `max_bytes` bytes remain; return the remaining size."""
     files = sorted(_files(folder))
     total = sum(size for _, size, _ in files)
     for _, size, name in files:

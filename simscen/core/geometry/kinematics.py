@@ -21,7 +21,7 @@ WheelValues = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class MecanumWheels:
-    """Four mecanum wheels of `radius`, at `half_base` before and behind and `half_track` left and right of the center (m).
+    """Four mecanum wheels of `radius`, at distances `half_base` (x) and `half_track` (y) from the center, in m.
 
     `slant` is the cotangent of the angle between roller and wheel axle: 1 for 45 degrees. Seen from above, the upper
     rollers point to the center, and the lower ones form an O. Kinematics of Taheri, Qiao and Ghaeminezhad, "Kinematic

@@ -36,7 +36,7 @@ def hello_content(
     sensor_topics: list[tuple[str, Topic]],
     answer_limit: float,
 ) -> dict[str, Any]:
-    """Return the content of HELLO; `named` are the topics of each sensor."""
+    """Return the content of HELLO; `sensor_topics` are pairs of sensor name and topic."""
     masks = surroundings.masks
     sensor_of = {topic.name: sensor for sensor, topic in sensor_topics}
     return {
