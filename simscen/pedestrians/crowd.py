@@ -1,4 +1,4 @@
-"""Everybody who walks, and one step of the social force model for all of them together."""
+"""All pedestrians of a world, stepped together with the social force model."""
 
 import math
 from collections.abc import Callable
@@ -10,25 +10,33 @@ import numpy.typing as npt
 from simscen.core.environment.world_model import PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2
 from simscen.pedestrians import forces
-from simscen.pedestrians.forces import RELAXATION_TIME, MoveLimits, Numbers, clip_moves, move_limits
+from simscen.pedestrians.forces import RELAXATION_TIME_S, Indices, MoveLimits, clip_moves, move_limits
 from simscen.pedestrians.pedestrian import SCARED_FORCE, THREATENING_SPEED, Intent, Pedestrian
-from simscen.pedestrians.surroundings import REACH, Near, ObservedRobot, Surroundings, WallMap, edges, nearest_on
+from simscen.pedestrians.surroundings import (
+    REACH_M,
+    NearestPoints,
+    ObservedRobot,
+    Surroundings,
+    WallMap,
+    edges,
+    nearest_on,
+)
 
-VIEW = 10.0
-"""m beyond which nobody minds anybody (HuNavSim's max_dist_view)."""
-UNFELT = 0.05
-"""m/s²; a weaker force from another is none, so that who comes into the world changes nobody far away."""
-PATIENCE = 20
-"""Steps after which somebody looks whether the way to go on is still in view."""
-CREEP = 0.01
-"""m/s; who would walk more slowly stands."""
-OWN_WIDTH = 0.25
-"""m; the radius of those by whom the model's parameters were found."""
+INTERACTION_RANGE_M = 10.0
+"""Distance beyond which pedestrians do not react to each other (HuNavSim's max_dist_view)."""
+MIN_SOCIAL_FORCE = 0.05
+"""m/s²; weaker social forces count as 0, so that a new pedestrian does not change others far away."""
+VIEW_CHECK_STEPS = 20
+"""Number of steps between two checks whether the next corner of a path is still in view."""
+MIN_SPEED = 0.01
+"""m/s; pedestrians that would walk more slowly stand still."""
+REFERENCE_RADIUS_M = 0.25
+"""Radius of the pedestrians with whom the parameters of the model were determined."""
 
 Point = tuple[float, float]
 Flags = npt.NDArray[np.bool_]
-FindWay = Callable[[Point, Point, float], list[Point]]
-"""Gives the corners of a way around walls for a body of a radius in m, from one place to another, which is the last."""
+PlanPath = Callable[[Point, Point, float], list[Point]]
+"""Returns the corners of a path around walls from a start to a goal, which is the last, for a radius in m."""
 
 
 def straight_path(_start: Point, goal: Point, _radius: float) -> list[Point]:
@@ -36,261 +44,269 @@ def straight_path(_start: Point, goal: Point, _radius: float) -> list[Point]:
     return [goal]
 
 
-class _Others(NamedTuple):
-    """Those whom somebody may mind as persons: everybody, then the robots."""
+class _Neighbors(NamedTuple):
+    """All pedestrians, then all robots; `extra_radii` in m compared with REFERENCE_RADIUS_M."""
 
-    places: Array
+    positions: Array
     velocities: Array
-    wider: Array
+    extra_radii: Array
 
 
 class Crowd:
-    """Everybody in one world, in the order of their names; nothing in it draws chance."""
+    """All pedestrians of a world, sorted by name. Deterministic: it uses no random numbers."""
 
-    def __init__(self, walls: WallMap, find_way: FindWay = straight_path) -> None:
-        self._walls, self._find_way = walls, find_way
+    def __init__(self, walls: WallMap, plan_path: PlanPath = straight_path) -> None:
+        self._walls, self._plan_path = walls, plan_path
         self._people: dict[str, Pedestrian] = {}
         self._steps = 0
 
     def __len__(self) -> int:
         return len(self._people)
 
-    def add(self, walker: WalkingPedestrian) -> None:
-        """Let somebody come; one of the same name goes."""
-        self._people[walker.name] = Pedestrian.of(walker)
+    def add(self, spec: WalkingPedestrian) -> None:
+        """Add a pedestrian, or replace the one with the same name."""
+        self._people[spec.name] = Pedestrian.at_start(spec)
         self._people = dict(sorted(self._people.items()))
 
     def remove(self, name: str) -> bool:
-        """Let somebody go; says whether they were there."""
+        """Remove a pedestrian. Return whether it existed."""
         return self._people.pop(name, None) is not None
 
     def poses(self) -> dict[str, Pose2]:
-        """Where everybody is."""
+        """Return the poses of all pedestrians."""
         return {name: person.pose for name, person in self._people.items()}
 
     def radius(self, name: str) -> float:
         """Return the body radius of a pedestrian in m."""
-        return self._people[name].who.radius
+        return self._people[name].spec.radius
 
     def top_speed(self, name: str) -> float:
         """Return the maximum walking speed of a pedestrian in m/s."""
-        who = self._people[name].who
-        return max(forces.MOST_OF_SPEED * who.speed, THREATENING_SPEED)
+        spec = self._people[name].spec
+        return max(forces.MAX_SPEED_RATIO * spec.speed, THREATENING_SPEED)
 
-    def step(self, around: Surroundings, seconds: float) -> list[PedestrianAction]:
-        """Let time pass, during which everybody walks in a straight line; says what they did."""
+    def step(self, surroundings: Surroundings, seconds: float) -> list[PedestrianAction]:
+        """Move all pedestrians, each in a straight line. Return their actions."""
         people = list(self._people.values())
         if not people:
             return []
-        reacting, deeds = self._reactions(people, around, seconds)
+        reacting, actions = self._reactions(people, surroundings, seconds)
         for number, person in enumerate(people):
             self._plan(person, number)
-        wishes = [person.wish(robot) for person, robot in zip(people, reacting, strict=True)]
-        places = np.array([person.place for person in people])
+        intents = [person.intent(robot) for person, robot in zip(people, reacting, strict=True)]
+        positions = np.array([person.position for person in people])
         velocities = np.array([person.velocity for person in people])
-        walls = self._walls.near(places)
-        pushed = self._pushes(people, reacting, wishes, places, velocities, around, walls)
-        moves, after = _relaxed(wishes, places, velocities, pushed, seconds)
-        allowed = clip_moves(moves, self._limits(people, places, around, walls))
-        cut = (allowed != moves).any(axis=1)
-        after[cut] = allowed[cut] / seconds
-        for person, by, velocity, wish in zip(people, allowed, after, wishes, strict=True):
-            person.move(by, velocity, wish.looks_at, seconds)
-            deeds += person.arrive()
+        walls = self._walls.nearest_points(positions)
+        external = self._external_forces(people, reacting, intents, positions, velocities, surroundings, walls)
+        moves, after = _integrate(intents, positions, velocities, external, seconds)
+        allowed = clip_moves(moves, self._limits(people, positions, surroundings, walls))
+        clipped = (allowed != moves).any(axis=1)
+        after[clipped] = allowed[clipped] / seconds
+        for person, move, velocity, intent in zip(people, allowed, after, intents, strict=True):
+            person.move(move, velocity, intent.looks_at, seconds)
+            actions += person.update_goal()
         self._steps += 1
-        return deeds
+        return actions
 
     def _reactions(
-        self, people: list[Pedestrian], around: Surroundings, seconds: float
+        self, people: list[Pedestrian], surroundings: Surroundings, seconds: float
     ) -> tuple[list[ObservedRobot | None], list[PedestrianAction]]:
         """Return the robot that each pedestrian reacts to, and their actions."""
         reacting: list[ObservedRobot | None] = []
-        deeds: list[PedestrianAction] = []
+        actions: list[PedestrianAction] = []
         for person in people:
             visible: dict[str, ObservedRobot] = {}
-            if person.who.reacts_within and "robots" not in person.who.blind_to:
-                visible = {robot.name: robot for robot in around.robots if self._in_view(person, robot)}
-                deeds += person.take(visible, seconds)
+            if person.spec.reacts_within and "robots" not in person.spec.blind_to:
+                visible = {robot.name: robot for robot in surroundings.robots if self._in_view(person, robot)}
+                actions += person.update_reaction(visible, seconds)
             reacting.append(None if person.reacts_to is None else visible.get(person.reacts_to))
-        return reacting, deeds
+        return reacting, actions
 
     def _in_view(self, person: Pedestrian, robot: ObservedRobot) -> bool:
-        return bool(self._walls.visible(np.array([person.place]), np.array([robot.pose[:2]]))[0])
+        return bool(self._walls.visible(np.array([person.position]), np.array([robot.pose[:2]]))[0])
 
     def _plan(self, person: Pedestrian, number: int) -> None:
         """Plan a path to the goal: for a new goal, or if the next corner is out of view after a push."""
         goal = person.destination
-        stale = person.planned_for != goal
-        if not stale and person.way and (self._steps + number) % PATIENCE == 0:
-            stale = not self._walls.visible(np.array([person.place]), np.array([person.way[0]]))[0]
-        if stale:
-            person.way, person.planned_for = self._find_way(person.place, goal, person.who.radius), goal
+        is_outdated = person.planned_for != goal
+        if not is_outdated and person.path and (self._steps + number) % VIEW_CHECK_STEPS == 0:
+            is_outdated = not self._walls.visible(np.array([person.position]), np.array([person.path[0]]))[0]
+        if is_outdated:
+            person.path, person.planned_for = self._plan_path(person.position, goal, person.spec.radius), goal
 
-    def _pushes(
+    def _external_forces(
         self,
         people: list[Pedestrian],
         reacting: list[ObservedRobot | None],
-        wishes: list[Intent],
-        places: Array,
+        intents: list[Intent],
+        positions: Array,
         velocities: Array,
-        around: Surroundings,
-        walls: Near,
+        surroundings: Surroundings,
+        walls: NearestPoints,
     ) -> Array:
         """Return the external forces (n, 2) on all pedestrians, without their own driving force."""
-        force = self._social(people, reacting, places, velocities, around)
-        force += self._obstacles(people, places, around, walls)
+        force = self._social_forces(people, reacting, positions, velocities, surroundings)
+        force += self._obstacle_forces(people, positions, surroundings, walls)
         for members in _groups(people):
-            force[members] += forces.group(places[members], velocities[members])
-        for number, (person, robot, wish) in enumerate(zip(people, reacting, wishes, strict=True)):
-            if wish.still:
+            force[members] += forces.group(positions[members], velocities[members])
+        for number, (person, robot, intent) in enumerate(zip(people, reacting, intents, strict=True)):
+            if intent.is_immovable:
                 force[number] = 0.0
-            elif robot is not None and person.who.behavior == "scared":
-                away = places[number] - np.array(robot.pose[:2])
+            elif robot is not None and person.spec.behavior == "scared":
+                away = positions[number] - np.array(robot.pose[:2])
                 distance = max(math.hypot(*away), 1e-6)
-                force[number] += SCARED_FORCE / max(distance - person.who.radius, 0.1) * away / distance
+                force[number] += SCARED_FORCE / max(distance - person.spec.radius, 0.1) * away / distance
         return force
 
-    def _social(
+    def _social_forces(
         self,
         people: list[Pedestrian],
         reacting: list[ObservedRobot | None],
-        places: Array,
+        positions: Array,
         velocities: Array,
-        around: Surroundings,
+        surroundings: Surroundings,
     ) -> Array:
-        others = _others(people, places, velocities, around)
-        towards = others.places[np.newaxis] - places[:, np.newaxis]
-        near = np.hypot(towards[..., 0], towards[..., 1]) <= VIEW
-        np.fill_diagonal(near, False)
-        near &= _minded(people, reacting, around)
-        one, other = np.nonzero(near)
-        force = forces.social(towards[one, other], velocities[one] - others.velocities[other], others.wider[other])
-        felt = np.hypot(force[:, 0], force[:, 1]) > UNFELT
-        one, other, force = one[felt], other[felt], force[felt]
-        seen = self._walls.visible(places[one], others.places[other])
-        return _summed(one[seen], force[seen], len(people))
+        others = _neighbors(people, positions, velocities, surroundings)
+        towards = others.positions[np.newaxis] - positions[:, np.newaxis]
+        interacts = np.hypot(towards[..., 0], towards[..., 1]) <= INTERACTION_RANGE_M
+        np.fill_diagonal(interacts, False)
+        interacts &= _interactions(people, reacting, surroundings)
+        person, other = np.nonzero(interacts)
+        force = forces.social(
+            towards[person, other], velocities[person] - others.velocities[other], others.extra_radii[other]
+        )
+        is_strong = np.hypot(force[:, 0], force[:, 1]) > MIN_SOCIAL_FORCE
+        person, other, force = person[is_strong], other[is_strong], force[is_strong]
+        visible = self._walls.visible(positions[person], others.positions[other])
+        return _sum_by_person(person[visible], force[visible], len(people))
 
-    def _obstacles(self, people: list[Pedestrian], places: Array, around: Surroundings, walls: Near) -> Array:
-        """Of walls, things, and the robot for whom it is but a thing: the nearest place of each."""
-        who, owner, nearest = walls
-        first = _first_of_each(who, owner, np.hypot(*(nearest - places[who]).T))
-        found = [(who[first], nearest[first])]
-        for thing in around.things:
-            seeing = np.array([k for k, person in enumerate(people) if "objects" not in person.who.blind_to], np.int64)
-            found.append(_nearest_of(seeing, places, edges(thing.outlines)))
-        for robot in around.robots:
-            impassive = np.array([k for k, p in enumerate(people) if p.who.behavior == "impassive"
-                                  and "robots" not in p.who.blind_to], np.int64)  # fmt: skip
-            found.append(_nearest_of(impassive, places, edges([robot.pose.apply(robot.outline)])))
-        who = np.concatenate([some for some, _ in found])
-        away = places[who] - np.concatenate([where for _, where in found])
+    def _obstacle_forces(
+        self, people: list[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
+    ) -> Array:
+        """Return the forces (n, 2) of the nearest points of walls, objects, and robots that count as objects."""
+        person, owner, nearest = walls
+        first = _nearest_by_owner(person, owner, np.hypot(*(nearest - positions[person]).T))
+        contacts = [(person[first], nearest[first])]
+        for item in surroundings.objects:
+            aware = np.array([k for k, p in enumerate(people) if "objects" not in p.spec.blind_to], np.int64)
+            contacts.append(_nearest_points(aware, positions, edges(item.outlines)))
+        for robot in surroundings.robots:
+            impassive = np.array([k for k, p in enumerate(people) if p.spec.behavior == "impassive"
+                                  and "robots" not in p.spec.blind_to], np.int64)  # fmt: skip
+            contacts.append(_nearest_points(impassive, positions, edges([robot.pose.apply(robot.outline)])))
+        person = np.concatenate([indices for indices, _ in contacts])
+        away = positions[person] - np.concatenate([points for _, points in contacts])
         distance = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
-        radii = np.array([person.who.radius for person in people])
-        force = forces.wall(away / distance[:, np.newaxis], distance - radii[who])
-        return _summed(who, force, len(people))
+        radii = np.array([p.spec.radius for p in people])
+        force = forces.wall(away / distance[:, np.newaxis], distance - radii[person])
+        return _sum_by_person(person, force, len(people))
 
-    def _limits(self, people: list[Pedestrian], places: Array, around: Surroundings, walls: Near) -> list[MoveLimits]:
-        radii = np.array([person.who.radius for person in people])
-        who, _, nearest = walls
-        every = [_keep_off(who, nearest, places, radii, 1.0)]
-        for blind, outlines in [
-            *(("objects", thing.outlines) for thing in around.things),
-            *(("robots", (robot.pose.apply(robot.outline),)) for robot in around.robots),
+    def _limits(
+        self, people: list[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
+    ) -> list[MoveLimits]:
+        """Return the limits of a step that keep pedestrians apart from obstacles and from each other."""
+        radii = np.array([person.spec.radius for person in people])
+        indices, _, nearest = walls
+        limits = [_limits_towards(indices, nearest, positions, radii, 1.0)]
+        for kind, outlines in [
+            *(("objects", item.outlines) for item in surroundings.objects),
+            *(("robots", (robot.pose.apply(robot.outline),)) for robot in surroundings.robots),
         ]:
-            seeing = np.array([k for k, person in enumerate(people) if blind not in person.who.blind_to], np.int64)
-            some, where = _nearest_of(seeing, places, edges(outlines), each=True)
-            every.append(_keep_off(some, where, places, radii, 0.5))
-        apart = places[np.newaxis] - places[:, np.newaxis]
-        distance = np.hypot(apart[..., 0], apart[..., 1])
-        one, other = np.nonzero((distance < 2 * REACH) & ~np.eye(len(people), dtype=np.bool_))
+            aware = np.array([k for k, person in enumerate(people) if kind not in person.spec.blind_to], np.int64)
+            near, points = _nearest_points(aware, positions, edges(outlines), each=True)
+            limits.append(_limits_towards(near, points, positions, radii, 0.5))
+        towards = positions[np.newaxis] - positions[:, np.newaxis]
+        distance = np.hypot(towards[..., 0], towards[..., 1])
+        one, other = np.nonzero((distance < 2 * REACH_M) & ~np.eye(len(people), dtype=np.bool_))
         length = np.maximum(distance[one, other], 1e-9)
-        unit = apart[one, other] / length[:, np.newaxis]
-        return [*every, move_limits(one, unit, length - radii[one] - radii[other], 0.5)]
+        unit = towards[one, other] / length[:, np.newaxis]
+        return [*limits, move_limits(one, unit, length - radii[one] - radii[other], 0.5)]
 
 
-def _others(people: list[Pedestrian], places: Array, velocities: Array, around: Surroundings) -> _Others:
-    robots = around.robots
-    return _Others(
-        np.concatenate((places, np.array([robot.pose[:2] for robot in robots]).reshape(-1, 2))),
+def _neighbors(people: list[Pedestrian], positions: Array, velocities: Array, surroundings: Surroundings) -> _Neighbors:
+    robots = surroundings.robots
+    radii = [*(p.spec.radius - REFERENCE_RADIUS_M for p in people), *(r.radius - REFERENCE_RADIUS_M for r in robots)]
+    return _Neighbors(
+        np.concatenate((positions, np.array([robot.pose[:2] for robot in robots]).reshape(-1, 2))),
         np.concatenate((velocities, np.array([robot.velocity for robot in robots]).reshape(-1, 2))),
-        np.array([*(p.who.radius - OWN_WIDTH for p in people), *(robot.radius - OWN_WIDTH for robot in robots)]),
+        np.array(radii),
     )
 
 
-def _minded(people: list[Pedestrian], reacting: list[ObservedRobot | None], around: Surroundings) -> Flags:
-    """Whether each person (rows) minds each other and each robot (columns) as a person."""
-    minds = np.ones((len(people), len(people) + len(around.robots)), dtype=np.bool_)
+def _interactions(people: list[Pedestrian], reacting: list[ObservedRobot | None], surroundings: Surroundings) -> Flags:
+    """Return whether each pedestrian (rows) evades each pedestrian and each robot (columns) as a person."""
+    evades = np.ones((len(people), len(people) + len(surroundings.robots)), dtype=np.bool_)
     for number, (person, reacts_to) in enumerate(zip(people, reacting, strict=True)):
-        if "people" in person.who.blind_to:
-            minds[number, : len(people)] = False
-        if "robots" in person.who.blind_to or person.who.behavior == "impassive":
-            minds[number, len(people) :] = False
+        if "people" in person.spec.blind_to:
+            evades[number, : len(people)] = False
+        if "robots" in person.spec.blind_to or person.spec.behavior == "impassive":
+            evades[number, len(people) :] = False
         elif reacts_to is not None:
-            minds[number, len(people) :] &= np.array([robot.name != reacts_to.name for robot in around.robots])
-    return minds
+            evades[number, len(people) :] &= np.array([robot.name != reacts_to.name for robot in surroundings.robots])
+    return evades
 
 
-def _groups(people: list[Pedestrian]) -> list[Numbers]:
-    """Those who walk together: whoever reacts to a robot leaves the group for that long."""
-    names = sorted({person.who.group for person in people if person.who.group is not None})
-    found = [[k for k, p in enumerate(people) if p.who.group == name and p.reacts_to is None] for name in names]
-    return [np.array(members) for members in found if len(members) > 1]
+def _groups(people: list[Pedestrian]) -> list[Indices]:
+    """Return the members of each group. A pedestrian that reacts to a robot leaves its group during the reaction."""
+    names = sorted({person.spec.group for person in people if person.spec.group is not None})
+    groups = [[k for k, p in enumerate(people) if p.spec.group == name and p.reacts_to is None] for name in names]
+    return [np.array(members) for members in groups if len(members) > 1]
 
 
-def _relaxed(
-    wishes: list[Intent], places: Array, velocities: Array, pushed: Array, seconds: float
+def _integrate(
+    intents: list[Intent], positions: Array, velocities: Array, external: Array, seconds: float
 ) -> tuple[Array, Array]:
-    """Return moves and velocities under constant forces: dv/dt = (wished - v) / τ + pushed, solved exactly."""
-    wished = np.zeros_like(places)
-    for number, wish in enumerate(wishes):
-        if wish.target is not None:
-            away = np.array(wish.target) - places[number]
-            distance = math.hypot(*away)
-            wished[number] = wish.speed * away / distance if distance > 0 else 0.0
-    steady = wished + RELAXATION_TIME * pushed
-    fading = math.exp(-seconds / RELAXATION_TIME)
-    most = np.array([wish.most for wish in wishes])
-    after = _capped(steady + (velocities - steady) * fading, most)
-    moves = steady * seconds + (velocities - steady) * RELAXATION_TIME * (1 - fading)
-    standing = (np.hypot(*steady.T) < CREEP) & (np.hypot(*velocities.T) < CREEP)
-    moves[standing] = after[standing] = 0.0
-    return _capped(moves, most * seconds), after
+    """Return moves and velocities under constant forces: dv/dt = (intended - v) / τ + external, solved exactly."""
+    intended = np.zeros_like(positions)
+    for number, intent in enumerate(intents):
+        if intent.target is not None:
+            towards = np.array(intent.target) - positions[number]
+            distance = math.hypot(*towards)
+            intended[number] = intent.speed * towards / distance if distance > 0 else 0.0
+    steady = intended + RELAXATION_TIME_S * external
+    decay = math.exp(-seconds / RELAXATION_TIME_S)
+    max_speeds = np.array([intent.max_speed for intent in intents])
+    after = _limit_lengths(steady + (velocities - steady) * decay, max_speeds)
+    moves = steady * seconds + (velocities - steady) * RELAXATION_TIME_S * (1 - decay)
+    is_standing = (np.hypot(*steady.T) < MIN_SPEED) & (np.hypot(*velocities.T) < MIN_SPEED)
+    moves[is_standing] = after[is_standing] = 0.0
+    return _limit_lengths(moves, max_speeds * seconds), after
 
 
-def _capped(vectors: Array, most: Array) -> Array:
-    length = np.hypot(vectors[:, 0], vectors[:, 1])
-    capped: Array = vectors * np.minimum(1.0, most / np.maximum(length, 1e-12))[:, np.newaxis]
-    return capped
+def _limit_lengths(vectors: Array, limits: Array) -> Array:
+    lengths = np.hypot(vectors[:, 0], vectors[:, 1])
+    limited: Array = vectors * np.minimum(1.0, limits / np.maximum(lengths, 1e-12))[:, np.newaxis]
+    return limited
 
 
-def _summed(who: Numbers, force: Array, count: int) -> Array:
+def _sum_by_person(person: Indices, force: Array, count: int) -> Array:
     """Return the sum of forces (n, 2) for each of `count`, added in order, so that rounding is reproducible."""
-    sums = [np.bincount(who, force[:, axis], minlength=count) for axis in (0, 1)]
-    return np.stack(sums, axis=1).astype(np.float64)  # of nobody it counts in whole numbers
+    sums = [np.bincount(person, force[:, axis], minlength=count) for axis in (0, 1)]
+    return np.stack(sums, axis=1).astype(np.float64)  # without any force, bincount returns integers
 
 
-def _first_of_each(who: Numbers, owner: Numbers, distance: Array) -> Numbers:
+def _nearest_by_owner(person: Indices, owner: Indices, distance: Array) -> Indices:
     """Return the index of the nearest entry for each pair of a pedestrian and an owner."""
-    order = np.lexsort((distance, owner, who))
-    pairs = np.stack((who[order], owner[order]), axis=1)
-    fresh = np.ones(len(order), dtype=np.bool_)
-    fresh[1:] = (pairs[1:] != pairs[:-1]).any(axis=1)
-    first: Numbers = order[fresh]
+    order = np.lexsort((distance, owner, person))
+    pairs = np.stack((person[order], owner[order]), axis=1)
+    is_first = np.ones(len(order), dtype=np.bool_)
+    is_first[1:] = (pairs[1:] != pairs[:-1]).any(axis=1)
+    first: Indices = order[is_first]
     return first
 
 
-def _nearest_of(who: Numbers, places: Array, sides: Array, each: bool = False) -> tuple[Numbers, Array]:
-    """Return the nearest point of an outline, or of `each` of its sides, for pedestrians within REACH."""
-    some = np.repeat(who, len(sides))
-    where = nearest_on(np.tile(sides, (len(who), 1, 1)), places[some])
-    distance = np.hypot(*(where - places[some]).T)
-    near = np.flatnonzero(distance <= REACH)
+def _nearest_points(indices: Indices, positions: Array, segments: Array, each: bool = False) -> tuple[Indices, Array]:
+    """Return the pedestrians within REACH_M of an outline, and its nearest points or those of `each` segment."""
+    repeated = np.repeat(indices, len(segments))
+    points = nearest_on(np.tile(segments, (len(indices), 1, 1)), positions[repeated])
+    distance = np.hypot(*(points - positions[repeated]).T)
+    near = np.flatnonzero(distance <= REACH_M)
     if not each:
-        near = near[_first_of_each(some[near], np.zeros_like(near), distance[near])]
-    return some[near], where[near]
+        near = near[_nearest_by_owner(repeated[near], np.zeros_like(near), distance[near])]
+    return repeated[near], points[near]
 
 
-def _keep_off(who: Numbers, where: Array, places: Array, radii: Array, share: float) -> MoveLimits:
-    towards = where - places[who]
+def _limits_towards(indices: Indices, points: Array, positions: Array, radii: Array, share: float) -> MoveLimits:
+    towards = points - positions[indices]
     distance = np.maximum(np.hypot(towards[:, 0], towards[:, 1]), 1e-9)
-    return move_limits(who, towards / distance[:, np.newaxis], distance - radii[who], share)
+    return move_limits(indices, towards / distance[:, np.newaxis], distance - radii[indices], share)

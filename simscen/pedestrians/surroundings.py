@@ -1,4 +1,4 @@
-"""What people may see beside walls and each other, where it is at one moment."""
+"""Surroundings of pedestrians: walls, and the robots and objects at one point in time."""
 
 import math
 from collections.abc import Sequence
@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.pedestrians.forces import Numbers
+from simscen.pedestrians.forces import Indices
 
 
 @dataclass(frozen=True, eq=False)
 class ObservedRobot:
-    """A robot: its base's pose, velocity (m/s) in the world, radius (m), and outline (n, 2) in its own frame."""
+    """A robot: pose and velocity (m/s) of its base in the world, radius (m), and outline (n, 2) in its base frame."""
 
     name: str
     pose: Pose2
@@ -24,7 +24,7 @@ class ObservedRobot:
 
 @dataclass(frozen=True, eq=False)
 class ObservedObject:
-    """An object that is no person: its outlines (n, 2) in the world."""
+    """An object: its outlines (n, 2) in the world frame."""
 
     name: str
     outlines: tuple[Array, ...]
@@ -32,108 +32,109 @@ class ObservedObject:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """All robots and things, in the order of their names."""
+    """All robots and objects, sorted by name."""
 
     robots: tuple[ObservedRobot, ...] = ()
-    things: tuple[ObservedObject, ...] = ()
+    objects: tuple[ObservedObject, ...] = ()
 
 
 def edges(outlines: Sequence[Array]) -> Array:
-    """Return the edges of rings as segments (n, 2, 2)."""
+    """Return the edges of closed outlines as segments (n, 2, 2)."""
     rings = [np.stack((ring, np.roll(ring, -1, axis=0)), axis=1) for ring in outlines]
     return np.concatenate(rings) if rings else np.empty((0, 2, 2))
 
 
-# Walls: the nearest ones that block pedestrians, and what they hide from view.
-CELL = 1.0
-"""m; what is near is remembered for each square of this size."""
-REACH = 1.2
-"""m within which a wall counts: 1 m of air leaves 0.00014 m/s² of its force."""
-SIGHT_CELL = 0.1
-"""m; what hides is remembered in squares of this size, or larger ones in a world of more than MOST_CELLS."""
-MOST_CELLS = 4_000_000
-Near = tuple[Numbers, Numbers, Array]
-ARMS_LENGTH = 0.3
-"""m from one's own middle and from that of what one looks at, within which nothing hides it."""
+CELL_M = 1.0
+"""Size of the grid cells for which nearby walls are cached."""
+REACH_M = 1.2
+"""Distance from the center of a pedestrian within which walls act; a gap of 1 m leaves 0.00014 m/s² of their force."""
+SIGHT_CELL_M = 0.1
+"""Cell size of the visibility grid; larger if it would have more than MAX_SIGHT_CELLS."""
+MAX_SIGHT_CELLS = 4_000_000
+NearestPoints = tuple[Indices, Indices, Array]
+"""Index of a pedestrian (k,), owner of a nearby wall (k,), and point of the wall nearest to the pedestrian (k, 2)."""
+SIGHT_MARGIN_M = 0.3
+"""Distance from both ends of a line of sight within which nothing blocks it."""
 
 
 class WallMap:
-    """Segments (n, 2, 2) in meters, each of the solid `owners` (n,); those that are `opaque` (n,) hide what is behind.
+    """Walls that block pedestrians, and among them the opaque ones, which block their view.
 
-    Raises ValueError for segments that are not finite.
+    Takes segments (n, 2, 2) in m in the world frame, the solids `owners` (n,) that they belong to, and which ones are
+    `opaque` (n,). Raises ValueError for segments that are not finite.
     """
 
-    def __init__(self, segments: Array, owners: Numbers, opaque: npt.NDArray[np.bool_]) -> None:
+    def __init__(self, segments: Array, owners: Indices, opaque: npt.NDArray[np.bool_]) -> None:
         if not np.isfinite(segments).all():
-            raise ValueError("a wall is not finite")
+            raise ValueError("a wall segment has coordinates that are not finite")
         self._segments, self._owners = segments, owners
         self._low, self._high = segments.min(axis=1), segments.max(axis=1)
-        self._known: dict[tuple[int, int], Numbers] = {}
-        self._sight = _Sight(segments[opaque])
+        self._segments_by_cell: dict[tuple[int, int], Indices] = {}
+        self._sight = _SightGrid(segments[opaque])
 
-    def near(self, points: Array) -> Near:
-        """Each meeting of a point (n, 2) with a segment within REACH: point, owner, and the nearest place (k, 2)."""
-        cells = np.floor(points / CELL).astype(np.int64).tolist()
-        found = [self._around(column, row) for column, row in cells]
-        who = np.repeat(np.arange(len(points)), [len(some) for some in found])
-        which = np.concatenate(found) if found else np.empty(0, dtype=np.int64)
-        return who, self._owners[which], nearest_on(self._segments[which], points[who])
+    def nearest_points(self, points: Array) -> NearestPoints:
+        """Return the nearest point of each segment within REACH_M of each of the `points` (n, 2)."""
+        cells = np.floor(points / CELL_M).astype(np.int64).tolist()
+        candidates = [self._segments_near(column, row) for column, row in cells]
+        point_index = np.repeat(np.arange(len(points)), [len(each) for each in candidates])
+        segment_index = np.concatenate(candidates) if candidates else np.empty(0, dtype=np.int64)
+        return point_index, self._owners[segment_index], nearest_on(self._segments[segment_index], points[point_index])
 
-    def _around(self, column: int, row: int) -> Numbers:
-        """Return the segments that may be within REACH of any point of a grid square."""
-        if (column, row) not in self._known:
-            low = np.array([column, row]) * CELL
-            outside = np.maximum(np.maximum(self._low - low - CELL, low - self._high), 0.0)
-            self._known[column, row] = np.flatnonzero(np.hypot(outside[:, 0], outside[:, 1]) <= REACH)
-        return self._known[column, row]
+    def _segments_near(self, column: int, row: int) -> Indices:
+        """Return the segments that may be within REACH_M of any point of a cell."""
+        if (column, row) not in self._segments_by_cell:
+            low = np.array([column, row]) * CELL_M
+            outside = np.maximum(np.maximum(self._low - low - CELL_M, low - self._high), 0.0)
+            self._segments_by_cell[column, row] = np.flatnonzero(np.hypot(outside[:, 0], outside[:, 1]) <= REACH_M)
+        return self._segments_by_cell[column, row]
 
-    def gap(self, point: tuple[float, float]) -> float:
-        """Meters from a point to the nearest wall; inf beyond REACH."""
-        here = np.array([point])
-        _, _, nearest = self.near(here)
-        return float(np.hypot(*(nearest - here).T).min(initial=math.inf))
+    def distance(self, point: tuple[float, float]) -> float:
+        """Return the distance in m from a point to the nearest wall; inf beyond REACH_M."""
+        points = np.array([point])
+        _, _, nearest = self.nearest_points(points)
+        return float(np.hypot(*(nearest - points).T).min(initial=math.inf))
 
-    def visible(self, eyes: Array, things: Array) -> npt.NDArray[np.bool_]:
-        """Whether no wall hides things (n, 2) from eyes (n, 2)."""
-        return self._sight.clear(eyes, things)
+    def visible(self, viewers: Array, targets: Array) -> npt.NDArray[np.bool_]:
+        """Return for each pair of viewers (n, 2) and targets (n, 2) whether no wall hides the target."""
+        return self._sight.clear_lines(viewers, targets)
 
 
-class _Sight:
-    """What hides, as squares that are opaque."""
+class _SightGrid:
+    """Grid of opaque cells, which block lines of sight."""
 
     def __init__(self, segments: Array) -> None:
-        self._low = segments.reshape(-1, 2).min(axis=0, initial=0.0) - SIGHT_CELL
-        size = segments.reshape(-1, 2).max(axis=0, initial=0.0) + SIGHT_CELL - self._low
-        self._cell = max(SIGHT_CELL, math.sqrt(float(size[0] * size[1]) / MOST_CELLS))
+        self._low = segments.reshape(-1, 2).min(axis=0, initial=0.0) - SIGHT_CELL_M
+        size = segments.reshape(-1, 2).max(axis=0, initial=0.0) + SIGHT_CELL_M - self._low
+        self._cell = max(SIGHT_CELL_M, math.sqrt(float(size[0] * size[1]) / MAX_SIGHT_CELLS))
         self._opaque = np.zeros(np.ceil(size / self._cell).astype(np.int64) + 1, dtype=np.bool_)
         steps = 1 + np.ceil(np.hypot(*(segments[:, 1] - segments[:, 0]).T) / (self._cell / 4)).astype(np.int64)
-        which = np.repeat(np.arange(len(segments)), steps)
+        segment = np.repeat(np.arange(len(segments)), steps)
         first = np.repeat(np.cumsum(steps) - steps, steps)
-        part = (np.arange(len(which)) - first) / np.maximum(np.repeat(steps, steps) - 1, 1)
-        points = segments[which, 0] + part[:, np.newaxis] * (segments[which, 1] - segments[which, 0])
+        ratio = (np.arange(len(segment)) - first) / np.maximum(np.repeat(steps, steps) - 1, 1)
+        points = segments[segment, 0] + ratio[:, np.newaxis] * (segments[segment, 1] - segments[segment, 0])
         cells = np.floor((points - self._low) / self._cell).astype(np.int64)
         self._opaque[cells[:, 0], cells[:, 1]] = True
 
-    def clear(self, eyes: Array, things: Array) -> npt.NDArray[np.bool_]:
-        """Return which lines of sight are clear, sampled once per grid square, as walls are thicker or closed."""
-        away = things - eyes
-        distance = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
-        looks = np.maximum(np.ceil((distance - 2 * ARMS_LENGTH) / self._cell), 0).astype(np.int64)
-        line = np.repeat(np.arange(len(eyes)), looks)
-        number = np.arange(len(line)) - np.repeat(np.cumsum(looks) - looks, looks)
-        part = (ARMS_LENGTH + number * self._cell) / distance[line]
-        cells = ((eyes[line] - self._low + away[line] * part[:, np.newaxis]) / self._cell).astype(np.int64)
+    def clear_lines(self, viewers: Array, targets: Array) -> npt.NDArray[np.bool_]:
+        """Return which lines of sight are clear. One sample per cell suffices, because walls are closed or thicker."""
+        offset = targets - viewers
+        distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
+        samples = np.maximum(np.ceil((distance - 2 * SIGHT_MARGIN_M) / self._cell), 0).astype(np.int64)
+        line = np.repeat(np.arange(len(viewers)), samples)
+        number = np.arange(len(line)) - np.repeat(np.cumsum(samples) - samples, samples)
+        ratio = (SIGHT_MARGIN_M + number * self._cell) / distance[line]
+        cells = ((viewers[line] - self._low + offset[line] * ratio[:, np.newaxis]) / self._cell).astype(np.int64)
         inside = ((cells >= 0) & (cells < self._opaque.shape)).all(axis=1)
-        hit = line[inside][self._opaque[cells[inside, 0], cells[inside, 1]]]
-        seen = np.ones(len(eyes), dtype=np.bool_)
-        seen[hit] = False
-        return seen
+        blocked = line[inside][self._opaque[cells[inside, 0], cells[inside, 1]]]
+        is_clear = np.ones(len(viewers), dtype=np.bool_)
+        is_clear[blocked] = False
+        return is_clear
 
 
 def nearest_on(segments: Array, points: Array) -> Array:
     """Return the point (n, 2) on each segment (n, 2, 2) that is nearest to each point (n, 2)."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     squared = np.maximum(np.sum(along * along, axis=1), 1e-18)
-    part = np.clip(np.sum((points - start) * along, axis=1) / squared, 0.0, 1.0)
-    place: Array = start + part[:, np.newaxis] * along
-    return place
+    ratio = np.clip(np.sum((points - start) * along, axis=1) / squared, 0.0, 1.0)
+    nearest: Array = start + ratio[:, np.newaxis] * along
+    return nearest

@@ -83,10 +83,10 @@ class PedestrianSimulation:
 
     def has_room(self, place: Point, radius: float, walls_only: bool) -> bool:
         """Return whether a pedestrian with this radius in m fits at a place."""
-        if walls_only or self._walls.gap(place) < radius:
-            return self._walls.gap(place) >= radius
+        if walls_only or self._walls.distance(place) < radius:
+            return self._walls.distance(place) >= radius
         surroundings = self._surroundings()
-        outlines = [outline for observed in surroundings.things for outline in observed.outlines]
+        outlines = [outline for observed in surroundings.objects for outline in observed.outlines]
         outlines += [robot.pose.apply(robot.outline) for robot in surroundings.robots]
         position = Pose2(*place, 0.0)
         if any(distance_to_polygon(position, outline.tolist()) < radius for outline in outlines):

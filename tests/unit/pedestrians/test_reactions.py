@@ -112,7 +112,7 @@ def test_things_are_walked_around_and_not_into():
     crate = ObservedObject("crate", (np.array([(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)]),))
     track = []
     for _ in range(200):
-        crowd.step(Surroundings(things=(crate,)), STEP)
+        crowd.step(Surroundings(objects=(crate,)), STEP)
         track.append(crowd.poses()["anna"][:2])
     gap = np.hypot(*np.maximum(np.abs(np.array(track)) - 0.3, 0.0).T) - 0.25
     assert gap.min() >= -1e-9

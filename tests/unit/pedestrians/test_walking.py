@@ -13,7 +13,7 @@ from tests.unit.pedestrians.rig import STEP, corridor, people, walk, walker, wal
 def test_who_sets_off_alone_comes_to_speed_as_helbing_and_molnar_say():
     """v(t) = v0 (1 - exp(-t/τ)), and the way is its integral."""
     tracks, _ = walk(people(walker("anna", 0.0, 0.0, (50.0, 0.0), speed=1.3)), 3.0)
-    t, tau = np.arange(61) * STEP, forces.RELAXATION_TIME
+    t, tau = np.arange(61) * STEP, forces.RELAXATION_TIME_S
     assert tracks["anna"][:, 0] == pytest.approx(1.3 * (t - tau * (1 - np.exp(-t / tau))), abs=1e-9)
     assert not tracks["anna"][:, 1:].any()
 
@@ -22,7 +22,7 @@ def test_who_walks_against_a_wall_stands_where_its_force_is_that_of_their_wish()
     """a exp(-gap/b) = v0/τ, so the gap is b ln(a τ / v0); the way on leads through the wall."""
     crowd = people(walker("anna", 0.0, 0.0, (50.0, 0.0), speed=1.3), around=walls([[5.0, -9.0], [5.0, 9.0]]))
     tracks, _ = walk(crowd, 20.0)
-    gap = forces.WALL_RANGE * math.log(forces.WALL * forces.RELAXATION_TIME / 1.3)
+    gap = forces.WALL_RANGE_M * math.log(forces.WALL_STRENGTH * forces.RELAXATION_TIME_S / 1.3)
     assert 5.0 - tracks["anna"][-1, 0] - 0.25 == pytest.approx(gap, abs=1e-3)
 
 
