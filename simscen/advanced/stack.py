@@ -19,17 +19,17 @@ from simscen.stack.reference import ReferenceStack
 DECAY_DISTANCE_M = 0.5
 """Distance in which an earlier estimate decays by a factor of e, because the ground changes."""
 MAX_CURVATURE_PER_M = 1.0
-"""Limit of the estimate, in case of a broken sensor."""
+"""Limit of the estimated curvature, in case of a broken sensor."""
 
 
 class TurnSlipObserver:
-    """Compares wheel odometry with the odometry that fuses wheels and gyroscope."""
+    """Estimates the curvature that the wheels do not measure, from wheel odometry and fused odometry."""
 
     def __init__(self) -> None:
         self._curvature = 0.0
         self._before: tuple[Pose2, Pose2] | None = None
 
-    def learn(self, wheels: Pose2, fused: Pose2) -> None:
+    def update(self, wheels: Pose2, fused: Pose2) -> None:
         """Update the estimate with poses of wheel and fused odometry; ignores values that are not finite."""
         if not math.isfinite(wheels.x + wheels.y + wheels.yaw + fused.yaw):
             return
@@ -39,12 +39,12 @@ class TurnSlipObserver:
         c, s = math.cos(before[0].yaw), math.sin(before[0].yaw)
         ahead = c * (wheels.x - before[0].x) + s * (wheels.y - before[0].y)
         turned = math.remainder((fused.yaw - before[1].yaw) - (wheels.yaw - before[0].yaw), math.tau)
-        share = min(1.0, abs(ahead) / DECAY_DISTANCE_M)
+        gain = min(1.0, abs(ahead) / DECAY_DISTANCE_M)
         if ahead != 0.0:
-            curvature = self._curvature + share * (turned / ahead - self._curvature)
+            curvature = self._curvature + gain * (turned / ahead - self._curvature)
             self._curvature = min(max(curvature, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
 
-    def countered(self, command: Twist) -> Twist:
+    def compensate(self, command: Twist) -> Twist:
         """Return the command to send so that the robot turns as `command` intends."""
         if command.vx == 0.0 or self._curvature == 0.0:
             return command
@@ -77,42 +77,42 @@ class AdvancedStack(ReferenceStack):
         return (*super().components, ("prediction", self._prediction, ("on_scan", "steer", "stand")))
 
     def _on_motion(self, reading: Odometry | Imu) -> None:
-        self._prediction.take(reading)
+        self._prediction.add_reading(reading)
 
     def _on_odometry_step(self, wheels: Pose2, fused: Pose2) -> None:
         if self._turn_slip is not None:
-            self._turn_slip.learn(wheels, fused)
+            self._turn_slip.update(wheels, fused)
 
     def _on_lidar_scan(self, tick: int, scan: Scan) -> Scan:
         self._prediction.on_scan(scan)
-        return self._prediction.marking(scan)
+        return self._prediction.with_moving_hits(scan)
 
     def _on_costmaps_updated(self, tick: int, frames: Frames) -> None:
         """Give the moving obstacles to collision monitor, controller, and planner, each in its frame."""
-        if self._prediction.calm and not self._has_moving_obstacles:
+        if self._prediction.is_idle and not self._has_moving_obstacles:
             return
-        around = self._prediction.seen_from(tick, ROBOT_FRAME)
-        self._has_moving_obstacles = len(around) > 0
-        self._monitor.on_moving(around)
-        self._costmaps.local_costmap.moving = self._prediction.seen_from(tick, frames.odometry)
-        self._costmaps.global_costmap.moving = self._prediction.seen_from(tick, frames.pose)
+        moving = self._prediction.moving_in_frame(tick, ROBOT_FRAME)
+        self._has_moving_obstacles = len(moving) > 0
+        self._monitor.on_moving(moving)
+        self._costmaps.local_costmap.moving = self._prediction.moving_in_frame(tick, frames.odometry)
+        self._costmaps.global_costmap.moving = self._prediction.moving_in_frame(tick, frames.pose)
 
     def _on_drive(self) -> None:
-        if self._prediction.stands:
-            self._prediction.settle()
+        if self._prediction.is_standing:
+            self._prediction.on_drive()
 
     def _adjust_wanted_command(self, tick: int, frames: Frames, command: Twist) -> Twist:
-        if self._prediction.calm:
+        if self._prediction.is_idle:
             return command
         return self._prediction.steer(
             tick, command, frames.pose, self._twist, self._costmaps.global_costmap.view, self.plan
         )
 
     def _adjust_sent_command(self, command: Twist) -> Twist:
-        return command if self._turn_slip is None else self._turn_slip.countered(command)
+        return command if self._turn_slip is None else self._turn_slip.compensate(command)
 
     def _on_idle(self, tick: int, pose: Pose2) -> None:
-        """Step out of the way of moving obstacles, and come back."""
+        """Step aside for moving obstacles, and return."""
         command = self._prediction.stand(tick, pose, self._twist, self._costmaps.global_costmap.view)
         if command == STOP or self._monitor.silent(tick):
             self._commands.stop(tick)
@@ -147,5 +147,5 @@ class AdvancedStackBuilder(StackBuilder):
         prediction = MotionPrediction(
             spec.prediction, self.robot, surroundings.lidars, surroundings.tick_rate, self._full_speed
         )
-        counters_slip = spec.localizer.fuses_odometry and spec.velocity_smoother.counter_turn_slip
-        return AdvancedStack(*parts, prediction=prediction, turn_slip=TurnSlipObserver() if counters_slip else None)
+        compensates_slip = spec.localizer.fuses_odometry and spec.velocity_smoother.counter_turn_slip
+        return AdvancedStack(*parts, prediction=prediction, turn_slip=TurnSlipObserver() if compensates_slip else None)

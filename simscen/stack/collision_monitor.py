@@ -140,7 +140,7 @@ class CollisionMonitor:
         own_velocity = complex(wanted.vx, wanted.vy)
         deviation = abs(own_velocity) * abs(wanted.wz) * horizon * horizon / 2
         margin = self._spec.stop_margin
-        for place, velocity, radius, *_ in self._moving.things:
+        for place, velocity, radius, *_ in self._moving.obstacles:
             towards = velocity - own_velocity
             square = towards.real * towards.real + towards.imag * towards.imag
             when = -(place * towards.conjugate()).real / square if square > 0.0 else 0.0

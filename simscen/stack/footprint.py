@@ -165,11 +165,11 @@ class CoveringDiscs:
         return least
 
     def nearness(
-        self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, kept_off: float
+        self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, margin: float
     ) -> tuple[Reals, Mask]:
         """Return the nearness (…,) of the discs to moving obstacles and whether they touch; see MovingObstacles."""
         places = self._placed(x, y, yaw)
-        (nearest, touched), *others = [moving.nearness(*at, times, self.radius, kept_off) for at in places]
+        (nearest, touched), *others = [moving.nearness(*at, times, self.radius, margin) for at in places]
         for near, touch in others:
             np.maximum(nearest, near, out=nearest)
             touched |= touch

@@ -13,7 +13,7 @@ from simscen.core.geometry import Array, Pose2
 MAX_UNCERTAINTY_M = 0.8
 """Largest inflation of an obstacle for its uncertainty."""
 MAX_STEP_S, MIN_STEP_S = 0.5, 0.05
-"""Longest and shortest time step of `surely_off`. Steps are longer where the distance exceeds MAX_UNCERTAINTY_M."""
+"""Longest and shortest time step of `is_surely_clear`; longer where the distance exceeds MAX_UNCERTAINTY_M."""
 CONTACT_DISTANCE_M = 0.03
 """Closer obstacles count as touching."""
 
@@ -28,30 +28,31 @@ class MovingObstacle(NamedTuple):
     velocity.
     """
 
-    place: complex
+    position: complex
     velocity: complex
     radius: float
-    place_variance: float
+    position_variance: float
     covariance: float
     velocity_variance: float
 
-    def deviation(self, seconds: float, acceleration: float) -> float:
+    def position_std(self, seconds: float, acceleration: float) -> float:
         """Return the standard deviation in m of the position after `seconds`, with this `acceleration` in m/s²."""
-        *_, variance, covariance, wanders = self
-        turned = 0.5 * acceleration * seconds * seconds
-        return math.sqrt(variance + seconds * (2.0 * covariance + wanders * seconds) + turned * turned)
+        *_, variance, covariance, velocity_variance = self
+        drift = 0.5 * acceleration * seconds * seconds
+        return math.sqrt(variance + seconds * (2.0 * covariance + velocity_variance * seconds) + drift * drift)
 
-    def missed_by(self, here: complex, speed: float, seconds: float) -> float:
-        """Return a lower bound of the distance in m to anything that leaves `here` at `speed` in any direction."""
-        off, velocity = self.place - here, self.velocity
-        own = abs(velocity)
-        if speed >= own:
-            when = seconds
-        else:  # the minimum lies between the closest approach to `here` and the end of the time
-            along, aside = (off.conjugate() * velocity).real / own, abs((off.conjugate() * velocity).imag) / own
-            when = (aside * speed / math.sqrt(own * own - speed * speed) - along) / own
-            when = min(max(0.0, when), seconds)
-        return abs(off + velocity * when) - self.radius - speed * when
+    def min_distance(self, start: complex, speed: float, seconds: float) -> float:
+        """Return a lower bound of the distance in m to anything that leaves `start` at `speed` in any direction."""
+        offset, velocity = self.position - start, self.velocity
+        own_speed = abs(velocity)
+        if speed >= own_speed:
+            time = seconds
+        else:  # the minimum lies between the closest approach to `start` and the end of the time
+            product = offset.conjugate() * velocity
+            along, across = product.real / own_speed, abs(product.imag) / own_speed
+            time = (across * speed / math.sqrt(own_speed * own_speed - speed * speed) - along) / own_speed
+            time = min(max(0.0, time), seconds)
+        return abs(offset + velocity * time) - self.radius - speed * time
 
 
 class MovingObstacles:
@@ -60,7 +61,7 @@ class MovingObstacles:
     `acceleration` in m/s² is the assumed change of velocity; the uncertainty of predictions grows with it.
     """
 
-    __slots__ = ("acceleration", "things")
+    __slots__ = ("acceleration", "obstacles")
 
     def __init__(
         self, centers: Array, velocities: Array, radii: Array, covariances: Array, acceleration: float
@@ -71,40 +72,43 @@ class MovingObstacles:
         """
         spreads = np.maximum(covariances[:, (0, 0, 2), (0, 2, 2)], covariances[:, (1, 1, 3), (1, 3, 3)])
         rows = zip(centers.tolist(), velocities.tolist(), radii.tolist(), spreads.tolist(), strict=True)
-        self.things = tuple(
-            MovingObstacle(complex(*at), complex(*goes), radius, *spread) for at, goes, radius, spread in rows
+        self.obstacles = tuple(
+            MovingObstacle(complex(*center), complex(*velocity), radius, *spread)
+            for center, velocity, radius, spread in rows
         )
         self.acceleration = acceleration
 
     @classmethod
-    def of(cls, things: Iterable[MovingObstacle], acceleration: float) -> "MovingObstacles":
+    def of(cls, obstacles: Iterable[MovingObstacle], acceleration: float) -> "MovingObstacles":
         """Create a set of these obstacles."""
         moving = object.__new__(cls)
-        moving.things, moving.acceleration = tuple(things), acceleration
+        moving.obstacles, moving.acceleration = tuple(obstacles), acceleration
         return moving
 
     def __len__(self) -> int:
-        return len(self.things)
+        return len(self.obstacles)
 
     @property
     def centers(self) -> Array:
         """Centers (n, 2) in m."""
-        return np.array([(each.place.real, each.place.imag) for each in self.things]).reshape(-1, 2)
+        return np.array([(each.position.real, each.position.imag) for each in self.obstacles]).reshape(-1, 2)
 
     @property
     def velocities(self) -> Array:
         """Velocities (n, 2) in m/s."""
-        return np.array([(each.velocity.real, each.velocity.imag) for each in self.things]).reshape(-1, 2)
+        return np.array([(each.velocity.real, each.velocity.imag) for each in self.obstacles]).reshape(-1, 2)
 
     @property
     def radii(self) -> Array:
         """Radii (n,) in m."""
-        return np.array([each.radius for each in self.things])
+        return np.array([each.radius for each in self.obstacles])
 
     @property
     def covariances(self) -> Array:
         """Covariances (n, 4, 4) of x, y, vx, vy in that order."""
-        spreads = [((place, both), (both, velocity)) for *_, place, both, velocity in self.things]
+        spreads = [
+            ((position, covariance), (covariance, velocity)) for *_, position, covariance, velocity in self.obstacles
+        ]
         return np.kron(np.array(spreads).reshape(-1, 2, 2), np.eye(2))
 
     def at(self, times: Array) -> Array:
@@ -118,93 +122,97 @@ class MovingObstacles:
         `times` broadcast with the points. Obstacles are inflated by `sigmas` standard deviations, at most by
         MAX_UNCERTAINTY_M. Without obstacles, the distance is inf.
         """
-        least = np.full(np.broadcast_shapes(x.shape, times.shape), np.inf, x.dtype)
-        for thing, gap in self._gaps(x, y, times):
-            wider = np.minimum(sigmas * self._deviation(thing, times), MAX_UNCERTAINTY_M) if sigmas else 0.0
-            np.minimum(least, gap - wider, out=least)
-        return least
+        nearest = np.full(np.broadcast_shapes(x.shape, times.shape), np.inf, x.dtype)
+        for obstacle, gap in self._gaps(x, y, times):
+            inflation = np.minimum(sigmas * self._position_std(obstacle, times), MAX_UNCERTAINTY_M) if sigmas else 0.0
+            np.minimum(nearest, gap - inflation, out=nearest)
+        return nearest
 
-    def nearness(self, x: Reals, y: Reals, times: Reals, radius: float, kept_off: float) -> tuple[Reals, Mask]:
+    def nearness(self, x: Reals, y: Reals, times: Reals, radius: float, margin: float) -> tuple[Reals, Mask]:
         """Return the nearness (…,) of discs at points (…,) to the nearest obstacle at `times`, and whether they touch.
 
-        The nearness is 1 at contact and 0 at the distance `kept_off` (m) plus one standard deviation of the position,
+        The nearness is 1 at contact and 0 at the distance `margin` (m) plus one standard deviation of the position,
         at most MAX_UNCERTAINTY_M; farther away it is negative.
         """
         shape = np.broadcast_shapes(x.shape, times.shape)
         nearest, touched = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
-        for thing, gap in self._gaps(x, y, times):
+        for obstacle, gap in self._gaps(x, y, times):
             touched |= gap < radius + CONTACT_DISTANCE_M
-            room = np.minimum(kept_off + self._deviation(thing, times), MAX_UNCERTAINTY_M)
-            np.maximum(nearest, (radius - gap) / room, out=nearest)
+            required = np.minimum(margin + self._position_std(obstacle, times), MAX_UNCERTAINTY_M)
+            np.maximum(nearest, (radius - gap) / required, out=nearest)
         nearest += 1.0
         return nearest, touched
 
-    def surely_off(
-        self, place: Callable[[float], complex], speed: float, reach: float, kept_off: float, seconds: float
+    def is_surely_clear(
+        self, position: Callable[[float], complex], speed: float, radius: float, margin: float, seconds: float
     ) -> bool:
-        """Return True if a disc of radius `reach` at `place(t)`, not faster than `speed`, has a nearness of at most 0.
+        """Return True if a disc at `position` (t in s), not faster than `speed`, has a nearness of at most 0.
 
         This is a quick check for the given time in s; False means that it could not decide.
         """
-        for thing in self.things:
-            closing, time = max(speed + abs(thing.velocity), 1e-3), 0.0
+        for obstacle in self.obstacles:
+            closing_speed, time = max(speed + abs(obstacle.velocity), 1e-3), 0.0
             while time < seconds:
-                off = abs(thing.place + thing.velocity * time - place(time))
-                room = min(
-                    kept_off + thing.deviation(min(time + MAX_STEP_S, seconds), self.acceleration), MAX_UNCERTAINTY_M
+                offset = abs(obstacle.position + obstacle.velocity * time - position(time))
+                required = min(
+                    margin + obstacle.position_std(min(time + MAX_STEP_S, seconds), self.acceleration),
+                    MAX_UNCERTAINTY_M,
                 )
-                spare = (off - thing.radius - reach - room) / closing
-                if spare < MIN_STEP_S:
+                slack = (offset - obstacle.radius - radius - required) / closing_speed
+                if slack < MIN_STEP_S:
                     return False
-                time += max(min(spare, MAX_STEP_S), spare - (MAX_UNCERTAINTY_M - room) / closing)
+                time += max(min(slack, MAX_STEP_S), slack - (MAX_UNCERTAINTY_M - required) / closing_speed)
         return True
 
-    def _deviation(self, thing: MovingObstacle, times: Reals) -> Reals:
+    def _position_std(self, obstacle: MovingObstacle, times: Reals) -> Reals:
         """Return the standard deviation (…,) in m of an obstacle's predicted position along any axis."""
-        turned = (0.5 * self.acceleration * times**2) ** 2
-        *_, variance, covariance, wanders = thing
-        return np.asarray(np.sqrt(variance + 2.0 * covariance * times + wanders * times**2 + turned))
+        drift = (0.5 * self.acceleration * times**2) ** 2
+        *_, variance, covariance, velocity_variance = obstacle
+        return np.asarray(np.sqrt(variance + 2.0 * covariance * times + velocity_variance * times**2 + drift))
 
     def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[MovingObstacle, Reals]]:
         """Yield each obstacle with the distances (…,) in m to its surface."""
-        for thing in self.things:
-            place, velocity, radius, *_ = thing
-            dx, dy = x - (place.real + velocity.real * times), y - (place.imag + velocity.imag * times)
+        for obstacle in self.obstacles:
+            position, velocity, radius, *_ = obstacle
+            dx, dy = x - (position.real + velocity.real * times), y - (position.imag + velocity.imag * times)
             dx *= dx
             dy *= dy
             dx += dy
             np.sqrt(dx, out=dx)
             dx -= radius
-            yield thing, dx
+            yield obstacle, dx
 
     def near(self, x: float, y: float, reach: float, speed: float, seconds: float) -> "MovingObstacles":
         """Return the obstacles that can come within `reach` m of a robot that leaves a point at `speed`."""
-        here = complex(x, y)
-        close = [each for each in self.things if each.missed_by(here, speed, seconds) < reach]
-        return self if len(close) == len(self.things) else MovingObstacles.of(close, self.acceleration)
+        start = complex(x, y)
+        close = [each for each in self.obstacles if each.min_distance(start, speed, seconds) < reach]
+        return self if len(close) == len(self.obstacles) else MovingObstacles.of(close, self.acceleration)
 
-    def seen_from(self, frame: Pose2) -> "MovingObstacles":
+    def in_frame(self, frame: Pose2) -> "MovingObstacles":
         """Return the obstacles expressed in another frame, whose pose in this frame is `frame`."""
         origin, turn = complex(frame.x, frame.y), cmath.rect(1.0, -frame.yaw)
         return MovingObstacles.of(
-            [MovingObstacle((place - origin) * turn, goes * turn, *rest) for place, goes, *rest in self.things],
+            [
+                MovingObstacle((position - origin) * turn, velocity * turn, *rest)
+                for position, velocity, *rest in self.obstacles
+            ],
             self.acceleration,
         )
 
     def after(self, seconds: float) -> "MovingObstacles":
         """Return the obstacles as predicted after `seconds`."""
-        later = [
+        predicted = [
             MovingObstacle(
-                place + goes * seconds,
-                goes,
+                position + velocity * seconds,
+                velocity,
                 radius,
-                variance + seconds * (2.0 * covariance + seconds * wanders),
-                covariance + seconds * wanders,
-                wanders,
+                variance + seconds * (2.0 * covariance + seconds * velocity_variance),
+                covariance + seconds * velocity_variance,
+                velocity_variance,
             )
-            for place, goes, radius, variance, covariance, wanders in self.things
+            for position, velocity, radius, variance, covariance, velocity_variance in self.obstacles
         ]
-        return MovingObstacles.of(later, self.acceleration)
+        return MovingObstacles.of(predicted, self.acceleration)
 
 
 def no_moving_obstacles(acceleration: float = 0.0) -> MovingObstacles:

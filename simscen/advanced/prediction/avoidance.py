@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from simscen.advanced.prediction.rollouts import HORIZON, TIMES, FollowedPath, Rollouts, TrajectorySampler, arc
+from simscen.advanced.prediction.rollouts import HORIZON_S, TIMES, FollowedPath, Rollouts, TrajectorySampler, arc
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.guards import Prediction
@@ -21,26 +21,26 @@ from simscen.stack.footprint import CoveringDiscs
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles, Reals
 from simscen.stack.protocols import CostmapView, RobotModel
 
-ROOM = 0.25
+MIN_DISTANCE_M = 0.25
 """Distance in m to keep from moving obstacles, in addition to a standard deviation of their position."""
-SOON = 1.2
+DECAY_TIME_S = 1.2
 """Time in s in which the weight of a predicted event decays by a factor of e."""
-SOONER: Array = np.exp(-TIMES / SOON)
-NEAR, HIT, LASTING = 3.0, 10.0, 1.0
+DECAY: Array = np.exp(-TIMES / DECAY_TIME_S)
+APPROACH_WEIGHT, COLLISION_WEIGHT, MEAN_WEIGHT = 3.0, 10.0, 1.0
 """Weights of the closest approach, of a collision, and of the mean nearness."""
-WALL, WALL_ROOM = 8.0, 0.08
+STATIC_WEIGHT, STATIC_DISTANCE_M = 8.0, 0.08
 """Weight of a collision with a static obstacle, and the distance in m to keep from it."""
-PROGRESS, BACKWARD, CHANGE, OWN = 1.0, 0.15, 0.08, 0.1
+PROGRESS_WEIGHT, BACKWARD_WEIGHT, CHANGE_WEIGHT, OTHER_COST = 1.0, 0.15, 0.08, 0.1
 """Weights of progress, of driving backward, of a changed command, and of not using the controller's trajectory."""
-CALM = 0.02
+SAFE_RISK = 0.02
 """Risk below which the controller's command stays."""
-CALMER = 0.01
+RESUME_RISK = 0.01
 """Risk below which the controller gets back control after avoidance."""
-SLOWER = (1.0, 0.75, 0.5, 0.25, 0.0)
+SPEED_FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.0)
 """Factors on the controller's speed that are tried on its own trajectory."""
-AT_ONCE, ROUNDING = 64, 1e-9
+BATCH_SIZE, ROUNDING = 64, 1e-9
 """Number of trajectories that are evaluated together, and the tolerance for rounding of their costs."""
-NEARLY_ROUND = 0.15
+MAX_ROUND_DIFFERENCE_M = 0.15
 """Maximum difference in m of circumscribed and inscribed radius for which a robot counts as round."""
 
 
@@ -51,22 +51,22 @@ class Avoidance:
         """Take the parameters, the robot, and the full speed of its controller in m/s."""
         self._spec, self._robot = spec, robot
         self._speed = max(full_speed, 0.3)
-        round_enough = robot.circumscribed_radius - robot.inscribed_radius < NEARLY_ROUND
-        self._discs = CoveringDiscs(replace(robot, radius=robot.circumscribed_radius) if round_enough else robot)
+        is_round = robot.circumscribed_radius - robot.inscribed_radius < MAX_ROUND_DIFFERENCE_M
+        self._discs = CoveringDiscs(replace(robot, radius=robot.circumscribed_radius) if is_round else robot)
         self._last: Twist | None = None
 
     @cached_property
-    def _repertoire(self) -> TrajectorySampler:
-        """Candidate velocities; built on first use because most runs do not need them."""
+    def _sampler(self) -> TrajectorySampler:
+        """Candidate trajectories; built on first use because most runs do not need them."""
         return TrajectorySampler(self._robot, self._speed)
 
-    def rest(self) -> None:
+    def reset(self) -> None:
         """Reset, because nothing moves."""
         self._last = None
 
     def steer(
         self,
-        wanted: Twist,
+        command: Twist,
         pose: Pose2,
         twist: Twist,
         moving: MovingObstacles,
@@ -74,34 +74,36 @@ class Avoidance:
         path: FollowedPath | None,
         home: Pose2 | None = None,
     ) -> Twist:
-        """Return the command to send instead of `wanted`; the same object if that is safe.
+        """Return a safe command instead of `command`; the same object if it is safe.
 
         All arguments are in one frame. `path` is the path that the robot follows; without one, it stays at `home`.
         """
-        near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_UNCERTAINTY_M, self._speed, HORIZON)
-        if not near.things:
+        near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_UNCERTAINTY_M, self._speed, HORIZON_S)
+        if not near.obstacles:
             self._last = None
-            return wanted
-        if self._clear(wanted, pose, twist, near, path):
+            return command
+        if self._is_surely_safe(command, pose, twist, near, path):
             self._last = None
-            return wanted
-        as_wanted = self._own(wanted, pose, twist, path, SLOWER[:1])
-        if self._risk(as_wanted, near)[0] <= (CALM if self._last is None else CALMER):
+            return command
+        own = self._own_rollouts(command, pose, twist, path, SPEED_FRACTIONS[:1])
+        if self._risk(own, near)[0] <= (SAFE_RISK if self._last is None else RESUME_RISK):
             self._last = None
-            return wanted
-        self._last = self._best(self._own(wanted, pose, twist, path, SLOWER), pose, twist, near, costmap, path, home)
+            return command
+        self._last = self._best_command(
+            self._own_rollouts(command, pose, twist, path, SPEED_FRACTIONS), pose, twist, near, costmap, path, home
+        )
         return self._last
 
-    def _clear(
-        self, wanted: Twist, pose: Pose2, twist: Twist, moving: MovingObstacles, path: FollowedPath | None
+    def _is_surely_safe(
+        self, command: Twist, pose: Pose2, twist: Twist, moving: MovingObstacles, path: FollowedPath | None
     ) -> bool:
         """Return True if a quick check shows that the controller's trajectory comes close to nothing."""
-        if path is None or len(path) < 2 or wanted.vx == 0.0:
+        if path is None or len(path) < 2 or command.vx == 0.0:
             return False
-        place, speed, off = path.course(pose, twist, wanted, self._robot)
-        return moving.surely_off(place, speed, self._discs.reach + off, ROOM, HORIZON)
+        position, speed, deviation = path.position_over_time(pose, twist, command, self._robot)
+        return moving.is_surely_clear(position, speed, self._discs.reach + deviation, MIN_DISTANCE_M, HORIZON_S)
 
-    def _best(
+    def _best_command(
         self,
         own: Rollouts,
         pose: Pose2,
@@ -115,105 +117,113 @@ class Avoidance:
 
         The risk is only computed for trajectories that can be the best by their other costs, in order of these.
         """
-        fan, goal = self._repertoire.roll(pose, twist), self._goal(pose, path, home)
-        everything = np.arange(len(fan.commands))
-        soon = np.s_[:, 1]
-        room = max(self._room(each, costmap, soon).max() for each in (own, fan.ways(everything, 2)))
-        least = min(WALL_ROOM, float(room))
-        cost = self._cost(own, pose, goal, moving, costmap, least, 0.0)
+        fan, goal = self._sampler.sample(pose, twist), self._goal(pose, path, home)
+        all_indices = np.arange(len(fan.commands))
+        second_step = np.s_[:, 1]
+        clearance = max(
+            self._clearance(each, costmap, second_step).max() for each in (own, fan.rollouts(all_indices, 2))
+        )
+        min_clearance = min(STATIC_DISTANCE_M, float(clearance))
+        cost = self._cost(own, pose, goal, moving, costmap, min_clearance, 0.0)
         number = int(cost.argmin())
-        best, command = (float(cost[number]), -1), own.commands[number]
-        free = OWN + self._change(fan.commands) - PROGRESS * self._progress(*fan.ends, pose, goal)
-        free += BACKWARD * self._backward(fan.vx)[fan.speed]
-        order = free.argsort(kind="stable")
-        for first in range(0, len(order), AT_ONCE):
-            which = order[first : first + AT_ONCE]
-            if free[which[0]] > best[0] + ROUNDING:
+        best, first_command = (float(cost[number]), -1), own.commands[number]
+        base = OTHER_COST + self._change_costs(fan.commands) - PROGRESS_WEIGHT * self._progress(*fan.ends, pose, goal)
+        base += BACKWARD_WEIGHT * self._backward(fan.vx)[fan.speed]
+        order = base.argsort(kind="stable")
+        for begin in range(0, len(order), BATCH_SIZE):
+            batch = order[begin : begin + BATCH_SIZE]
+            if base[batch[0]] > best[0] + ROUNDING:
                 break
-            cost = self._cost(fan.ways(which), pose, goal, moving, costmap, least, OWN)
-            found = float(cost.min())
-            number = int(which[cost == found].min())
-            if (found, number) < best:
-                best, command = (found, number), fan.commands[number]
-        return Twist(float(command[0]), 0.0, float(command[1]))
+            cost = self._cost(fan.rollouts(batch), pose, goal, moving, costmap, min_clearance, OTHER_COST)
+            lowest = float(cost.min())
+            number = int(batch[cost == lowest].min())
+            if (lowest, number) < best:
+                best, first_command = (lowest, number), fan.commands[number]
+        return Twist(float(first_command[0]), 0.0, float(first_command[1]))
 
     def _cost(
         self,
-        ways: Rollouts,
+        rollouts: Rollouts,
         pose: Pose2,
         goal: tuple[float, float],
         moving: MovingObstacles,
         costmap: CostmapView,
-        least: float,
-        other: float,
+        min_clearance: float,
+        extra: float,
     ) -> Array:
-        """Return the costs (n,) of trajectories, with `least` m kept from walls; `other` is added to all."""
-        cost = self._risk(ways, moving)
-        progress = self._progress(ways.x[:, -1], ways.y[:, -1], pose, goal)
-        cost += self._walls(ways, costmap, least) - PROGRESS * progress
-        cost += BACKWARD * self._backward(ways.vx)
-        cost += other
-        cost += self._change(ways.commands)
+        """Return the costs (n,) of trajectories, plus `extra`. Static obstacles cost within `min_clearance` m."""
+        cost = self._risk(rollouts, moving)
+        progress = self._progress(rollouts.x[:, -1], rollouts.y[:, -1], pose, goal)
+        cost += self._static_costs(rollouts, costmap, min_clearance) - PROGRESS_WEIGHT * progress
+        cost += BACKWARD_WEIGHT * self._backward(rollouts.vx)
+        cost += extra
+        cost += self._change_costs(rollouts.commands)
         return cost
 
-    def _own(
-        self, wanted: Twist, pose: Pose2, twist: Twist, path: FollowedPath | None, parts: tuple[float, ...]
+    def _own_rollouts(
+        self, command: Twist, pose: Pose2, twist: Twist, path: FollowedPath | None, fractions: tuple[float, ...]
     ) -> Rollouts:
         """Return the controller's own trajectory at fractions of its speed."""
-        if path is None or len(path) < 2 or wanted.vx == 0.0:
-            return arc(pose, wanted, parts if wanted != STOP else (1.0,))
-        return path.driven(pose, twist, wanted, parts, self._robot, not self._discs.centered)
+        if path is None or len(path) < 2 or command.vx == 0.0:
+            return arc(pose, command, fractions if command != STOP else (1.0,))
+        return path.rollouts(pose, twist, command, fractions, self._robot, not self._discs.centered)
 
-    def _risk(self, ways: Rollouts, moving: MovingObstacles) -> Array:
+    def _risk(self, rollouts: Rollouts, moving: MovingObstacles) -> Array:
         """Return the costs (n,) of trajectories for their nearness to moving obstacles."""
-        worst, hit = self._discs.nearness(moving, ways.x, ways.y, ways.yaw, TIMES, ROOM)
-        near = np.minimum(np.maximum(worst, 0.0), 2.0) ** 2 * SOONER
-        risk: Array = NEAR * near.max(axis=1) + LASTING * near.mean(axis=1) + HIT * (hit * SOONER).max(axis=1)
+        nearness, touches = self._discs.nearness(moving, rollouts.x, rollouts.y, rollouts.yaw, TIMES, MIN_DISTANCE_M)
+        near = np.minimum(np.maximum(nearness, 0.0), 2.0) ** 2 * DECAY
+        risk: Array = (
+            APPROACH_WEIGHT * near.max(axis=1)
+            + MEAN_WEIGHT * near.mean(axis=1)
+            + COLLISION_WEIGHT * (touches * DECAY).max(axis=1)
+        )
         return risk
 
-    def _walls(self, ways: Rollouts, costmap: CostmapView, least: float) -> Array:
-        """Return the costs (n,) of trajectories for static obstacles that are closer than `least` m."""
-        touched = (self._room(ways, costmap, np.s_[:, 1::2]) < least) * np.exp(-TIMES[1::2] / (2 * SOON))
-        cost: Array = WALL * touched.max(axis=1)
+    def _static_costs(self, rollouts: Rollouts, costmap: CostmapView, min_clearance: float) -> Array:
+        """Return the costs (n,) of trajectories for static obstacles that are closer than `min_clearance` m."""
+        is_close = (self._clearance(rollouts, costmap, np.s_[:, 1::2]) < min_clearance) * np.exp(
+            -TIMES[1::2] / (2 * DECAY_TIME_S)
+        )
+        cost: Array = STATIC_WEIGHT * is_close.max(axis=1)
         return cost
 
-    def _room(self, ways: Rollouts, costmap: CostmapView, some: tuple[slice, int | slice]) -> Reals:
-        """Return the distances in m of trajectories from static obstacles at some of their times."""
-        return np.asarray(self._discs.clearance(costmap, ways.x[some], ways.y[some], ways.yaw[some]))
+    def _clearance(self, rollouts: Rollouts, costmap: CostmapView, times: tuple[slice, int | slice]) -> Reals:
+        """Return the distances in m of trajectories from static obstacles at `times`."""
+        return np.asarray(self._discs.clearance(costmap, rollouts.x[times], rollouts.y[times], rollouts.yaw[times]))
 
     def _goal(self, pose: Pose2, path: FollowedPath | None, home: Pose2 | None) -> tuple[float, float]:
         """Return the position that the robot should approach."""
         if path is not None:
-            return path.ahead(pose, self._speed * HORIZON)
+            return path.ahead(pose, self._speed * HORIZON_S)
         return (pose.x, pose.y) if home is None else (home.x, home.y)
 
     def _progress(self, x: Array, y: Array, pose: Pose2, goal: tuple[float, float]) -> Array:
         """Return the progress (n,) of trajectories that end at x and y (n,), relative to full speed."""
         before = math.hypot(goal[0] - pose.x, goal[1] - pose.y)
-        gain: Array = (before - np.hypot(x - goal[0], y - goal[1])) / (self._speed * HORIZON)
+        gain: Array = (before - np.hypot(x - goal[0], y - goal[1])) / (self._speed * HORIZON_S)
         return gain
 
     def _backward(self, vx: Array) -> Array:
         """Return the mean backward speed (n,) of trajectories with speeds (n, times), relative to full speed."""
         return np.asarray(np.maximum(-vx / self._speed, 0.0).mean(axis=1))
 
-    def _change(self, commands: Array) -> Array:
+    def _change_costs(self, commands: Array) -> Array:
         """Return the costs (n,) of commands (n, 2) for differing from the previous command."""
         if self._last is None:
             return np.zeros(len(commands))
         change = np.abs(commands[:, 0] - self._last.vx) / self._speed
-        return np.asarray(CHANGE * (change + np.abs(commands[:, 1] - self._last.wz) / 3.0))
+        return np.asarray(CHANGE_WEIGHT * (change + np.abs(commands[:, 1] - self._last.wz) / 3.0))
 
 
-THERE, TURNED = 0.08, 0.15
+ARRIVED_M, ARRIVED_RAD = 0.08, 0.15
 """Distance in m and angle in rad within which the robot is at its stand position."""
-LEFT = 0.15
+LEAVE_DISTANCE_M = 0.15
 """Distance in m from which the robot returns."""
-PART, GAIN = 0.3, 1.0
+RETURN_SPEED_RATIO, RETURN_GAIN = 0.3, 1.0
 """Maximum speed of returning relative to full speed, and gain in 1/s of the speed on the distance."""
-TURN = 1.0
+RETURN_TURN_RATE = 1.0
 """Maximum turn rate in rad/s of returning."""
-FACING = 0.4
+MAX_BEARING_RAD = 0.4
 """Angle in rad to the line back above which the robot turns before it drives."""
 
 
@@ -222,14 +232,14 @@ class StandPosition:
 
     def __init__(self, robot: RobotModel, full_speed: float) -> None:
         """Take the robot and its full speed in m/s."""
-        self._speed, self._turn = PART * full_speed, min(TURN, robot.max_angular)
-        self._reverses, self._turns = robot.max_reverse > 0.0, robot.turning_radius == 0.0
+        self._speed, self._max_turn_rate = RETURN_SPEED_RATIO * full_speed, min(RETURN_TURN_RATE, robot.max_angular)
+        self._can_reverse, self._can_turn_in_place = robot.max_reverse > 0.0, robot.turning_radius == 0.0
         self._home: Pose2 | None = None
-        self._away = False
+        self._is_away = False
 
-    def leave(self) -> None:
+    def clear(self) -> None:
         """Forget the pose, because the robot drives."""
-        self._home, self._away = None, False
+        self._home, self._is_away = None, False
 
     def home(self, pose: Pose2, moving: bool) -> Pose2 | None:
         """Return the stand position, which is set when the first obstacle moves nearby; None before."""
@@ -237,21 +247,21 @@ class StandPosition:
             self._home = pose
         return self._home
 
-    def back(self, pose: Pose2) -> Twist:
+    def return_command(self, pose: Pose2) -> Twist:
         """Return the command to return; STOP at the stand position, and for a robot that cannot turn in place."""
         home = self._home
-        if home is None or not self._turns:
+        if home is None or not self._can_turn_in_place:
             return STOP
         distance = home.distance(pose)
-        self._away = distance > (THERE if self._away else LEFT)
-        if not self._away:
+        self._is_away = distance > (ARRIVED_M if self._is_away else LEAVE_DISTANCE_M)
+        if not self._is_away:
             turn = wrap(home.yaw - pose.yaw)
-            return Twist(0.0, 0.0, self._turned(turn)) if abs(turn) > TURNED else STOP
+            return Twist(0.0, 0.0, self._turn_rate(turn)) if abs(turn) > ARRIVED_RAD else STOP
         bearing = wrap(math.atan2(home.y - pose.y, home.x - pose.x) - pose.yaw)
-        sign = -1.0 if abs(bearing) > math.pi / 2 and self._reverses else 1.0
-        off = wrap(bearing + math.pi) if sign < 0 else bearing
-        speed = min(self._speed, GAIN * distance) if abs(off) < FACING else 0.0
-        return Twist(sign * speed, 0.0, self._turned(off))
+        sign = -1.0 if abs(bearing) > math.pi / 2 and self._can_reverse else 1.0
+        deviation = wrap(bearing + math.pi) if sign < 0 else bearing
+        speed = min(self._speed, RETURN_GAIN * distance) if abs(deviation) < MAX_BEARING_RAD else 0.0
+        return Twist(sign * speed, 0.0, self._turn_rate(deviation))
 
-    def _turned(self, angle: float) -> float:
-        return math.copysign(min(self._turn, 2.0 * abs(angle)), angle)
+    def _turn_rate(self, angle: float) -> float:
+        return math.copysign(min(self._max_turn_rate, 2.0 * abs(angle)), angle)

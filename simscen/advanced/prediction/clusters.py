@@ -11,57 +11,57 @@ import numpy.typing as npt
 from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array
 
-GAP, SPARSE = 0.15, 2.5
+MAX_GAP_M, MAX_GAP_BEAMS = 0.15, 2.5
 """Maximum distance between hits of one cluster: in m, or as a multiple of the beam spacing."""
-MISSED = 2
+MAX_MISSED_BEAMS = 2
 """Maximum number of consecutive beams without a hit within a cluster."""
-VALLEY = 0.1
+MIN_RISE_M = 0.1
 """Minimum rise of the range in m between two obstacles that are neighbors in the scan."""
-BOTH = 2
+BOTH_EDGES = 2
 """Number of visible edges of a completely visible obstacle."""
-STEP_APART = 1e3
+RUN_OFFSET_M = 1e3
 """A distance in m larger than any range."""
-STEEPEST = math.radians(80.0)
+MAX_HALF_ANGLE_RAD = math.radians(80.0)
 """Limit in rad of half the angle that a cluster covers, for computing its radius."""
-FEWEST = 3
+MIN_HITS = 3
 """Minimum number of hits of a cluster."""
-ROUNDING = 1e-6
+ROUNDING_M = 1e-6
 """Tolerance in m for rounding."""
-STEPS, ENOUGH = 4, 3e-3
+MAX_ITERATIONS, CONVERGED_STEP_M = 4, 3e-3
 """Maximum number of Gauss-Newton iterations, and the step in m below which they end."""
 
 Indices = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
-Places = npt.NDArray[np.complex128]
-"""Points (n,) as complex numbers, x + iy: to turn them is one multiplication."""
+Points = npt.NDArray[np.complex128]
+"""Points (n,) as complex numbers x + iy, so that a rotation is one multiplication."""
 
 
 @fast_dataclass(eq=False)
 class Hits:
-    """Hits of a scan in order: indices of `beams`, `ranges`, and `places` (m,).
+    """Hits of a scan in order: indices of `beams`, `ranges`, and `points` (m,).
 
-    Two successive hits belong together if their distance is at most `sparse` times the range.
+    Two successive hits belong together if their distance is at most `gap_ratio` times the range.
     """
 
     beams: Indices
     ranges: Array
-    places: Places
-    sparse: float
+    points: Points
+    gap_ratio: float
 
-    def may_be_together(self, which: list[int], few: int) -> bool:
-        """Return whether `few` of these successive hits may be in one run."""
-        row = 1
-        for one, other in pairwise(which):
-            row = row + 1 if self._linked(one) and self._linked(other - 1) else 1
-            if row == few:
+    def may_share_run(self, indices: list[int], count: int) -> bool:
+        """Return whether `count` of the hits with these indices, in order, may be in one run."""
+        linked = 1
+        for one, other in pairwise(indices):
+            linked = linked + 1 if self._may_link_next(one) and self._may_link_next(other - 1) else 1
+            if linked == count:
                 return True
         return False
 
-    def _linked(self, hit: int) -> bool:
-        """Return whether the next hit may belong to this one, computed with scalars."""
-        here, there = self.places.item(hit), self.places.item(hit + 1)
+    def _may_link_next(self, hit: int) -> bool:
+        """Return whether this hit and the next may be in one run, computed with scalars."""
+        point, next_point = self.points.item(hit), self.points.item(hit + 1)
         near = min(self.ranges.item(hit), self.ranges.item(hit + 1))
-        return abs(there - here) <= max(self.sparse * near, GAP) + ROUNDING
+        return abs(next_point - point) <= max(self.gap_ratio * near, MAX_GAP_M) + ROUNDING_M
 
 
 @fast_dataclass(eq=False)
@@ -72,10 +72,10 @@ class Runs:
     first: Indices
     last: Indices
 
-    def together(self, which: Mask, few: int) -> bool:
-        """Return whether at least `few` (more than one) of these hits (m,) are in one run."""
-        runs = self.first.searchsorted(which.nonzero()[0], side="right")
-        return bool((runs[few - 1 :] == runs[: 1 - few]).any())
+    def share_run(self, mask: Mask, count: int) -> bool:
+        """Return whether at least `count` (more than one) of the hits in the mask (m,) are in one run."""
+        runs = self.first.searchsorted(mask.nonzero()[0], side="right")
+        return bool((runs[count - 1 :] == runs[: 1 - count]).any())
 
 
 class Cluster(NamedTuple):
@@ -97,68 +97,70 @@ class Cluster(NamedTuple):
         return self.last - self.first + 1
 
 
-def valid_hits(ranges: Array, places: Places, step: float, least: float, most: float) -> Hits:
+def valid_hits(ranges: Array, points: Points, step: float, least: float, most: float) -> Hits:
     """Return the hits of a scan with ranges between `least` and `most` m.
 
-    `places` (n,) are the ends of the beams, which are `step` rad apart.
+    `points` (n,) are the ends of the beams, which are `step` rad apart.
     """
     beams = ((ranges >= least) & (ranges <= most)).nonzero()[0]
-    return Hits(beams, ranges[beams], places[beams], SPARSE * abs(step))
+    return Hits(beams, ranges[beams], points[beams], MAX_GAP_BEAMS * abs(step))
 
 
 def runs(hits: Hits) -> Runs:
     """Return the runs of hits. The first and the last run of a full circle are not joined."""
-    beams, ranges, places = hits.beams, hits.ranges, hits.places
+    beams, ranges, points = hits.beams, hits.ranges, hits.points
     gap = np.minimum(ranges[1:], ranges[:-1])
-    gap *= hits.sparse
-    apart = np.abs(places[1:] - places[:-1]) > np.maximum(gap, GAP, out=gap)
+    gap *= hits.gap_ratio
+    is_gap = np.abs(points[1:] - points[:-1]) > np.maximum(gap, MAX_GAP_M, out=gap)
     if len(beams) and beams[-1] - beams[0] >= len(beams):
-        apart |= beams[1:] - beams[:-1] > MISSED + 1
-    return Runs(hits, *_between(apart.nonzero()[0], len(ranges)))
+        is_gap |= beams[1:] - beams[:-1] > MAX_MISSED_BEAMS + 1
+    return Runs(hits, *_runs_between(is_gap.nonzero()[0], len(ranges)))
 
 
-def clusters(found: Runs, scanned: Array, start: float, step: float, largest: float) -> list[Cluster]:
-    """Return the clusters with a radius up to `largest` in a scan with ranges `scanned` and these runs.
+def clusters(hit_runs: Runs, ranges: Array, start: float, step: float, max_radius: float) -> list[Cluster]:
+    """Return the clusters with a radius up to `max_radius` in a scan with these runs and ranges.
 
     The first beam points along `start`; beams are `step` rad apart.
     """
-    wide = abs(step)
-    hits = found.hits
-    if len(hits.beams) < FEWEST:
+    spacing = abs(step)
+    hits = hit_runs.hits
+    if len(hits.beams) < MIN_HITS:
         return []
-    first, last = _parted(hits.ranges, found.first, found.last)
+    first, last = _split_runs(hits.ranges, hit_runs.first, hit_runs.last)
     nearest = np.minimum.reduceat(hits.ranges, first).tolist()
-    full = abs(len(scanned) * wide - 2 * math.pi) < wide
-    pieces: list[Cluster] = []
+    is_full_circle = abs(len(ranges) * spacing - 2 * math.pi) < spacing
+    found: list[Cluster] = []
     begin, end = hits.beams.take(first).tolist(), hits.beams.take(last).tolist()
-    for one, other, near, low, high in zip(first, last, nearest, begin, end, strict=True):
-        if other - one + 1 < FEWEST:
+    for one, other, near, first_index, last_index in zip(first, last, nearest, begin, end, strict=True):
+        if other - one + 1 < MIN_HITS:
             continue
-        sine = math.sin(min((high - low + 1) * (0.5 * wide), STEEPEST))
+        sine = math.sin(min((last_index - first_index + 1) * (0.5 * spacing), MAX_HALF_ANGLE_RAD))
         radius = near * sine / (1.0 - sine)
-        if radius <= largest:
-            center = cmath.rect(near + radius, start + (0.5 * step) * (low + high))
-            edges = _clear(scanned, low, low - 1, full) + _clear(scanned, high, high + 1, full)
-            pieces.append(Cluster(one, other, center, radius, edges))
-    return pieces
+        if radius <= max_radius:
+            center = cmath.rect(near + radius, start + (0.5 * step) * (first_index + last_index))
+            edges = _has_edge(ranges, first_index, first_index - 1, is_full_circle) + _has_edge(
+                ranges, last_index, last_index + 1, is_full_circle
+            )
+            found.append(Cluster(one, other, center, radius, edges))
+    return found
 
 
-def _clear(ranges: Array, beam: int, beside: int, full_circle: bool) -> bool:
-    """Return whether the beam `beside` has a longer range than `beam`."""
-    if not 0 <= beside < len(ranges):
-        if not full_circle:
+def _has_edge(ranges: Array, beam: int, neighbor: int, is_full_circle: bool) -> bool:
+    """Return whether a cluster has a visible edge at `beam`: the beam `neighbor` next to it has a longer range."""
+    if not 0 <= neighbor < len(ranges):
+        if not is_full_circle:
             return False
-        beside %= len(ranges)
-    return bool(ranges[beside] > ranges[beam])
+        neighbor %= len(ranges)
+    return bool(ranges[neighbor] > ranges[beam])
 
 
-def marked_hits(pieces: list[Cluster], which: Mask) -> list[tuple[int, int]]:
-    """Return for each cluster how many of its hits are marked in `which` (m,), and how many it has."""
-    told = which.tobytes()
-    return [(told.count(1, first, last + 1), last + 1 - first) for first, last, *_ in pieces]
+def marked_hits(found: list[Cluster], mask: Mask) -> list[tuple[int, int]]:
+    """Return for each cluster how many of its hits are marked in `mask` (m,), and how many it has."""
+    marks = mask.tobytes()
+    return [(marks.count(1, first, last + 1), last + 1 - first) for first, last, *_ in found]
 
 
-def _between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
+def _runs_between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
     """Return the first and last indices of the runs of `count` hits that are separated after `breaks` (k,)."""
     if not count:
         return breaks, breaks
@@ -168,7 +170,7 @@ def _between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
     return first, last
 
 
-def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[list[int], list[int]]:
+def _split_runs(ranges: Array, first: Indices, last: Indices) -> tuple[list[int], list[int]]:
     """Return the first and last hits of runs, divided where two adjacent obstacles meet.
 
     Along one convex obstacle, the range falls to its closest point and then rises. A local maximum of the range
@@ -176,55 +178,55 @@ def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[list[int], li
     """
     # All runs are processed at once. An offset that increases from run to run keeps them independent.
     count = last - first + 1
-    steps = np.repeat(STEP_APART * np.arange(len(first)), count)
+    steps = np.repeat(RUN_OFFSET_M * np.arange(len(first)), count)
     after = ranges + steps
     after -= np.minimum.accumulate(after[::-1])[::-1]
     before = np.subtract(ranges, steps, out=steps)
     before -= np.minimum.accumulate(before)
     rise = np.maximum.reduceat(np.minimum(before, after, out=before), first)
     begin, end = first.tolist(), last.tolist()
-    for number in ((rise > VALLEY) & (count >= 2 * FEWEST)).nonzero()[0].tolist()[::-1]:
-        cut = slice(number, number + 1)
-        begin[cut], end[cut] = zip(*_parts(ranges, begin[number], end[number]), strict=True)
+    for number in ((rise > MIN_RISE_M) & (count >= 2 * MIN_HITS)).nonzero()[0].tolist()[::-1]:
+        place = slice(number, number + 1)
+        begin[place], end[place] = zip(*_split_run(ranges, begin[number], end[number]), strict=True)
     return begin, end
 
 
-def _parts(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
+def _split_run(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
     """Return the parts of one run, in order."""
-    left = [(begin, end)]
+    pending = [(begin, end)]
     parts: list[tuple[int, int]] = []
-    while left:
-        begin, end = left.pop()
-        if end - begin + 1 >= 2 * FEWEST:
-            piece = ranges[begin : end + 1]
-            before, after = np.minimum.accumulate(piece), np.minimum.accumulate(piece[::-1])[::-1]
-            rise = piece - np.maximum(before, after)
-            valley = int(rise.argmax())
-            if rise[valley] > VALLEY:
-                left += [(begin + valley + 1, end), (begin, begin + valley)]
+    while pending:
+        begin, end = pending.pop()
+        if end - begin + 1 >= 2 * MIN_HITS:
+            part = ranges[begin : end + 1]
+            before, after = np.minimum.accumulate(part), np.minimum.accumulate(part[::-1])[::-1]
+            rise = part - np.maximum(before, after)
+            peak = int(rise.argmax())
+            if rise[peak] > MIN_RISE_M:
+                pending += [(begin + peak + 1, end), (begin, begin + peak)]
                 continue
         parts.append((begin, end))
     return parts
 
 
 def fit_circle(arc: list[complex], radius: float, center: complex) -> complex:
-    """Return the center of the circle with this radius that fits points x + iy best; `center` is the initial guess.
+    """Return the center of the circle with this radius that fits the points `arc` (x + iy) best.
 
-    Computed with scalars, because a dozen points are too few for arrays.
+    `center` is the initial guess. Computed with scalars, because a dozen points are too few for arrays.
     """
     half = 0.52 * len(arc)  # slightly damped, because a short arc does not determine the lateral position
-    for _ in range(STEPS):
-        squares = miss = 0j
-        for place in arc:
-            off = center - place
-            distance = abs(off)
-            towards = off / max(distance, 1e-6)
+    for _ in range(MAX_ITERATIONS):
+        squares = residual = 0j
+        for point in arc:
+            offset = center - point
+            distance = abs(offset)
+            towards = offset / max(distance, 1e-6)
             # The squares of unit vectors x + iy sum up to x² - y² + 2ixy, their squared lengths to their number.
             squares += towards * towards
-            miss += towards * (distance - radius)
+            residual += towards * (distance - radius)
         square = squares / 2
-        change = (half * miss - square * miss.conjugate()) / (half * half - abs(square) ** 2)
+        change = (half * residual - square * residual.conjugate()) / (half * half - abs(square) ** 2)
         center -= change
-        if abs(change) < ENOUGH:
+        if abs(change) < CONVERGED_STEP_M:
             break
     return center

@@ -30,20 +30,20 @@ class MotionPrediction:
         self._spec, self._rate = spec, tick_rate
         self._trackers = {name: Tracker(spec, tick_rate) for name in lidars} if spec.enabled else {}
         self._avoidance = Avoidance(spec, robot, full_speed)
-        self._standing = StandPosition(robot, full_speed)
-        self._enough, self._held = WARM_UP_S * tick_rate, False
-        self.stands = False
-        """Whether the robot was asked to stand since it last drove."""
-        self._rolled = DeadReckoning(tick_rate)
-        self._nothing = no_moving_obstacles(spec.acceleration)
-        self._seeing: list[Tracker] = []
-        self._foretold: tuple[int, MovingObstacles] | None = None
-        self._told: tuple[MovingObstacles, Pose2, Pose2, MovingObstacles] | None = None
+        self._stand_position = StandPosition(robot, full_speed)
+        self._warm_up_ticks, self._must_stay = WARM_UP_S * tick_rate, False
+        self.is_standing = False
+        """Whether the robot has received a command to stand since it last drove."""
+        self._dead_reckoning = DeadReckoning(tick_rate)
+        self._no_obstacles = no_moving_obstacles(spec.acceleration)
+        self._active: list[Tracker] = []  # trackers with moving obstacles
+        self._predicted: tuple[int, MovingObstacles] | None = None
+        self._transformed: tuple[MovingObstacles, Pose2, Pose2, MovingObstacles] | None = None
         self._plan: Path | None = None
         self._followed: FollowedPath | None = None
-        self.take = self._rolled.take
+        self.add_reading = self._dead_reckoning.add
         """Process an odometry or IMU reading."""
-        self.calm = not self._trackers
+        self.is_idle = not self._trackers
         """Whether no obstacle moves and the warm-up is over, so that no command is changed."""
 
     def on_scan(self, scan: Scan) -> None:
@@ -51,83 +51,86 @@ class MotionPrediction:
         tracker = self._trackers.get(scan.sensor)
         if tracker is None:
             return
-        tracker.on_scan(scan, self._rolled.at(scan.tick))
-        self._foretold = None
-        if self.calm and not tracker.sees:
+        tracker.on_scan(scan, self._dead_reckoning.at(scan.tick))
+        self._predicted = None
+        if self.is_idle and not tracker.has_moving:
             return
-        self._seeing = [each for each in self._trackers.values() if each.sees]
-        self.calm = not self._seeing and all(
-            each.began is not None and scan.tick - each.began >= self._enough for each in self._trackers.values()
+        self._active = [each for each in self._trackers.values() if each.has_moving]
+        self.is_idle = not self._active and all(
+            each.first_tick is not None and scan.tick - each.first_tick >= self._warm_up_ticks
+            for each in self._trackers.values()
         )
-        if not self._seeing:
-            self._avoidance.rest()
+        if not self._active:
+            self._avoidance.reset()
 
-    def marking(self, scan: Scan) -> Scan:
+    def with_moving_hits(self, scan: Scan) -> Scan:
         """Return the scan for costmaps, in which hits on moving obstacles are flagged so that they are not marked."""
         tracker = self._trackers.get(scan.sensor)
-        if tracker is None or tracker.hits is None or tracker.tick != scan.tick:
+        if tracker is None or tracker.moving_hits is None or tracker.tick != scan.tick:
             return scan
-        return ScanWithMovingHits(**vars(scan), moving=tracker.hits)
+        return ScanWithMovingHits(**vars(scan), moving=tracker.moving_hits)
 
     def moving(self, tick: int) -> MovingObstacles:
         """Return the moving obstacles at a tick in the frame of DeadReckoning, from all lidars."""
-        if not self._seeing:
-            return self._nothing
-        if self._foretold is None or self._foretold[0] != tick:
-            self._foretold = tick, self._after(tick)
-        return self._foretold[1]
+        if not self._active:
+            return self._no_obstacles
+        if self._predicted is None or self._predicted[0] != tick:
+            self._predicted = tick, self._predict(tick)
+        return self._predicted[1]
 
-    def _after(self, tick: int) -> MovingObstacles:
-        seen = [tracker.moving.after((tick - tracker.tick) / self._rate) for tracker in self._seeing]
-        return MovingObstacles.of([thing for each in seen for thing in each.things], self._spec.acceleration)
+    def _predict(self, tick: int) -> MovingObstacles:
+        predicted = [tracker.moving.after((tick - tracker.tick) / self._rate) for tracker in self._active]
+        return MovingObstacles.of(
+            [obstacle for each in predicted for obstacle in each.obstacles], self._spec.acceleration
+        )
 
-    def seen_from(self, tick: int, pose: Pose2) -> MovingObstacles:
+    def moving_in_frame(self, tick: int, pose: Pose2) -> MovingObstacles:
         """Return the moving obstacles at a tick in a frame in which the robot is at `pose` now."""
         moving = self.moving(tick)
-        if not moving.things:
+        if not moving.obstacles:
             return moving
-        now, told = self._rolled.now, self._told
-        if told is None or told[0] is not moving or told[1] is not now or told[2] is not pose:
-            self._told = told = moving, now, pose, moving.seen_from(now.compose(pose.inverse()))
-        return told[3]
+        now, cached = self._dead_reckoning.now, self._transformed
+        if cached is None or cached[0] is not moving or cached[1] is not now or cached[2] is not pose:
+            self._transformed = cached = moving, now, pose, moving.in_frame(now.compose(pose.inverse()))
+        return cached[3]
 
     def steer(
-        self, tick: int, wanted: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None
+        self, tick: int, command: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None
     ) -> Twist:
-        """Return the command to send instead of `wanted`; `pose`, `costmap`, and `plan` are in one frame."""
-        if not self._seeing:
-            return wanted if self.calm else _limit_speed(wanted)
+        """Return a safe command instead of `command`; `pose`, `costmap`, and `plan` are in one frame."""
+        if not self._active:
+            return command if self.is_idle else _limit_speed(command)
         if plan is not self._plan:
             self._plan, self._followed = plan, None if plan is None else FollowedPath(plan.points)
-        return self._avoidance.steer(wanted, pose, twist, self.seen_from(tick, pose), costmap, self._followed)
+        return self._avoidance.steer(command, pose, twist, self.moving_in_frame(tick, pose), costmap, self._followed)
 
-    def settle(self) -> None:
-        """Record that the robot drives, so that it gets a new stand position afterward."""
-        self._standing.leave()
-        self._held = self.stands = False
+    def on_drive(self) -> None:
+        """Clear the stand position, because the robot drives."""
+        self._stand_position.clear()
+        self._must_stay = self.is_standing = False
 
     def hold(self) -> None:
         """Stay in place until the robot drives again, even if an obstacle approaches."""
-        self._held = self.stands = True
+        self._must_stay = self.is_standing = True
 
     def stand(self, tick: int, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
         """Return the command for a standing robot: step aside for obstacles, and return afterward."""
-        self.stands = True
-        if self._held:
+        self.is_standing = True
+        if self._must_stay:
             return STOP
-        home = self._standing.home(pose, bool(self._seeing))
+        home = self._stand_position.home(pose, bool(self._active))
         if home is None:
             return STOP
-        wanted = self._standing.back(pose)
-        if not self._seeing:
-            return wanted
-        return self._avoidance.steer(wanted, pose, twist, self.seen_from(tick, pose), costmap, None, home)
+        command = self._stand_position.return_command(pose)
+        if not self._active:
+            return command
+        return self._avoidance.steer(command, pose, twist, self.moving_in_frame(tick, pose), costmap, None, home)
 
 
-def _limit_speed(wanted: Twist) -> Twist:
+def _limit_speed(command: Twist) -> Twist:
     """Return the command with the speed limit of the warm-up."""
-    speed = math.hypot(wanted.vx, wanted.vy)
+    speed = math.hypot(command.vx, command.vy)
     if speed <= WARM_UP_SPEED_M_S:
-        return wanted
+        return command
     scale = WARM_UP_SPEED_M_S / speed
-    return Twist(scale * wanted.vx, scale * wanted.vy, scale * wanted.wz)
+    return Twist(scale * command.vx, scale * command.vy, scale * command.wz)

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from simscen.advanced.prediction.avoidance import ROOM
-from simscen.advanced.prediction.rollouts import HORIZON
+from simscen.advanced.prediction.avoidance import MIN_DISTANCE_M
+from simscen.advanced.prediction.rollouts import HORIZON_S
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
 from simscen.stack.planners.traversal_costs import MAX_NON_OBSTACLE
@@ -34,48 +34,48 @@ def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius
         return costmap
     size, (height, width) = costmap.resolution, costmap.costs.shape
     factor = max(1, round(BLOCK_SIZE_M / size))
-    low, high, middles = [], [], []
-    for at, corner, cells in ((robot.y, costmap.origin[1], height), (robot.x, costmap.origin[0], width)):
-        first = max(0, math.floor((at - speed * HORIZON - corner) / size))
-        last = min(cells, math.ceil((at + speed * HORIZON - corner) / size))
+    low, high, centers = [], [], []
+    for center, corner, cells in ((robot.y, costmap.origin[1], height), (robot.x, costmap.origin[0], width)):
+        first = max(0, math.floor((center - speed * HORIZON_S - corner) / size))
+        last = min(cells, math.ceil((center + speed * HORIZON_S - corner) / size))
         low.append(first)
         high.append(max(first, last))
-        middles.append(corner + size * (first + factor * (np.arange(-(-max(0, last - first) // factor)) + 0.5)))
-    x, y = np.meshgrid(middles[1], middles[0])
-    dear = _dear(costmap.moving, x, y, np.hypot(x - robot.x, y - robot.y) / speed, radius)
-    if not dear.any():
+        centers.append(corner + size * (first + factor * (np.arange(-(-max(0, last - first) // factor)) + 0.5)))
+    x, y = np.meshgrid(centers[1], centers[0])
+    predicted = _predicted_costs(costmap.moving, x, y, np.hypot(x - robot.x, y - robot.y) / speed, radius)
+    if not predicted.any():
         return costmap
     window = slice(low[0], high[0]), slice(low[1], high[1])
-    cells = dear.repeat(factor, axis=0).repeat(factor, axis=1)[: high[0] - low[0], : high[1] - low[1]]
+    cells = predicted.repeat(factor, axis=0).repeat(factor, axis=1)[: high[0] - low[0], : high[1] - low[1]]
     costs = costmap.costs.copy()
     np.maximum(costs[window], cells, out=costs[window])
     return replace(costmap, costs=costs)
 
 
-def _dear(moving: MovingObstacles, x: Array, y: Array, times: Array, radius: float) -> npt.NDArray[np.uint8]:
-    near, _ = moving.nearness(x, y, times, radius, ROOM)
+def _predicted_costs(moving: MovingObstacles, x: Array, y: Array, times: Array, radius: float) -> npt.NDArray[np.uint8]:
+    near, _ = moving.nearness(x, y, times, radius, MIN_DISTANCE_M)
     cost = MAX_NON_OBSTACLE * np.clip(near, 0.0, 1.0) * np.exp(-times / DECAY_TIME_S)
-    return np.where(times > HORIZON, 0.0, cost).astype(np.uint8)
+    return np.where(times > HORIZON_S, 0.0, cost).astype(np.uint8)
 
 
 def meets_moving_obstacle(
-    moving: MovingObstacles, robot: Pose2, way: Iterable[complex], speed: float, radius: float
+    moving: MovingObstacles, robot: Pose2, path: Iterable[complex], speed: float, radius: float
 ) -> bool:
-    """Return whether a robot at `robot` that drives along `way` (x + iy) at `speed` comes too close to an obstacle.
+    """Return whether a robot at `robot` that drives along `path` (x + iy) at `speed` comes too close to an obstacle.
 
     The distances are those of `MovingObstacles.nearness`, computed with scalars because there are only few points.
     """
-    moving = moving.near(robot.x, robot.y, radius + MAX_UNCERTAINTY_M, speed, HORIZON)
-    if not moving.things:
+    moving = moving.near(robot.x, robot.y, radius + MAX_UNCERTAINTY_M, speed, HORIZON_S)
+    if not moving.obstacles:
         return False
-    here, come = complex(robot.x, robot.y), 0.0
-    for place in way:
-        come += abs(place - here)
-        here, time = place, come / speed
-        if time >= HORIZON:
+    position, driven = complex(robot.x, robot.y), 0.0
+    for point in path:
+        driven += abs(point - position)
+        position, time = point, driven / speed
+        if time >= HORIZON_S:
             return False
-        for thing in moving.things:
-            room = min(ROOM + thing.deviation(time, moving.acceleration), MAX_UNCERTAINTY_M)
-            if abs(place - thing.place - time * thing.velocity) - thing.radius < radius + room:
+        for obstacle in moving.obstacles:
+            distance = min(MIN_DISTANCE_M + obstacle.position_std(time, moving.acceleration), MAX_UNCERTAINTY_M)
+            if abs(point - obstacle.position - time * obstacle.velocity) - obstacle.radius < radius + distance:
                 return True
     return False

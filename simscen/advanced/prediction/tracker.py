@@ -8,22 +8,22 @@ visible, later if it is hidden.
 import numpy as np
 
 from simscen.advanced.prediction.association import ScanClusters, associate, start_tracks
-from simscen.advanced.prediction.clusters import Hits, Mask, Places, Runs, clusters, marked_hits, runs, valid_hits
+from simscen.advanced.prediction.clusters import Hits, Mask, Points, Runs, clusters, marked_hits, runs, valid_hits
 from simscen.advanced.prediction.scan_outline import CurrentScan
 from simscen.advanced.prediction.tracks import Track, TrackLifecycle
-from simscen.advanced.prediction.visibility import FARTHEST, EarlierScan, FreeSpaceMemory
+from simscen.advanced.prediction.visibility import NO_HIT_RANGE_M, EarlierScan, FreeSpaceMemory
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles, no_moving_obstacles
 
-CHECKED = 120
+CHECKED_BEAMS = 120
 """Number of beams that are checked while nothing moves; if one of them hits something new, all are."""
-APPEARED, FEW = 0.3, 3
+MIN_NEW_SHARE, MIN_NEW_HITS = 0.3, 3
 """Minimum share and number of new hits of a cluster that starts a track."""
-STANDS = 0.5
+STATIC_SHARE = 0.5
 """Share of hits that an earlier scan also has, above which a cluster is static."""
-BODY = 0.25
+MIN_RADIUS_M = 0.25
 """Minimum radius in m of a moving obstacle. The lidar may see only the mast of a robot or the leg of a person."""
 
 
@@ -34,127 +34,132 @@ class Tracker:
         """Take the parameters and the tick rate in Hz."""
         self._spec, self._rate = spec, tick_rate
         self._memory = FreeSpaceMemory(tick_rate)
-        self._every, self._restless = 1, False
-        self._towards = self._towards_some = np.zeros(0, dtype=np.complex128)
-        self._tracks, self._going = list[Track](), TrackLifecycle(spec, tick_rate)
+        self._stride, self._had_new_hits = 1, False
+        self._directions = self._checked_directions = np.zeros(0, dtype=np.complex128)
+        self._tracks, self._lifecycle = list[Track](), TrackLifecycle(spec, tick_rate)
         self.tick = 0
         """Tick of the latest scan."""
-        self.began: int | None = None
+        self.first_tick: int | None = None
         """Tick of the first scan."""
-        self.hits: Mask | None = None
+        self.moving_hits: Mask | None = None
         """Mask of the beams of the latest scan that hit moving obstacles; None if there are none."""
-        self._nothing = no_moving_obstacles(spec.acceleration)
-        self.moving = self._nothing
+        self._no_obstacles = no_moving_obstacles(spec.acceleration)
+        self.moving = self._no_obstacles
         """Moving obstacles at the tick of the latest scan."""
 
     @property
-    def sees(self) -> bool:
+    def has_moving(self) -> bool:
         """Whether there are moving obstacles."""
-        return self.moving is not self._nothing
+        return self.moving is not self._no_obstacles
 
     def on_scan(self, scan: Scan, odometry: Pose2) -> None:
         """Process a scan that was taken with the base at `odometry`."""
         lidar = odometry.compose(scan.mount)
-        if len(self._towards) != len(scan.ranges):
-            self._look_along(scan)
-        if self.began is None:
-            self.began = scan.tick
+        if len(self._directions) != len(scan.ranges):
+            self._set_directions(scan)
+        if self.first_tick is None:
+            self.first_tick = scan.tick
         seconds, self.tick = (scan.tick - self.tick) / self._rate, scan.tick
         if seconds > 0:
             for track in self._tracks:
                 track.predict(seconds, self._spec.acceleration)
-        self.hits, self.moving = None, self._nothing
-        before = self._memory.before(scan.tick)
-        if self._tracks or (before is not None and (self._restless or self._suspicious(scan, lidar, before))):
-            self._follow(CurrentScan(scan, _ends(scan.ranges, self._towards), lidar, before))
-        self._memory.remember(scan, lidar)
+        self.moving_hits, self.moving = None, self._no_obstacles
+        earlier = self._memory.scan_before(scan.tick)
+        if self._tracks or (earlier is not None and (self._had_new_hits or self._has_new_hit(scan, lidar, earlier))):
+            self._update_tracks(CurrentScan(scan, _ends(scan.ranges, self._directions), lidar, earlier))
+        self._memory.add(scan, lidar)
 
-    def _look_along(self, scan: Scan) -> None:
+    def _set_directions(self, scan: Scan) -> None:
         """Compute the directions of the beams, and of those that are checked while nothing moves."""
-        self._every = max(1, len(scan.ranges) // CHECKED)
-        self._towards = np.exp(1j * scan.angles())
-        self._towards_some = self._towards[:: self._every].copy()
+        self._stride = max(1, len(scan.ranges) // CHECKED_BEAMS)
+        self._directions = np.exp(1j * scan.angles())
+        self._checked_directions = self._directions[:: self._stride].copy()
 
-    def _suspicious(self, scan: Scan, lidar: Pose2, before: EarlierScan) -> bool:
+    def _has_new_hit(self, scan: Scan, lidar: Pose2, earlier: EarlierScan) -> bool:
         """Return whether one of the checked beams hits something new."""
-        ranges = scan.ranges[:: self._every]
-        looked = before.looked(_ends(ranges, self._towards_some), lidar)
-        come = looked.free()
-        if not come.any():
+        ranges = scan.ranges[:: self._stride]
+        comparison = earlier.compare(_ends(ranges, self._checked_directions), lidar)
+        is_new = comparison.was_free()
+        if not is_new.any():
             return False
-        come &= (ranges >= scan.range_min) & (ranges <= self._farthest(scan))
-        return bool(looked.appeared(come).any())
+        is_new &= (ranges >= scan.range_min) & (ranges <= self._max_range(scan))
+        return bool(comparison.has_appeared(is_new).any())
 
-    def _farthest(self, scan: Scan) -> float:
+    def _max_range(self, scan: Scan) -> float:
         return min(scan.range_max, self._spec.max_range)
 
-    def _follow(self, sight: CurrentScan) -> None:
-        seen = self._seen(sight)
-        if seen is None:
+    def _update_tracks(self, current: CurrentScan) -> None:
+        scan_clusters = self._compare_clusters(current)
+        if scan_clusters is None:
             return
-        tracks, going, tick = self._tracks, self._going, sight.scan.tick
-        start_tracks(tracks, seen, associate(tracks, seen))
-        followed: list[Track] = []
+        tracks, lifecycle, tick = self._tracks, self._lifecycle, current.scan.tick
+        start_tracks(tracks, scan_clusters, associate(tracks, scan_clusters))
+        remaining: list[Track] = []
         for track in tracks:
-            going.settle(track, tick, tracks, sight.left)
-            if not going.ended(track, tick, tracks, sight.past):
-                followed.append(track)
-        self._tracks = followed
-        if moving := [track for track in followed if track.moving]:
-            self._tell(moving, sight)
+            lifecycle.update_motion(track, tick, tracks, current.has_left)
+            if not lifecycle.has_ended(track, tick, tracks, current.sees_past):
+                remaining.append(track)
+        self._tracks = remaining
+        if moving := [track for track in remaining if track.is_moving]:
+            self._update_moving(moving, current)
 
-    def _seen(self, sight: CurrentScan) -> ScanClusters | None:
-        """Return the clusters of the scan compared with an earlier one; None if there is no track and none starts."""
-        scan, before, tracks = sight.scan, sight.before, self._tracks
-        hits = valid_hits(scan.ranges, sight.ends, scan.angle_increment, scan.range_min, self._farthest(scan))
-        looked = None if before is None or not len(hits.beams) else before.looked(hits.places, sight.at)
-        free = None if looked is None else looked.free()
-        if not tracks and (free is None or not self._may_begin(hits, free)):
+    def _compare_clusters(self, current: CurrentScan) -> ScanClusters | None:
+        """Compare the clusters of the scan with an earlier one. Return None if there is no track and none starts."""
+        scan, earlier, tracks = current.scan, current.earlier, self._tracks
+        hits = valid_hits(scan.ranges, current.ends, scan.angle_increment, scan.range_min, self._max_range(scan))
+        comparison = (
+            None if earlier is None or not len(hits.beams) else earlier.compare(hits.points, current.lidar_pose)
+        )
+        free = None if comparison is None else comparison.was_free()
+        if not tracks and (free is None or not self._may_start_track(hits, free)):
             return None
-        found = runs(hits)
-        appeared = None if looked is None or free is None else looked.appeared(free)
-        if not tracks and (appeared is None or not self._begins(found, appeared)):
+        hit_runs = runs(hits)
+        new_hits = None if comparison is None or free is None else comparison.has_appeared(free)
+        if not tracks and (new_hits is None or not self._starts_track(hit_runs, new_hits)):
             return None
-        pieces = clusters(found, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
-        came = stood = [False] * len(pieces)
-        if looked is not None and appeared is not None and pieces:
-            came = [count >= max(FEW, APPEARED * every) for count, every in marked_hits(pieces, appeared)]
+        found = clusters(hit_runs, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
+        appeared = was_occupied = [False] * len(found)
+        if comparison is not None and new_hits is not None and found:
+            counts = marked_hits(found, new_hits)
+            appeared = [count >= max(MIN_NEW_HITS, MIN_NEW_SHARE * total) for count, total in counts]
             if tracks:
-                stood = [count > STANDS * every for count, every in marked_hits(pieces, looked.stood())]
-        return ScanClusters(scan.tick, hits.places, pieces, sight.lidar, came, stood)
+                counts = marked_hits(found, comparison.was_occupied())
+                was_occupied = [count > STATIC_SHARE * total for count, total in counts]
+        return ScanClusters(scan.tick, hits.points, found, current.lidar, appeared, was_occupied)
 
-    def _may_begin(self, hits: Hits, free: Mask) -> bool:
+    def _may_start_track(self, hits: Hits, free: Mask) -> bool:
         """Return whether enough hits in formerly free space may belong to one obstacle."""
-        which = free.nonzero()[0].tolist()
-        self._restless = len(which) > 0
-        return hits.may_be_together(which, FEW)
+        indices = free.nonzero()[0].tolist()
+        self._had_new_hits = len(indices) > 0
+        return hits.may_share_run(indices, MIN_NEW_HITS)
 
-    def _begins(self, found: Runs, appeared: Mask) -> bool:
+    def _starts_track(self, hit_runs: Runs, new_hits: Mask) -> bool:
         """Return whether enough hits of a run are new, including one of the checked beams."""
-        return found.together(appeared, FEW) and bool((found.hits.beams[appeared] % self._every == 0).any())
+        checked = hit_runs.hits.beams[new_hits] % self._stride == 0
+        return hit_runs.share_run(new_hits, MIN_NEW_HITS) and bool(checked.any())
 
-    def _tell(self, moving: list[Track], sight: CurrentScan) -> None:
+    def _update_moving(self, moving: list[Track], current: CurrentScan) -> None:
         """Update the moving obstacles, and the beams that hit them."""
-        scan, ends, lidar = sight.scan, sight.ends, sight.lidar
-        things = [
+        scan, ends, lidar = current.scan, current.ends, current.lidar
+        obstacles = [
             MovingObstacle(
-                each.place,
+                each.position,
                 each.velocity,
-                max(each.radius, BODY),
+                max(each.radius, MIN_RADIUS_M),
                 each.variance,
                 each.covariance,
                 each.velocity_variance,
             )
             for each in moving
         ]
-        self.moving = MovingObstacles.of(things, self._spec.acceleration)
+        self.moving = MovingObstacles.of(obstacles, self._spec.acceleration)
         hits = np.zeros(len(ends), dtype=np.bool_)
-        for thing in things:
-            hits |= np.abs(ends - lidar.into(thing.place)) <= self._spec.margin + thing.radius
-        self.hits = hits & (scan.ranges >= scan.range_min) & (scan.ranges <= scan.range_max)
+        for obstacle in obstacles:
+            hits |= np.abs(ends - lidar.to_lidar(obstacle.position)) <= self._spec.margin + obstacle.radius
+        self.moving_hits = hits & (scan.ranges >= scan.range_min) & (scan.ranges <= scan.range_max)
 
 
-def _ends(ranges: Array, towards: Places) -> Places:
-    """Return the ends of beams (n,); beams without a valid range end farther away than anything that can be seen."""
-    ends: Places = np.fmin(np.abs(ranges), 2 * FARTHEST) * towards  # too close beams have the range -inf
+def _ends(ranges: Array, directions: Points) -> Points:
+    """Return the ends of beams (n,); beams without a valid range end farther away than any range of a lidar."""
+    ends: Points = np.fmin(np.abs(ranges), 2 * NO_HIT_RANGE_M) * directions  # the range of too close beams is -inf
     return ends

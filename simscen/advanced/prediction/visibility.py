@@ -1,4 +1,4 @@
-"""Memory of free space as earlier scans: what is now where an earlier beam passed through has appeared since.
+"""Memory of free space as earlier scans: an obstacle at a point that an earlier beam passed has appeared since.
 
 Parts of a wall that come into view, and the edges of hidden obstacles, were never passed by a beam. Therefore static
 obstacles do not seem to move when the robot moves. The drift of odometry within this time is less than the margin.
@@ -12,31 +12,31 @@ from functools import cached_property
 
 import numpy as np
 
-from simscen.advanced.prediction.clusters import Indices, Mask, Places
+from simscen.advanced.prediction.clusters import Indices, Mask, Points
 from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 
-MARGIN, RELATIVE = 0.25, 0.02
+MARGIN_M, MARGIN_RATIO = 0.25, 0.02
 """Margin, in m and as a share of the range, by which an earlier beam must have passed a point."""
-SLIPPED = (0.05, 0.1, 0.15)
+SLIP_RATIOS = (0.05, 0.1, 0.15)
 """Assumed wheel slip between two scans, as shares of the distance. A new obstacle must be new for each of them;
-otherwise, posts beside a fast robot seem to jump to the next post."""
-LEFT = 1.0 - np.array(SLIPPED)[:, None]
+otherwise, posts next to a fast robot seem to jump to the next post."""
+REMAINING_RATIOS = 1.0 - np.array(SLIP_RATIOS)[:, None]
 """Remaining share of the distance."""
-AGO, AT_LEAST = 0.9, 0.2
+PREFERRED_AGE_S, MIN_AGE_S = 0.9, 0.2
 """Preferred and minimum age in s of the earlier scan. At 0.25 m/s, an obstacle moves by the margin in the former."""
-EVERY = 0.19
-"""Minimum time in s between two scans that are kept."""
-FEWEST_BEAMS = 3
+MIN_INTERVAL_S = 0.19
+"""Minimum time in s between two scans that are stored."""
+MIN_BEAMS = 3
 """Minimum number of beams of a scan."""
-TURNED = 0.02
+HEADING_ERROR_RAD = 0.02
 """Angle in rad to both sides of a point within which earlier beams must have passed too, for errors of the heading."""
-SAME, SAME_RELATIVE = 0.12, 0.01
+SAME_DISTANCE_M, SAME_DISTANCE_RATIO = 0.12, 0.01
 """Tolerance, in m and as a share of the range, for an earlier beam to have hit the same obstacle."""
-KEPT = 64
-"""Maximum number of scans that are kept."""
-FARTHEST = 1e5
+MAX_SCANS = 64
+"""Maximum number of scans that are stored."""
+NO_HIT_RANGE_M = 1e5
 """Range in m of a beam that hit nothing."""
 
 
@@ -49,61 +49,61 @@ class ScanGeometry:
     increment: float
 
     @cached_property
-    def full(self) -> bool:
+    def is_full_circle(self) -> bool:
         """Whether the field of view is a full circle."""
         return (self.count + 1.5) * self.increment > 2 * math.pi
 
     @cached_property
-    def beside(self) -> int:
+    def neighbors(self) -> int:
         """Number of beams to each side of a point that must have passed it as well."""
-        return max(1, math.ceil(TURNED / self.increment))
+        return max(1, math.ceil(HEADING_ERROR_RAD / self.increment))
 
     @cached_property
-    def around(self) -> Indices:
+    def neighbor_offsets(self) -> Indices:
         """Offsets from the index of a beam in `free` to the previous, the same, and the next beam in `lengths`."""
-        return self.beside + np.array(((-1,), (0,), (1,)))
+        return self.neighbors + np.array(((-1,), (0,), (1,)))
 
     @cached_property
-    def more(self) -> int:
+    def padding(self) -> int:
         """Number of beams added at each end, so that each direction has a beam."""
-        behind = 0 if self.full else max(0, math.ceil(math.pi / self.increment - self.count / 2))
-        return self.beside + 2 + behind
+        missing = 0 if self.is_full_circle else max(0, math.ceil(math.pi / self.increment - self.count / 2))
+        return self.neighbors + 2 + missing
 
     @cached_property
-    def middle(self) -> float:
+    def center_direction(self) -> float:
         """Direction in rad of the center."""
         return self.start + (self.count - 1) / 2 * self.increment
 
     @cached_property
-    def center(self) -> float:
+    def center_index(self) -> float:
         """Index of the center in `free`."""
-        return self.more - self.beside + (self.count - 1) / 2
+        return self.padding - self.neighbors + (self.count - 1) / 2
 
     def lengths(self, scan: Scan) -> Array:
         """Return the ranges (n,) of a scan, with the beams added at each end."""
-        lengths = np.zeros(self.count + 2 * self.more)
-        seen = lengths[self.more : -self.more]
-        np.fmin(np.fmax(scan.ranges, 0.0), FARTHEST, out=seen)
-        seen[seen < scan.range_min] = 0.0
-        if self.full:
-            lengths[: self.more], lengths[-self.more :] = seen[-self.more :], seen[: self.more]
+        lengths = np.zeros(self.count + 2 * self.padding)
+        measured = lengths[self.padding : -self.padding]
+        np.fmin(np.fmax(scan.ranges, 0.0), NO_HIT_RANGE_M, out=measured)
+        measured[measured < scan.range_min] = 0.0
+        if self.is_full_circle:
+            lengths[: self.padding], lengths[-self.padding :] = measured[-self.padding :], measured[: self.padding]
         return lengths
 
     def free(self, lengths: Array) -> Array:
-        """Return the maximum distance of a new obstacle in each direction; shorter by `beside` at each end."""
-        free = _least(lengths, 2 * self.beside + 1)
-        free -= MARGIN
-        free *= 1.0 / (1.0 + RELATIVE)
+        """Return the maximum distance of a new obstacle in each direction; shorter by `neighbors` at each end."""
+        free = _sliding_minimum(lengths, 2 * self.neighbors + 1)
+        free -= MARGIN_M
+        free *= 1.0 / (1.0 + MARGIN_RATIO)
         return free
 
 
-def _least(values: Array, width: int) -> Array:
+def _sliding_minimum(values: Array, width: int) -> Array:
     """Return the minimum of each `width` neighbors."""
-    done = 1
-    while done < width:
-        step = min(done, width - done)
+    combined = 1
+    while combined < width:
+        step = min(combined, width - combined)
         values = np.minimum(values[:-step], values[step:])
-        done += step
+        combined += step
     return values
 
 
@@ -113,64 +113,66 @@ class EarlierScan:
 
     tick: int
     lidar: Pose2
-    view: ScanGeometry
+    geometry: ScanGeometry
     lengths: Array
     free: Array
 
-    def looked(self, places: Places, lidar: Pose2) -> "BeamComparison":
-        """Compare places (n,), given in the frame of a lidar at `lidar`, with this scan."""
-        moved, ahead = self.lidar.between(lidar), self.view.middle
-        turned = places * cmath.rect(1.0, moved.yaw - ahead)
-        way = complex(moved.x, moved.y) * cmath.rect(1.0, -ahead)
-        return BeamComparison(self, turned, way, *self.towards(turned + way))
+    def compare(self, points: Points, lidar: Pose2) -> "BeamComparison":
+        """Compare points (n,), given in the frame of a lidar at `lidar`, with this scan."""
+        motion, center_direction = self.lidar.between(lidar), self.geometry.center_direction
+        rotated = points * cmath.rect(1.0, motion.yaw - center_direction)
+        displacement = complex(motion.x, motion.y) * cmath.rect(1.0, -center_direction)
+        return BeamComparison(self, rotated, displacement, *self.beams_toward(rotated + displacement))
 
-    def towards(self, places: Places) -> tuple[Indices, Array]:
-        """Return the indices in `free` of the beams (…,) toward places, and the distances of the places.
+    def beams_toward(self, points: Points) -> tuple[Indices, Array]:
+        """Return the indices in `free` of the beams (…,) toward points, and the distances of the points.
 
-        Places are in this lidar's frame, rotated to its center direction.
+        Points are in this lidar's frame, rotated to its center direction.
         """
-        beam = np.arctan2(places.imag, places.real)
-        beam *= 1.0 / self.view.increment
-        beam += self.view.center + 0.5
-        return beam.astype(np.int64), np.abs(places)
+        beam = np.arctan2(points.imag, points.real)
+        beam *= 1.0 / self.geometry.increment
+        beam += self.geometry.center_index + 0.5
+        return beam.astype(np.int64), np.abs(points)
 
-    def through(self, beam: Indices, distance: Array) -> Mask:
+    def passed_beyond(self, beam: Indices, distance: Array) -> Mask:
         """Return whether beams (…,) passed beyond a distance."""
         return np.asarray(self.free.take(beam) > distance)
 
 
 @fast_dataclass(eq=False)
 class BeamComparison:
-    """Beams (n,) of an earlier scan toward places, with the distances of the places in m.
+    """Beams (n,) of an earlier scan toward points, with the distances of the points in m.
 
-    `turned` are the places relative to the current lidar in the earlier orientation; `way` is the displacement between
-    both lidar poses.
+    `rotated` are the points relative to the current lidar in the earlier orientation; `displacement` is that
+    between both lidar poses.
     """
 
     earlier: EarlierScan
-    turned: Places
-    way: complex
+    rotated: Points
+    displacement: complex
     beam: Indices
     distance: Array
 
-    def free(self) -> Mask:
-        """Return which places were free then. Places beyond FARTHEST were not."""
-        return self.earlier.through(self.beam, self.distance)
+    def was_free(self) -> Mask:
+        """Return which points were free in the earlier scan. Points beyond NO_HIT_RANGE_M were not."""
+        return self.earlier.passed_beyond(self.beam, self.distance)
 
-    def appeared(self, free: Mask) -> Mask:
-        """Return which of the free places were free for each of the assumed slips."""
-        earlier, some = self.earlier, free.nonzero()[0]
-        appeared: Mask = free.copy()
-        if len(some):
-            appeared[some] = earlier.through(*earlier.towards(self.turned[some] + LEFT * self.way)).all(axis=0)
-        return appeared
+    def has_appeared(self, free: Mask) -> Mask:
+        """Return which of the free points were free for each of the assumed slips."""
+        earlier, indices = self.earlier, free.nonzero()[0]
+        has_appeared: Mask = free.copy()
+        if len(indices):
+            has_appeared[indices] = earlier.passed_beyond(
+                *earlier.beams_toward(self.rotated[indices] + REMAINING_RATIOS * self.displacement)
+            ).all(axis=0)
+        return has_appeared
 
-    def stood(self) -> Mask:
-        """Return which places were also hit then."""
-        off = self.earlier.lengths.take(self.beam + self.earlier.view.around)
-        off -= self.distance
-        near = np.abs(off, out=off).min(axis=0)
-        return np.asarray(near < SAME + SAME_RELATIVE * self.distance)
+    def was_occupied(self) -> Mask:
+        """Return at which points the earlier scan hit something."""
+        difference = self.earlier.lengths.take(self.beam + self.earlier.geometry.neighbor_offsets)
+        difference -= self.distance
+        closest = np.abs(difference, out=difference).min(axis=0)
+        return np.asarray(closest < SAME_DISTANCE_M + SAME_DISTANCE_RATIO * self.distance)
 
 
 class FreeSpaceMemory:
@@ -178,26 +180,26 @@ class FreeSpaceMemory:
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""
-        self._ago, self._at_least = round(AGO * tick_rate), round(AT_LEAST * tick_rate)
-        self._every = round(EVERY * tick_rate)
-        self._scans: deque[EarlierScan] = deque(maxlen=KEPT)
-        self._view = ScanGeometry(0, 0.0, 0.0)
+        self._preferred_age, self._min_age = round(PREFERRED_AGE_S * tick_rate), round(MIN_AGE_S * tick_rate)
+        self._min_interval = round(MIN_INTERVAL_S * tick_rate)
+        self._scans: deque[EarlierScan] = deque(maxlen=MAX_SCANS)
+        self._geometry = ScanGeometry(0, 0.0, 0.0)
 
-    def remember(self, scan: Scan, lidar: Pose2) -> None:
-        """Keep a scan, taken with the lidar at a pose."""
-        if self._scans and 0 <= scan.tick - self._scans[-1].tick < self._every:
+    def add(self, scan: Scan, lidar: Pose2) -> None:
+        """Store a scan, taken with the lidar at a pose."""
+        if self._scans and 0 <= scan.tick - self._scans[-1].tick < self._min_interval:
             return
-        view, count = self._view, len(scan.ranges)
-        if count < FEWEST_BEAMS or scan.angle_increment <= 0.0:
+        geometry, count = self._geometry, len(scan.ranges)
+        if count < MIN_BEAMS or scan.angle_increment <= 0.0:
             return
-        if (view.count, view.start, view.increment) != (count, scan.angle_min, scan.angle_increment):
-            self._view = view = ScanGeometry(count, scan.angle_min, scan.angle_increment)
-        lengths = view.lengths(scan)
-        self._scans.append(EarlierScan(scan.tick, lidar, view, lengths, view.free(lengths)))
+        if (geometry.count, geometry.start, geometry.increment) != (count, scan.angle_min, scan.angle_increment):
+            self._geometry = geometry = ScanGeometry(count, scan.angle_min, scan.angle_increment)
+        lengths = geometry.lengths(scan)
+        self._scans.append(EarlierScan(scan.tick, lidar, geometry, lengths, geometry.free(lengths)))
 
-    def before(self, tick: int) -> EarlierScan | None:
-        """Return the scan that is about AGO old, or None if there is none older than AT_LEAST."""
-        scans, ago = self._scans, tick - self._ago
-        while len(scans) > 1 and scans[1].tick <= ago:
+    def scan_before(self, tick: int) -> EarlierScan | None:
+        """Return the scan that is about PREFERRED_AGE_S old, or None if there is none older than MIN_AGE_S."""
+        scans, latest = self._scans, tick - self._preferred_age
+        while len(scans) > 1 and scans[1].tick <= latest:
             scans.popleft()
-        return scans[0] if scans and scans[0].tick <= tick - self._at_least else None
+        return scans[0] if scans and scans[0].tick <= tick - self._min_age else None

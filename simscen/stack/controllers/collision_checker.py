@@ -51,11 +51,11 @@ class CollisionChecker:
         The positions of robot and obstacles are compared at the same times, so that the robot does not slow down for an
         obstacle that will have left by then. A stop is not a failure, because a moving obstacle will move on.
         """
-        if not costmap.moving.things or command == STOP:
+        if not costmap.moving.obstacles or command == STOP:
             return command
         reach, speed = self._footprint.discs.reach + MAX_UNCERTAINTY_M, math.hypot(command.vx, command.vy)
         near = costmap.moving.near(pose.x, pose.y, reach, speed, horizon)
-        if not near.things:
+        if not near.obstacles:
             return command
         times = np.linspace(0.0, horizon, max(1, math.ceil(horizon / MAX_TIME_STEP_S)) + 1)
         collision_steps = list[int]()

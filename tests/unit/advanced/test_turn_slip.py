@@ -85,14 +85,14 @@ def test_scans_tell_an_ekf_how_far_a_robot_came_whose_wheels_turn_in_vain(matche
 
 def test_a_command_is_countered_by_as_much_as_was_seen_and_no_broken_sensor_makes_it_more() -> None:
     slip, wheels, fused = TurnSlipObserver(), Pose2(0.0, 0.0, 0.0), Pose2(5.0, 5.0, 2.0)
-    assert slip.countered(Twist(1.0, 0.0, 0.2)) == Twist(1.0, 0.0, 0.2)
+    assert slip.compensate(Twist(1.0, 0.0, 0.2)) == Twist(1.0, 0.0, 0.2)
     for _ in range(200):
         wheels, fused = wheels.compose(Pose2(0.02, 0.0, 0.01)), fused.compose(Pose2(0.02, 0.0, 0.014))
-        slip.learn(wheels, fused)
-    assert math.isclose(slip.countered(Twist(1.0, 0.0, 0.5)).wz, 0.3, abs_tol=1e-3)
-    assert math.isclose(slip.countered(Twist(-1.0, 0.0, 0.5)).wz, 0.7, abs_tol=1e-3)
-    assert slip.countered(Twist(0.0, 0.0, 0.5)) == Twist(0.0, 0.0, 0.5)
+        slip.update(wheels, fused)
+    assert math.isclose(slip.compensate(Twist(1.0, 0.0, 0.5)).wz, 0.3, abs_tol=1e-3)
+    assert math.isclose(slip.compensate(Twist(-1.0, 0.0, 0.5)).wz, 0.7, abs_tol=1e-3)
+    assert slip.compensate(Twist(0.0, 0.0, 0.5)) == Twist(0.0, 0.0, 0.5)
     for _ in range(200):
         wheels, fused = wheels.compose(Pose2(0.02, 0.0, 0.0)), fused.compose(Pose2(0.02, 0.0, 1.0))
-        slip.learn(wheels, fused)
-    assert slip.countered(Twist(1.0, 0.0, 0.0)).wz == -MAX_CURVATURE_PER_M
+        slip.update(wheels, fused)
+    assert slip.compensate(Twist(1.0, 0.0, 0.0)).wz == -MAX_CURVATURE_PER_M

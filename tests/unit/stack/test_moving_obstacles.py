@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.prediction.rollouts import HORIZON, TIMES, FollowedPath
+from simscen.advanced.prediction.rollouts import HORIZON_S, TIMES, FollowedPath
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
@@ -16,17 +16,17 @@ def test_what_is_told_to_come_no_nearer_comes_no_nearer_whichever_way_one_goes()
         x, y, vx, vy = rng.normal(0.0, 2.0, 4).tolist()
         here, speed = complex(*rng.normal(0.0, 2.0, 2)), float(rng.uniform(0.0, 3.0))
         thing = MovingObstacle(complex(x, y), complex(vx, vy), 0.3, 0.0, 0.0, 0.0)
-        off = np.abs(thing.place + thing.velocity * times - here) - speed * times - 0.3
-        assert thing.missed_by(here, speed, 3.0) == pytest.approx(off.min(), abs=2e-3)
-    assert MovingObstacle(2 + 0j, 0j, 0.3, 0.0, 0.0, 0.0).missed_by(0j, 0.0, 3.0) == pytest.approx(1.7)
-    assert MovingObstacle(0j, -1 + 0j, 0.3, 0.0, 0.0, 0.0).missed_by(0j, 0.0, 3.0) == pytest.approx(-0.3)
+        off = np.abs(thing.position + thing.velocity * times - here) - speed * times - 0.3
+        assert thing.min_distance(here, speed, 3.0) == pytest.approx(off.min(), abs=2e-3)
+    assert MovingObstacle(2 + 0j, 0j, 0.3, 0.0, 0.0, 0.0).min_distance(0j, 0.0, 3.0) == pytest.approx(1.7)
+    assert MovingObstacle(0j, -1 + 0j, 0.3, 0.0, 0.0, 0.0).min_distance(0j, 0.0, 3.0) == pytest.approx(-0.3)
 
 
 def test_arrays_are_what_it_was_made_of_and_turn_with_the_frame() -> None:
     spread = np.kron([[[0.1, 0.02], [0.02, 0.4]]], np.eye(2))
     one = MovingObstacles(np.array([[3.0, 1.0]]), np.array([[1.0, 0.0]]), np.array([0.3]), spread, 1.0)
     assert one.covariances == pytest.approx(spread)
-    seen = one.seen_from(Pose2(1.0, 1.0, np.pi / 2)).after(2.0)
+    seen = one.in_frame(Pose2(1.0, 1.0, np.pi / 2)).after(2.0)
     assert seen.centers == pytest.approx(np.array([[0.0, -4.0]]))
     assert seen.velocities == pytest.approx(np.array([[0.0, -1.0]]))
     step = np.eye(4) + 2.0 * np.eye(4, k=2)
@@ -48,11 +48,11 @@ def test_what_is_told_at_once_to_stay_off_a_way_stays_off_it_at_each_moment() ->
         twist, wanted = (Twist(float(rng.uniform(-0.5, 0.5)), 0.0, 0.0) for _ in range(2))
         thing = MovingObstacle(complex(*rng.uniform(-4, 4, 2)), complex(*rng.uniform(-1, 1, 2)), 0.3, 0.01, 0.0, 0.02)
         moving = MovingObstacles.of((thing,), 1.5)
-        place, speed, apart = path.course(here, twist, wanted, robot)
-        way = path.driven(here, twist, wanted, (1.0,), robot, turns=False)
+        place, speed, apart = path.position_over_time(here, twist, wanted, robot)
+        way = path.rollouts(here, twist, wanted, (1.0,), robot, with_headings=False)
         assert np.abs(way.x[0] + 1j * way.y[0] - [place(time) for time in TIMES]).max() <= apart + 1e-9
         near = moving.nearness(way.x, way.y, TIMES, 0.22, 0.25)[0].max()
-        if moving.surely_off(place, speed, 0.22 + apart, 0.25, HORIZON):
+        if moving.is_surely_clear(place, speed, 0.22 + apart, 0.25, HORIZON_S):
             clear += 1
             assert near <= 0.0
         off += near <= 0.0

@@ -94,7 +94,7 @@ class CriticData:
         farthest, times = np.sqrt((rollouts.x * rollouts.x + rollouts.y * rollouts.y).max(axis=1)), self.times
         reach, speed = self.footprint.circumscribed + MAX_UNCERTAINTY_M, float((farthest / times).max())
         near = moving.near(self.pose.x, self.pose.y, reach, speed, float(times[-1]))
-        return near.seen_from(Pose2(self.pose.x, self.pose.y, 0.0)) if len(near) else near
+        return near.in_frame(Pose2(self.pose.x, self.pose.y, 0.0)) if len(near) else near
 
     @cached_property
     def times(self) -> Array:

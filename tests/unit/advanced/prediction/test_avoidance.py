@@ -135,8 +135,8 @@ def test_what_looks_at_the_cheapest_ways_only_finds_the_way_that_is_cheapest_of_
     path = FollowedPath(np.column_stack((np.arange(0.0, 8.0, 0.05), np.zeros(160))))
     given = list[list[Twist]]()
     drawn = [(rng.normal(0, 2, (3, 2)), rng.normal(0, 1, (3, 2)), rng.uniform(0, 1, 3)) for _ in range(24)]
-    for at_once in (avoidance.AT_ONCE, 10**6):
-        monkeypatch.setattr(avoidance, "AT_ONCE", at_once)
+    for at_once in (avoidance.BATCH_SIZE, 10**6):
+        monkeypatch.setattr(avoidance, "BATCH_SIZE", at_once)
         avoids, commands = Avoidance(Prediction(), robot, 1.0), list[Twist]()
         for places, speeds, (x, vx, wz) in drawn:
             moving = MovingObstacles(places, speeds, np.full(3, 0.3), np.tile(0.01 * np.eye(4), (3, 1, 1)), 1.0)

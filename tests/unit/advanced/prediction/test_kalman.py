@@ -26,7 +26,7 @@ def test_it_is_filterpys_filter_of_either_axis() -> None:
         point.correct(complex(*measured), deviation)
         oracle.predict()
         oracle.update(measured, R=np.eye(2) * deviation**2)
-        known = [point.place.real, point.place.imag, point.velocity.real, point.velocity.imag]
+        known = [point.position.real, point.position.imag, point.velocity.real, point.velocity.imag]
         assert known == pytest.approx(oracle.x, abs=1e-9)
         spread = [[point.variance, point.covariance], [point.covariance, point.velocity_variance]]
         assert np.kron(spread, np.eye(2)) == pytest.approx(oracle.P, abs=1e-9)

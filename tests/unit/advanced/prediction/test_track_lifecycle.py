@@ -1,32 +1,32 @@
 """Which tracks are followed on, from updates written down by hand."""
 
-from simscen.advanced.prediction.tracks import UNCOME, Track, TrackLifecycle
+from simscen.advanced.prediction.tracks import MAX_NOT_APPEARED, Track, TrackLifecycle
 from simscen.model.guards import Prediction
 from simscen.testing.flatland import RATE
 
 
 def track(*came: bool) -> Track:
     """At 0.5 m/s along x and hit at ten scans a second: it stood where it had been free, or not."""
-    found = Track.begun(0, 0j, 0.02, 0.3)
+    found = Track.start(0, 0j, 0.02, 0.3)
     found.velocity = 0.5 + 0j
     for step, one in enumerate(came):
-        found.fast_at = RATE // 10 * step
-        found.note(found.fast_at, one, False, 1, 0.03)
+        found.last_fast_tick = RATE // 10 * step
+        found.record_update(found.last_fast_tick, one, False, 1, 0.03)
     return found
 
 
 def ended(*tracks: Track) -> list[bool]:
     going = TrackLifecycle(Prediction(), RATE)
-    return [going.ended(each, each.hit_at, list(tracks), lambda _: True) for each in tracks]
+    return [going.has_ended(each, each.last_update_tick, list(tracks), lambda _: True) for each in tracks]
 
 
 def test_what_never_again_stands_where_it_was_free_is_a_wall_that_comes_into_view_and_followed_no_more() -> None:
-    slides, comes = [True] + [False] * UNCOME, [True] * 4 + [False] * (UNCOME - 1) + [True]
+    slides, comes = [True] + [False] * MAX_NOT_APPEARED, [True] * 4 + [False] * (MAX_NOT_APPEARED - 1) + [True]
     assert ended(track(*slides)) == [True]
     assert ended(track(*comes)) == [False]
 
 
 def test_beside_something_that_moves_it_is_followed_on_for_that_may_have_hidden_the_place() -> None:
-    beside = track(*[True] * (UNCOME + 1))
-    beside.moving = True
-    assert ended(track(True, *[False] * UNCOME), beside) == [False, False]
+    beside = track(*[True] * (MAX_NOT_APPEARED + 1))
+    beside.is_moving = True
+    assert ended(track(True, *[False] * MAX_NOT_APPEARED), beside) == [False, False]

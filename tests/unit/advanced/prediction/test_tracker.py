@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from simscen.advanced.prediction.clusters import ENOUGH, clusters, fit_circle, runs, valid_hits
+from simscen.advanced.prediction.clusters import CONVERGED_STEP_M, clusters, fit_circle, runs, valid_hits
 from simscen.advanced.prediction.tracker import Tracker
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
@@ -254,7 +254,7 @@ def test_hits_that_are_in_one_run_are_never_told_beforehand_to_be_in_several() -
         ranges[rng.random(72) < 0.1] = np.inf
         hits = valid_hits(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
         which = rng.random(len(hits.beams)) < 0.15
-        told.append((runs(hits).together(which, 3), hits.may_be_together(which.nonzero()[0].tolist(), 3)))
+        told.append((runs(hits).share_run(which, 3), hits.may_share_run(which.nonzero()[0].tolist(), 3)))
         first, last = runs(hits).first, runs(hits).last
         assert told[-1][0] == any(which[one : other + 1].sum() >= 3 for one, other in zip(first, last, strict=True))
     assert (True, False) not in told
@@ -274,8 +274,8 @@ def test_who_looks_at_all_beams_at_once_tells_what_he_tells_who_looks_at_some_of
         found = list[list[complex]]()
 
         def note(watch: Watch) -> None:
-            found.append([track.place for track in watch.tracker._tracks])
-            watch.tracker._restless &= not afresh
+            found.append([track.position for track in watch.tracker._tracks])
+            watch.tracker._had_new_hits &= not afresh
 
         Watch(flies, base=lambda t: Pose2(0.4 * t, 0.0), walls=wires).run(12.0, note)
         return found
@@ -303,10 +303,10 @@ def test_a_circle_that_is_seen_in_part_is_found_from_half_its_radius_off(seen: f
     middle, radius = 2.0 + 1.0j, 0.3
     towards = math.pi + math.atan2(middle.imag, middle.real)
     arc = [middle + cmath.rect(radius, towards + seen * (k / 14 - 0.5)) for k in range(15)]
-    assert abs(fit_circle(arc, radius, middle + cmath.rect(radius / 2, towards + 0.4)) - middle) < ENOUGH
+    assert abs(fit_circle(arc, radius, middle + cmath.rect(radius / 2, towards + 0.4)) - middle) < CONVERGED_STEP_M
 
 
 @pytest.mark.filterwarnings("error")
 def test_too_close_returns_say_nothing_about_moving_obstacles() -> None:
-    moving = [Watch(crossing, covered=value).run(3.0).tracker.moving.things for value in (-np.inf, np.nan)]
+    moving = [Watch(crossing, covered=value).run(3.0).tracker.moving.obstacles for value in (-np.inf, np.nan)]
     assert moving[0] == moving[1] != ()
