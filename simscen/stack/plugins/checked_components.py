@@ -1,4 +1,4 @@
-"""Wrappers that check the answers of installed planners, controllers, goal checkers, behaviors and localizers."""
+"""Wrappers that check what installed planners, controllers, goal checkers, behaviors, and localizers return."""
 
 import math
 
@@ -27,19 +27,19 @@ class CheckedPlanner(CheckedPlugin):
 
     def __init__(self, spec: PlannerSpec, setting: Setting) -> None:
         super().__init__("planner", spec, setting, Planner)
-        self._reach = setting.robot.circumscribed_radius
+        self._radius = setting.robot.circumscribed_radius
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """Return the planner's path. Raises RunError when it is invalid or leads through an obstacle."""
-        path = self.checked_path(self.ask(self.inner.plan, costmap, start, goal, seed), "returned")
+        path = self.checked_path(self.call(self.inner.plan, costmap, start, goal, seed), "returned")
         points = path.points
         if not len(points):
-            self.broke("returned a path without points instead of failing with NO_VALID_PATH")
+            self.raise_invalid("returned a path without points instead of failing with NO_VALID_PATH")
         if np.hypot(points[0, 0] - start.x, points[0, 1] - start.y) > START_TOLERANCE_M:
-            self.broke(f"returned a path that begins at {_at(points[0])}, not at the start {_at(np.array(start))}")
-        away = points[np.hypot(points[:, 0] - start.x, points[:, 1] - start.y) > self._reach]
-        if len(away) and (struck := lethal(costmap, away)).any():
-            self.broke(f"returned a path through an obstacle: the cell at {_at(away[struck.argmax()])} is lethal")
+            self.raise_invalid(f"returned a path from {_at(points[0])} instead of the start {_at(np.array(start))}")
+        outside = points[np.hypot(points[:, 0] - start.x, points[:, 1] - start.y) > self._radius]
+        if len(outside) and (is_lethal := lethal(costmap, outside)).any():
+            self.raise_invalid(f"returned a path through the lethal cell at {_at(outside[is_lethal.argmax()])}")
         return path
 
 
@@ -48,8 +48,8 @@ def lethal(costmap: CostmapView, points: Array) -> npt.NDArray[np.bool_]:
     cells = np.floor((points[:, :2] - costmap.origin) / costmap.resolution)[:, ::-1]
     inside: npt.NDArray[np.bool_] = np.all((cells >= 0) & (cells < costmap.costs.shape), axis=1)
     rows, columns = np.where(inside[:, None], cells, 0).astype(np.int64).T
-    struck: npt.NDArray[np.bool_] = inside & (costmap.costs[rows, columns] == LETHAL)
-    return struck
+    is_lethal: npt.NDArray[np.bool_] = inside & (costmap.costs[rows, columns] == LETHAL)
+    return is_lethal
 
 
 def _at(point: Array) -> str:
@@ -64,33 +64,33 @@ class CheckedController(CheckedPlugin):
 
     def set_path(self, path: Path) -> None:
         """Follow this path from now on."""
-        self.ask(self.inner.set_path, path)
+        self.call(self.inner.set_path, path)
 
     @property
     def full_speed(self) -> float:
         """Speed in m/s without a speed limit."""
-        speed = self.ask(lambda: self.inner.full_speed)
+        speed = self.call(lambda: self.inner.full_speed)
         if not isinstance(speed, float | int) or not math.isfinite(speed) or speed < 0:
-            self.broke(f"says that its full speed is {speed!r}")
+            self.raise_invalid(f"returned {speed!r} as its full speed, which is not a finite number of at least 0")
         return float(speed)
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than this in m/s from now on; None lifts the limit."""
-        self.ask(self.inner.set_speed_limit, limit)
+        self.call(self.inner.set_speed_limit, limit)
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
         """Return the controller's command. Raises RunError when it is invalid."""
-        return self.checked_twist(self.ask(self.inner.command, pose, twist, costmap, goal))
+        return self.checked_twist(self.call(self.inner.command, pose, twist, costmap, goal))
 
     @property
     def local_plan(self) -> Path | None:
         """Trajectory that the controller expects to drive, for the log."""
-        plan = self.ask(lambda: self.inner.local_plan)
-        return None if plan is None else self.checked_path(plan, "expects to drive")
+        plan = self.call(lambda: self.inner.local_plan)
+        return None if plan is None else self.checked_path(plan, "returned as `local_plan`")
 
 
 class CheckedGoalChecker(CheckedPlugin):
-    """Calls the goal checker and accepts only a boolean answer."""
+    """Calls the goal checker and checks that it returns a boolean."""
 
     may_fail = False
 
@@ -99,13 +99,13 @@ class CheckedGoalChecker(CheckedPlugin):
 
     def reset(self) -> None:
         """Reset the goal checker for a new goal."""
-        self.ask(self.inner.reset)
+        self.call(self.inner.reset)
 
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
-        """Return whether the goal is reached. Raises RunError when the answer is not a boolean."""
-        reached = self.ask(self.inner.reached, goal, pose, twist)
+        """Return whether the goal is reached. Raises RunError if the goal checker does not return a boolean."""
+        reached = self.call(self.inner.reached, goal, pose, twist)
         if reached not in (True, False):
-            self.broke(f"answered {reached!r} to whether a goal is reached")
+            self.raise_invalid(f"returned {reached!r} instead of True or False")
         return bool(reached)
 
 
@@ -118,11 +118,11 @@ class CheckedBehavior(CheckedPlugin):
 
     def start(self, pose: Pose2) -> None:
         """Begin from this pose."""
-        self.ask(self.inner.start, pose)
+        self.call(self.inner.start, pose)
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
         """Return the behavior's command; None when it is done. Raises RunError when it is invalid."""
-        command = self.ask(self.inner.step, pose, costmap, seconds)
+        command = self.call(self.inner.step, pose, costmap, seconds)
         return None if command is None else self.checked_twist(command)
 
 
@@ -133,48 +133,48 @@ class CheckedLocalizer(CheckedPlugin):
 
     def __init__(self, spec: LocalizerSpec, setting: Setting) -> None:
         super().__init__("localizer", spec, setting, Localizer)
-        self._seen: Belief | None = None
+        self._last: Belief | None = None
 
     def reset(self, estimate: Estimate) -> None:
         """Start over at an estimate."""
-        self.ask(self.inner.reset, estimate)
+        self.call(self.inner.reset, estimate)
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Pass an odometry reading."""
-        self.ask(self.inner.on_odometry, odometry)
+        self.call(self.inner.on_odometry, odometry)
 
     def on_scan(self, scan: Scan) -> None:
         """Pass a lidar scan."""
-        self.ask(self.inner.on_scan, scan)
+        self.call(self.inner.on_scan, scan)
 
     def on_imu(self, imu: Imu) -> None:
         """Pass an IMU reading."""
-        self.ask(self.inner.on_imu, imu)
+        self.call(self.inner.on_imu, imu)
 
     @property
     def belief(self) -> Belief:
         """Belief of the localizer. Raises RunError when it is invalid."""
         try:
             belief = self.inner.belief
-        except Exception as error:  # as in `ask`, and it is asked at every beat
-            self.raised(error)
-        if self._seen is None or belief is not self._seen:
-            self._seen = checked_belief(self, belief, self._seen)
-        return self._seen
+        except Exception as error:  # as in `call`, without its overhead at every beat
+            self.raise_as_run_error(error)
+        if self._last is None or belief is not self._last:
+            self._last = checked_belief(self, belief, self._last)
+        return self._last
 
 
-def checked_belief(watched: CheckedPlugin, belief: object, before: Belief | None = None) -> Belief:
-    """Return the belief if it is finite and well shaped. Parts shared with `before` are not checked again."""
+def checked_belief(plugin: CheckedPlugin, belief: object, before: Belief | None = None) -> Belief:
+    """Return the belief if it is finite and has the right shape. Parts shared with `before` are not checked again."""
     if not isinstance(belief, Belief):
-        watched.broke(f"believes {type(belief).__name__} instead of a Belief")
-    watched.checked_pose(belief.pose, "believes to be at")
+        plugin.raise_invalid(f"returned {type(belief).__name__} instead of a Belief")
+    plugin.checked_pose(belief.pose, "returned a Belief with the pose")
     if before is None or belief.map_from_odom is not before.map_from_odom:
-        watched.checked_pose(belief.map_from_odom, "puts the odom frame at")
+        plugin.checked_pose(belief.map_from_odom, "returned a Belief with `map_from_odom`")
     if not _is_table(belief.covariance, 3) or len(belief.covariance) != 3:
-        watched.broke("believes with a covariance that is no finite array (3, 3)")
-    known = before is not None and belief.particles is before.particles and not belief.particles.flags.writeable
-    if not known and not _is_table(belief.particles, 4):
-        watched.broke("believes with particles that are no finite array (n, 4)")
+        plugin.raise_invalid("returned a Belief whose covariance is not a finite array (3, 3)")
+    is_checked = before is not None and belief.particles is before.particles and not belief.particles.flags.writeable
+    if not is_checked and not _is_table(belief.particles, 4):
+        plugin.raise_invalid("returned a Belief whose particles are not a finite array (n, 4)")
     return belief
 
 

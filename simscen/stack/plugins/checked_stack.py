@@ -29,15 +29,15 @@ class CheckedStack(CheckedPlugin):
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
         """Localize at the estimate, then drive to the goals in order."""
-        self.ask(self.inner.start, estimate, goals)
+        self.call(self.inner.start, estimate, goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
         """Drive to this goal first."""
-        self.ask(self.inner.preempt, tick, goal)
+        self.call(self.inner.preempt, tick, goal)
 
     def cancel(self, tick: int) -> None:
         """Cancel the current goal and all after it."""
-        self.ask(self.inner.cancel, tick)
+        self.call(self.inner.cancel, tick)
 
     @property
     def can_switch_zones(self) -> bool:
@@ -46,61 +46,61 @@ class CheckedStack(CheckedPlugin):
 
     def set_zones(self, tick: int, zones: Zones) -> None:
         """Apply these zones, and no others, from the next update of the costmap on."""
-        self.ask(self.inner.set_zones, tick, zones)
+        self.call(self.inner.set_zones, tick, zones)
 
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Return the stack's decision. Raises RunError when it is invalid."""
         try:
             decision = self.inner.decide(tick, readings)
-        except Exception as error:  # as in `ask`, and it is asked at every beat
-            self.raised(error)
-        if self._last is None or decision is not self._last:  # a stack that repeats itself does so with the same object
+        except Exception as error:  # as in `call`, without its overhead at every beat
+            self.raise_as_run_error(error)
+        if self._last is None or decision is not self._last:  # an unchanged decision is the same object
             self._last = self._checked(decision, tick)
         return self._last
 
     @property
     def plan(self) -> Path | None:
         """The plan being followed."""
-        plan = self.ask(lambda: self.inner.plan)
-        return None if plan is None else self.checked_path(plan, "follows")
+        plan = self.call(lambda: self.inner.plan)
+        return None if plan is None else self.checked_path(plan, "returned as `plan`")
 
     @property
     def goal(self) -> Goal | None:
         """The goal being driven to; None when the task has ended."""
-        goal = self.ask(lambda: self.inner.goal)
+        goal = self.call(lambda: self.inner.goal)
         if goal is not None and not isinstance(goal, Goal):
-            self.broke(f"drives to {goal!r}, which is no Goal")
+            self.raise_invalid(f"returned {goal!r} as `goal`, which is not a Goal")
         return goal
 
     def _checked(self, decision: object, tick: int) -> Decision:
         if not isinstance(decision, Decision):
-            self.broke(f"decided {type(decision).__name__} instead of a Decision")
+            self.raise_invalid(f"returned {type(decision).__name__} instead of a Decision")
         if decision.command is not self._command:
             self._command = self.checked_twist(decision.command)
         if decision.belief is not None:
             self._belief = checked_belief(self, decision.belief, self._belief)
         if decision.plan is not None:
-            self.checked_path(decision.plan, "planned")
+            self.checked_path(decision.plan, "returned in `Decision.plan`")
         if decision.local_plan is not None:
-            self.checked_path(decision.local_plan, "expects to drive")
+            self.checked_path(decision.local_plan, "returned in `Decision.local_plan`")
         for costmap in decision.costmaps:
-            self._look_at(costmap)
+            self._check_costmap(costmap)
         for odometry in decision.odometry:
             if not isinstance(odometry, Odometry):
-                self.broke(f"published {type(odometry).__name__} instead of filtered Odometry")
+                self.raise_invalid(f"published {type(odometry).__name__} instead of filtered Odometry")
         for event in decision.events:
             if not isinstance(event, Event) or not isinstance(event.kind, EventKind):
-                self.broke(f"told of {event!r}, which is no Event")
+                self.raise_invalid(f"reported {event!r}, which is not an Event")
             if event.tick != tick:
-                self.broke(f"told at tick {tick} of `{event.kind}` at tick {event.tick}")
+                self.raise_invalid(f"reported `{event.kind}` of tick {event.tick} at tick {tick}")
         return decision
 
-    def _look_at(self, costmap: object) -> None:
+    def _check_costmap(self, costmap: object) -> None:
         """Check the name, frame and cell type (int8) of a published costmap."""
         if not isinstance(costmap, CostGrid) or not isinstance(costmap.grid, OccupancyGrid):
-            self.broke(f"published {type(costmap).__name__} instead of a CostGrid")
+            self.raise_invalid(f"published {type(costmap).__name__} instead of a CostGrid")
         if costmap.name not in ("global", "local") or costmap.frame not in ("map", "odom"):
-            self.broke(f"published a costmap {costmap.name!r} in frame {costmap.frame!r}")
+            self.raise_invalid(f"published a costmap {costmap.name!r} in frame {costmap.frame!r}")
         cells = costmap.grid.cells
         if not isinstance(cells, np.ndarray) or cells.dtype != np.int8 or cells.ndim != 2:
-            self.broke(f"published a {costmap.name} costmap whose cells are no (height, width) of int8")
+            self.raise_invalid(f"published a {costmap.name} costmap whose cells are not an int8 array (height, width)")

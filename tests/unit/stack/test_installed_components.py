@@ -267,11 +267,11 @@ def test_a_mistake_is_told_at_its_place(odd, tmp_path: Path, stack: str, told: s
         ("raise", "crashed", "KeyError: 'no such key' (odd.py:41)"),
         ("raise deep", "crashed", "LinAlgError: Singular matrix (odd.py:43)"),
         ("not begin", "crashed", "OSError: no such model (odd.py:34)"),
-        ("nan", "broken-component", "returned a path with points that are no finite numbers"),
+        ("nan", "broken-component", "returned a path with points that are not finite numbers"),
         ("shape", "broken-component", "returned a path whose points are (31, 2) instead of (n, 3): x, y, yaw"),
         ("list", "broken-component", "returned list instead of a Path"),
         ("nothing", "broken-component", "returned a path without points"),
-        ("elsewhere", "broken-component", "begins at (1.50, 1.50), not at the start (1.00, 1.00)"),
+        ("elsewhere", "broken-component", "from (1.50, 1.50) instead of the start (1.00, 1.00)"),
     ],
 )
 def test_a_planner_that_breaks_ends_the_run_with_its_name(odd, does: str, kind: str, told: str) -> None:
@@ -283,7 +283,7 @@ def test_a_planner_that_breaks_ends_the_run_with_its_name(odd, does: str, kind: 
 
 
 def test_a_path_through_a_wall_ends_the_run(odd) -> None:
-    with pytest.raises(RunError, match=r"through an obstacle: the cell at \(2\.9., 1\.00\) is lethal"):
+    with pytest.raises(RunError, match=r"through the lethal cell at \(2\.9., 1\.00\)"):
         driven(Pose2(5.0, 1.0, 0.0), planner={"type": "straight"}).run(1)
 
 
@@ -291,8 +291,8 @@ def test_a_path_through_a_wall_ends_the_run(odd) -> None:
     ("stack", "told"),
     [
         ({"controller": {"type": "wild"}}, "controller `wild` (odd:WildController) commanded (inf, 0.0, 0.0)"),
-        ({"localizer": {"type": "lost"}}, "localizer `lost` (odd:LostLocalizer) believes with a covariance that is no"),
-        ({"localizer": {"type": "half"}}, "HalfLocalizer has no `on_odometry`, which every localizer has"),
+        ({"localizer": {"type": "lost"}}, "localizer `lost` (odd:LostLocalizer) returned a Belief whose covariance"),
+        ({"localizer": {"type": "half"}}, "HalfLocalizer has no method `on_odometry`, which every localizer needs"),
         ({"goal_checker": {"type": "unsure"}}, "goal_checker `unsure` (odd:UnsureChecker) answered 'perhaps'"),
     ],
 )
@@ -306,7 +306,7 @@ def test_every_role_is_named_where_it_breaks(odd, stack: dict, told: str) -> Non
 @pytest.mark.parametrize(
     ("command", "kind", "told"),
     [
-        (lambda *asked: Twist(math.nan), "broken-component", "which is no velocity"),
+        (lambda *asked: Twist(math.nan), "broken-component", "which is not a finite velocity"),
         (lambda *asked: 1 / 0, "crashed", "ZeroDivisionError: division by zero (navigator.py:"),
     ],
 )
@@ -370,9 +370,9 @@ def test_a_stack_of_a_package_is_checked_beat_by_beat(odd, tmp_path: Path) -> No
     assert type(pickle.loads(pickle.dumps(spec))) is type(spec)
     stack = build_stack(spec, driven_setting(), Streams(1), Clock(RATE))
     assert stack.decide(0, ()).command == (0.0, 0.0, 0.0)
-    with pytest.raises(RunError, match=r"stack `still` \(odd:StillStack\) decided str instead of a Decision"):
+    with pytest.raises(RunError, match=r"stack `still` \(odd:StillStack\) returned str instead of a Decision"):
         stack.decide(60, ())
-    with pytest.raises(RunError, match="decided NoneType instead of a Decision"):
+    with pytest.raises(RunError, match="returned NoneType instead of a Decision"):
         build_stack(spec, driven_setting(), Streams(1), Clock(RATE)).decide(120, ())
 
 
@@ -401,6 +401,6 @@ def test_a_failure_without_a_code_of_nav2_is_a_broken_promise(odd) -> None:
     def fail(*asked: object) -> None:
         raise NavigationFailure(208, "no way")  # type: ignore[arg-type]
 
-    with pytest.raises(RunError, match="fails with 208, which is no ErrorCode"):
+    with pytest.raises(RunError, match="failed with 208, which is not an ErrorCode"):
         CheckedPlanner(Own(), setting(round_robot())).plan(None, Pose2(0, 0), Pose2(1, 1), 1)  # type: ignore[arg-type]
     assert ErrorCode.NO_VALID_PATH == 208
