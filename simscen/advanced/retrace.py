@@ -1,4 +1,4 @@
-"""Trail of a robot: the poses that it came through, in reverse order, without loops and evenly spaced."""
+"""Recovery behavior that drives back along the robot's own trail."""
 
 import math
 from collections.abc import Sequence
@@ -16,223 +16,227 @@ from simscen.stack.path_geometry import poses_along
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 from simscen.stack.setting import Setting
 
-STEP = 0.01
+SPACING_M = 0.01
 """Distance in m that the footprint moves between two poses of a trail, including rotation."""
-AGAIN, LOOP = 0.12, 0.3
-"""A loop, which is removed, returns to within AGAIN m of a pose after the footprint has moved by at least LOOP m."""
-ASIDE = 0.1
+LOOP_CLOSURE_M, MIN_LOOP_M = 0.12, 0.3
+"""A loop, which is removed, returns to within the first distance of a pose after the footprint has moved by at least
+the second one."""
+MIN_LATERAL_SHARE = 0.1
 """Share of lateral motion above which the base has strafed; a slipping base has less."""
 
 
 class Trail:
-    """Poses (n, 3) to drive back along, starting at the robot, and the distance (n,) that the footprint moves to each.
+    """Evenly spaced poses (n, 3) of the robot's path in reverse, without loops, starting at the current pose.
 
-    Beyond the known part, the trail continues straight backward.
+    `along` (n,) is the distance in m that the footprint moves to each pose, rotations included. Beyond the known part,
+    the trail continues straight backward.
     """
 
-    def __init__(self, way: Sequence[Pose2], pose: Pose2, lever: float, length: float) -> None:
-        """Take earlier poses (oldest first), the current one, the circumscribed radius and the minimum length in m."""
+    def __init__(self, poses: Sequence[Pose2], pose: Pose2, lever: float, length: float) -> None:
+        """Take earlier poses (oldest first), the current one, the circumscribed radius, and the length to add in m."""
         self._lever = lever
-        came = self._thinned(np.array([pose, *reversed(way)], dtype=np.float64))
-        self.strafed = _strafed(came)
+        passed = self._thinned(np.array([pose, *reversed(poses)], dtype=np.float64))
+        self.has_strafed = _has_strafed(passed)
         """Whether the base moved sideways."""
-        back = self._without_loops(came)
-        x, y, yaw = back[-1].tolist()
+        trail = self._without_loops(passed)
+        x, y, yaw = trail[-1].tolist()
         end = (x - length * math.cos(yaw), y - length * math.sin(yaw), yaw)
-        self.known = len(self._even(back))
-        """Number of poses that the robot really came through."""
-        self.poses = self._even(np.concatenate((back, [end])))
-        self.along = np.concatenate(([0.0], np.cumsum(self.apart(self.poses[1:], self.poses[:-1]))))
+        self.known_count = len(self._resampled(trail))
+        """Number of poses that the robot has passed, without the continuation."""
+        self.poses = self._resampled(np.concatenate((trail, [end])))
+        self.along = np.concatenate(([0.0], np.cumsum(self.footprint_distance(self.poses[1:], self.poses[:-1]))))
         steps = np.hypot(np.diff(self.poses[:, 0]), np.diff(self.poses[:, 1]))
         self.driven = np.concatenate(([0.0], np.cumsum(steps)))
         """Distance (n,) in m that the base drives to each pose."""
 
-    def apart(self, poses: Array, others: Array) -> Array:
+    def footprint_distance(self, poses: Array, others: Array) -> Array:
         """Return the distances (…,) in m that the footprint moves from poses (…, 3) to others."""
         turned = np.abs(wrap_array(poses[..., 2] - others[..., 2]))
         return np.asarray(
             np.hypot(poses[..., 0] - others[..., 0], poses[..., 1] - others[..., 1]) + self._lever * turned
         )
 
-    def _thinned(self, back: Array) -> Array:
-        """Return poses between which the footprint moves by at least STEP."""
-        kept = [0]
-        for k in range(1, len(back)):
-            if self.apart(back[k], back[kept[-1]]) >= STEP:
-                kept.append(k)
-        return back[kept]
+    def _thinned(self, trail: Array) -> Array:
+        """Return poses between which the footprint moves by at least SPACING_M."""
+        indices = [0]
+        for k in range(1, len(trail)):
+            if self.footprint_distance(trail[k], trail[indices[-1]]) >= SPACING_M:
+                indices.append(k)
+        return trail[indices]
 
-    def _without_loops(self, back: Array) -> Array:
+    def _without_loops(self, trail: Array) -> Array:
         """Return the poses without loops, in which the robot returns to an earlier pose."""
-        moved = np.concatenate(([0.0], np.cumsum(self.apart(back[1:], back[:-1]))))
-        kept, k = [0], 0
-        while k < len(back) - 1:
-            near = (self.apart(back, back[k]) <= AGAIN) & (moved >= moved[k] + LOOP)
-            k = int(near.nonzero()[0][-1]) if near.any() else k + 1
-            kept.append(k)
-        return back[kept]
+        moved = np.concatenate(([0.0], np.cumsum(self.footprint_distance(trail[1:], trail[:-1]))))
+        indices, k = [0], 0
+        while k < len(trail) - 1:
+            is_return = (self.footprint_distance(trail, trail[k]) <= LOOP_CLOSURE_M) & (moved >= moved[k] + MIN_LOOP_M)
+            k = int(is_return.nonzero()[0][-1]) if is_return.any() else k + 1
+            indices.append(k)
+        return trail[indices]
 
-    def _even(self, back: Array) -> Array:
-        """Return the poses resampled evenly."""
-        moved = np.concatenate(([0.0], np.cumsum(self.apart(back[1:], back[:-1]))))
-        at = np.arange(0.0, moved[-1], STEP)
-        back = np.column_stack((back[:, :2], np.unwrap(back[:, 2])))
-        return np.column_stack([np.interp(at, moved, column) for column in back.T])
-
-
-def _strafed(came: Array) -> bool:
-    steps, yaw = np.diff(came[:, :2], axis=0), came[:-1, 2] + wrap_array(np.diff(came[:, 2])) / 2
-    aside = np.abs(np.cos(yaw) * steps[:, 1] - np.sin(yaw) * steps[:, 0])
-    return bool(aside.sum() > ASIDE * np.hypot(*steps.T).sum())
+    def _resampled(self, trail: Array) -> Array:
+        """Return poses interpolated at equal distances."""
+        moved = np.concatenate(([0.0], np.cumsum(self.footprint_distance(trail[1:], trail[:-1]))))
+        stations = np.arange(0.0, moved[-1], SPACING_M)
+        trail = np.column_stack((trail[:, :2], np.unwrap(trail[:, 2])))
+        return np.column_stack([np.interp(stations, moved, column) for column in trail.T])
 
 
-AHEAD = 1.0
+def _has_strafed(passed: Array) -> bool:
+    steps, yaw = np.diff(passed[:, :2], axis=0), passed[:-1, 2] + wrap_array(np.diff(passed[:, 2])) / 2
+    lateral = np.abs(np.cos(yaw) * steps[:, 1] - np.sin(yaw) * steps[:, 0])
+    return bool(lateral.sum() > MIN_LATERAL_SHARE * np.hypot(*steps.T).sum())
+
+
+HORIZON_S = 1.0
 """Horizon in s of each candidate command: 15 cm at Nav2's backup_speed."""
-TIMES: Array = np.linspace(0.0, AHEAD, 11)
-AT_LEAST = 3
+TIMES: Array = np.linspace(0.0, HORIZON_S, 11)
+MIN_FREE_STEPS = 3
 """Number of steps of TIMES that must be free if no command is free for the whole horizon."""
-SLACK = 0.3
+SLACK_CELLS = 0.3
 """Cells by which the robot may come closer to an obstacle than on its trail."""
-OFF = 2.0
+DEVIATION_WEIGHT = 2.0
 """Weight of the deviation from the trail relative to the progress along it."""
-GAIN = 0.01
+MIN_GAIN_M = 0.01
 """Minimum advantage in m of a command over standing still."""
-WINDOW = 0.5
+WINDOW_M = 0.5
 """Length in m of the trail in which the robot is located."""
-SPEEDS = (-1.0, -0.5, 0.0, 0.5)
+SPEED_RATIOS = (-1.0, -0.5, 0.0, 0.5)
 """Candidate speeds relative to the maximum; also forward, because a trail can have cusps."""
-RATES = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
+TURN_RATES = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
 """Candidate turn rates in rad/s."""
-SIDEWAYS = (0.0, 0.5, -0.5, 1.0, -1.0)
+LATERAL_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
 """Candidate lateral speeds relative to the maximum, for a holonomic base whose trail has lateral motion."""
 
 
 class TrailFollower:
     """Follows the trail of the robot backward; straight backward where there is no trail.
 
-    A robot that stands at an angle between two posts can neither turn nor leave in a straight line, but it can leave
-    the way it entered. Each step compares a few velocities on the local costmap and takes the one with the most
+    A robot at an angle between two posts can neither turn nor leave in a straight line, but it can leave on the path
+    on which it entered. Each step compares a few velocities on the local costmap and takes the one with the most
     progress along the trail, so that slipping wheels do not lead the robot away from it.
     """
 
     def __init__(self, setting: Setting, speed: float) -> None:
         """Take the setting of the behavior and the maximum speed in m/s."""
-        self._footprint, self._way, self._allowed = setting.footprint, setting.trail, setting.limit_command
+        self._footprint, self._recorded, self._limit_command = setting.footprint, setting.trail, setting.limit_command
         self.speed = min(speed, setting.robot.max_reverse)
         """Speed in m/s; 0 for a robot that cannot reverse."""
         self._last: Pose2 | None = None
-        self._commands = _possible(setting.robot, self.speed)
+        self._commands = _candidate_commands(setting.robot, self.speed)
 
     def start(self, pose: Pose2, length: float) -> None:
         """Start at this pose in the odom frame, to drive back at most `length` m."""
-        there = np.array([AHEAD])
-        self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, there)[0] for each in (*self._commands, STOP)])
+        horizon = np.array([HORIZON_S])
+        self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, horizon)[0] for each in (*self._commands, STOP)])
         lever = self._footprint.circumscribed
-        self._trail, self._at = Trail(self._came(), pose, lever, length + self.speed * AHEAD), 0
+        self._trail, self._index = Trail(self._remaining_trail(), pose, lever, length + self.speed * HORIZON_S), 0
         self._last = pose
 
-    def _came(self) -> Sequence[Pose2]:
+    def _remaining_trail(self) -> Sequence[Pose2]:
         """Return the poses of the trail, without the part that was already driven back."""
-        way = self._way()
-        if self._last is None or self._last not in way:
-            return way
-        since = len(way) - way[::-1].index(self._last)
-        rest = self._trail.poses[self._at : self._trail.known]
-        return [*(Pose2(*each) for each in rest[::-1].tolist()), *way[since:]]
+        poses = self._recorded()
+        if self._last is None or self._last not in poses:
+            return poses
+        first_new = len(poses) - poses[::-1].index(self._last)
+        remaining = self._trail.poses[self._index : self._trail.known_count]
+        return [*(Pose2(*each) for each in remaining[::-1].tolist()), *poses[first_new:]]
 
     def locate(self, pose: Pose2) -> None:
         """Locate the robot on the trail; it never moves forward on it."""
-        ahead, self._last = self._ahead(), pose
-        self._at += int(self._trail.apart(self._trail.poses[ahead], np.array(pose)).argmin())
+        window, self._last = self._window(), pose
+        self._index += int(self._trail.footprint_distance(self._trail.poses[window], np.array(pose)).argmin())
 
     @property
     def driven(self) -> float:
         """Distance in m that the base has driven back."""
-        return float(self._trail.driven[self._at])
+        return float(self._trail.driven[self._index])
 
     @property
-    def moved(self) -> float:
+    def footprint_moved(self) -> float:
         """Distance in m that the footprint has moved, including rotation."""
-        return float(self._trail.along[self._at])
+        return float(self._trail.along[self._index])
 
-    def _ahead(self) -> slice:
+    def _window(self) -> slice:
         along = self._trail.along
-        return slice(self._at, int(np.searchsorted(along, along[self._at] + WINDOW, side="right")))
+        return slice(self._index, int(np.searchsorted(along, along[self._index] + WINDOW_M, side="right")))
 
     def command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """Return the free command with the most progress, or one that is free for a moment, or None.
+        """Return the free command with the most progress, or one that is free at first, or None.
 
         None means that standing still is as good. If the collision monitor rejects the best command, because it sees
-        obstacles more precisely than the costmap, any other command that leads back is tried.
+        obstacles more precisely than the costmap, other backward commands are tried.
         """
-        *worth, standing = self._worth(pose).tolist()
-        strafed, vetoed = self._trail.strafed, False
-        possible = [k for k, each in enumerate(self._commands) if strafed or each.vy == 0.0]
-        possible.sort(key=lambda k: -worth[k])
-        for_now: Twist | None = None
-        for k in possible:
-            command, gains = self._commands[k], worth[k] > standing + GAIN
-            if not gains and (for_now is not None or not vetoed):
+        *scores, stop_score = self._scores(pose).tolist()
+        has_strafed, is_vetoed = self._trail.has_strafed, False
+        candidates = [k for k, each in enumerate(self._commands) if has_strafed or each.vy == 0.0]
+        candidates.sort(key=lambda k: -scores[k])
+        fallback: Twist | None = None
+        for k in candidates:
+            command, is_better = self._commands[k], scores[k] > stop_score + MIN_GAIN_M
+            if not is_better and (fallback is not None or not is_vetoed):
                 break
-            if vetoed and (command.vx > 0.0 or (command.vx == 0.0 and not gains)):
+            if is_vetoed and (command.vx > 0.0 or (command.vx == 0.0 and not is_better)):
                 continue
             blocked = self._blocked(pose, poses_along(pose, command, TIMES), costmap)
-            if blocked.any() and (not gains or for_now is not None or blocked.argmax() <= AT_LEAST):
+            if blocked.any() and (not is_better or fallback is not None or blocked.argmax() <= MIN_FREE_STEPS):
                 continue
-            if self._allowed(command, pose) == STOP:
-                vetoed = True
+            if self._limit_command(command, pose) == STOP:
+                is_vetoed = True
             elif blocked.any():
-                for_now = command
+                fallback = command
             else:
                 return command
-        return for_now
+        return fallback
 
     def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:
         """Return which of the poses (n, 3) collide, unless the robot collided as much on its trail or does so now.
 
-        The robot has passed the trail, so that apparent collisions there by less than a cell are errors of the costmap;
-        deeper ones are obstacles that appeared later.
+        The robot has passed the trail, so that collisions there by less than a cell are errors of the costmap. Deeper
+        collisions are due to obstacles that appeared later.
         """
         blocked: Mask = ~self._footprint.free(costmap, poses)
         if not blocked.any():
             return blocked
         edge = costmap.resolution
-        cells = lethal_near(costmap, pose.x, pose.y, self._footprint.circumscribed + self.speed * AHEAD + edge)
-        known = self._trail.poses[self._ahead()][: max(0, self._trail.known - self._at)]
-        came = self._footprint.gaps(cells, known).min(axis=0, initial=edge)
-        now = self._footprint.gaps(cells, np.array([pose]))[0]
-        least = np.minimum(np.where(came < -edge, edge, came), np.maximum(now, -edge / 2))
-        nearer = self._footprint.gaps(cells, poses) < np.minimum(least - SLACK * edge, edge / math.sqrt(2.0))
-        return np.asarray(blocked & nearer.any(axis=1))
+        cells = lethal_near(costmap, pose.x, pose.y, self._footprint.circumscribed + self.speed * HORIZON_S + edge)
+        known_poses = self._trail.poses[self._window()][: max(0, self._trail.known_count - self._index)]
+        passed = self._footprint.gaps(cells, known_poses).min(axis=0, initial=edge)
+        current = self._footprint.gaps(cells, np.array([pose]))[0]
+        limits = np.minimum(np.where(passed < -edge, edge, passed), np.maximum(current, -edge / 2))
+        is_nearer = self._footprint.gaps(cells, poses) < np.minimum(limits - SLACK_CELLS * edge, edge / math.sqrt(2.0))
+        return np.asarray(blocked & is_nearer.any(axis=1))
 
-    def _worth(self, pose: Pose2) -> Array:
-        """Return the progress (commands + 1,) of each command minus its deviation from the trail; last, of a stop."""
+    def _scores(self, pose: Pose2) -> Array:
+        """Return the scores (commands + 1,), progress minus weighted deviation from the trail; the last for a stop."""
         cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
         ends = np.column_stack((
             pose.x + cosine * self._ends[:, 0] - sine * self._ends[:, 1],
             pose.y + sine * self._ends[:, 0] + cosine * self._ends[:, 1],
             pose.yaw + self._ends[:, 2],
         ))  # fmt: skip
-        ahead = self._ahead()
-        off = self._trail.apart(ends[:, None], self._trail.poses[None, ahead])
-        worth: Array = (self._trail.along[ahead] - OFF * off).max(axis=1)
-        return worth
+        window = self._window()
+        deviation = self._trail.footprint_distance(ends[:, None], self._trail.poses[None, window])
+        scores: Array = (self._trail.along[window] - DEVIATION_WEIGHT * deviation).max(axis=1)
+        return scores
 
 
-def _possible(robot: RobotModel, speed: float) -> list[Twist]:
+def _candidate_commands(robot: RobotModel, speed: float) -> list[Twist]:
     """Return the candidate commands of a robot."""
     commands = list[Twist]()
-    for part, side, rate in product(SPEEDS, SIDEWAYS if robot.max_lateral > 0.0 else (0.0,), RATES):
-        fastest = robot.max_angular
+    for speed_ratio, lateral_ratio, rate in product(
+        SPEED_RATIOS, LATERAL_RATIOS if robot.max_lateral > 0.0 else (0.0,), TURN_RATES
+    ):
+        max_rate = robot.max_angular
         if robot.turning_radius > 0.0:
-            fastest = min(fastest, abs(part) * speed / robot.turning_radius)
-        turn = max(-fastest, min(rate, fastest))
-        commands.append(Twist(part * speed, side * min(speed, robot.max_lateral), turn))
+            max_rate = min(max_rate, abs(speed_ratio) * speed / robot.turning_radius)
+        turn = max(-max_rate, min(rate, max_rate))
+        commands.append(Twist(speed_ratio * speed, lateral_ratio * min(speed, robot.max_lateral), turn))
     return [each for each in dict.fromkeys(commands) if each != STOP]
 
 
-SLOWLY = 1.5
-"""Factor on the time that the distance takes at full speed, before the behavior times out."""
+TIME_ALLOWANCE_RATIO = 1.5
+"""Time after which the behavior fails, relative to the time that the distance takes at full speed."""
 
 
 class Retrace:
@@ -243,30 +247,30 @@ class Retrace:
     def __init__(self, spec: model.Retrace, setting: Setting) -> None:
         """Take the parameters and the setting of the behavior."""
         self._spec, self._footprint = spec, setting.footprint
-        self._back = TrailFollower(setting, spec.backup_speed)
+        self._follower = TrailFollower(setting, spec.backup_speed)
 
     def start(self, pose: Pose2) -> None:
         """Start the behavior at this pose."""
-        self._back.start(pose, max(self._spec.backup_dist, self._spec.retrace_dist))
+        self._follower.start(pose, max(self._spec.backup_dist, self._spec.retrace_dist))
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Return the command, or None when the robot is far enough back or cannot get any further.
+        """Return the command, or None when the robot has driven back far enough or cannot get any further.
 
         Raises BACKUP_COLLISION_AHEAD if the robot cannot move by a single cell, BACKUP_TIMEOUT, or
         BACKUP_INVALID_INPUT.
         """
-        back = self._back
-        if back.speed <= 0.0:
+        follower = self._follower
+        if follower.speed <= 0.0:
             raise NavigationFailure(ErrorCode.BACKUP_INVALID_INPUT, "the robot cannot drive backward")
-        back.locate(pose)
-        if back.driven >= self._spec.retrace_dist:
+        follower.locate(pose)
+        if follower.driven >= self._spec.retrace_dist:
             return None
-        if back.driven >= self._spec.backup_dist and self._may_turn(pose, costmap):
+        if follower.driven >= self._spec.backup_dist and self._may_turn(pose, costmap):
             return None
-        if seconds > max(TIME_ALLOWANCE_S, SLOWLY * self._spec.retrace_dist / back.speed):
+        if seconds > max(TIME_ALLOWANCE_S, TIME_ALLOWANCE_RATIO * self._spec.retrace_dist / follower.speed):
             raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "driving back along the trail took too long")
-        command = back.command(pose, costmap)
-        if command is None and back.moved < costmap.resolution:
+        command = follower.command(pose, costmap)
+        if command is None and follower.footprint_moved < costmap.resolution:
             raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "the trail is blocked")
         return command
 

@@ -8,7 +8,7 @@ import pytest
 from grounds import ROBOT, cheapest, forest, large_maze, maze, pair, rooms, view_of
 
 from simscen.advanced.planners import informed_set, medial_axis_planner, search_regions
-from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner, dear_until
+from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner, costly_distance
 from simscen.advanced.planners.path_refinement import refined
 from simscen.advanced.planners.spec import MedialAxisPlanner as MedialAxisSpec
 from simscen.core.geometry import Pose2
@@ -73,7 +73,7 @@ def test_a_way_that_is_dear_here_and_there_and_else_straight_is_as_good(monkeypa
         rates = TraversalCosts(view, ROBOT, 2.0, True)
         points = medial_axis().plan(view, start, goal, seed).points
         assert rates.along(points[:, :2]) < 1.02 * cheapest(rates, start, goal)
-        dear += dear_until(view, start, goal, ROBOT.circumscribed_radius) > 0.0
+        dear += costly_distance(view, start, goal, ROBOT.circumscribed_radius) > 0.0
     assert 4 <= len(everywhere) <= dear - 4
 
 

@@ -34,52 +34,51 @@ Mask = npt.NDArray[np.bool_]
 
 
 class InformedSet:
-    """Points on near-shortest paths from start to goal; `length` is the approximate length of the shortest in m.
+    """Points on near-shortest paths from start to goal; `length` is the approximate length of the shortest path in m.
 
     A path goes to the 16 nearest neighbors of a block (a king's and a knight's moves in chess), so that its length is
     at most 2.8 % too long.
     """
 
-    def __init__(self, rates: TraversalCosts, start: Point, goal: Point, priced: bool = False) -> None:
-        """Search the shortest paths, or with `priced` the cheapest ones, whose cost is in m of free ground."""
-        size, most = (COST_BLOCK_M, MAX_COST_BLOCKS) if priced else (BLOCK_M, MAX_BLOCKS)
-        widest = max(1, int(2.0 * rates.inscribed / rates.resolution))
-        fewest = min(math.ceil(math.sqrt(rates.height * rates.width / most)), widest)
-        self._factor = max(1, round(size / rates.resolution), fewest)
-        self._size = self._factor * rates.resolution
-        self._origin = rates.origin
-        self._height, self._width = -(-rates.height // self._factor), -(-rates.width // self._factor)
-        ends = [self._index(*start), self._index(*goal)]
-        graph = rates.kept.get((self._factor, priced))
+    def __init__(self, costs: TraversalCosts, start: Point, goal: Point, by_cost: bool = False) -> None:
+        """Search the shortest paths, or if `by_cost` the cheapest ones, whose cost is in m of free space."""
+        size, max_blocks = (COST_BLOCK_M, MAX_COST_BLOCKS) if by_cost else (BLOCK_M, MAX_BLOCKS)
+        max_factor = max(1, int(2.0 * costs.inscribed / costs.resolution))
+        min_factor = min(math.ceil(math.sqrt(costs.height * costs.width / max_blocks)), max_factor)
+        self._factor = max(1, round(size / costs.resolution), min_factor)
+        self._size = self._factor * costs.resolution
+        self._origin = costs.origin
+        self._height, self._width = -(-costs.height // self._factor), -(-costs.width // self._factor)
+        end_blocks = [self._index(*start), self._index(*goal)]
+        graph = costs.cache.get((self._factor, by_cost))
         if graph is None:
-            rates.kept[self._factor, priced] = graph = _graph(rates, self._factor, priced)
-        lengths, self._before = dijkstra(graph, directed=False, indices=ends, return_predecessors=True)
-        through: Array = lengths * self._size
-        self._along, self._sum, self._end = through[0], through[0] + through[1], ends[1]
-        self.length = float(through[0][ends[1]])
-        self._inside = b"\1" * len(self._sum)
+            costs.cache[self._factor, by_cost] = graph = _graph(costs, self._factor, by_cost)
+        lengths, self._before = dijkstra(graph, directed=False, indices=end_blocks, return_predecessors=True)
+        distances: Array = lengths * self._size
+        self._from_start, self._through, self._end = distances[0], distances[0] + distances[1], end_blocks[1]
+        self.length = float(distances[0][end_blocks[1]])
+        self._inside = b"\1" * len(self._through)
 
-    def narrow(self, slack: float, leg: tuple[float, float] = (0.0, math.inf)) -> None:
-        """Keep only blocks on paths that are longer than the shortest by at most the ratio `slack` and a block's
-        diagonal.
+    def narrow(self, slack: float, section: tuple[float, float] = (0.0, math.inf)) -> None:
+        """Keep only blocks on paths longer than the shortest by at most the ratio `slack` and two block diagonals.
 
-        `leg` is the range of distances in m along such a path to keep.
+        `section` is the range of distances in m along such a path to keep.
         """
-        more = 2 * math.sqrt(2.0) * self._size
-        inside = self._sum <= self.length * (1.0 + slack) + more
-        low, high = leg
+        tolerance = 2 * math.sqrt(2.0) * self._size
+        is_inside = self._through <= self.length * (1.0 + slack) + tolerance
+        low, high = section
         if low > 0.0 or high < self.length:
-            inside &= (self._along >= low - more) & (self._along <= high * (1.0 + slack) + more)
-        self._inside = inside.tobytes()
+            is_inside &= (self._from_start >= low - tolerance) & (self._from_start <= high * (1.0 + slack) + tolerance)
+        self._inside = is_inside.tobytes()
 
-    def holds(self, points: Array) -> Mask:
+    def contains_points(self, points: Array) -> Mask:
         """Return which of the points (n, 2) are in the set."""
-        held: Mask = np.frombuffer(self._inside, dtype=bool)[self._blocks(points)]
-        return held
+        inside: Mask = np.frombuffer(self._inside, dtype=bool)[self._blocks(points)]
+        return inside
 
-    def through(self, points: Array) -> Array:
+    def lengths_through(self, points: Array) -> Array:
         """Return the lengths, or the costs, of the shortest paths through each of the points (n, 2)."""
-        return np.asarray(self._sum[self._blocks(points)])
+        return np.asarray(self._through[self._blocks(points)])
 
     def _blocks(self, points: Array) -> npt.NDArray[np.int64]:
         columns, rows = ((points - self._origin) / self._size).astype(np.int64).T
@@ -93,27 +92,27 @@ class InformedSet:
         blocks = [int(self._before[0, self._end])]
         while blocks[-1] >= 0:
             blocks.append(int(self._before[0, blocks[-1]]))
-        between = np.array(blocks[:-2], dtype=np.int64)
+        inner = np.array(blocks[:-2], dtype=np.int64)
         rows, columns = cells_with_most_clearance(
-            costmap.distance, np.column_stack(np.divmod(between, self._width)), self._factor
+            costmap.distance, np.column_stack(np.divmod(inner, self._width)), self._factor
         )
-        every = max(1, round(PATH_SPACING_M / self._size))
-        kept = (costmap.distance[rows, columns] < ample_clearance) | (np.arange(len(rows)) % every == 0)
-        places: Array = (np.column_stack((columns, rows))[kept] + 0.5) * costmap.resolution + self._origin
-        return places
+        stride = max(1, round(PATH_SPACING_M / self._size))
+        chosen = (costmap.distance[rows, columns] < ample_clearance) | (np.arange(len(rows)) % stride == 0)
+        points: Array = (np.column_stack((columns, rows))[chosen] + 0.5) * costmap.resolution + self._origin
+        return points
 
-    def stops(self, costmap: CostmapView) -> list[tuple[Point, float]]:
+    def waypoints(self, costmap: CostmapView) -> list[tuple[Point, float]]:
         """Return points that divide a near-shortest path, at most MAX_LEG_M apart, with their distances along it.
 
         A tree planner needs far fewer samples for several short legs than for one long path through many doors.
         """
         legs = math.ceil(self.length / MAX_LEG_M) if math.isfinite(self.length) else 1
-        return [self._point_with_most_clearance(costmap, self.length * leg / legs) for leg in range(1, legs)]
+        return [self._point_with_most_clearance(costmap, self.length * number / legs) for number in range(1, legs)]
 
     def _point_with_most_clearance(self, costmap: CostmapView, along: float) -> tuple[Point, float]:
         """Return the point with the most clearance at the distance `along` of the shortest paths, and `along`."""
-        on_way = self._sum <= self.length + 2 * self._size
-        blocks = np.flatnonzero(on_way & (np.abs(self._along - along) <= self._size)).tolist()
+        near_shortest = self._through <= self.length + 2 * self._size
+        blocks = np.flatnonzero(near_shortest & (np.abs(self._from_start - along) <= self._size)).tolist()
         cells = [self._best_cell(costmap, *divmod(block, self._width)) for block in blocks]
         _, row, column = max(cells)
         x = self._origin[0] + (column + 0.5) * costmap.resolution
@@ -136,7 +135,7 @@ class InformedSet:
             float(y + (rows.max() + 1) * size),
         )
 
-    def has(self, x: float, y: float) -> bool:
+    def contains(self, x: float, y: float) -> bool:
         """Return whether a point is in the set."""
         return bool(self._inside[self._index(x, y)])
 
@@ -146,8 +145,8 @@ class InformedSet:
         return int(row * self._width + column)
 
 
-def _blocks_of(free: Mask, factor: int) -> Mask:
-    """Return the cells as blocks (rows, columns, factor, factor); the last blocks are filled with occupied cells."""
+def _as_blocks(free: Mask, factor: int) -> Mask:
+    """Return the cells as blocks (rows, columns, factor, factor); the last blocks are filled up with occupied cells."""
     height, width = (-(-side // factor) * factor for side in free.shape)
     padded = np.zeros((height, width), dtype=bool)
     padded[: free.shape[0], : free.shape[1]] = free
@@ -187,58 +186,58 @@ def _shifted(mask: Mask, rows: int, columns: int) -> Mask:
     return moved
 
 
-def _graph(rates: TraversalCosts, factor: int, priced: bool) -> csr_matrix:
-    """Return the edges between blocks, with the length of the move in blocks, times the mean cost if `priced`."""
-    blocks = _blocks_of(rates.free, factor)
+def _graph(costs: TraversalCosts, factor: int, by_cost: bool) -> csr_matrix:
+    """Return the edges between blocks, with the length of the move in blocks, times the mean cost if `by_cost`."""
+    blocks = _as_blocks(costs.free, factor)
     height, width = blocks.shape[:2]
     steps = _steps(blocks)
     moves = sorted(steps, key=lambda move: move[0] * width + move[1])
-    onward = np.array([rows * width + columns for rows, columns in moves])
+    offsets = np.array([rows * width + columns for rows, columns in moves])
     lengths = np.array([math.hypot(*move) for move in moves])
     possible = np.stack([steps[move].reshape(-1) for move in moves], axis=1)
-    at, move = possible.nonzero()  # block by block, as the matrix has them
-    to = at + onward[move]
-    if priced:
-        price = _block_costs(rates, factor)
-        length = (0.5 * lengths).astype(np.float32)[move] * (price[at] + price[to])
+    from_block, move = possible.nonzero()  # in the row order of the matrix
+    to_block = from_block + offsets[move]
+    if by_cost:
+        costs_per_meter = _block_costs(costs, factor)
+        length = (0.5 * lengths).astype(np.float32)[move] * (costs_per_meter[from_block] + costs_per_meter[to_block])
     else:
         length = lengths[move]
-    begin = np.concatenate(([0], possible.sum(axis=1).cumsum()))
-    return csr_matrix((length, to, begin), shape=(height * width, height * width))
+    row_starts = np.concatenate(([0], possible.sum(axis=1).cumsum()))
+    return csr_matrix((length, to_block, row_starts), shape=(height * width, height * width))
 
 
-def _block_costs(rates: TraversalCosts, factor: int) -> Array:
+def _block_costs(costs: TraversalCosts, factor: int) -> Array:
     """Return the cost per m of each block, flat: the mean of its cheapest cell and its average over free cells.
 
-    The cheapest cell alone ignores expensive cells, and the average alone makes a gap more expensive than its middle.
+    The cheapest cell alone ignores expensive cells, and the average alone makes a gap more expensive than its center.
     """
-    finite = np.isfinite(rates.rates)
-    least = pool_blocks(rates.rates, factor, np.minimum, np.inf)
-    total = pool_blocks(np.where(finite, rates.rates, np.float32(0.0)), factor, np.add, 0.0)
-    prices: Array = 0.5 * (least + total / np.maximum(pool_blocks(finite, factor, np.add, 0.0), 1.0))
-    return prices.reshape(-1)
+    finite = np.isfinite(costs.rates)
+    minimum = pool_blocks(costs.rates, factor, np.minimum, np.inf)
+    total = pool_blocks(np.where(finite, costs.rates, np.float32(0.0)), factor, np.add, 0.0)
+    mean: Array = 0.5 * (minimum + total / np.maximum(pool_blocks(finite, factor, np.add, 0.0), 1.0))
+    return mean.reshape(-1)
 
 
 Numbers = npt.NDArray[np.float32]
 
 
-def pool_blocks(cells: Numbers | npt.NDArray[np.bool_], factor: int, choice: np.ufunc, beyond: float) -> Numbers:
-    """Reduce each block of `factor` x `factor` cells by `choice`; the last blocks are filled with `beyond`."""
+def pool_blocks(cells: Numbers | npt.NDArray[np.bool_], factor: int, ufunc: np.ufunc, padding: float) -> Numbers:
+    """Reduce each block of `factor` x `factor` cells by a ufunc; the last blocks are filled up with `padding`."""
     height, width = (-(-side // factor) * factor for side in cells.shape)
-    padded = np.full((height, width), beyond, dtype=np.float32)
+    padded = np.full((height, width), padding, dtype=np.float32)
     padded[: cells.shape[0], : cells.shape[1]] = cells
     parts = [padded[row::factor, column::factor] for row in range(factor) for column in range(factor)]
-    left: Numbers = reduce(choice, parts)
-    return left
+    reduced: Numbers = reduce(ufunc, parts)
+    return reduced
 
 
 def cells_with_most_clearance(
-    room: Numbers, blocks: npt.NDArray[np.int64], factor: int
+    clearance: Numbers, blocks: npt.NDArray[np.int64], factor: int
 ) -> tuple[npt.NDArray[np.int64], ...]:
     """Return row and column of the cell with the most clearance in each of the blocks (n, 2)."""
     inner = np.arange(factor)
-    rows = np.minimum(blocks[:, 0, None] * factor + np.repeat(inner, factor), room.shape[0] - 1)
-    columns = np.minimum(blocks[:, 1, None] * factor + np.tile(inner, factor), room.shape[1] - 1)
-    best = room[rows, columns].argmax(axis=1)
-    which = np.arange(len(blocks))
-    return rows[which, best], columns[which, best]
+    rows = np.minimum(blocks[:, 0, None] * factor + np.repeat(inner, factor), clearance.shape[0] - 1)
+    columns = np.minimum(blocks[:, 1, None] * factor + np.tile(inner, factor), clearance.shape[1] - 1)
+    best = clearance[rows, columns].argmax(axis=1)
+    indices = np.arange(len(blocks))
+    return rows[indices, best], columns[indices, best]

@@ -45,17 +45,19 @@ class MedialAxisPlanner:
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """Return a path of poses in the map frame, 5 cm apart. Raises NavigationFailure if there is none."""
         radius = self._robot.circumscribed_radius
-        points = straight_on(costmap, start, goal, radius, lambda part, there: self._past(part, start, there, seed))
+        points = straight_path(
+            costmap, start, goal, radius, lambda part, part_goal: self._path_on_part(part, start, part_goal, seed)
+        )
         if points is not None:
             return Path(with_headings(spaced(points, SPACING_M), goal))
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         costs = self._make_costs(costmap)
-        self._costs = costs.after(self._costs) if costmap.costs.size <= MAX_CACHED_CELLS else None
+        self._costs = costs.reusing_cache(self._costs) if costmap.costs.size <= MAX_CACHED_CELLS else None
         return Path(with_headings(self._points(costs, start, goal, seed), goal))
 
-    def _past(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> tuple[Array, float]:
+    def _path_on_part(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> tuple[Array, float]:
         """Return a path (n, 2) on a part of the costmap, and its cost."""
         costs = self._make_costs(costmap)
         points = self._points(costs, start, goal, seed)
@@ -81,7 +83,7 @@ class MedialAxisPlanner:
                         break
                     points += found[1:]
                 else:
-                    path = _finished(costs, np.array(points))
+                    path = _postprocessed(costs, np.array(points))
                     if path is not None:
                         return path
                     was_rejected = True
@@ -94,8 +96,8 @@ class MedialAxisPlanner:
         return leg.search(seed, self._spec.max_iterations).solve(simplify=False)
 
 
-def _finished(costs: TraversalCosts, points: Array) -> Array | None:
-    """Return the path refined and led around corners; None if it passes a blocked cell between two checks."""
+def _postprocessed(costs: TraversalCosts, points: Array) -> Array | None:
+    """Return the path, refined and led around corners; None if it passes a blocked cell between two checks."""
     path = avoid_cell_corners(costs, spaced(refined(costs, points), SPACING_M))
     return path if path is not None else avoid_cell_corners(costs, spaced(points, SPACING_M))
 
@@ -116,75 +118,80 @@ Cars need wider sets than discs because they swing out.
 
 
 class ConfinedPosePlanner(PosePlanner):
-    """Plans over poses in the informed set: a tree cannot lose itself in a wrong room."""
+    """Plans over poses in the informed set, so that the tree does not grow into wrong rooms."""
 
-    def _attempts(self, costs: TraversalCosts, ends: Endpoints, begin: Pose2, goal: Pose2) -> Iterator[Attempt]:
-        """Yield the attempts in turn, in wider and wider informed sets."""
-        informed = InformedSet(costs, (begin.x, begin.y), (goal.x, goal.y))
-        for slack, clearance, share, spacing in ATTEMPTS:
+    def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
+        """Yield the attempts, in increasingly wide informed sets."""
+        informed = InformedSet(costs, (free_start.x, free_start.y), (goal.x, goal.y))
+        for slack, clearance, fraction, spacing in ATTEMPTS:
             informed.narrow(slack)
-            yield Attempt(informed.bounds(), informed.has, clearance, share, spacing)
+            yield Attempt(informed.bounds(), informed.contains, clearance, fraction, spacing)
 
 
-MOST_DEAR = 0.5
-"""Of the way, what may be searched for: of a longer part that is no less than of all."""
-BEYOND, BESIDE = 2.0, 2.0
-"""Meters behind what is dear of the straight way, and on all sides of both ends, in which the way past is sought."""
-HARDLY_DEARER = 1.01
-"""How much more than its length (ratio) the whole may cost then. Plans are promised within 5 % of the optimum."""
-Past = Callable[[CostmapView, Pose2], tuple[Array, float]]
-"""From a part of a costmap and a pose on it to a way there (n, 2), and its cost. Raises NavigationFailure."""
+MAX_COSTLY_RATIO = 0.5
+"""Maximum share of the distance to the goal that is searched separately. A larger part does not save time."""
+MARGIN_BEHIND_M, MARGIN_AROUND_M = 2.0, 2.0
+"""Margins of the part of the costmap that is searched: behind the costly cells, and around both ends."""
+MAX_COST_RATIO = 1.01
+"""Maximum ratio of the cost of the path to the straight distance. Plans are within 5 % of the optimum."""
+PlanPart = Callable[[CostmapView, Pose2], tuple[Array, float]]
+"""Returns a path (n, 2) to a pose on a part of the costmap, and its cost. Raises NavigationFailure."""
 
 
-def straight_on(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float, past: Past) -> Array | None:
-    """Points (n, 2) from start to goal, straight on or `past` what is dear before; None where that may be too dear."""
+def straight_path(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float, plan_part: PlanPart) -> Array | None:
+    """Return a straight path (n, 2), with a detour by `plan_part` around costly cells near the start.
+
+    None if such a path may cost too much.
+    """
     length = start.distance(goal)
-    dear = dear_until(costmap, start, goal, radius)
-    if dear == 0.0:
+    costly = costly_distance(costmap, start, goal, radius)
+    if costly == 0.0:
         return np.array((start[:2], goal[:2]))
-    if dear + BEYOND > MOST_DEAR * length:
+    if costly + MARGIN_BEHIND_M > MAX_COSTLY_RATIO * length:
         return None
-    share = (dear + BEYOND) / length
-    there = Pose2(start.x + share * (goal.x - start.x), start.y + share * (goal.y - start.y))
-    part = window(costmap, start, there, BESIDE)
+    ratio = (costly + MARGIN_BEHIND_M) / length
+    part_goal = Pose2(start.x + ratio * (goal.x - start.x), start.y + ratio * (goal.y - start.y))
+    part = window(costmap, start, part_goal, MARGIN_AROUND_M)
     if part is None:
         return None
     try:
-        points, cost = past(part, there)
+        points, cost = plan_part(part, part_goal)
     except NavigationFailure:
         return None
-    hardly = cost + (1.0 - share) * length <= HARDLY_DEARER * length
-    return np.vstack((points, goal[:2])) if hardly and np.allclose(points[-1], there[:2]) else None
+    is_cheap = cost + (1.0 - ratio) * length <= MAX_COST_RATIO * length
+    return np.vstack((points, goal[:2])) if is_cheap and np.allclose(points[-1], part_goal[:2]) else None
 
 
-def dear_until(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float) -> float:
-    """Meters from the start up to which something that a robot of this radius passes straight to the goal costs more
-    than its length: 0 where nothing does, inf where it leads off the costmap.
+def costly_distance(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float) -> float:
+    """Return the distance in m from the start to the end of the last costly cell on the straight line to the goal.
+
+    Cells are costly if they are not free or within `radius` m of an obstacle. 0 without such cells, inf if the line
+    leaves the costmap.
     """
-    columns, rows, left = _passed(costmap, start, goal)
+    columns, rows, leaving_ratios = _cells_on_line(costmap, start, goal)
     height, width = costmap.costs.shape
     if min(columns.min(), rows.min()) < 0 or columns.max() >= width or rows.max() >= height:
         return math.inf
-    dear = (costmap.costs[rows, columns] != 0) | (costmap.distance[rows, columns] <= radius)
-    return float(left[dear].max(initial=0.0)) * start.distance(goal)
+    costly = (costmap.costs[rows, columns] != 0) | (costmap.distance[rows, columns] <= radius)
+    return float(leaving_ratios[costly].max(initial=0.0)) * start.distance(goal)
 
 
-def _passed(
+def _cells_on_line(
     costmap: CostmapView, start: Pose2, goal: Pose2
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.float64]]:
-    """Column and row of each cell that the straight way leads through, and the share of the way at which it leaves it.
+    """Return column and row of each cell on the straight line, and the ratio of the line at which it leaves the cell.
 
-    Between two lines of the grid it is in one cell: that of the middle between where it crosses them.
+    Between two crossings of grid lines, the line is in the cell that contains the center between them.
     """
-    crossed = [np.array((0.0, 1.0))]
-    begin, onward = np.empty(2), np.empty(2)
-    for axis, (here, there) in enumerate(((start.x, goal.x), (start.y, goal.y))):
-        begin[axis] = (here - costmap.origin[axis]) / costmap.resolution
-        onward[axis] = (there - here) / costmap.resolution
-        first, last = sorted((begin[axis], begin[axis] + onward[axis]))
+    crossings = [np.array((0.0, 1.0))]
+    origin, direction = np.empty(2), np.empty(2)
+    for axis, (start_coordinate, end) in enumerate(((start.x, goal.x), (start.y, goal.y))):
+        origin[axis] = (start_coordinate - costmap.origin[axis]) / costmap.resolution
+        direction[axis] = (end - start_coordinate) / costmap.resolution
+        first, last = sorted((origin[axis], origin[axis] + direction[axis]))
         if last > first:
-            crossed.append((np.arange(math.ceil(first), math.floor(last) + 1) - begin[axis]) / onward[axis])
-    at = np.sort(np.concatenate(crossed))
-    middles = begin[:, None] + onward[:, None] * (0.5 * (at[1:] + at[:-1]))
-    columns, rows = np.floor(middles).astype(np.int64)
-    return columns, rows, at[1:]
+            crossings.append((np.arange(math.ceil(first), math.floor(last) + 1) - origin[axis]) / direction[axis])
+    ratios = np.sort(np.concatenate(crossings))
+    centers = origin[:, None] + direction[:, None] * (0.5 * (ratios[1:] + ratios[:-1]))
+    columns, rows = np.floor(centers).astype(np.int64)
+    return columns, rows, ratios[1:]

@@ -16,85 +16,88 @@ from simscen.stack.planners.path_postprocessing import smoothed
 from simscen.stack.planners.traversal_costs import SAMPLE_SPACING_CELLS, TraversalCosts
 
 ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
-"""Rounds of refinement: distance between stations in m, maximum offset in m, and number of points across."""
+"""Rounds of refinement: distance between stations in m, maximum offset in m, and number of points per station."""
 MIN_SEGMENTS = 2
 """Minimum number of segments, so that there is a station to move."""
 Costs = npt.NDArray[np.float32]
 
 
-def refined(rates: TraversalCosts, points: Array) -> Array:
+def refined(costs: TraversalCosts, points: Array) -> Array:
     """Return the cheapest path near a path (n, 2) with the same ends, smoothed."""
-    points = _with_shortcuts(rates, points)
-    cost = rates.along(points)
-    for station, side, across in ROUNDS:
-        for stride in (rates.stride, SAMPLE_SPACING_CELLS * rates.resolution):
+    points = _with_shortcuts(costs, points)
+    cost = costs.along(points)
+    for spacing, max_offset, count in ROUNDS:
+        for stride in (costs.stride, SAMPLE_SPACING_CELLS * costs.resolution):
             other = _cheapest_through(
-                rates, resample_polyline(points, station, MIN_SEGMENTS), np.linspace(-side, side, across), stride
+                costs,
+                resample_polyline(points, spacing, MIN_SEGMENTS),
+                np.linspace(-max_offset, max_offset, count),
+                stride,
             )
-            if math.isfinite(moved := rates.along(other)):
+            if math.isfinite(new_cost := costs.along(other)):
                 break
-        if moved < cost:
-            points, cost = other, moved
-    return smoothed(rates, points)
+        if new_cost < cost:
+            points, cost = other, new_cost
+    return smoothed(costs, points)
 
 
-def _with_shortcuts(rates: TraversalCosts, points: Array) -> Array:
+def _with_shortcuts(costs: TraversalCosts, points: Array) -> Array:
     """Return the path with shortcuts: straight lines to the farthest point to which they are not more expensive."""
-    places = resample_polyline(points, ROUNDS[0][0], MIN_SEGMENTS)
-    rows = places.tolist()
+    resampled = resample_polyline(points, ROUNDS[0][0], MIN_SEGMENTS)
+    rows = resampled.tolist()
     cost = [0.0]
     for (ax, ay), (bx, by) in pairwise(rows):
-        cost.append(cost[-1] + rates.between(ax, ay, bx, by))
+        cost.append(cost[-1] + costs.between(ax, ay, bx, by))
     if not math.isfinite(cost[-1]):
         return points
-    kept, last = [0], len(rows) - 1
-    while kept[-1] < last:
-        here = kept[-1]
-        near, step = here + 1, 2
-        while near < last:
-            far = min(here + step, last)
-            if rates.between(*rows[here], *rows[far]) > cost[far] - cost[here] + 1e-9:
+    corners, last = [0], len(rows) - 1
+    while corners[-1] < last:
+        current = corners[-1]
+        reachable, step = current + 1, 2
+        while reachable < last:
+            candidate = min(current + step, last)
+            if costs.between(*rows[current], *rows[candidate]) > cost[candidate] - cost[current] + 1e-9:
                 break
-            near, step = far, 2 * step
-        kept.append(near)
-    return places[kept]
+            reachable, step = candidate, 2 * step
+        corners.append(reachable)
+    return resampled[corners]
 
 
-def _cheapest_through(rates: TraversalCosts, stations: Array, offsets: Array, stride: float) -> Array:
+def _cheapest_through(costs: TraversalCosts, stations: Array, offsets: Array, stride: float) -> Array:
     """Return the cheapest path through points at `offsets` m to the left of each station except the first and last.
 
     Costs are sampled every `stride` m.
     """
-    ahead = np.empty_like(stations)
-    ahead[1:-1] = stations[2:] - stations[:-2]
-    ahead[0], ahead[-1] = stations[1] - stations[0], stations[-1] - stations[-2]
-    ahead /= np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)[:, None]
-    left = np.column_stack((-ahead[:, 1], ahead[:, 0]))
-    costs = _step_costs(rates, stations[:, None] + offsets[:, None] * left[:, None], stride)
+    direction = np.empty_like(stations)
+    direction[1:-1] = stations[2:] - stations[:-2]
+    direction[0], direction[-1] = stations[1] - stations[0], stations[-1] - stations[-2]
+    direction /= np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-9)[:, None]
+    left = np.column_stack((-direction[:, 1], direction[:, 0]))
+    segment_costs = _step_costs(costs, stations[:, None] + offsets[:, None] * left[:, None], stride)
     middle = len(offsets) // 2
-    least = np.full(len(offsets), np.inf, dtype=np.float32)
-    least[middle] = 0.0
-    came, columns = [], np.arange(len(offsets))
-    for step in costs:
-        total = least[:, None] + step
-        came.append(total.argmin(axis=0))
-        least = total[came[-1], columns]
+    lowest = np.full(len(offsets), np.inf, dtype=np.float32)
+    lowest[middle] = 0.0
+    predecessors, columns = [], np.arange(len(offsets))
+    for step in segment_costs:
+        total = lowest[:, None] + step
+        predecessors.append(total.argmin(axis=0))
+        lowest = total[predecessors[-1], columns]
     chosen = [middle]
-    for back in came[::-1]:
-        chosen.append(int(back[chosen[-1]]))
+    for predecessor in predecessors[::-1]:
+        chosen.append(int(predecessor[chosen[-1]]))
     return stations + offsets[chosen[::-1], None] * left
 
 
-def _step_costs(rates: TraversalCosts, points: Array, stride: float) -> Costs:
+def _step_costs(costs: TraversalCosts, points: Array, stride: float) -> Costs:
     """Return the costs (n - 1, k, k) from each point of a station to each of the next; `points` (n, k, 2)."""
-    before = ((points[:-1] - rates.origin) / rates.resolution).astype(np.float32)[:, :, None]
-    step = ((points[1:] - rates.origin) / rates.resolution).astype(np.float32)[:, None] - before
+    before = ((points[:-1] - costs.origin) / costs.resolution).astype(np.float32)[:, :, None]
+    step = ((points[1:] - costs.origin) / costs.resolution).astype(np.float32)[:, None] - before
     samples = math.ceil(float(np.hypot(*(points[1:, 0] - points[:-1, 0]).T).max()) / stride)
-    flat, total = rates.rates.reshape(-1), np.zeros(step.shape[:-1], dtype=np.float32)
+    flat, total = costs.rates.reshape(-1), np.zeros(step.shape[:-1], dtype=np.float32)
     for sample in range(samples):
-        at = before + np.float32((sample + 0.5) / samples) * step
-        columns = np.clip(at[..., 0], 0, rates.width - 1).astype(np.int32)
-        total += flat[np.clip(at[..., 1], 0, rates.height - 1).astype(np.int32) * rates.width + columns]
-    lengths = np.sqrt(step[..., 0] ** 2 + step[..., 1] ** 2) * np.float32(rates.resolution / samples)
-    costs: Costs = total * lengths
-    return costs
+        points_between = before + np.float32((sample + 0.5) / samples) * step
+        columns = np.clip(points_between[..., 0], 0, costs.width - 1).astype(np.int32)
+        total += flat[np.clip(points_between[..., 1], 0, costs.height - 1).astype(np.int32) * costs.width + columns]
+    lengths = np.sqrt(step[..., 0] ** 2 + step[..., 1] ** 2) * np.float32(costs.resolution / samples)
+    segment_costs: Costs = total * lengths
+    return segment_costs

@@ -16,17 +16,17 @@ from simscen.stack.planners.ompl_search import Motion, OmplSearch, Problem, Stat
 from simscen.stack.planners.traversal_costs import TraversalCosts
 
 DENSITIES = (1, 2, 4, 8)
-"""Samples per meter of successive searches, as multiples of the usual number."""
+"""Sample densities of successive searches, relative to the usual density."""
 CORRIDOR_SLACKS = (0.05, 0.15, 1.0)
-"""How much longer than the shortest path of the coarse grid a path in the corridor may be, as a ratio."""
+"""Ratio by which paths in the corridor may be longer than the shortest path over the coarse grid."""
 COST_SLACK = 0.15
-"""How much more than the cheapest path of the coarse grid a path may cost to be searched; the grid errs by percents."""
+"""Ratio by which paths in the first search may cost more than the cheapest path over the coarse grid."""
 MAX_SAMPLES = 3000
-"""If there are more samples, only those on the cheapest paths are used. BIT* takes some ten iterations for each."""
+"""Maximum number of samples, those on the cheapest paths. BIT* takes about ten iterations for each."""
 REACH_M, FAR_REACH_M = 1.8, 2.3
 """Distance up to which samples are connected: with the path of the coarse grid among them, and without."""
 AMPLE_CLEARANCE_M = 0.15
-"""Clearance beyond the robot's radius that leaves room for a straight motion between samples."""
+"""Clearance beyond the robot's radius that suffices for straight motions between samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +47,11 @@ class Leg:
 def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iterator[Leg]]:
     """Yield searches, each as its successive legs.
 
-    The first one samples the medial axis, and thinly the open, where a path can pass that costs little more than the
-    cheapest one over the coarse grid. Then follow, if there were too many samples, the corridor, and at last samples
-    everywhere, more and more of them.
+    The first one samples the medial axis, and sparsely the open space, near the cheapest path over the coarse grid. If
+    there were too many samples, searches in corridors follow. The last ones sample everywhere, with increasing density.
     """
     problem, samples = whole_problem(costs, ends), medial_axis_samples(costs.costmap, ends.reachable, seed)
-    yield iter((Leg(problem, _where_cheap(costs, ends, samples), REACH_M),))
+    yield iter((Leg(problem, _cheap_samples(costs, ends, samples), REACH_M),))
     if len(samples) > MAX_SAMPLES:
         informed = InformedSet(costs, ends.start, ends.goal)
         for slack in CORRIDOR_SLACKS:
@@ -62,15 +61,15 @@ def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iter
         yield iter((Leg(problem, samples, FAR_REACH_M / density),))
 
 
-def _where_cheap(costs: TraversalCosts, ends: Endpoints, samples: Array) -> Array:
-    """Return the samples on paths that cost little more than the cheapest over the coarse grid, and points of that."""
-    informed = InformedSet(costs, ends.start, ends.goal, priced=True)
+def _cheap_samples(costs: TraversalCosts, ends: Endpoints, samples: Array) -> Array:
+    """Return the samples on near-cheapest paths over the coarse grid, and the points of the cheapest path."""
+    informed = InformedSet(costs, ends.start, ends.goal, by_cost=True)
     informed.narrow(COST_SLACK)
-    held = samples[informed.holds(samples)]
-    if len(held) > MAX_SAMPLES:
-        held = held[np.argsort(informed.through(held), kind="stable")[:MAX_SAMPLES]]
+    chosen = samples[informed.contains_points(samples)]
+    if len(chosen) > MAX_SAMPLES:
+        chosen = chosen[np.argsort(informed.lengths_through(chosen), kind="stable")[:MAX_SAMPLES]]
     path = informed.path(costs.costmap, costs.inscribed + AMPLE_CLEARANCE_M)
-    return np.vstack((held, path[np.isfinite(costs.at(path))]))
+    return np.vstack((chosen, path[np.isfinite(costs.at(path))]))
 
 
 def _corridor_legs(costs: TraversalCosts, ends: Endpoints, informed: InformedSet, slack: float) -> Iterator[Leg]:
@@ -78,31 +77,31 @@ def _corridor_legs(costs: TraversalCosts, ends: Endpoints, informed: InformedSet
 
     A leg must be solved before the next one is taken, because the corridor is narrowed to each leg in turn.
     """
-    stops = informed.stops(costs.costmap) if slack < 1.0 else []
-    here, before = ends.start, 0.0
-    for stop, along in [*stops, (ends.goal, np.inf)]:
-        informed.narrow(slack, (before, along))
-        yield Leg(Problem(here, stop, informed.bounds(), _confined(costs.between, informed)))
-        here, before = stop, along
+    waypoints = informed.waypoints(costs.costmap) if slack < 1.0 else []
+    leg_start, distance_before = ends.start, 0.0
+    for waypoint, along in [*waypoints, (ends.goal, np.inf)]:
+        informed.narrow(slack, (distance_before, along))
+        yield Leg(Problem(leg_start, waypoint, informed.bounds(), _motion_within(costs.between, informed)))
+        leg_start, distance_before = waypoint, along
 
 
-def _confined(motion: Motion, informed: InformedSet) -> Motion:
-    """Return the cost of a motion, inf outside the informed set."""
-    has = informed.has
+def _motion_within(motion: Motion, informed: InformedSet) -> Motion:
+    """Return the cost function of motions with the value inf outside the informed set."""
+    contains = informed.contains
 
-    def within(ax: float, ay: float, bx: float, by: float) -> float:
-        inside = has(0.5 * (ax + bx), 0.5 * (ay + by)) and has(bx, by) and has(ax, ay)
+    def confined_motion(ax: float, ay: float, bx: float, by: float) -> float:
+        inside = contains(0.5 * (ax + bx), 0.5 * (ay + by)) and contains(bx, by) and contains(ax, ay)
         return motion(ax, ay, bx, by) if inside else np.inf
 
-    return within
+    return confined_motion
 
 
 CHECKS_BEFORE_FIRST_BATCH = 4
-"""Evaluations of the termination condition by BIT* before it draws its first batch, and one more."""
+"""Evaluations of the termination condition by BIT* until after it has drawn its first batch."""
 
 
 class _SampledValidity(StateValidity):
-    """Validity of a state that also moves each state that OMPL draws to the next of the samples.
+    """Validity check that also replaces each state that OMPL draws by the next of the samples.
 
     OMPL's Python bindings (2.0.1) cannot give a planner a sampler of states. BIT* checks the validity of each state
     that it has drawn before it uses the state, and continues with the moved one.
@@ -111,13 +110,13 @@ class _SampledValidity(StateValidity):
     def __init__(self, problem: Problem, samples: Array) -> None:
         super().__init__(problem.motion)
         self._ends = (problem.start, problem.goal)
-        self._left: Iterator[list[float]] = iter(samples.tolist())
+        self._remaining: Iterator[list[float]] = iter(samples.tolist())
 
     def __call__(self, state: Any) -> bool:
-        """Return whether a state is valid: a state that is drawn after the last sample is not."""
+        """Return whether a state is valid. A state that is drawn after the last sample is not."""
         if (state[0], state[1]) in self._ends:
             return super().__call__(state)
-        sample = next(self._left, None)
+        sample = next(self._remaining, None)
         if sample is None:
             return False
         state[0], state[1] = sample
@@ -143,14 +142,14 @@ class SampledSearch(OmplSearch):
 
     def _make_termination(self, planner: Any) -> Termination:
         """Stop when BIT* draws its second batch, which is made small during the first."""
-        batches, left = planner.numBatches, self.max_iterations
+        batches, remaining = planner.numBatches, self.max_iterations
 
         def should_stop() -> bool:
-            nonlocal left
-            left -= 1
-            if left == self.max_iterations - CHECKS_BEFORE_FIRST_BATCH:
+            nonlocal remaining
+            remaining -= 1
+            if remaining == self.max_iterations - CHECKS_BEFORE_FIRST_BATCH:
                 planner.setSamplesPerBatch(1)
-            return left < 0 or batches() > 1
+            return remaining < 0 or batches() > 1
 
         return should_stop
 

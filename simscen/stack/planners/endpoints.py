@@ -15,14 +15,14 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import NavigationFailure
 
 MAX_ESCAPE_M = 0.5
-"""Distance that a robot too near to an obstacle may drive to the start of a plan."""
+"""Distance that a robot too close to an obstacle may drive to the start of a plan."""
 
 
 @dataclass(frozen=True, eq=False)
 class Endpoints:
-    """Where the search begins and ends; they differ from what was asked where the robot could not stand there.
+    """Start and goal of a search, moved to free cells where necessary.
 
-    `reachable` (height, width) are the cells that a way joins with the start.
+    `reachable` (height, width) marks the cells that are connected with the start.
     """
 
     start: tuple[float, float]
@@ -30,70 +30,72 @@ class Endpoints:
     reachable: npt.NDArray[np.bool_]
 
 
-def find_endpoints(rates: TraversalCosts, start: Pose2, goal: Pose2, tolerance: float) -> Endpoints:
+def find_endpoints(costs: TraversalCosts, start: Pose2, goal: Pose2, tolerance: float) -> Endpoints:
     """Return the start and goal of the search.
 
-    A start where the robot is too near an obstacle is moved to the nearest free place that nothing is in front of (it
-    is there already). A goal is moved to the nearest place within `tolerance` that can be reached. Raises
-    NavigationFailure with START_/GOAL_OUTSIDE_MAP, START_/GOAL_OCCUPIED or NO_VALID_PATH.
+    A start that is too close to an obstacle is moved to the nearest free point in a straight line without obstacles. A
+    goal is moved to the nearest reachable point within `tolerance` m. Raises NavigationFailure with
+    START_/GOAL_OUTSIDE_MAP, START_/GOAL_OCCUPIED or NO_VALID_PATH.
     """
-    _possible(rates, start, ErrorCode.START_OUTSIDE_MAP, ErrorCode.START_OCCUPIED, "start")
-    _possible(rates, goal, ErrorCode.GOAL_OUTSIDE_MAP, ErrorCode.GOAL_OCCUPIED, "goal")
-    free = rates.free
-    begin = next((place for place in near(rates, free, start, MAX_ESCAPE_M) if _open(rates, start, place)), None)
-    if begin is None:
-        raise NavigationFailure(ErrorCode.START_OCCUPIED, f"no free place within {MAX_ESCAPE_M} m of the start")
-    if next(near(rates, free, goal, tolerance), None) is None:
-        raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, f"no room for the robot within {tolerance} m of the goal")
-    reachable = reachable_cells(rates, begin)
-    end = next(near(rates, reachable, goal, tolerance), None)
-    if end is None:
+    _raise_if_blocked(costs, start, ErrorCode.START_OUTSIDE_MAP, ErrorCode.START_OCCUPIED, "start")
+    _raise_if_blocked(costs, goal, ErrorCode.GOAL_OUTSIDE_MAP, ErrorCode.GOAL_OCCUPIED, "goal")
+    free = costs.free
+    free_start = next(
+        (point for point in near(costs, free, start, MAX_ESCAPE_M) if _is_line_free(costs, start, point)), None
+    )
+    if free_start is None:
+        raise NavigationFailure(ErrorCode.START_OCCUPIED, f"no free cell within {MAX_ESCAPE_M} m of the start")
+    if next(near(costs, free, goal, tolerance), None) is None:
+        raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, f"no free cell within {tolerance} m of the goal")
+    reachable = reachable_cells(costs, free_start)
+    free_goal = next(near(costs, reachable, goal, tolerance), None)
+    if free_goal is None:
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, "start and goal are not connected")
-    return Endpoints(begin, end, reachable)
+    return Endpoints(free_start, free_goal, reachable)
 
 
-def reachable_cells(rates: TraversalCosts, start: tuple[float, float]) -> npt.NDArray[np.bool_]:
+def reachable_cells(costs: TraversalCosts, start: tuple[float, float]) -> npt.NDArray[np.bool_]:
     """Return the cells (height, width) that are connected with a free start."""
-    pieces, _ = label(rates.free)
-    return np.asarray(pieces == pieces[rates.cell(start)])
+    regions, _ = label(costs.free)
+    return np.asarray(regions == regions[costs.cell(start)])
 
 
-def _possible(rates: TraversalCosts, pose: Pose2, outside: ErrorCode, occupied: ErrorCode, what: str) -> None:
-    row, column = rates.cell((pose.x, pose.y))
-    if not (0 <= row < rates.height and 0 <= column < rates.width):
-        raise NavigationFailure(outside, f"{what} ({pose.x:.2f}, {pose.y:.2f}) is outside the map")
-    if rates.costmap.distance[row, column] == 0.0:
-        raise NavigationFailure(occupied, f"{what} ({pose.x:.2f}, {pose.y:.2f}) is in an obstacle")
+def _raise_if_blocked(costs: TraversalCosts, pose: Pose2, outside: ErrorCode, occupied: ErrorCode, name: str) -> None:
+    row, column = costs.cell((pose.x, pose.y))
+    if not (0 <= row < costs.height and 0 <= column < costs.width):
+        raise NavigationFailure(outside, f"{name} ({pose.x:.2f}, {pose.y:.2f}) is outside the map")
+    if costs.costmap.distance[row, column] == 0.0:
+        raise NavigationFailure(occupied, f"{name} ({pose.x:.2f}, {pose.y:.2f}) is in an obstacle")
 
 
 def near(
-    rates: TraversalCosts, free: npt.NDArray[np.bool_], pose: Pose2, within: float
+    costs: TraversalCosts, free: npt.NDArray[np.bool_], pose: Pose2, max_distance: float
 ) -> Iterator[tuple[float, float]]:
-    """Yield the point itself if its cell is free, then centers of free cells at most `within` m away."""
-    row, column = rates.cell((pose.x, pose.y))
+    """Yield the point itself if its cell is free, then centers of free cells at most `max_distance` m away."""
+    row, column = costs.cell((pose.x, pose.y))
     if free[row, column]:
         yield pose.x, pose.y
-    reach = math.ceil(within / rates.resolution)
+    reach = math.ceil(max_distance / costs.resolution)
     top, left = max(0, row - reach), max(0, column - reach)
     cells = np.argwhere(free[top : row + reach + 1, left : column + reach + 1]) + np.array((top, left))
-    x = rates.origin[0] + (cells[:, 1] + 0.5) * rates.resolution
-    y = rates.origin[1] + (cells[:, 0] + 0.5) * rates.resolution
+    x = costs.origin[0] + (cells[:, 1] + 0.5) * costs.resolution
+    y = costs.origin[1] + (cells[:, 0] + 0.5) * costs.resolution
     distance = np.hypot(x - pose.x, y - pose.y)
     for best in np.argsort(distance, kind="stable").tolist():
-        if distance[best] > within:
+        if distance[best] > max_distance:
             return
         yield float(x[best]), float(y[best])
 
 
-def _open(rates: TraversalCosts, start: Pose2, place: tuple[float, float]) -> bool:
-    """Return whether no obstacle is between the start and this position."""
-    way = spaced(np.array([(start.x, start.y), place]), 0.5 * rates.resolution)
-    columns, rows = np.floor((way - rates.origin) / rates.resolution).astype(np.int64).T
-    return bool((rates.costmap.distance[rows, columns] > 0.0).all())
+def _is_line_free(costs: TraversalCosts, start: Pose2, point: tuple[float, float]) -> bool:
+    """Return whether no obstacle is on the line from the start to a point."""
+    line = spaced(np.array([(start.x, start.y), point]), 0.5 * costs.resolution)
+    columns, rows = np.floor((line - costs.origin) / costs.resolution).astype(np.int64).T
+    return bool((costs.costmap.distance[rows, columns] > 0.0).all())
 
 
 def reachable_bounds(costs: TraversalCosts, ends: Endpoints) -> tuple[float, float, float, float]:
-    """Return the bounding box (min x, min y, max x, max y) of everything that can be reached, in m."""
+    """Return the bounding box (min x, min y, max x, max y) of the reachable cells in m."""
     rows, columns = np.flatnonzero(ends.reachable.any(axis=1)), np.flatnonzero(ends.reachable.any(axis=0))
     (x, y), size = costs.origin, costs.resolution
     return (

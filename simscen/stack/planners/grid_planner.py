@@ -16,7 +16,7 @@ from simscen.stack.setting import Setting
 COST_FACTOR, COST_NEUTRAL = 0.8, 50
 """nav2_navfn_planner/navfn.hpp: a cell costs 50 + 0.8 times its cost."""
 BORDER_CELLS = 2
-"""Cells at the edge of a lattice that no way leads over: so many are laid around the costmap."""
+"""Width of the border of blocked cells around the costmap that the graph needs."""
 
 
 def navfn(spec: Navfn, setting: Setting) -> Planner:
@@ -38,7 +38,7 @@ def smac_2d(spec: Smac2d, setting: Setting) -> Planner:
 
 
 class GridPlanner:
-    """Dijkstra over the cells: the same path whatever the seed."""
+    """Dijkstra's algorithm on the cells. The path does not depend on the seed."""
 
     def __init__(
         self,
@@ -57,29 +57,29 @@ class GridPlanner:
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, _: int) -> Path:
-        rates = TraversalCosts(costmap, self._robot, self._multiplier, self._allow_unknown)
-        ends = find_endpoints(rates, start, goal, self._tolerance)
-        way = self._finished(rates, ends, self._over(rates, ends))
-        return Path(with_headings(spaced(np.vstack(((start.x, start.y), way)), SPACING_M), goal))
+        costs = TraversalCosts(costmap, self._robot, self._multiplier, self._allow_unknown)
+        ends = find_endpoints(costs, start, goal, self._tolerance)
+        path = self._postprocessed(costs, ends, self._search(costs, ends))
+        return Path(with_headings(spaced(np.vstack(((start.x, start.y), path)), SPACING_M), goal))
 
-    def _finished(self, rates: TraversalCosts, ends: Endpoints, cells: Array) -> Array:
-        """From start to goal over the cells, smoothed, if that leads through nothing."""
-        way = np.vstack((ends.start, cells[1:-1], ends.goal))
-        for points in (smoothed(rates, way), way) if self._smooth else (way,):
-            led = avoid_cell_corners(rates, spaced(points, SPACING_M))
-            if led is not None:
-                return led
-        return np.vstack((ends.start, cells, ends.goal))  # no move between middles of cells cuts a corner
+    def _postprocessed(self, costs: TraversalCosts, ends: Endpoints, cells: Array) -> Array:
+        """Return the path (n, 2) from start to goal, smoothed if possible, and led around blocked corners."""
+        raw = np.vstack((ends.start, cells[1:-1], ends.goal))
+        for points in (smoothed(costs, raw), raw) if self._smooth else (raw,):
+            path = avoid_cell_corners(costs, spaced(points, SPACING_M))
+            if path is not None:
+                return path
+        return np.vstack((ends.start, cells, ends.goal))  # no move between cell centers cuts a corner
 
-    def _over(self, rates: TraversalCosts, ends: Endpoints) -> Array:
+    def _search(self, costs: TraversalCosts, ends: Endpoints) -> Array:
         """Return the centers (n, 2) of the cells of the cheapest path."""
-        lattice = GridGraph(np.pad(ends.reachable, BORDER_CELLS), self._moves, np.pad(rates.rates, BORDER_CELLS))
+        graph = GridGraph(np.pad(ends.reachable, BORDER_CELLS), self._moves, np.pad(costs.rates, BORDER_CELLS))
         first, last = (
-            tuple(int((point[axis] - rates.origin[axis]) / rates.resolution) + BORDER_CELLS for axis in (1, 0))
+            tuple(int((point[axis] - costs.origin[axis]) / costs.resolution) + BORDER_CELLS for axis in (1, 0))
             for point in (ends.start, ends.goal)
         )
-        cells = lattice.shortest_path((first[0], first[1]), (last[0], last[1]))
+        cells = graph.way((first[0], first[1]), (last[0], last[1]))
         if cells is None:
-            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "no way over the cells of the costmap")
-        middles: Array = (cells[:, ::-1] - BORDER_CELLS + 0.5) * rates.resolution + np.array(rates.origin)
-        return middles
+            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "start and goal are not connected on the costmap")
+        centers: Array = (cells[:, ::-1] - BORDER_CELLS + 0.5) * costs.resolution + np.array(costs.origin)
+        return centers

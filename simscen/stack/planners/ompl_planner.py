@@ -19,9 +19,9 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, Rob
 from simscen.stack.setting import Setting
 
 FINE_CELLS = 0.125
-"""Spacing of the checks of another search, if the path of the first one leads through something between its checks."""
+"""Spacing of the collision checks of the next search, if the path of the first one is blocked between its checks."""
 SEARCHES = 4
-"""Searches with other random numbers before planning fails: a search may miss a narrow gap."""
+"""Number of searches with different seeds before planning fails, because a search may miss a narrow gap."""
 
 
 class OmplPlanner:
@@ -51,7 +51,7 @@ class OmplPlanner:
         return (wide, replace(ends, reachable=reachable)) if reachable[wide.cell(ends.goal)] else (costs, ends)
 
     def _search(self, costs: TraversalCosts, ends: Endpoints, seed: int) -> Array:
-        """Return the points (n, 2) of a path that leads through no blocked cell."""
+        """Return the points (n, 2) of a path without blocked cells."""
         spec, problem = self._spec, whole_problem(costs, ends)
         for number in range(SEARCHES):
             search = OmplSearch(spec.type, problem, seed + number, spec.max_iterations, spec.improving_iterations)
@@ -67,12 +67,12 @@ class OmplPlanner:
 
 
 def whole_problem(costs: TraversalCosts, ends: Endpoints) -> Problem:
-    """Return the search in the bounding box of everything that can be reached from the start."""
+    """Return the problem in the bounding box of the cells that are reachable from the start."""
     return Problem(ends.start, ends.goal, reachable_bounds(costs, ends), costs.between)
 
 
 LONG_HULL_RATIO = 2.0
-"""Ratio of circumscribed to inscribed radius from which a hull is planned with its heading."""
+"""Ratio of circumscribed to inscribed radius above which the planner considers the heading of the robot."""
 
 
 def ompl_planner(spec: PlannerSpec, setting: Setting) -> Planner:

@@ -36,11 +36,11 @@ BATCH_SAMPLES, BATCHES = 200, 2
 REWIRE_FACTOR = 1.5
 """Factor of BIT* for the distance up to which samples are connected. With OMPL's 1.1, detours are more frequent."""
 GOOD_ENOUGH_RATIO = 1.01
-"""A path that costs at most this times the distance to the goal ends the search: no path costs less than that."""
+"""A path that costs at most this ratio of the distance to the goal, a lower bound of the cost, ends the search."""
 SIMPLIFY_STEPS = 100
 """Attempts of each pass of the simplification. Counted, because OMPL's own simplify() stops by wall-clock time."""
 PERTURBATIONS_M = (0.5, 0.15)
-"""Distances by which states are moved to where the path costs less, one pass each."""
+"""Distances by which states are moved to reduce the cost of the path, one pass each."""
 ou.setLogLevel(ou.LOG_NONE)
 
 
@@ -55,7 +55,7 @@ class Problem:
 
 
 class _MotionValidator(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
-    """Validity of a motion by its cost: one call instead of one for each state on the way."""
+    """Validity of a motion by its cost, in one call instead of one call for each state along it."""
 
     def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
@@ -84,7 +84,7 @@ class _CostBeyondLength(ob.OptimizationObjective):  # type: ignore[misc] # ompl 
 
 
 class _MotionCost(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl has no types
-    """Cost of a motion, as an objective of length: only for these OMPL samples the ellipse of the informed set."""
+    """Cost of a motion as a path length objective, for which alone OMPL samples the ellipse of the informed set."""
 
     def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
@@ -95,12 +95,12 @@ class _MotionCost(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # o
         return ob.Cost(self.motion(a[0], a[1], b[0], b[1]))
 
     def motionCostHeuristic(self, a: Any, b: Any) -> Any:
-        """Return the length of the motion, since no meter costs less than 1."""
+        """Return the length of the motion, a lower bound of its cost."""
         return ob.Cost(math.hypot(b[0] - a[0], b[1] - a[1]))
 
 
 class StateValidity:
-    """Validity of a state: whether the robot can be there."""
+    """Validity of a state: the robot is not in a blocked cell."""
 
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
@@ -173,7 +173,7 @@ class OmplSearch:
             planner.setRewireFactor(REWIRE_FACTOR)
 
     def _make_termination(self, planner: Any) -> Termination:
-        """Return when this planner is to stop."""
+        """Return the termination condition of this planner."""
         if self.kind in FEASIBLE_ONLY:
             return stop_after(self.max_iterations)
 
@@ -211,15 +211,15 @@ class OmplSearch:
             return whole
         beyond = _CostBeyondLength(information, motion)
         self._callbacks.append(beyond)
-        both = ob.MultiOptimizationObjective(information)
-        both.addObjective(ob.PathLengthOptimizationObjective(information), 1.0)
-        both.addObjective(beyond, 1.0)
-        both.setCostThreshold(ob.Cost(self.good_enough_ratio * math.dist(self.problem.start, self.problem.goal)))
-        return both
+        total = ob.MultiOptimizationObjective(information)
+        total.addObjective(ob.PathLengthOptimizationObjective(information), 1.0)
+        total.addObjective(beyond, 1.0)
+        total.setCostThreshold(ob.Cost(self.good_enough_ratio * math.dist(self.problem.start, self.problem.goal)))
+        return total
 
 
 def _simplify(simplifier: Any, path: Any) -> None:
-    """Shorten a path where that costs less, and move its states to where it costs less."""
+    """Shorten a path and move its states where that reduces the cost."""
     simplifier.partialShortcutPath(path, SIMPLIFY_STEPS, SIMPLIFY_STEPS // 2)
     for distance in PERTURBATIONS_M:
         simplifier.perturbPath(path, distance, SIMPLIFY_STEPS, SIMPLIFY_STEPS // 2)
@@ -234,11 +234,11 @@ def _state(information: Any, point: Point) -> Any:
 
 def stop_after(iterations: int, is_done: Termination = lambda: False, least: int = 0) -> Termination:
     """Return a termination condition: stop after so many iterations, or after at least `least` when it `is_done`."""
-    left = iterations
+    remaining = iterations
 
     def should_stop() -> bool:
-        nonlocal left
-        left -= 1
-        return left < 0 or (iterations - left > least and is_done())
+        nonlocal remaining
+        remaining -= 1
+        return remaining < 0 or (iterations - remaining > least and is_done())
 
     return should_stop

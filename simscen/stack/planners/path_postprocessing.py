@@ -11,18 +11,18 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 SPACING_M = 0.05
 """Distance between the points of a finished path."""
 SMOOTHING_PASSES, MAX_COST_RATIO = 8, 1.003
-"""Passes of the smoothing, and how much the cost of the path may rise by all of them."""
+"""Passes of the smoothing, and maximum ratio of the cost after it to the cost before."""
 
 
 def spaced(points: Array, spacing: float) -> Array:
-    """Return the polyline (n, 2) with points at most `spacing` m apart. Its corners are kept."""
+    """Return the polyline (n, 2) with additional points, at most `spacing` m apart."""
     steps = np.diff(points, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     counts = np.maximum(1, np.ceil(lengths / spacing - 1e-9)).astype(np.int64)
     counts[lengths == 0.0] = 0
     first = np.repeat(np.cumsum(counts) - counts, counts)
-    part = (np.arange(counts.sum()) - first + 1) / np.repeat(counts, counts)
-    inner = np.repeat(points[:-1], counts, axis=0) + part[:, None] * np.repeat(steps, counts, axis=0)
+    fraction = (np.arange(counts.sum()) - first + 1) / np.repeat(counts, counts)
+    inner = np.repeat(points[:-1], counts, axis=0) + fraction[:, None] * np.repeat(steps, counts, axis=0)
     return np.vstack((points[:1], inner))
 
 
@@ -34,9 +34,9 @@ def with_headings(points: Array, goal: Pose2) -> Array:
 
 
 def smoothed(costs: TraversalCosts, points: Array) -> Array:
-    """Return the path (n, 2) with rounded corners, as long as that costs next to nothing.
+    """Return the path (n, 2) with rounded corners, as long as its cost hardly rises.
 
-    A path that clips a blocked cell costs inf, and is only replaced by one that does not.
+    A path through a blocked cell costs inf, and is only replaced by one with a finite cost.
     """
     cost = costs.along(points)
     for _ in range(SMOOTHING_PASSES):
@@ -50,42 +50,43 @@ def smoothed(costs: TraversalCosts, points: Array) -> Array:
 
 
 CORNER_OFFSET_CELLS = 0.02
-"""Cells by which a path passes a corner that it would cut."""
+"""Distance in cells at which a path passes a corner that it would cut."""
 
 
-def avoid_cell_corners(rates: TraversalCosts, points: Array) -> Array | None:
+def avoid_cell_corners(costs: TraversalCosts, points: Array) -> Array | None:
     """Return the path (n, 2) led around each blocked corner that it cut; None if more than a corner blocks it.
 
-    The points of a path that cut any are then no further apart than the cells are wide.
+    If it cut any, the points of the result are at most one cell apart.
     """
-    if not np.isfinite(rates.at(points)).all():
+    if not np.isfinite(costs.at(points)).all():
         return None
     steps = np.diff(points, axis=0)
-    path = points if np.hypot(*steps.T).max(initial=0.0) <= rates.resolution else spaced(points, rates.resolution)
-    places = (path - rates.origin) / rates.resolution
-    cells = np.floor(places)
-    aslant = np.flatnonzero((cells[1:] != cells[:-1]).all(axis=1))  # no step is longer than a cell: over one edge each
-    here, there = cells[aslant], cells[aslant + 1]
-    corners = np.maximum(here, there)
-    reached = (corners - places[aslant]) / (places[aslant + 1] - places[aslant])
-    first = (reached[:, 0] < reached[:, 1])[:, None]  # over the edge on the left or right
-    over = np.where(first, *_mixed(there, here))
-    beside = np.where(first, *_mixed(here, there))
-    cut = ~_free(rates, over)
-    if not (np.isfinite(rates.at(path)).all() and _free(rates, beside[cut]).all()):
+    path = points if np.hypot(*steps.T).max(initial=0.0) <= costs.resolution else spaced(points, costs.resolution)
+    positions = (path - costs.origin) / costs.resolution
+    cells = np.floor(positions)
+    # No step is longer than a cell, so that it crosses at most one edge per axis.
+    diagonal = np.flatnonzero((cells[1:] != cells[:-1]).all(axis=1))
+    before, after = cells[diagonal], cells[diagonal + 1]
+    corners = np.maximum(before, after)
+    reached = (corners - positions[diagonal]) / (positions[diagonal + 1] - positions[diagonal])
+    is_vertical_first = (reached[:, 0] < reached[:, 1])[:, None]  # crosses the vertical edge before the horizontal one
+    crossed = np.where(is_vertical_first, *_swap_rows(after, before))
+    opposite = np.where(is_vertical_first, *_swap_rows(before, after))
+    cut = ~_free(costs, crossed)
+    if not (np.isfinite(costs.at(path)).all() and _free(costs, opposite[cut]).all()):
         return None
     if not cut.any():
         return points
-    led = corners[cut] + CORNER_OFFSET_CELLS * np.sign(beside[cut] + 0.5 - corners[cut])
-    return np.insert(path, aslant[cut] + 1, led * rates.resolution + np.array(rates.origin), axis=0)
+    detours = corners[cut] + CORNER_OFFSET_CELLS * np.sign(opposite[cut] + 0.5 - corners[cut])
+    return np.insert(path, diagonal[cut] + 1, detours * costs.resolution + np.array(costs.origin), axis=0)
 
 
-def _mixed(one: Array, other: Array) -> tuple[Array, Array]:
-    """Return the columns of the first with the rows of the second array, and the other way round."""
-    return np.column_stack((one[:, 0], other[:, 1])), np.column_stack((other[:, 0], one[:, 1]))
+def _swap_rows(a: Array, b: Array) -> tuple[Array, Array]:
+    """Return the columns of `a` with the rows of `b`, and the columns of `b` with the rows of `a`."""
+    return np.column_stack((a[:, 0], b[:, 1])), np.column_stack((b[:, 0], a[:, 1]))
 
 
-def _free(rates: TraversalCosts, cells: Array) -> npt.NDArray[np.bool_]:
-    """Return whether the robot can be in cells (n, 2), given as (column, row)."""
+def _free(costs: TraversalCosts, cells: Array) -> npt.NDArray[np.bool_]:
+    """Return which cells (n, 2), given as (column, row), are not blocked."""
     columns, rows = cells.astype(np.int64).T
-    return np.asarray(np.isfinite(rates.rates[rows, columns]))
+    return np.asarray(np.isfinite(costs.rates[rows, columns]))

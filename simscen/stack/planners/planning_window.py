@@ -31,7 +31,7 @@ def plan_in_windows(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2,
             break
         with contextlib.suppress(NavigationFailure):
             path = plan(part, start, goal, seed)
-            if path.length() <= _around(costmap, part, start, goal):
+            if path.length() <= _min_length_outside(costmap, part, start, goal):
                 return path
         margin *= 2
     return plan(costmap, start, goal, seed)
@@ -54,26 +54,26 @@ def window(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> Co
     return replace(costmap, costs=costmap.costs[window], distance=costmap.distance[window], origin=origin)
 
 
-def _around(costmap: CostmapView, part: CostmapView, start: Pose2, goal: Pose2) -> float:
-    """Return the length in m of the shortest path that leaves a part of the costmap; inf if none can.
+def _min_length_outside(costmap: CostmapView, part: CostmapView, start: Pose2, goal: Pose2) -> float:
+    """Return the minimum length in m of a path that leaves a part of the costmap; inf if none can.
 
-    It is that to the goal's image in one of the part's sides; those that are the map's own cannot be crossed.
+    It is the distance to the mirror image of the goal behind a side of the part, except sides of the whole costmap.
     """
-    least = math.inf
-    for axis, here, there, beside in (
+    shortest = math.inf
+    for axis, start_coordinate, goal_coordinate, lateral in (
         (0, start.x, goal.x, goal.y - start.y),
         (1, start.y, goal.y, goal.x - start.x),
     ):
         low, high = _sides(part, axis)
         first, last = _sides(costmap, axis)
         if low > first + part.resolution / 2:
-            least = min(least, math.hypot(here - low + there - low, beside))
+            shortest = min(shortest, math.hypot(start_coordinate - low + goal_coordinate - low, lateral))
         if high < last - part.resolution / 2:
-            least = min(least, math.hypot(high - here + high - there, beside))
-    return least
+            shortest = min(shortest, math.hypot(high - start_coordinate + high - goal_coordinate, lateral))
+    return shortest
 
 
 def _sides(costmap: CostmapView, axis: int) -> tuple[float, float]:
-    """Return the least and the greatest x (axis 0) or y (axis 1) of a costmap, in m."""
+    """Return the minimum and maximum x (axis 0) or y (axis 1) of a costmap in m."""
     begin = costmap.origin[axis]
     return begin, begin + costmap.costs.shape[1 - axis] * costmap.resolution

@@ -1,4 +1,4 @@
-"""OMPL search over poses, for cars and for hulls whose heading decides where they fit."""
+"""OMPL search over poses, for cars and for hulls that fit through gaps only with some headings."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -20,11 +20,11 @@ Valid = Callable[[float, float, float], bool]
 POSE_SPACING_M = 0.05
 """Distance between the poses of a path."""
 MIN_CHORD_RATIO = 0.995
-"""Least ratio of chord to length of a step on an arc of 0.2 m radius; cusps have a smaller one."""
+"""Minimum ratio of chord to length of a step on an arc of 0.2 m radius. A step with a cusp has a smaller ratio."""
 CUSP_TOLERANCE_M = 1e-4
 """Accuracy of the position of a cusp."""
 SHORTCUT_ATTEMPTS = 60
-"""Attempts to leave out states of the found path; counted, as OMPL's own simplify() stops by the clock."""
+"""Attempts to remove states of the path. Counted, because OMPL's own simplify() stops by wall-clock time."""
 
 
 def search_poses(
@@ -37,11 +37,11 @@ def search_poses(
     valid: Valid,
     seed: int,
     iterations: int,
-    looks: float = POSE_SPACING_M,
+    check_spacing: float = POSE_SPACING_M,
 ) -> list[Pose2] | None:
     """Return poses from start to goal, `POSE_SPACING_M` apart; None if the iterations did not suffice.
 
-    `valid` is evaluated every `looks` meters.
+    `valid` is evaluated every `check_spacing` m.
 
     "dubins" drives forward only, "reeds_shepp" also backward, both on arcs of at least `turning_radius`; "se2" moves
     in any direction.
@@ -55,11 +55,11 @@ def search_poses(
     states.setBounds(limits)
     information = ob.SpaceInformation(states)
     information.setStateValidityChecker(lambda state: valid(state.getX(), state.getY(), state.getYaw()))
-    information.setStateValidityCheckingResolution(looks / states.getMaximumExtent())
+    information.setStateValidityCheckingResolution(check_spacing / states.getMaximumExtent())
     information.setup()
     ends = _state(information, start), _state(information, goal)
     if not all(information.satisfiesBounds(end) and information.isValid(end) for end in ends):
-        return None  # a planner would wait for a better goal, 5 ms an iteration
+        return None  # a planner would wait for a better goal, 5 ms per iteration
     problem = ob.ProblemDefinition(information)
     problem.setStartAndGoalStates(*ends)
     planner = PLANNERS[kind](information)
@@ -71,44 +71,44 @@ def search_poses(
     path = problem.getSolutionPath()
     og.PathSimplifier(information).reduceVertices(path, SHORTCUT_ATTEMPTS, SHORTCUT_ATTEMPTS, 0.5)
     if space == "reeds_shepp":
-        return _driven(states, path.getStates())
+        return _reeds_shepp_poses(states, path.getStates())
     path.interpolate(max(2, math.ceil(path.length() / POSE_SPACING_M) + 1))
     return [_pose(state) for state in path.getStates()]
 
 
-def _driven(states: Any, stops: Any) -> list[Pose2]:
+def _reeds_shepp_poses(states: Any, waypoints: Any) -> list[Pose2]:
     """Return the Reeds-Shepp paths between stops, at most `POSE_SPACING_M` apart, with the poses of all cusps.
 
-    Between two poses on both sides of such a change less way would be told than is driven. OMPL's bindings tell
-    nothing of the arcs that a path is made of (2.0.1), but on one way between is shorter than way driven.
+    Without the cusps, the path would be shorter than the motion of the robot. OMPL's bindings (2.0.1) do not return the
+    arcs of a path, so that a cusp is found by a chord that is shorter than the length of its step.
     """
-    between, poses = states.allocState(), [_pose(stops[0])]
-    for first, last in pairwise(stops):
+    between, poses = states.allocState(), [_pose(waypoints[0])]
+    for first, last in pairwise(waypoints):
         length = states.distance(first, last)
         if length == 0.0:
             continue
         count = max(1, math.ceil(length / POSE_SPACING_M))
 
-        def at(along: float, first: Any = first, last: Any = last, length: float = length) -> Pose2:
-            states.interpolate(first, last, along / length, between)
+        def pose_at(length_along: float, first: Any = first, last: Any = last, length: float = length) -> Pose2:
+            states.interpolate(first, last, length_along / length, between)
             return _pose(between)
 
-        marks = [length * k / count for k in range(count + 1)]
-        for low, high in pairwise(marks):
-            poses += [at(cusp) for cusp in _cusps(at, low, high)]
-            poses.append(at(high))
+        stations = [length * k / count for k in range(count + 1)]
+        for low, high in pairwise(stations):
+            poses += [pose_at(cusp) for cusp in _cusps(pose_at, low, high)]
+            poses.append(pose_at(high))
     return poses
 
 
-def _cusps(at: Callable[[float], Pose2], low: float, high: float) -> list[float]:
-    """How far along (m) the direction changes on a piece of way."""
-    one, other = at(low), at(high)
-    if math.hypot(other.x - one.x, other.y - one.y) > MIN_CHORD_RATIO * (high - low):
+def _cusps(pose_at: Callable[[float], Pose2], low: float, high: float) -> list[float]:
+    """Return the positions in m along a path between `low` and `high` at which the direction changes."""
+    first_pose, last_pose = pose_at(low), pose_at(high)
+    if math.hypot(last_pose.x - first_pose.x, last_pose.y - first_pose.y) > MIN_CHORD_RATIO * (high - low):
         return []
     middle = 0.5 * (low + high)
     if high - low < CUSP_TOLERANCE_M:
         return [middle]
-    return [*_cusps(at, low, middle), *_cusps(at, middle, high)] or [middle]
+    return [*_cusps(pose_at, low, middle), *_cusps(pose_at, middle, high)] or [middle]
 
 
 def _pose(state: Any) -> Pose2:
@@ -132,38 +132,38 @@ def _state(information: Any, pose: Pose2) -> Any:
 
 
 ESCAPE_DIRECTIONS = 16
-"""A base that drives in any direction is tried in so many."""
+"""Number of escape directions of a holonomic base."""
 ESCAPE_CURVATURE_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
 """Curvatures of a car's escape arcs, relative to its tightest one."""
 
 
 def escape_arcs(space: Space, turning_radius: float, start: Pose2) -> Iterator[Array]:
-    """Yield arcs as poses (n, 3) from the start on, `POSE_SPACING_M` apart and `MAX_ESCAPE_M` long.
+    """Yield arcs of poses (n, 3) from the start, `POSE_SPACING_M` apart and `MAX_ESCAPE_M` long.
 
     "dubins" only drives forward.
     """
-    along = np.linspace(0.0, MAX_ESCAPE_M, round(MAX_ESCAPE_M / POSE_SPACING_M) + 1)
+    length_along = np.linspace(0.0, MAX_ESCAPE_M, round(MAX_ESCAPE_M / POSE_SPACING_M) + 1)
     if space == "se2":
         for heading in np.arange(ESCAPE_DIRECTIONS) * (2.0 * math.pi / ESCAPE_DIRECTIONS):
-            yield _arc(start, along, 0.0, float(heading))
+            yield _arc(start, length_along, 0.0, float(heading))
         return
-    for signed in (along,) if space == "dubins" else (along, -along):
-        for share in ESCAPE_CURVATURE_RATIOS:
-            yield _arc(start, signed, share / turning_radius, 0.0)
+    for signed_length in (length_along,) if space == "dubins" else (length_along, -length_along):
+        for ratio in ESCAPE_CURVATURE_RATIOS:
+            yield _arc(start, signed_length, ratio / turning_radius, 0.0)
 
 
-def _arc(start: Pose2, along: Array, curvature: float, heading: float) -> Array:
-    """Poses so many meters along an arc that begins at `heading` to the base's own."""
-    turned = curvature * along
-    chord = along * np.sinc(turned / (2.0 * math.pi))
-    towards = start.yaw + heading + 0.5 * turned
+def _arc(start: Pose2, length_along: Array, curvature: float, heading: float) -> Array:
+    """Return poses (n, 3) at lengths (n,) in m along an arc in direction `heading` relative to the base."""
+    turned = curvature * length_along
+    chord = length_along * np.sinc(turned / (2.0 * math.pi))
+    direction = start.yaw + heading + 0.5 * turned
     yaw = np.remainder(start.yaw + turned + math.pi, 2.0 * math.pi) - math.pi
     yaw[0] = start.yaw
-    return np.column_stack((start.x + chord * np.cos(towards), start.y + chord * np.sin(towards), yaw))
+    return np.column_stack((start.x + chord * np.cos(direction), start.y + chord * np.sin(direction), yaw))
 
 
 class DistanceLookup:
-    """Clearances of a costmap, by plain look-ups: a memoryview answers in a tenth of numpy's time for a scalar."""
+    """Lookup of single distances of a costmap by a memoryview, in a tenth of numpy's time."""
 
     def __init__(self, costmap: CostmapView) -> None:
         self.costmap = costmap
@@ -172,12 +172,12 @@ class DistanceLookup:
         self.origin = costmap.origin
         self._per_meter = 1.0 / costmap.resolution
         flat: Any = np.ascontiguousarray(costmap.distance).reshape(-1)
-        self._look: Any = memoryview(flat)
+        self._flat_distances: Any = memoryview(flat)
 
-    def at(self, x: float, y: float) -> float:
-        """Distance in meters to the nearest lethal cell; -1 off the map."""
+    def distance(self, x: float, y: float) -> float:
+        """Return the distance in m from a point to the nearest lethal cell; -1 outside the map."""
         column = math.floor((x - self.origin[0]) * self._per_meter)
         row = math.floor((y - self.origin[1]) * self._per_meter)
         if 0 <= row < self.height and 0 <= column < self.width:
-            return float(self._look[row * self.width + column])
+            return float(self._flat_distances[row * self.width + column])
         return -1.0

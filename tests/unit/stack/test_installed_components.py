@@ -293,7 +293,7 @@ def test_a_path_through_a_wall_ends_the_run(odd) -> None:
         ({"controller": {"type": "wild"}}, "controller `wild` (odd:WildController) commanded (inf, 0.0, 0.0)"),
         ({"localizer": {"type": "lost"}}, "localizer `lost` (odd:LostLocalizer) returned a Belief whose covariance"),
         ({"localizer": {"type": "half"}}, "HalfLocalizer has no method `on_odometry`, which every localizer needs"),
-        ({"goal_checker": {"type": "unsure"}}, "goal_checker `unsure` (odd:UnsureChecker) answered 'perhaps'"),
+        ({"goal_checker": {"type": "unsure"}}, "goal_checker `unsure` (odd:UnsureChecker) returned 'perhaps'"),
     ],
 )
 def test_every_role_is_named_where_it_breaks(odd, stack: dict, told: str) -> None:

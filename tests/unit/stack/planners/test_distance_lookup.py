@@ -13,5 +13,5 @@ def test_a_point_is_as_far_from_obstacles_as_the_costmap_says_and_off_it_is_told
     view = LayeredCostmap(Spec(), Surroundings(round_robot(), world.grid((-0.5, -0.5, 8.5, 6.5)), RATE)).view
     tested = DistanceLookup(view)
     for x, y in np.random.default_rng(1).uniform((0, 0), (8, 6), (50, 2)).tolist():
-        assert tested.at(x, y) == distances(view, np.array([[x, y]]))[0]
-    assert tested.at(-3.0, 1.0) == -1.0
+        assert tested.distance(x, y) == distances(view, np.array([[x, y]]))[0]
+    assert tested.distance(-3.0, 1.0) == -1.0

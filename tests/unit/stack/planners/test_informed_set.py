@@ -35,12 +35,12 @@ def test_around_a_wall_its_length_is_that_of_the_way_around() -> None:
 def test_a_narrow_set_has_the_way_and_not_the_rooms_beside_it() -> None:
     informed = InformedSet(ground(WALL), (1.0, 1.0), (9.0, 1.0))
     informed.narrow(0.05)
-    assert informed.has(4.95, 4.5)
-    assert informed.has(3.0, 2.7)
-    assert not informed.has(1.0, 5.5)
-    assert not informed.has(4.5, 0.5)
+    assert informed.contains(4.95, 4.5)
+    assert informed.contains(3.0, 2.7)
+    assert not informed.contains(1.0, 5.5)
+    assert not informed.contains(4.5, 0.5)
     informed.narrow(1.0)
-    assert informed.has(1.0, 5.5)
+    assert informed.contains(1.0, 5.5)
 
 
 def test_no_way_has_no_length_and_a_thin_wall_is_not_leapt_over() -> None:
@@ -53,7 +53,7 @@ def test_no_way_has_no_length_and_a_thin_wall_is_not_leapt_over() -> None:
 def test_by_cost_the_set_goes_by_what_ways_cost_and_knows_the_way_itself() -> None:
     tested = ground((4.9, 0.0, 5.0, 0.6), (4.9, 1.2, 5.0, 4.0))  # a narrow gap ahead, and roomy ground farther up
     tested.rates[(tested.rates > 1.0) & (tested.rates < math.inf)] *= 20.0
-    informed = InformedSet(tested, (1.0, 1.0), (9.0, 1.0), priced=True)
+    informed = InformedSet(tested, (1.0, 1.0), (9.0, 1.0), by_cost=True)
     shortest = InformedSet(tested, (1.0, 1.0), (9.0, 1.0))
     assert shortest.length == pytest.approx(8.0, rel=0.03)
     assert shortest.length < informed.length
@@ -61,6 +61,6 @@ def test_by_cost_the_set_goes_by_what_ways_cost_and_knows_the_way_itself() -> No
     assert way[:, 1].max() > 4.2
     assert np.isfinite(tested.at(way)).all()
     informed.narrow(0.05)
-    assert informed.holds(way).all()
-    assert not informed.holds(np.array([(4.95, 0.9)])).any()
+    assert informed.contains_points(way).all()
+    assert not informed.contains_points(np.array([(4.95, 0.9)])).any()
     assert len(informed.path(tested.costmap, 0.0)) == math.ceil(len(way) / 3)

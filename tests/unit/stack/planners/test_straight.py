@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from simscen.advanced.planners.medial_axis_planner import BEYOND, dear_until, straight_on
+from simscen.advanced.planners.medial_axis_planner import MARGIN_BEHIND_M, costly_distance, straight_path
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.planners import OmplPlanner as PlannerSpec
@@ -41,7 +41,7 @@ def test_a_straight_way_is_dear_as_far_as_it_meets_dear_cells() -> None:
     for _ in range(300):
         costs = (rng.random((30, 40)) < 0.02) * rng.integers(1, 253, (30, 40))
         start, goal = (Pose2(*(rng.uniform((0, 0), (40, 30)) * SIZE + CORNER).tolist()) for _ in range(2))
-        told.append(dear_until(view_of(costs), start, goal, RADIUS))
+        told.append(costly_distance(view_of(costs), start, goal, RADIUS))
         assert told[-1] == pytest.approx(left_at(costs, start, goal) * start.distance(goal))
     assert 60 < told.count(0.0) < 240
 
@@ -53,19 +53,19 @@ def test_along_an_axis_or_a_diagonal_the_cells_are_those_passed(turn: int) -> No
     middle = Pose2(CORNER[0] + 20.5 * SIZE, CORNER[1] + 20.5 * SIZE)
     reach = SIZE * 20 * (math.sqrt(2) if turn % 2 else 1.0) - 1e-9
     goal = Pose2(middle.x + reach * math.cos(heading), middle.y + reach * math.sin(heading))
-    assert dear_until(view_of(costs), middle, goal, RADIUS) == 0.0
+    assert costly_distance(view_of(costs), middle, goal, RADIUS) == 0.0
     costs[20 + 7 * round(math.sin(heading)), 20 + 7 * round(math.cos(heading))] = 1
     until = SIZE * 7.5 * (math.sqrt(2) if turn % 2 else 1.0)
-    assert dear_until(view_of(costs), middle, goal, RADIUS) == pytest.approx(until)
+    assert costly_distance(view_of(costs), middle, goal, RADIUS) == pytest.approx(until)
 
 
 def test_a_way_that_leaves_the_costmap_or_is_too_near_an_obstacle_is_dear_to_its_end() -> None:
     view = view_of(np.zeros((20, 20)))
     inside = Pose2(CORNER[0] + 0.5, CORNER[1] + 0.5)
-    assert dear_until(view, inside, inside, RADIUS) == 0.0
+    assert costly_distance(view, inside, inside, RADIUS) == 0.0
     for x, y in ((1.01, 0.5), (-0.01, 0.5), (0.5, 1.01), (0.5, -0.01)):
-        assert dear_until(view, inside, Pose2(CORNER[0] + x, CORNER[1] + y), RADIUS) == math.inf
-    assert dear_until(view, inside, Pose2(CORNER[0] + 0.9, CORNER[1] + 0.5), 1.0) == pytest.approx(0.4)
+        assert costly_distance(view, inside, Pose2(CORNER[0] + x, CORNER[1] + y), RADIUS) == math.inf
+    assert costly_distance(view, inside, Pose2(CORNER[0] + 0.9, CORNER[1] + 0.5), 1.0) == pytest.approx(0.4)
 
 
 def test_the_default_planner_goes_straight_on_where_that_costs_nothing() -> None:
@@ -97,8 +97,8 @@ def test_a_way_past_what_is_dear_is_taken_only_where_all_of_it_costs_hardly_more
         assert part.costs.max() == 90
         return np.array((start[:2], (there.x, there.y + aside))), start.distance(there) + more
 
-    points = straight_on(view_of(costs), start, goal, RADIUS, past)
-    assert asked[0][:2] == pytest.approx((x + 1.5 + BEYOND, y + 1.0))
+    points = straight_path(view_of(costs), start, goal, RADIUS, past)
+    assert asked[0][:2] == pytest.approx((x + 1.5 + MARGIN_BEHIND_M, y + 1.0))
     assert (points is not None) == taken
     if points is not None:
         assert points.tolist() == [list(start[:2]), list(asked[0][:2]), list(goal[:2])]
@@ -115,5 +115,5 @@ def test_where_there_is_no_way_past_or_too_much_is_dear_nothing_is_said() -> Non
     def unasked(part: CostmapView, there: Pose2) -> tuple[Array, float]:
         raise AssertionError
 
-    assert straight_on(view_of(costs), start, Pose2(x + 10.2, y + 1.0), RADIUS, shut) is None
-    assert straight_on(view_of(costs), start, Pose2(x + 5.2, y + 1.0), RADIUS, unasked) is None
+    assert straight_path(view_of(costs), start, Pose2(x + 10.2, y + 1.0), RADIUS, shut) is None
+    assert straight_path(view_of(costs), start, Pose2(x + 5.2, y + 1.0), RADIUS, unasked) is None
