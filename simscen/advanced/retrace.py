@@ -208,7 +208,7 @@ class TrailFollower:
         return np.asarray(blocked & is_nearer.any(axis=1))
 
     def _scores(self, pose: Pose2) -> Array:
-        """Return the scores (commands + 1,), progress minus weighted deviation from the trail; the last for a stop."""
+        """Return the scores (commands + 1,): progress minus weighted deviation; the last one is for a stop."""
         cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
         ends = np.column_stack((
             pose.x + cosine * self._ends[:, 0] - sine * self._ends[:, 1],

@@ -37,7 +37,7 @@ def precompute(prepared: PreparedScenario) -> None:
         walls.prepare_walls(part.obstacles)
         if part.map is not None and isinstance(part.stack, StackSpec):
             grid = part.map.refined(part.stack.costmap.resolution)
-            layered_costmap.ready(part.stack.costmap, robot_model(part.body), grid)
+            layered_costmap.precompute(part.stack.costmap, robot_model(part.body), grid)
             precompute_localizer(part.stack.localizer, grid)
 
 

@@ -44,13 +44,13 @@ def project_depth_image(
     inside = frame.inside(cells) & np.isfinite(heights).reshape(-1)
     cells[~inside] = 0
     if spec.max_ground_slope > 0.0:
-        before = (known[cells[:, 0], cells[:, 1]] & inside).reshape(heights.shape)
-        above, level = above_ground(away, heights, spec.max_ground_slope, spec.min_obstacle_height, before)
+        was_ground = (known[cells[:, 0], cells[:, 1]] & inside).reshape(heights.shape)
+        above, level = above_ground(away, heights, spec.max_ground_slope, spec.min_obstacle_height, was_ground)
     else:
         above, level = heights, np.zeros(heights.shape, dtype=bool)
-    counts = (above >= spec.min_obstacle_height) & (above <= spec.max_obstacle_height)
-    counts &= (away >= spec.obstacle_min_range) & (away <= spec.obstacle_max_range)
-    marked = counts.reshape(-1) & inside
+    is_obstacle = (above >= spec.min_obstacle_height) & (above <= spec.max_obstacle_height)
+    is_obstacle &= (away >= spec.obstacle_min_range) & (away <= spec.obstacle_max_range)
+    marked = is_obstacle.reshape(-1) & inside
     return DepthObservation(
         cells[marked], heights.reshape(-1)[marked].astype(np.float32), cells[level.reshape(-1) & inside]
     )
@@ -59,32 +59,32 @@ def project_depth_image(
 def seen_through(
     cells: Cells, heights: Heights, frame: GridFrame, image: Image, base: Pose2, spec: CostmapSpec
 ) -> Mask:
-    """Which of the cells (n, 2) the camera looks through at their heights (n,), to something farther away."""
-    place = base.inverse().apply(frame.centers(cells))
-    seen = image.mount.inverse().apply(np.column_stack((place, heights.astype(np.float64))))
-    ahead = seen[:, 0] > 0.0
-    depth = np.where(ahead, seen[:, 0], 1.0)
+    """Return which of the cells (n, 2) the camera sees through at their heights (n,), to something farther away."""
+    in_base = base.inverse().apply(frame.centers(cells))
+    points = image.mount.inverse().apply(np.column_stack((in_base, heights.astype(np.float64))))
+    is_ahead = points[:, 0] > 0.0
+    depth = np.where(is_ahead, points[:, 0], 1.0)
     rows, columns = image.depth.shape
-    focal = _focal(columns, image.field_of_view)
-    column = np.floor(columns / 2 - focal * seen[:, 1] / depth).astype(np.int64)
-    row = np.floor(rows / 2 - focal * seen[:, 2] / depth).astype(np.int64)
-    inside = ahead & (row >= 0) & (column >= 0) & (row < rows) & (column < columns)
-    project_depth_image = image.depth[np.where(inside, row, 0), np.where(inside, column, 0)]
+    focal = _focal_length(columns, image.field_of_view)
+    column = np.floor(columns / 2 - focal * points[:, 1] / depth).astype(np.int64)
+    row = np.floor(rows / 2 - focal * points[:, 2] / depth).astype(np.int64)
+    inside = is_ahead & (row >= 0) & (column >= 0) & (row < rows) & (column < columns)
+    measured = image.depth[np.where(inside, row, 0), np.where(inside, column, 0)]
     with np.errstate(invalid="ignore"):
-        through = inside & (project_depth_image > depth + frame.resolution) & (depth <= spec.raytrace_max_range)
+        through = inside & (measured > depth + frame.resolution) & (depth <= spec.raytrace_max_range)
     return np.asarray(through)
 
 
-def _focal(columns: int, field_of_view: float) -> float:
-    """In pixels."""
+def _focal_length(columns: int, field_of_view: float) -> float:
+    """Return the focal length in pixels."""
     return columns / 2 / math.tan(field_of_view / 2)
 
 
 @lru_cache(maxsize=8)
 def _slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]:
-    """For each pixel how far it looks to the left, and up, for each meter of depth."""
+    """Return the offset of the ray of each pixel (rows, columns) to the left and up, in m per m of depth."""
     rows, columns = shape
-    focal = _focal(columns, field_of_view)
+    focal = _focal_length(columns, field_of_view)
     left, up = (columns / 2 - 0.5 - np.arange(columns)) / focal, (rows / 2 - 0.5 - np.arange(rows)) / focal
     return np.broadcast_to(left, shape), np.broadcast_to(up[:, None], shape)
 
@@ -95,34 +95,37 @@ GROUND_STEP_M = 0.05
 MAX_RISE_RATIO = 1.0
 """Rise per meter above which points belong to an upright face."""
 SLOPE_ROWS_DIVISOR = 8
-"""The part of a picture's rows that tells how what is seen first rises."""
+"""Fraction of the image rows, as a divisor, over which the slope at the lowest visible point is measured."""
 
 
 def above_ground(away: Array, heights: Array, slope: float, low: float, known: Pixels) -> tuple[Array, Pixels]:
-    """How high points (rows, columns) are above the ground, in meters, and which of them are ground.
+    """Return the heights of points (rows, columns) above the ground in m, and which of them are ground.
 
-    `away` are their distances along the plane from the camera, `heights` above the plane on which the robot stands,
-    from the top row down; nan where nothing is seen. Ground rises by no more than the angle `slope`. What is seen
-    first, lies higher by more than `low` than its own slope leads from the robot's feet, and is not `known` for ground,
-    stands on a step that the picture does not show.
+    away:     horizontal distances of the points from the camera, top row first
+    heights:  above the plane on which the robot stands; nan for pixels without a point
+    slope:    maximum angle of the ground in rad
+    low:      height above which the lowest point of a column is on a step that the image does not show, unless its own
+              slope leads there from the robot
+    known:    points on cells that earlier images showed as ground
     """
-    steepest, upright = math.tan(slope), _upright(away, heights)
+    max_rise, upright = math.tan(slope), _upright(away, heights)
     rows, columns = heights.shape
-    far, ground = np.zeros(columns), np.zeros(columns)
-    follows = ~_on_a_step(away, heights, upright, low) | known[_lowest(heights), np.arange(columns)]
+    ground_distance, ground_height = np.zeros(columns), np.zeros(columns)
+    has_ground = ~_on_a_step(away, heights, upright, low) | known[_lowest(heights), np.arange(columns)]
     above, level = np.full(heights.shape, np.nan), np.zeros(heights.shape, dtype=bool)
     for row in range(rows - 1, -1, -1):
         r, z = away[row], heights[row]
-        on = follows & (z - ground <= steepest * (r - far)) & ~upright[row]
-        over = z - ground * np.minimum(1.0, r / np.maximum(far, GROUND_STEP_M))
-        above[row], level[row] = np.where(on, np.minimum(over, 0.0), over), on
-        on &= r - far >= GROUND_STEP_M
-        far, ground = np.where(on, r, far), np.where(on, z, ground)
+        is_ground = has_ground & (z - ground_height <= max_rise * (r - ground_distance)) & ~upright[row]
+        height = z - ground_height * np.minimum(1.0, r / np.maximum(ground_distance, GROUND_STEP_M))
+        above[row], level[row] = np.where(is_ground, np.minimum(height, 0.0), height), is_ground
+        is_ground &= r - ground_distance >= GROUND_STEP_M
+        ground_distance = np.where(is_ground, r, ground_distance)
+        ground_height = np.where(is_ground, z, ground_height)
     return above, level
 
 
 def _upright(away: Array, heights: Array) -> Pixels:
-    """Which points are of a face: what is seen in the next row, or in the one before, is straight above or below."""
+    """Return which points belong to an upright face: the point in an adjacent row is nearly straight above or below."""
     steep: Pixels = np.diff(-heights, axis=0) > MAX_RISE_RATIO * np.maximum(np.diff(-away, axis=0), 0.0)
     upright = np.zeros(heights.shape, dtype=bool)
     upright[1:] = steep
@@ -131,17 +134,17 @@ def _upright(away: Array, heights: Array) -> Pixels:
 
 
 def _on_a_step(away: Array, heights: Array, upright: Pixels, low: float) -> Pixels:
-    """In which columns what is seen first is a face, or higher than the slope on which it lies can lead."""
+    """Return the columns whose lowest point is on an upright face, or higher than its slope can lead from the robot."""
     rows, columns = heights.shape
-    every, first = np.arange(columns), _lowest(heights)
-    then = np.maximum(first - rows // SLOPE_ROWS_DIVISOR, 0)
-    r, z = away[first, every], heights[first, every]
-    rise = (heights[then, every] - z) / np.maximum(away[then, every] - r, GROUND_STEP_M)
-    step: Pixels = (z > low) & (upright[first, every] | ~(z - rise * r <= low))
+    all_columns, lowest = np.arange(columns), _lowest(heights)
+    upper = np.maximum(lowest - rows // SLOPE_ROWS_DIVISOR, 0)
+    r, z = away[lowest, all_columns], heights[lowest, all_columns]
+    rise = (heights[upper, all_columns] - z) / np.maximum(away[upper, all_columns] - r, GROUND_STEP_M)
+    step: Pixels = (z > low) & (upright[lowest, all_columns] | ~(z - rise * r <= low))
     return step
 
 
 def _lowest(heights: Array) -> npt.NDArray[np.intp]:
-    """Return the lowest row of each column in which anything is seen, or the last row."""
+    """Return the lowest row with a point in each column, or the last row."""
     rows: npt.NDArray[np.intp] = len(heights) - 1 - np.isfinite(heights)[::-1].argmax(axis=0)
     return rows

@@ -46,7 +46,9 @@ class SquaredDistanceTransform:
         if reach > MAX_COMPARED_CELLS:
             return
         height, width = shape
-        rows, columns = (max(1, min(one, BLOCK_SIZE // (reach * other))) for one, other in (shape, shape[::-1]))
+        rows, columns = (
+            max(1, min(size, BLOCK_SIZE // (reach * other_size))) for size, other_size in (shape, shape[::-1])
+        )
         buffer = np.empty(reach * max(rows * width, columns * height), dtype=np.uint16)
         self._along = _AxisPass(width, height, reach, buffer[: reach * columns * height], reuse)
         self._across = _AxisPass(height, width, reach, buffer[: reach * rows * width], reuse)
@@ -78,25 +80,25 @@ class _AxisPass:
         padded = np.full((height + 2 * reach, width), reach * reach + 1, dtype=np.uint16)
         self.values: Squares = padded[reach : reach + height]
         """Input values (rows, columns)."""
-        self._nearer = buffer.reshape(reach, -1, width)
-        self._steps = np.broadcast_to(_STEPS[:reach], self._nearer.shape)
+        self._buffer = buffer.reshape(reach, -1, width)
+        self._steps = np.broadcast_to(_STEPS[:reach], self._buffer.shape)
         if reuse:
             self._steps = self._steps.copy()  # adding a contiguous array takes half the time
-        count, (row, column) = self._nearer.shape[1], padded.strides
-        self._parts = list[tuple[slice, Squares, Squares]]()
+        count, (row, column) = self._buffer.shape[1], padded.strides
+        self._blocks = list[tuple[slice, Squares, Squares]]()
         for first in range(0, height, count):
-            place, shape = (first + reach) * row, (reach, min(count, height - first), width)
-            below: Squares = np.ndarray(shape, np.uint16, padded, place - row, (-row, row, column))
-            above: Squares = np.ndarray(shape, np.uint16, padded, place + row, (row, row, column))
-            self._parts.append((slice(first, first + shape[1]), below, above))
+            offset, shape = (first + reach) * row, (reach, min(count, height - first), width)
+            below: Squares = np.ndarray(shape, np.uint16, padded, offset - row, (-row, row, column))
+            above: Squares = np.ndarray(shape, np.uint16, padded, offset + row, (row, row, column))
+            self._blocks.append((slice(first, first + shape[1]), below, above))
 
     def run(self, out: Squares) -> None:
         """Write the result into `out` (rows, columns)."""
-        for rows, below, above in self._parts:
-            nearer, steps = self._nearer[:, : below.shape[1]], self._steps[:, : below.shape[1]]
-            np.minimum(below, above, out=nearer)
-            nearer += steps
-            np.minimum(np.minimum.reduce(nearer, axis=0), self.values[rows], out=out[rows])
+        for rows, below, above in self._blocks:
+            candidates, steps = self._buffer[:, : below.shape[1]], self._steps[:, : below.shape[1]]
+            np.minimum(below, above, out=candidates)
+            candidates += steps
+            np.minimum(np.minimum.reduce(candidates, axis=0), self.values[rows], out=out[rows])
 
 
 def squared_distance_blocks(marked: npt.NDArray[np.bool_]) -> Iterator[tuple[slice, npt.NDArray[np.signedinteger]]]:

@@ -12,12 +12,12 @@ from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.beams import Plane
 
 Cells = npt.NDArray[np.int64]
-_least, _most = np.minimum.reduce, np.maximum.reduce
+_minimum, _maximum = np.minimum.reduce, np.maximum.reduce
 CellIndices = npt.NDArray[np.int64]
-"""Cells (n,) by number: row by row, from cell (0, 0) on."""
+"""Flat indices (n,) of cells, row by row from cell (0, 0)."""
 
 MAX_CACHED_CELLS = 10_000
-"""Cells of a grid of which all centers are kept: those of a local costmap."""
+"""Maximum number of cells of a grid whose centers are cached: about a local costmap."""
 
 
 @dataclass(frozen=True)
@@ -29,79 +29,81 @@ class GridFrame:
     shape: tuple[int, int]
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Row and column of the cell under a point; may lie off the grid."""
+        """Return row and column of the cell at a point, possibly outside the grid."""
         scale = 1.0 / self.resolution
         return math.floor((y - self.origin[1]) * scale), math.floor((x - self.origin[0]) * scale)
 
     def cells(self, points: Array) -> Cells:
-        """Cells (n, 2) as (row, column) under points (n, 2); may lie off the grid."""
+        """Return the cells (n, 2) as (row, column) at points (n, 2), possibly outside the grid."""
         local = (points - np.array(self.origin)) * (1.0 / self.resolution)
         cells: Cells = np.floor(local[:, ::-1]).astype(np.int64)
         return cells
 
     def centers(self, cells: Cells) -> Array:
-        """Points (n, 2) of the centers of cells (n, 2)."""
+        """Return the centers (n, 2) of cells (n, 2)."""
         points: Array = (cells[:, ::-1] + 0.5) * self.resolution + np.array(self.origin)
         return points
 
     def inside(self, cells: Cells) -> npt.NDArray[np.bool_]:
-        """Which of the cells (n, 2) lie on the grid."""
+        """Return which of the cells (n, 2) are on the grid."""
         rows, columns = cells[:, 0], cells[:, 1]
         return (rows >= 0) & (columns >= 0) & (rows < self.shape[0]) & (columns < self.shape[1])
 
-    def numbers(self, points: Plane, center: complex, reach: float) -> CellIndices:
-        """Return the cells under those points (n,) that lie on the grid; all are within `reach` of `center`.
+    def indices_of(self, points: Plane, center: complex, reach: float) -> CellIndices:
+        """Return the flat indices of the cells at those points (n,) that are on the grid.
 
-        Where all of that is on the grid, nobody is asked.
+        All points are within `reach` m of `center`. If that circle is on the grid, single points are not checked.
         """
         local = points - complex(*self.origin)
         local *= 1.0 / self.resolution
-        flat, some = local.view(np.float64), not self._holds(center, reach + self.resolution)
-        if some:
-            np.floor(flat, out=flat)  # where all are positive, to cut off does the same
+        flat, may_leave_grid = local.view(np.float64), not self._contains_circle(center, reach + self.resolution)
+        if may_leave_grid:
+            np.floor(flat, out=flat)  # not needed for positive values, which are truncated
         cells = flat.astype(np.int64).reshape(-1, 2)
-        numbers: CellIndices = cells.dot(self._steps)
-        if some:
-            off = cells.view(np.uint64)  # below zero is far beyond every grid without a sign
-            numbers = numbers[(off[:, 0] < self.shape[1]) & (off[:, 1] < self.shape[0])]
-        return numbers
+        indices: CellIndices = cells.dot(self._index_factors)
+        if may_leave_grid:
+            offset = cells.view(np.uint64)  # negative values become larger than any grid
+            indices = indices[(offset[:, 0] < self.shape[1]) & (offset[:, 1] < self.shape[0])]
+        return indices
 
-    def _holds(self, center: complex, reach: float) -> bool:
+    def _contains_circle(self, center: complex, reach: float) -> bool:
         """Return whether the circle of radius `reach` m around a point lies on the grid."""
         (left, low), (rows, columns), x, y = self.origin, self.shape, center.real, center.imag
-        wide, high = columns * self.resolution, rows * self.resolution
-        return left + reach <= x <= left + wide - reach and low + reach <= y <= low + high - reach
+        width, height = columns * self.resolution, rows * self.resolution
+        return left + reach <= x <= left + width - reach and low + reach <= y <= low + height - reach
 
     @cached_property
-    def _steps(self) -> CellIndices:
-        """Factors that turn the column and row of a cell into its number."""
+    def _index_factors(self) -> CellIndices:
+        """Factors of the column and row of a cell in its flat index."""
         return np.array((1, self.shape[1]))
 
-    def points(self, numbers: CellIndices) -> Plane:
-        """Return the centers (n,) of cells."""
+    def points(self, indices: CellIndices) -> Plane:
+        """Return the centers x + iy (n,) of cells."""
         corner, (rows, columns) = complex(*self.origin), self.shape
         if rows * columns > MAX_CACHED_CELLS:
-            return _middles(numbers, columns, self.resolution, corner)
-        points: Plane = _centers(self.shape, self.resolution).take(numbers)
+            return _cell_centers(indices, columns, self.resolution, corner)
+        points: Plane = _all_cell_centers(self.shape, self.resolution).take(indices)
         points += corner
         return points
 
-    def extent(self, numbers: CellIndices) -> tuple[tuple[int, int], tuple[int, int]]:
+    def extent(self, indices: CellIndices) -> tuple[tuple[int, int], tuple[int, int]]:
         """Return the lowest and the highest row and column of at least one cell."""
         width = self.shape[1]
-        first, last, columns = int(_least(numbers)), int(_most(numbers)), numbers % width
-        return (first // width, int(_least(columns))), (last // width, int(_most(columns)))
+        first, last, columns = int(_minimum(indices)), int(_maximum(indices)), indices % width
+        return (first // width, int(_minimum(columns))), (last // width, int(_maximum(columns)))
 
     def covers(self, x: float, y: float) -> bool:
         """Return whether the point lies on the grid."""
         column, row = (x - self.origin[0]) / self.resolution, (y - self.origin[1]) / self.resolution
         return 0 <= row < self.shape[0] and 0 <= column < self.shape[1]
 
-    def within(self, window: tuple[slice, slice], numbers: CellIndices) -> CellIndices:
-        """Cells of a window, which are given as numbers in it."""
+    def from_window(self, window: tuple[slice, slice], indices: CellIndices) -> CellIndices:
+        """Return the flat indices in the grid of cells with these flat indices in a window."""
         (rows, columns), width = window, self.shape[1]
-        wide = max(1, columns.stop - columns.start)
-        cells: CellIndices = numbers + numbers // wide * (width - wide) + (rows.start * width + columns.start)
+        window_width = max(1, columns.stop - columns.start)
+        cells: CellIndices = (
+            indices + indices // window_width * (width - window_width) + (rows.start * width + columns.start)
+        )
         return cells
 
     def window(self, low: tuple[int, int], high: tuple[int, int], margin: int) -> tuple[slice, slice]:
@@ -112,17 +114,17 @@ class GridFrame:
         )
 
 
-def _middles(numbers: CellIndices, columns: int, edge: float, corner: complex = 0j) -> Plane:
-    """Return the centers x + iy (n,) of cells of a grid with this corner."""
-    up, across = np.divmod(numbers, columns)
-    middles: Plane = up * (1j * edge) + (across * edge + (corner + (0.5 + 0.5j) * edge))
-    return middles
+def _cell_centers(indices: CellIndices, columns: int, size: float, corner: complex = 0j) -> Plane:
+    """Return the centers x + iy (n,) of cells with size `size` in m of a grid with this corner."""
+    up, across = np.divmod(indices, columns)
+    centers: Plane = up * (1j * size) + (across * size + (corner + (0.5 + 0.5j) * size))
+    return centers
 
 
 @lru_cache(maxsize=8)
-def _centers(shape: tuple[int, int], edge: float) -> Plane:
+def _all_cell_centers(shape: tuple[int, int], size: float) -> Plane:
     """Return the centers of all cells of a grid, relative to its corner."""
-    return _middles(np.arange(shape[0] * shape[1]), shape[1], edge)
+    return _cell_centers(np.arange(shape[0] * shape[1]), shape[1], size)
 
 
 Cell = TypeVar("Cell", bound=np.generic)
@@ -130,37 +132,38 @@ Cell = TypeVar("Cell", bound=np.generic)
 GOAL_EDGE_MARGIN_M = 0.6
 """Distance inside the edge of the window of the intermediate goal for a goal beyond it."""
 ROLL_RATIO = 1 / 8
-"""The window is moved when the robot is this part of its size away from its middle, …"""
+"""A window is moved when the distance of the robot from its center exceeds this ratio of its size."""
 MAX_ROLL_OFFSET_M = 0.25
-"""… and a local costmap's at the latest when it is so many meters away: Nav2 moves it at each update."""
+"""Distance of the robot from the center after which a local costmap is moved at the latest. Nav2 moves it at each
+update."""
 
 
 def window_around(center: Pose2, size: tuple[float, float], resolution: float) -> GridFrame:
     """Return a window of this size in m around a point, aligned with a fixed grid in the plane."""
-    columns, rows = (math.ceil(edge / resolution) for edge in size)
+    columns, rows = (math.ceil(length / resolution) for length in size)
     column, row = round(center.x / resolution) - columns // 2, round(center.y / resolution) - rows // 2
     return GridFrame((column * resolution, row * resolution), resolution, (rows, columns))
 
 
-def should_roll(frame: GridFrame, base: Pose2, no_farther: float = math.inf) -> bool:
-    """Return whether the robot is so far from the center that the window should follow."""
+def should_roll(frame: GridFrame, base: Pose2, max_offset: float = math.inf) -> bool:
+    """Return whether the robot is so far from the center that the window should follow, at most `max_offset` m."""
     rows, columns = frame.shape
     across, up = columns * frame.resolution, rows * frame.resolution
-    off = abs(base.x - frame.origin[0] - across / 2), abs(base.y - frame.origin[1] - up / 2)
-    return off[0] > min(ROLL_RATIO * across, no_farther) or off[1] > min(ROLL_RATIO * up, no_farther)
+    offset = abs(base.x - frame.origin[0] - across / 2), abs(base.y - frame.origin[1] - up / 2)
+    return offset[0] > min(ROLL_RATIO * across, max_offset) or offset[1] > min(ROLL_RATIO * up, max_offset)
 
 
-def shift_layer(layer: npt.NDArray[Cell], before: GridFrame, now: GridFrame, new: float) -> npt.NDArray[Cell]:
-    """Return the layer copied to another window of the same size; cells without a source get the value `new`."""
-    moved = np.full(now.shape, new, dtype=layer.dtype)
-    steps = [round((now.origin[axis] - before.origin[axis]) / now.resolution) for axis in (1, 0)]
-    kept = [_kept(step, cells) for step, cells in zip(steps, before.shape, strict=True)]
-    target = tuple(slice(first - step, last - step) for (first, last), step in zip(kept, steps, strict=True))
-    moved[target] = layer[tuple(slice(first, last) for first, last in kept)]
-    return moved
+def shift_layer(layer: npt.NDArray[Cell], before: GridFrame, after: GridFrame, fill: float) -> npt.NDArray[Cell]:
+    """Return the layer copied to another window of the same size; cells without a source get the value `fill`."""
+    shifted = np.full(after.shape, fill, dtype=layer.dtype)
+    steps = [round((after.origin[axis] - before.origin[axis]) / after.resolution) for axis in (1, 0)]
+    remaining = [_remaining(step, cells) for step, cells in zip(steps, before.shape, strict=True)]
+    target = tuple(slice(first - step, last - step) for (first, last), step in zip(remaining, steps, strict=True))
+    shifted[target] = layer[tuple(slice(first, last) for first, last in remaining)]
+    return shifted
 
 
-def _kept(step: int, cells: int) -> tuple[int, int]:
+def _remaining(step: int, cells: int) -> tuple[int, int]:
     """Return the first and one past the last of the cells in a row that remain after a shift by `step`."""
     first = min(max(0, step), cells)
     return first, max(first, min(cells, cells + step))
@@ -171,13 +174,13 @@ def clip_goal(frame: GridFrame, start: Pose2, goal: Pose2) -> Pose2:
     if frame.covers(goal.x, goal.y):
         return goal
     across, up = frame.shape[1] * frame.resolution, frame.shape[0] * frame.resolution
-    part = 1.0
-    for here, there, low, size in (
+    fraction = 1.0
+    for start_coordinate, goal_coordinate, low, size in (
         (start.x, goal.x, frame.origin[0], across),
         (start.y, goal.y, frame.origin[1], up),
     ):
-        if there != here:
-            edge = low + size - GOAL_EDGE_MARGIN_M if there > here else low + GOAL_EDGE_MARGIN_M
-            part = min(part, max(0.0, (edge - here) / (there - here)))
+        if goal_coordinate != start_coordinate:
+            edge = low + size - GOAL_EDGE_MARGIN_M if goal_coordinate > start_coordinate else low + GOAL_EDGE_MARGIN_M
+            fraction = min(fraction, max(0.0, (edge - start_coordinate) / (goal_coordinate - start_coordinate)))
     dx, dy = goal.x - start.x, goal.y - start.y
-    return Pose2(start.x + part * dx, start.y + part * dy, math.atan2(dy, dx))
+    return Pose2(start.x + fraction * dx, start.y + fraction * dy, math.atan2(dy, dx))

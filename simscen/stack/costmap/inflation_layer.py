@@ -17,14 +17,14 @@ from simscen.stack.costmap.distance_transform import (
 
 FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
 MAX_SQUARED_CELLS = OUT_OF_REACH
-"""The largest squared distance kept: 256 cells, 12.8 m at 5 cm."""
+"""The largest squared distance: that of 256 cells, 12.8 m at 5 cm."""
 
 Squared = npt.NDArray[np.uint16]
 Costs = npt.NDArray[np.uint8]
 
 
 def squared_distances(lethal: npt.NDArray[np.bool_], reach: int) -> Squared:
-    """For each cell the exact squared distance in cells to the nearest lethal cell; more beyond `reach`."""
+    """Return the squared distance of each cell to the nearest lethal cell in cells, exact up to `reach`."""
     if not lethal.any():
         return np.full(lethal.shape, MAX_SQUARED_CELLS, dtype=np.uint16)
     if reach <= MAX_REACH_CELLS:
@@ -62,7 +62,7 @@ class Inflation:
         self.cost: npt.NDArray[np.uint8] = cost.astype(np.uint8)
 
     def costs(self, squared: npt.NDArray[np.integer], unknown: npt.NDArray[np.bool_] | None) -> Costs:
-        """Costs of cells; `unknown` ones stay unknown unless an obstacle is within the inscribed radius."""
+        """Return the costs of cells. `unknown` ones stay unknown unless an obstacle is within the inscribed radius."""
         cost = self.cost.take(squared)
         if unknown is not None:
             cost[unknown & (cost < INSCRIBED)] = NO_INFORMATION

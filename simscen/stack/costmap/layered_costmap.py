@@ -1,4 +1,4 @@
-"""A costmap: static map below, live obstacles above, inflated, updated where something changed."""
+"""Layered costmap: static map and live obstacles, inflated, and updated incrementally where cells changed."""
 
 import math
 from collections import deque
@@ -47,21 +47,21 @@ from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 DISTANCE_MARGIN_M = 0.5
 """Margin beyond the hull up to which distances are computed; the inflation radius if that is larger."""
 SCANS_PER_UNKNOWN_UPDATE = 5
-"""Every which scan is asked what unknown cells it shows to be free: once a second at the default rate, Nav2's own for
-the global costmap. Nothing that drives waits for it, and of a map's outside there are many."""
-KEPT_REVISIONS = 16
-"""The newest revisions of which it is known what changed."""
+"""Every n-th scan updates the unknown cells: once per second at the default rate, as Nav2's global costmap. A map can
+have many unknown cells, and driving does not depend on them."""
+MAX_REVISIONS = 16
+"""Number of latest revisions whose changes are stored."""
 
 
 class LayeredCostmap:
-    """Keeps costs and distances up to date; `view` shows them.
+    """Costs and distances of the cells, available as `view`.
 
-    The distance field of the static map is computed once. A scan changes few cells, so distances to live obstacles
-    are computed again only around those. For that to suffice, distances end at a reach of the inflation radius, or
-    half a meter beyond the hull: farther away than that, nothing asks how far.
+    The distance field of the static map is computed once. A scan changes few cells, so that distances to live obstacles
+    are only recomputed around these. For this, distances are limited to the inflation radius, or to half a meter beyond
+    the hull if that is more; larger distances are not needed.
 
-    Where there is no map it is a window that rolls with the robot, `size` meters along x and y. It lives in the frame
-    in which it is told where the robot is: that of the map, or odom.
+    Without a map, the costmap is a window of `size` m along x and y that rolls with the robot. Its frame, map or odom,
+    is that of the poses passed to `update`.
     """
 
     def __init__(
@@ -69,36 +69,38 @@ class LayeredCostmap:
         spec: CostmapSpec,
         surroundings: Surroundings,
         size: tuple[float, float] | None = None,
-        no_farther: float = math.inf,
+        max_offset: float = math.inf,
     ) -> None:
-        self._spec, self._surroundings, self._tracks = spec, surroundings, spec.track_unknown_space
+        self._spec, self._surroundings, self._tracks_unknown = spec, surroundings, spec.track_unknown_space
         self._rolling = surroundings.map is None
-        self._size, self._no_farther = size or (spec.rolling_size, spec.rolling_size), no_farther
+        self._size, self._max_offset = size or (spec.rolling_size, spec.rolling_size), max_offset
         self._inscribed = surroundings.robot.inscribed_radius
         resolution = spec.resolution if surroundings.map is None else surroundings.map.resolution
         self._inflation = _inflation(spec, surroundings.robot, resolution)
-        self._margin = _cells(_reach(spec, surroundings.robot), resolution)
-        self._speck = spec.denoise_layer.minimal_group_size if spec.denoise_layer.enabled else 0
-        self._revision, self._zoned, self._scans = 0, 0, 0
-        self._newest: dict[str, tuple[Pose2, Scan | Image]] = {}
+        self._margin_cells = _in_cells(_reach(spec, surroundings.robot), resolution)
+        self._min_group_size = spec.denoise_layer.minimal_group_size if spec.denoise_layer.enabled else 0
+        self._revision, self._keepout_change, self._scans = 0, 0, 0
+        self._latest_readings: dict[str, tuple[Pose2, Scan | Image]] = {}
         self._view: CostmapView | None = None
         self._changed: tuple[tuple[int, int], tuple[int, int]] | None = None
-        self._changes = deque[CellIndices | None](maxlen=KEPT_REVISIONS)
+        self._changes = deque[CellIndices | None](maxlen=MAX_REVISIONS)
         self.moving = NO_MOVING_OBSTACLES
         """Moving obstacles in the frame of the costmap, included in the view."""
-        layer = self._layer(Pose2(0.0, 0.0))
+        layer = self._initial_layer(Pose2(0.0, 0.0))
         self._frame: GridFrame = layer.frame
         self._live = ObstacleLayer(spec, self._inscribed, layer.frame)
-        self._lay(layer)
+        self._set_static_layer(layer)
         self._unknown = layer.unknown.copy()
-        grid = None if self._forbidding else surroundings.map
-        self._show(None if grid is None else _costs(grid, self._inflation, self._margin, self._tracks).copy())
+        grid = None if self._has_keepout else surroundings.map
+        self._recompute(
+            None if grid is None else _costs(grid, self._inflation, self._margin_cells, self._tracks_unknown).copy()
+        )
 
     @property
     def view(self) -> CostmapView:
-        """The costmap now. Its arrays are windows on this costmap and valid until the next update.
+        """The current costmap. Its arrays are shared with this object and valid until the next update.
 
-        What updates have changed is computed here, once for all of them that nobody looked at.
+        Changes by updates are computed here, once for all updates since the last access.
         """
         if self._changed is not None:
             self.refresh(*self._changed)
@@ -111,217 +113,216 @@ class LayeredCostmap:
 
     @property
     def revision(self) -> int:
-        """Another one after each update that changed something."""
+        """Revision of the costmap; increases with each update that changes a cell."""
         return self._revision
 
-    def changed_near(self, revision: int, places: Plane, meters: float) -> bool:
-        """Return whether obstacles may have changed within so many meters of a position since that revision.
+    def changed_near(self, revision: int, points: Plane, distance: float) -> bool:
+        """Return whether obstacles may have changed within `distance` m of `points` x + iy (n,) since a revision.
 
-        `places` are x + iy (n,). Where it says no, the view need not be looked at for how far obstacles are from these.
+        If not, their distances from obstacles are the same, and the view does not have to be computed.
         """
-        since = self._revision - revision
-        if since > len(self._changes):
+        count = self._revision - revision
+        if count > len(self._changes):
             return True
-        changes = list(self._changes)[len(self._changes) - since :]
-        reach = meters + (1 + self._speck) * math.sqrt(2.0) * self._frame.resolution  # of cells, told by their middles
+        changes = list(self._changes)[len(self._changes) - count :]
+        reach = distance + (1 + self._min_group_size) * math.sqrt(2.0) * self._frame.resolution  # between cell centers
         for cells in changes:
-            if cells is None or (np.abs(self._frame.points(cells)[:, None] - places) <= reach).any():
+            if cells is None or (np.abs(self._frame.points(cells)[:, None] - points) <= reach).any():
                 return True
         return False
 
     @property
     def obstacle_cells(self) -> int:
-        """How many cells are marked as live obstacles, or were forbidden since the start."""
-        return self._live.count + self._zoned
+        """Number of cells with live obstacles, plus the keepout cells that were added since the start."""
+        return self._live.count + self._keepout_change
 
-    def update(self, base: Pose2, seen: Scan | Image) -> None:
-        """Clear what a sensor sees through, then mark what it sees, from the robot at `base`."""
-        if self._rolling and should_roll(self._frame, base, self._no_farther):
+    def update(self, base: Pose2, reading: Scan | Image) -> None:
+        """Clear the cells that a sensor sees through, then mark its obstacles. `base` is the pose of the robot."""
+        if self._rolling and should_roll(self._frame, base, self._max_offset):
             self._roll(base)
-        self._newest[seen.sensor] = (base, seen)
-        if isinstance(seen, Image):
-            self._touch_cells(self._live.on_image(base, seen, self._static_squared))
+        self._latest_readings[reading.sensor] = (base, reading)
+        if isinstance(reading, Image):
+            self._mark_cells_changed(self._live.on_image(base, reading, self._static_squared))
             return
-        changed = self._live.on_scan(base, seen, self._static_squared if self._walled else None)
+        changed = self._live.on_scan(base, reading, self._static_squared if self._has_walls else None)
         if len(changed):
-            self._touch(*(self._whole if self._small else self._frame.extent(changed)), changed)
-        if self._tracks:
-            self._learn(base, seen)
+            self._mark_changed(*(self._whole if self._is_small else self._frame.extent(changed)), changed)
+        if self._tracks_unknown:
+            self._update_unknown(base, reading)
 
-    def clear(self, clip_goal: float = math.inf, unseen: float = DISTANCE_MARGIN_M) -> None:
-        """Forget every live obstacle `within` so many meters of the robot along x and y, but those that it sees now.
+    def clear(self, clear_within: float = math.inf, unseen: float = DISTANCE_MARGIN_M) -> None:
+        """Clear the live obstacles within a distance in m of the robot along x and y, except those in current readings.
 
-        Nav2's ClearEntireCostmap, or ClearCostmapAroundRobot. What is `unseen`, where no lidar looks, so many meters
-        beyond the hull at most, is kept: that nobody sees it does not tell that it has gone, and the next thing a robot
-        does may be to back up.
+        As Nav2's ClearEntireCostmap or ClearCostmapAroundRobot. Obstacles up to `unseen` m beyond the hull that no
+        lidar can see are not cleared: they may still be there, and the robot may back up next.
         """
-        newest = list(self._newest.values())
-        scans = [(base, seen) for base, seen in newest if isinstance(seen, Scan)]
-        blind = self._surroundings.robot.circumscribed_radius + unseen
-        kept = self._live.out_of_view(scans[-1][0], blind, scans) if scans else None
-        if newest and math.isfinite(clip_goal):
-            self._live.forget_around(newest[-1][0], clip_goal)
+        latest = list(self._latest_readings.values())
+        scans = [(base, reading) for base, reading in latest if isinstance(reading, Scan)]
+        radius = self._surroundings.robot.circumscribed_radius + unseen
+        out_of_view = self._live.out_of_view(scans[-1][0], radius, scans) if scans else None
+        if latest and math.isfinite(clear_within):
+            self._live.clear_around(latest[-1][0], clear_within)
         else:
-            self._live.forget(self._frame)
-        if kept is not None:
-            self._live.mark(kept)
-        self._show()
-        for base, seen in newest:
-            self.update(base, seen)
+            self._live.reset(self._frame)
+        if out_of_view is not None:
+            self._live.mark(out_of_view)
+        self._recompute()
+        for base, reading in latest:
+            self.update(base, reading)
 
     def set_zones(self, zones: Zones) -> None:
-        """Keep out of these from now on, and of no others."""
-        before = self._forbidden()
+        """Replace all keepout zones and masks."""
+        before = self._keepout_count()
         self._surroundings = replace(self._surroundings, keepout=zones.keepout, masks=zones.masks)
-        self._lay(self._layer_in(self._frame))
-        self._zoned += self._forbidden() - before
-        self._show()
+        self._set_static_layer(self._static_layer_in(self._frame))
+        self._keepout_change += self._keepout_count() - before
+        self._recompute()
 
-    def _forbidden(self) -> int:
+    def _keepout_count(self) -> int:
         return int(np.count_nonzero(self._static_squared == 0))
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
-        """Return whether the pose is off mapped walls and the inscribed circle fits within the tolerance."""
-        here = self._frame.cell(pose.x, pose.y)
-        if self._static_squared[here] == 0:
+        """Return whether the pose is not in a mapped wall, and the inscribed circle fits within `tolerance` m of it."""
+        center = self._frame.cell(pose.x, pose.y)
+        if self._static_squared[center] == 0:
             return False
-        near = self._frame.window(here, here, math.ceil(tolerance / self._frame.resolution))
-        fits = self._inflation.meters.take(self._static_squared[near]) > self._inscribed
-        points = self._frame.centers(np.argwhere(fits) + np.array((near[0].start, near[1].start)))
+        window = self._frame.window(center, center, math.ceil(tolerance / self._frame.resolution))
+        fits = self._inflation.meters.take(self._static_squared[window]) > self._inscribed
+        points = self._frame.centers(np.argwhere(fits) + np.array((window[0].start, window[1].start)))
         return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
 
     def aim(self, start: Pose2, goal: Pose2) -> Pose2:
-        """Return the goal, or if it is beyond a rolling window, the nearest point to it inside."""
+        """Return the goal; if it is outside a rolling window, a point inside in the direction of the goal."""
         return clip_goal(self._frame, start, goal) if self._rolling else goal
 
     def _roll(self, base: Pose2) -> None:
-        """Follow the robot; what is new in the window is unknown, where that is tracked."""
+        """Move the window with the robot. New cells are unknown if unknown space is tracked."""
         before, window = self._frame, window_around(base, self._size, self._spec.resolution)
-        if self._forbidding:
-            self._lay(self._layer_in(window))
-        self._frame = window  # where nothing is forbidden, the cells of one window are those of any other
+        if self._has_keepout:
+            self._set_static_layer(self._static_layer_in(window))
+        self._frame = window  # without keepout zones, the static layer of all windows is the same
         self._live.roll(window)
-        if self._tracks:
+        if self._tracks_unknown:
             self._unknown = shift_layer(self._unknown, before, window, True)
-        self._touch(*self._whole)
+        self._mark_changed(*self._whole)
 
-    def _layer(self, center: Pose2) -> StaticLayer:
-        return self._layer_in(window_around(center, self._size, self._spec.resolution))
+    def _initial_layer(self, center: Pose2) -> StaticLayer:
+        return self._static_layer_in(window_around(center, self._size, self._spec.resolution))
 
-    def _layer_in(self, window: GridFrame) -> StaticLayer:
+    def _static_layer_in(self, window: GridFrame) -> StaticLayer:
         """Return the static layer in this window, or on the map if there is one."""
         grid, keepout, mask = self._surroundings.map, self._surroundings.keepout, self._surroundings.masks.keepout
-        unknown = self._tracks
+        unknown = self._tracks_unknown
         if grid is None:
             return empty_layer(window, keepout, mask, unknown)
-        if not self._forbidding:
+        if not self._has_keepout:
             return free_layer(grid, unknown)
         return static_layer(grid, keepout, mask, unknown)
 
     @property
-    def _forbidding(self) -> bool:
+    def _has_keepout(self) -> bool:
         """Whether keepout zones or a keepout mask apply."""
         return bool(self._surroundings.keepout) or self._surroundings.masks.keepout is not None
 
-    def _lay(self, layer: StaticLayer) -> None:
+    def _set_static_layer(self, layer: StaticLayer) -> None:
         self._frame = layer.frame
         rows, columns = layer.frame.shape
         self._whole = (0, 0), (rows - 1, columns - 1)
-        # Who looks for what has changed in such a window finds that most of it is near that.
-        self._small = max(rows, columns) <= 4 * self._margin and self._margin <= MAX_REACH_CELLS
-        grid = None if self._forbidding else self._surroundings.map
+        # In a small window, most cells are near any change, so that all are recomputed.
+        self._is_small = max(rows, columns) <= 4 * self._margin_cells and self._margin_cells <= MAX_REACH_CELLS
+        grid = None if self._has_keepout else self._surroundings.map
         if grid is None:
-            self._static_squared = squared_distances(layer.lethal, self._margin)
+            self._static_squared = squared_distances(layer.lethal, self._margin_cells)
         else:
-            self._static_squared = static_distances(grid, self._margin)
-        self._walled = bool(layer.lethal.any())
+            self._static_squared = static_distances(grid, self._margin_cells)
+        self._has_walls = bool(layer.lethal.any())
 
-    def _show(self, costs: Costs | None = None) -> None:
-        """Compute everything again, but for `costs` that are known."""
+    def _recompute(self, costs: Costs | None = None) -> None:
+        """Recompute all costs and distances. `costs` are those of the static layer if they are known."""
         if costs is None:
-            costs = self._inflation.costs(self._static_squared, self._unknown if self._tracks else None)
+            costs = self._inflation.costs(self._static_squared, self._unknown if self._tracks_unknown else None)
         self._costs = costs
         self._distance = self._inflation.meters.take(self._static_squared)
-        self._note(None)
+        self._add_revision(None)
         self._changed = None
         if len(marked := self._live.cells):
-            self._touch(*self._frame.extent(marked))
+            self._mark_changed(*self._frame.extent(marked))
 
     def _obstacles(self, window: Window) -> Mask:
-        """Live obstacles in a window, without specks where they are noise."""
+        """Return the live obstacles in a window, without noise if denoising is enabled."""
         marked = self._live.marked(window)
-        if not self._speck:
+        if not self._min_group_size:
             return marked
         return remove_small_groups(marked, self._static_squared[window] == 0, self._spec.denoise_layer)
 
-    def _learn(self, base: Pose2, scan: Scan) -> None:
-        """Unknown cells that the beams pass through are known from now on."""
+    def _update_unknown(self, base: Pose2, scan: Scan) -> None:
+        """Mark unknown cells that beams cross as known."""
         self._scans += 1
         if self._scans % SCANS_PER_UNKNOWN_UPDATE != 1:
             return
         frame = self._frame
-        around = self._live.around(base, math.hypot(scan.mount.x, scan.mount.y))
-        cells = frame.within(around, np.flatnonzero(self._unknown[around]))
+        window = self._live.window_around_robot(base, math.hypot(scan.mount.x, scan.mount.y))
+        cells = frame.from_window(window, np.flatnonzero(self._unknown[window]))
         if not len(cells):
             return
         passed, _ = crossed_cells(frame.points(cells), frame.resolution, scan, base, self._spec)
         cells = cells[passed]
         if len(cells):
             self._unknown[np.divmod(cells, frame.shape[1])] = False
-            self._touch(*frame.extent(cells), NO_CELLS)
+            self._mark_changed(*frame.extent(cells), NO_CELLS)
 
-    def _touch_cells(self, cells: Cells) -> None:
+    def _mark_cells_changed(self, cells: Cells) -> None:
         """Mark these cells (n, 2) as changed."""
         if len(cells):
             (top, left), (bottom, right) = cells.min(axis=0).tolist(), cells.max(axis=0).tolist()
-            self._touch((top, left), (bottom, right))
+            self._mark_changed((top, left), (bottom, right))
 
-    def _touch(self, low: tuple[int, int], high: tuple[int, int], which: CellIndices | None = None) -> None:
-        """Cells from `low` to `high` have changed: obstacles came to, or went from, these at most, if that is known."""
+    def _mark_changed(self, low: tuple[int, int], high: tuple[int, int], cells: CellIndices | None = None) -> None:
+        """Mark cells from `low` to `high` as changed. `cells` contains all whose obstacles changed, if known."""
         if self._changed is not None:
             before_low, before_high = self._changed
             low = min(low[0], before_low[0]), min(low[1], before_low[1])
             high = max(high[0], before_high[0]), max(high[1], before_high[1])
         self._changed = low, high
-        self._note(which)
+        self._add_revision(cells)
 
-    def _note(self, which: CellIndices | None) -> None:
-        """Another revision, in which obstacles came to or went from these cells, or anywhere."""
+    def _add_revision(self, cells: CellIndices | None) -> None:
+        """Add a revision in which obstacles in these cells changed; None if it could be any cells."""
         self._revision += 1
-        self._changes.append(which)
+        self._changes.append(cells)
 
     def refresh(self, low: tuple[int, int], high: tuple[int, int]) -> None:
-        """Compute distances and costs again wherever one of the cells from `low` to `high` can matter."""
+        """Recompute distances and costs of all cells that the cells from `low` to `high` can affect."""
         self._changed = None
         if (low, high) == self._whole:
             self._refresh_all()
             return
-        inner = self._frame.window(low, high, self._margin + self._speck)
-        outer = self._frame.window(low, high, 2 * (self._margin + self._speck))
+        inner = self._frame.window(low, high, self._margin_cells + self._min_group_size)
+        outer = self._frame.window(low, high, 2 * (self._margin_cells + self._min_group_size))
         part = (
             slice(inner[0].start - outer[0].start, inner[0].stop - outer[0].start),
             slice(inner[1].start - outer[1].start, inner[1].stop - outer[1].start),
         )
-        squared = squared_distances(self._obstacles(outer), self._margin)[part]
-        if self._walled:
+        squared = squared_distances(self._obstacles(outer), self._margin_cells)[part]
+        if self._has_walls:
             squared = np.minimum(self._static_squared[inner], squared)
         self._distance[inner] = self._inflation.meters.take(squared)
-        self._costs[inner] = self._inflation.costs(squared, self._unknown[inner] if self._tracks else None)
+        self._costs[inner] = self._inflation.costs(squared, self._unknown[inner] if self._tracks_unknown else None)
 
     @cached_property
-    def _around(self) -> SquaredDistanceTransform:
+    def _transform(self) -> SquaredDistanceTransform:
         """Distance transform for small windows."""
-        return SquaredDistanceTransform(self._frame.shape, self._margin)
+        return SquaredDistanceTransform(self._frame.shape, self._margin_cells)
 
     def _refresh_all(self) -> None:
-        """Compute the distances and costs of all cells again."""
+        """Recompute the distances and costs of all cells."""
         obstacles = self._obstacles(WHOLE_GRID)
-        squared = self._around.of(obstacles) if self._small else squared_distances(obstacles, self._margin)
-        if self._walled:
+        squared = self._transform.of(obstacles) if self._is_small else squared_distances(obstacles, self._margin_cells)
+        if self._has_walls:
             squared = np.minimum(self._static_squared, squared)
-        places = squared.astype(np.intp)  # once, for both look-ups
-        self._distance = self._inflation.meters.take(places)
-        self._costs = self._inflation.costs(places, self._unknown if self._tracks else None)
+        indices = squared.astype(np.intp)  # converted once for both lookups
+        self._distance = self._inflation.meters.take(indices)
+        self._costs = self._inflation.costs(indices, self._unknown if self._tracks_unknown else None)
 
 
 def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
@@ -329,16 +330,18 @@ def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
     return max(spec.inflation_radius, robot.circumscribed_radius + DISTANCE_MARGIN_M)
 
 
-def ready(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
-    """Work out now what a robot's costmap needs to know of its map, as long as nothing is forbidden there."""
-    tables, margin = _inflation(spec, robot, grid.resolution), _cells(_reach(spec, robot), grid.resolution)
+def precompute(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
+    """Compute the costs of a map in advance, for a robot without keepout zones."""
+    tables, margin = _inflation(spec, robot, grid.resolution), _in_cells(_reach(spec, robot), grid.resolution)
     _costs(grid, tables, margin, spec.track_unknown_space)
 
 
 @cached_on_instance
-def _costs(grid: OccupancyGrid, tables: Inflation, margin: int, tracks: bool) -> Costs:
+def _costs(grid: OccupancyGrid, tables: Inflation, margin: int, tracks_unknown: bool) -> Costs:
     """Return the costs of the cells of a map without zones and readings, computed once for all runs."""
-    return tables.costs(static_distances(grid, margin), free_layer(grid, tracks).unknown if tracks else None)
+    return tables.costs(
+        static_distances(grid, margin), free_layer(grid, tracks_unknown).unknown if tracks_unknown else None
+    )
 
 
 def _inflation(spec: CostmapSpec, robot: RobotModel, resolution: float) -> Inflation:
@@ -346,5 +349,5 @@ def _inflation(spec: CostmapSpec, robot: RobotModel, resolution: float) -> Infla
     return inflation(resolution, inscribed, spec.inflation_radius, spec.cost_scaling_factor, reach)
 
 
-def _cells(reach: float, resolution: float) -> int:
-    return max(2, math.ceil(reach / resolution))  # coarse cells beside a wall still know it
+def _in_cells(reach: float, resolution: float) -> int:
+    return max(2, math.ceil(reach / resolution))  # at least the neighbors of a wall, if cells are coarse

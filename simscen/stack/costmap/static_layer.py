@@ -32,7 +32,7 @@ def static_layer(
 ) -> StaticLayer:
     """Return the layer of a map; a rotated map is sampled into an unrotated frame of the same resolution.
 
-    Where unknown space is not tracked (`unknown`), what the map does not know is free, as in Nav2.
+    Without tracking of `unknown` space, unknown cells are free, as in Nav2.
     """
     if abs(grid.origin.yaw) < 1e-9:
         frame = GridFrame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
@@ -40,7 +40,7 @@ def static_layer(
     else:
         frame = _bounding_frame(grid)
         cells = grid.values_at(_all_centers(frame)).reshape(frame.shape)
-    lethal = np.ascontiguousarray(cells >= OCCUPIED_THRESHOLD) | _forbidden(frame, keepout, mask)
+    lethal = np.ascontiguousarray(cells >= OCCUPIED_THRESHOLD) | _keepout_cells(frame, keepout, mask)
     return StaticLayer(frame, lethal, (cells == UNKNOWN) & ~lethal & unknown)
 
 
@@ -52,7 +52,7 @@ def free_layer(grid: OccupancyGrid, unknown: bool) -> StaticLayer:
 
 @cached_on_instance
 def static_distances(grid: OccupancyGrid, reach: int) -> Squared:
-    """For each cell of such a layer, see `squared_distances`: once for all its runs."""
+    """Return the squared distances in a layer without zones, computed once for all runs."""
     return squared_distances(free_layer(grid, True).lethal, reach)
 
 
@@ -60,10 +60,10 @@ def empty_layer(
     frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = False
 ) -> StaticLayer:
     """Return the layer of a robot without a map: only keepout zones and masks; the rest is `unknown` or free."""
-    return StaticLayer(frame, _forbidden(frame, keepout, mask), np.full(frame.shape, unknown))
+    return StaticLayer(frame, _keepout_cells(frame, keepout, mask), np.full(frame.shape, unknown))
 
 
-def _forbidden(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
+def _keepout_cells(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
     lethal = np.zeros(frame.shape, dtype=bool)
     for polygon in keepout:
         lethal |= inside_polygon(frame, polygon)
@@ -75,7 +75,7 @@ def _forbidden(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGr
 
 
 def inside_polygon(frame: GridFrame, polygon: Polygon) -> Mask:
-    """Return the cells whose center lies inside the polygon (even-odd rule)."""
+    """Return the cells whose center is inside the polygon (even-odd rule)."""
     points = _all_centers(frame)
     inside = np.zeros(len(points), dtype=bool)
     for (ax, ay), (bx, by) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):

@@ -62,6 +62,6 @@ def test_a_drive_sees_the_same_with_updates_as_if_all_were_computed_anew() -> No
         pose = Pose2(0.1 * k, 0.0)
         map_.update(pose, scan_of(world, pose, noise=0.03))
         costs, distance = map_.view.costs.copy(), map_.view.distance.copy()
-        map_._show()
+        map_._recompute()
         assert np.array_equal(map_.view.costs, costs)
         assert np.array_equal(map_.view.distance, distance)
