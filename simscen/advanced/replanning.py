@@ -27,7 +27,7 @@ CAUTIOUS_CLEARANCES_M = (0.10, 0.05)
 PREFERRED_CLEARANCE_M, MAX_DETOUR_RATIO = 0.15, 1.15
 """Larger additional clearance that is used if it makes the path longer by at most this ratio."""
 DISAPPEARED_CELLS = 8
-"""Obstacle cells that must have disappeared before a shorter path is sought; single cells vary with lidar noise."""
+"""Obstacle cells that must have disappeared before a shorter path is searched; single cells vary with lidar noise."""
 MAX_LENGTH_RATIO, MIN_SAVING_M = 0.85, 0.5
 """Hysteresis: a new path must be shorter than the rest of the current one by this ratio and this length."""
 LOST_CLEARANCE_M = 0.1
@@ -44,12 +44,12 @@ class ClearancePlan(FollowedPlan):
         self._initial_clearance = np.minimum(distances(costmap, path.points[:, :2]), np.float32(WATCH_DISTANCE_M))
         super().__init__(path, radius, costmap)
 
-    def see(self, costmap: CostmapView) -> None:
+    def compare(self, costmap: CostmapView) -> None:
         """Compare the plan with a costmap."""
         clearance = distances(costmap, self.path.points[:, :2])
         self._occupied = clearance <= np.float32(self._radius)
-        least = self._initial_clearance - np.float32(LOST_CLEARANCE_M)
-        self._has_lost = np.minimum(clearance, np.float32(WATCH_DISTANCE_M)) < least
+        min_clearance = self._initial_clearance - np.float32(LOST_CLEARANCE_M)
+        self._has_lost = np.minimum(clearance, np.float32(WATCH_DISTANCE_M)) < min_clearance
 
     def has_lost_clearance(self) -> bool:
         """Return whether the plan ahead has clearly less clearance than when it was made.
@@ -65,8 +65,8 @@ class ClearancePlan(FollowedPlan):
 
     def is_longer_than(self, length: float) -> bool:
         """Return whether a path of `length` m is clearly shorter than the rest of this plan."""
-        left = self.remaining()
-        return length < MAX_LENGTH_RATIO * left and length < left - MIN_SAVING_M
+        remaining_length = self.remaining()
+        return length < MAX_LENGTH_RATIO * remaining_length and length < remaining_length - MIN_SAVING_M
 
 
 class AdvancedPlanManager(PlanManager):
@@ -129,7 +129,7 @@ class AdvancedPlanManager(PlanManager):
         return "better" if disappeared and can_be_shorter else ""
 
     def _should_avoid_moving(self, now: float, pose: Pose2, plan: FollowedPlan) -> bool:
-        """Return whether the plan meets a moving obstacle, or avoids one that may have gone."""
+        """Return whether the plan meets a moving obstacle, or avoids one that may have moved away."""
         moving = self._costmap.moving
         if not (self._avoids_moving or len(moving)) or now - self._moving_checked_at < MOVING_PERIOD_S:
             return False
@@ -156,9 +156,9 @@ class AdvancedPlanManager(PlanManager):
     def _with_preferred_clearance(self, path: Path, view: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """Return a path with the preferred clearance if it is not much longer, otherwise `path`."""
         with contextlib.suppress(NavigationFailure):
-            other = self.planner.plan(view.with_grown_obstacles(PREFERRED_CLEARANCE_M), start, goal, seed)
-            if other.length() <= MAX_DETOUR_RATIO * path.length():
-                return other
+            alternative = self.planner.plan(view.with_grown_obstacles(PREFERRED_CLEARANCE_M), start, goal, seed)
+            if alternative.length() <= MAX_DETOUR_RATIO * path.length():
+                return alternative
         return path
 
     def _followed(self, path: Path) -> ClearancePlan:
@@ -175,11 +175,11 @@ class AdvancedPlanManager(PlanManager):
 INITIAL_WAIT_S = 10.0
 """Time until the entire costmap may be cleared again; it doubles each time."""
 PROGRESS_M = 1.0
-"""The robot must have come this much closer to its goal for the last clearing to count as successful."""
+"""Decrease of the distance to the goal after which the last clearing counts as successful."""
 
 
 class ClearingBackoff:
-    """Clear the entire global costmap at first and then ever more rarely, otherwise only the area around the robot.
+    """Clear the entire global costmap at first, then at increasing intervals, otherwise only the area around the robot.
 
     Obstacles that were seen earlier may have disappeared. But a robot that clears the costmap each time it finds no
     path plans around the end of a wall that is out of sight, drives there, sees it, and has forgotten the other end.
@@ -193,12 +193,12 @@ class ClearingBackoff:
         """Prepare for a new goal."""
         self._wait, self._due, self._nearest = INITIAL_WAIT_S, 0.0, float("inf")
 
-    def entirely(self, now: float, to_go: float) -> bool:
-        """Return whether to clear all of it `now` (s), with the goal `to_go` m away in a straight line."""
-        if to_go <= self._nearest - PROGRESS_M:
+    def entirely(self, now: float, goal_distance: float) -> bool:
+        """Return whether to clear all of it `now` (s), with the goal `goal_distance` m away in a straight line."""
+        if goal_distance <= self._nearest - PROGRESS_M:
             self._wait, self._due = INITIAL_WAIT_S, now
         if now < self._due:
             return False
         self._due, self._wait = now + self._wait, 2 * self._wait
-        self._nearest = min(self._nearest, to_go)
+        self._nearest = min(self._nearest, goal_distance)
         return True

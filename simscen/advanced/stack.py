@@ -101,7 +101,7 @@ class AdvancedStack(ReferenceStack):
         if self._prediction.is_standing:
             self._prediction.on_drive()
 
-    def _adjust_wanted_command(self, tick: int, frames: Frames, command: Twist) -> Twist:
+    def _adjust_controller_command(self, tick: int, frames: Frames, command: Twist) -> Twist:
         if self._prediction.is_idle:
             return command
         return self._prediction.steer(
@@ -117,7 +117,7 @@ class AdvancedStack(ReferenceStack):
         if command == STOP or self._monitor.silent(tick):
             self._commands.stop(tick)
         elif not self._commands.busy(tick):
-            self._commands.want(tick, command, self._commands.periods(tick))
+            self._commands.request(tick, command, self._commands.periods(tick))
 
 
 class AdvancedStackBuilder(StackBuilder):

@@ -34,8 +34,8 @@ class SimpleGoalChecker:
 
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
         """Return whether the robot has reached the goal, given its estimated pose in the map frame and its velocity."""
-        stands = abs(twist.vx) + abs(twist.vy) < STANDSTILL_SPEED and abs(twist.wz) < STANDSTILL_YAW_RATE
-        self._standstill_checks = self._standstill_checks + 1 if stands else 0
+        is_standing = abs(twist.vx) + abs(twist.vy) < STANDSTILL_SPEED and abs(twist.wz) < STANDSTILL_YAW_RATE
+        self._standstill_checks = self._standstill_checks + 1 if is_standing else 0
         factor = 1.0 if self._standstill_checks >= STANDSTILL_CHECKS else self._well_inside
         distance = math.hypot(pose.x - goal.pose.x, pose.y - goal.pose.y)
         is_close = distance <= factor * goal.xy_tolerance

@@ -21,7 +21,7 @@ SAMPLES = 8
 """Number of times within the horizon at which the footprint is compared with the scan."""
 ORIGIN = Pose2(0.0, 0.0)
 MIN_APPROACH_M = 0.005
-"""Braking for a moving obstacle helps only if it would come closer by this much than to a robot that stands still."""
+"""Braking for a moving obstacle helps only if it would come closer by this much than to a stationary robot."""
 ROUNDING_M = 1e-6
 """Tolerance of the quick check of moving obstacles."""
 
@@ -46,23 +46,23 @@ class CollisionMonitor:
         """For each lidar, the tick at which its latest message arrived and the tick of the scan."""
         self.hold_ticks = spec.hold_timeout * tick_rate or math.inf
         """Time in ticks for which the monitor may stop the robot before that counts as a failure."""
-        self._scan_ticks, self._oldest, self._began = dict.fromkeys(lidars, -math.inf), -math.inf, 0
+        self._scan_ticks, self._oldest, self._start_tick = dict.fromkeys(lidars, -math.inf), -math.inf, 0
         self._scans: dict[str, RecordedScan] = {}
-        self._moving, self._moves = no_moving_obstacles(), False
+        self._moving, self._has_moving = no_moving_obstacles(), False
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
         self._times = np.linspace(0.0, spec.time_before_collision, SAMPLES + 1)
-        self._near = robot.circumscribed_radius + spec.stop_margin
+        self._stop_radius = robot.circumscribed_radius + spec.stop_margin
         self._normal = normal / np.hypot(normal[:, 0], normal[:, 1])[:, None]
         self._offset = np.sum(self._normal * corners, axis=1)
-        self._half, self._mitre = float(self._offset.max()), _mitre(self._normal)
+        self._max_edge_distance, self._miter_factor = float(self._offset.max()), _miter_factor(self._normal)
         if robot.radius is not None:
-            self._half, self._mitre = robot.radius, 1.0
+            self._max_edge_distance, self._miter_factor = robot.radius, 1.0
 
     def start(self, tick: int) -> None:
         """Start the timeout of lidars that have not sent a scan yet."""
-        self._began = tick
+        self._start_tick = tick
 
     def on_scan(self, scan: Scan, odometry: Pose2, tick: int = 0) -> None:
         """Process a scan that arrived at `tick`, with the odometry pose of its time; ignored without returns."""
@@ -76,96 +76,96 @@ class CollisionMonitor:
 
     def on_moving(self, moving: MovingObstacles) -> None:
         """Set the moving obstacles in the base frame. Beams that hit them must be marked in the scans."""
-        self._moving, self._moves = moving, len(moving) > 0
+        self._moving, self._has_moving = moving, len(moving) > 0
 
     def silent(self, tick: int) -> bool:
         """Return whether any lidar has sent no usable scan for `source_timeout`, or none at all."""
         return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._scan_ticks)
 
-    def silence(self, tick: int) -> str:
+    def silence_reason(self, tick: int) -> str:
         """Return the reason why a lidar counts as silent."""
         name = min(self._scan_ticks, key=lambda sensor: self._scan_ticks[sensor])
-        limit, ago = f"source_timeout is {self._spec.source_timeout:g} s", self._since(name, tick)
+        limit, elapsed = f"source_timeout is {self._spec.source_timeout:g} s", self._since(name, tick)
         arrived, taken = self._arrivals.get(name, (None, 0))
         if arrived is None or (tick - arrived) > self._timeout:
-            return f"lidar `{name}` has been silent for {ago:.2f} s; {limit}"
+            return f"lidar `{name}` has been silent for {elapsed:.2f} s; {limit}"
         if taken != self._scan_ticks[name]:
-            return f"lidar `{name}` has been blind for {ago:.2f} s: its scans contain no returns; {limit}"
+            return f"lidar `{name}` has been blind for {elapsed:.2f} s: its scans contain no returns; {limit}"
         late = (arrived - taken) / self._tick_rate
         return f"scans of lidar `{name}` are {late:.2f} s old when they arrive; {limit}"
 
     def _since(self, name: str, tick: int) -> float:
         """Return the time in s since the last usable scan of a lidar."""
-        return (tick - max(self._scan_ticks[name], self._began)) / self._tick_rate
+        return (tick - max(self._scan_ticks[name], self._start_tick)) / self._tick_rate
 
-    def allow(self, wanted: Twist, odometry: Pose2) -> Twist:
+    def allow(self, command: Twist, odometry: Pose2) -> Twist:
         """Return the command, scaled so that the first contact is at least `time_before_collision` away."""
-        if not self._spec.enabled or wanted == STOP:
-            return wanted
-        free = horizon = self._spec.time_before_collision
+        if not self._spec.enabled or command == STOP:
+            return command
+        free_time = horizon = self._spec.time_before_collision
         for recorded in self._scans.values():
-            free = min(free, self._time_to_scan_points(recorded, wanted, odometry, horizon))
-        if self._moves and self._may_meet_moving(wanted, horizon):
-            free = min(free, self._time_to_moving(wanted, horizon))
-        if free >= horizon:
-            return wanted
-        scale = free / horizon
-        return Twist(wanted.vx * scale, wanted.vy * scale, wanted.wz * scale) if scale > 0.0 else STOP
+            free_time = min(free_time, self._time_to_scan_points(recorded, command, odometry, horizon))
+        if self._has_moving and self._may_meet_moving(command, horizon):
+            free_time = min(free_time, self._time_to_moving(command, horizon))
+        if free_time >= horizon:
+            return command
+        scale = free_time / horizon
+        return Twist(command.vx * scale, command.vy * scale, command.wz * scale) if scale > 0.0 else STOP
 
-    def _time_to_scan_points(self, recorded: RecordedScan, wanted: Twist, odometry: Pose2, horizon: float) -> float:
+    def _time_to_scan_points(self, recorded: RecordedScan, command: Twist, odometry: Pose2, horizon: float) -> float:
         """Return the time in s until enough points of a scan are within the stop margin, at most `horizon`.
 
         Points that the robot moves away from do not count.
         """
-        (vx, vy, _), (x, y, _), (then_x, then_y, _) = wanted, odometry, recorded.odometry
-        reach = self._near + math.hypot(vx, vy) * horizon + math.hypot(x - then_x, y - then_y)
+        (vx, vy, _), (x, y, _), (scan_x, scan_y, _) = command, odometry, recorded.odometry
+        reach = self._stop_radius + math.hypot(vx, vy) * horizon + math.hypot(x - scan_x, y - scan_y)
         if recorded.nearest > reach:
             return horizon
-        moved = recorded.odometry.between(odometry)
-        points = moved.inverse().apply(_points_within(recorded.scan, reach))
+        motion = recorded.odometry.between(odometry)
+        points = motion.inverse().apply(_points_within(recorded.scan, reach))
         if not len(points):
             return horizon
         times = self._times
-        gap = self._gaps(points[None], poses_along(ORIGIN, wanted, times))
-        now, least = gap[0], self._spec.stop_margin
-        touched = (gap[1:] < least) & (gap[1:] < now - 1e-4)
-        when = touched.sum(axis=1) >= self._spec.min_points
-        return float(times[int(when.argmax())]) if when.any() else horizon
+        gap = self._gaps(points[None], poses_along(ORIGIN, command, times))
+        current, margin = gap[0], self._spec.stop_margin
+        collides = (gap[1:] < margin) & (gap[1:] < current - 1e-4)
+        is_contact = collides.sum(axis=1) >= self._spec.min_points
+        return float(times[int(is_contact.argmax())]) if is_contact.any() else horizon
 
-    def _may_meet_moving(self, wanted: Twist, horizon: float) -> bool:
+    def _may_meet_moving(self, command: Twist, horizon: float) -> bool:
         """Return whether a moving obstacle can come within the stop margin of the footprint within the horizon.
 
         For straight motion, the closest approach has a closed form; a turning robot deviates at most by `deviation`.
         """
-        own_velocity = complex(wanted.vx, wanted.vy)
-        deviation = abs(own_velocity) * abs(wanted.wz) * horizon * horizon / 2
+        own_velocity = complex(command.vx, command.vy)
+        deviation = abs(own_velocity) * abs(command.wz) * horizon * horizon / 2
         margin = self._spec.stop_margin
-        for place, velocity, radius, *_ in self._moving.obstacles:
+        for position, velocity, radius, *_ in self._moving.obstacles:
             towards = velocity - own_velocity
             square = towards.real * towards.real + towards.imag * towards.imag
-            when = -(place * towards.conjugate()).real / square if square > 0.0 else 0.0
-            near = abs(place + min(max(when, 0.0), horizon) * towards) - deviation
-            if near <= (self._half + radius + margin) * self._mitre + ROUNDING_M:
+            time = -(position * towards.conjugate()).real / square if square > 0.0 else 0.0
+            closest = abs(position + min(max(time, 0.0), horizon) * towards) - deviation
+            if closest <= (self._max_edge_distance + radius + margin) * self._miter_factor + ROUNDING_M:
                 return True
         return False
 
-    def _time_to_moving(self, wanted: Twist, horizon: float) -> float:
+    def _time_to_moving(self, command: Twist, horizon: float) -> float:
         """Return the time in s until a moving obstacle is within the stop margin of the footprint, at most `horizon`.
 
-        Obstacles that would come as close to a robot that stands still do not count, because braking does not help.
+        Obstacles that would come as close to a stationary robot do not count, because braking does not help.
         """
         times = self._times
         centers = self._moving.at(times)
-        gaps = self._gaps_to(centers, wanted)
-        met = (gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - 1e-4)
-        if not met.any():
+        gaps = self._gaps_to(centers, command)
+        collides = (gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - 1e-4)
+        if not collides.any():
             return horizon
-        standing = self._gaps_to(centers, STOP)
-        unavoidable = (standing[1:] < 0.0) & (standing[1:] < standing[0] - 1e-4)
-        first = (met | unavoidable).argmax(axis=0)  # for each obstacle, the time at which both are compared
-        worse = (gaps < standing - MIN_APPROACH_M)[1 + first, np.arange(len(first))]
-        when = (met & worse).any(axis=1)
-        return float(times[int(when.argmax())]) if when.any() else horizon
+        gaps_standing = self._gaps_to(centers, STOP)
+        unavoidable = (gaps_standing[1:] < 0.0) & (gaps_standing[1:] < gaps_standing[0] - 1e-4)
+        first = (collides | unavoidable).argmax(axis=0)  # for each obstacle, the time at which both are compared
+        worse = (gaps < gaps_standing - MIN_APPROACH_M)[1 + first, np.arange(len(first))]
+        is_contact = (collides & worse).any(axis=1)
+        return float(times[int(is_contact.argmax())]) if is_contact.any() else horizon
 
     def _gaps_to(self, centers: Array, twist: Twist) -> Array:
         """Return distances (times, obstacles) of moving obstacles from the stop margin for a constant `twist`."""
@@ -188,7 +188,7 @@ class CollisionMonitor:
         return gaps
 
 
-def _mitre(normals: Array) -> float:
+def _miter_factor(normals: Array) -> float:
     """Return the miter factor of a convex polygon with edge normals (n, 2).
 
     A point within the distance d of all edge lines is at most d times this factor from the origin.
@@ -202,14 +202,14 @@ def _nearest(scan: Scan) -> float | None:
     nearest = float(np.fmin.reduce(scan.ranges, initial=math.inf))
     if nearest >= scan.range_min and nearest < math.inf:
         return nearest
-    answers = scan.ranges[scan.ranges >= scan.range_min]
-    return float(answers.min()) if len(answers) else None
+    returns = scan.ranges[scan.ranges >= scan.range_min]
+    return float(returns.min()) if len(returns) else None
 
 
 def _points_within(scan: Scan, reach: float) -> Array:
-    """Return the hits (n, 2) within `reach` meters of the base, in the base frame."""
-    most = reach + math.hypot(scan.mount.x, scan.mount.y)
-    hits = (scan.ranges >= scan.range_min) & (scan.ranges <= min(most, scan.range_max))
-    near = np.flatnonzero(hits & ~scan.moving if isinstance(scan, ScanWithMovingHits) else hits)
-    angles, ranges = scan.angle_min + scan.angle_increment * near, scan.ranges[near]
+    """Return the hits (n, 2) on static obstacles within `reach` m of the base, in the base frame."""
+    max_range = reach + math.hypot(scan.mount.x, scan.mount.y)
+    hits = (scan.ranges >= scan.range_min) & (scan.ranges <= min(max_range, scan.range_max))
+    beams = np.flatnonzero(hits & ~scan.moving if isinstance(scan, ScanWithMovingHits) else hits)
+    angles, ranges = scan.angle_min + scan.angle_increment * beams, scan.ranges[beams]
     return scan.mount.apply(np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles))))

@@ -16,11 +16,11 @@ from simscen.stack.protocols import Controller, CostmapView
 WATCH_DISTANCE_M = 0.5
 """Changes of the costmap this close to the plan are compared with the plan, or closer if the robot is larger."""
 WATCH_EVERY_POINTS = 4
-"""Spacing, in points of the plan, of the places near which changes are looked for."""
-UNLOCATED_M = 0.5
+"""Every n-th point of the plan is checked for changes nearby."""
+MAX_UNLOCATED_M = 0.5
 """Distance that the robot may move before its position on the plan is determined even if it is not needed."""
 MISSED_M, END_M = 0.2, 0.03
-"""A car needs a new plan this far beside its plan, or this close to its end, because it cannot turn in place."""
+"""A car needs a new plan this far from its plan, or this close to its end, because it cannot turn in place."""
 COMPARISON_DISTANCE_M = 1.0
 """Distance ahead of the robot at which a shift between map and odom frame is measured."""
 MIN_SHIFT_M = 0.01
@@ -38,32 +38,32 @@ class FollowedPlan:
         self.path, self._radius = path, radius
         self._tracker = PathTracker(path)
         self._pose: Pose2 | None = None
-        self._located = Pose2(*path.points[0].tolist())
-        self._line: Plane = path.points[:, 0] + 1j * path.points[:, 1]
+        self._located_pose = Pose2(*path.points[0].tolist())
+        self._complex_points: Plane = path.points[:, 0] + 1j * path.points[:, 1]
         self._watch_distance = max(radius, WATCH_DISTANCE_M) + WATCH_EVERY_POINTS * self._tracker.longest_step
         self._revision = costmap.revision
-        self.see(costmap)
+        self.compare(costmap)
 
-    def watch(self, costmap: LayeredCostmap) -> None:
+    def compare_if_changed(self, costmap: LayeredCostmap) -> None:
         """Compare the plan with the costmap if that has changed near the rest of the plan."""
-        ahead = self._line[self._track.index :: WATCH_EVERY_POINTS]
+        ahead = self._complex_points[self._track.index :: WATCH_EVERY_POINTS]
         if costmap.changed_near(self._revision, ahead, self._watch_distance):
-            self.see(costmap.view)
+            self.compare(costmap.view)
         self._revision = costmap.revision
 
-    def see(self, costmap: CostmapView) -> None:
+    def compare(self, costmap: CostmapView) -> None:
         """Compare the plan with a costmap."""
         self._occupied = distances(costmap, self.path.points[:, :2]) <= np.float32(self._radius)
 
     def locate(self, pose: Pose2) -> None:
         """Set the pose of the robot. Its position on the plan is determined when it is needed."""
-        self._pose, (x, y, _) = pose, self._located
-        if self._tracker.has_cusps or abs(pose.x - x) + abs(pose.y - y) > UNLOCATED_M:
+        self._pose, (x, y, _) = pose, self._located_pose
+        if self._tracker.has_cusps or abs(pose.x - x) + abs(pose.y - y) > MAX_UNLOCATED_M:
             self._update_tracker(pose)
 
     def _update_tracker(self, pose: Pose2) -> None:
         self._tracker.locate(pose)
-        self._located, self._pose = pose, None
+        self._located_pose, self._pose = pose, None
 
     @property
     def _track(self) -> PathTracker:
@@ -94,21 +94,21 @@ class FollowedPlan:
     def blocked(self) -> bool:
         """Return whether the robot does not fit at a point ahead.
 
-        The first points are ignored as long as they are occupied: a robot that stands there has to get out.
+        Occupied points at the start are ignored, so that a robot in collision can leave.
         """
         occupied = self._occupied[self._track.index :: 2]
         if not occupied.any():
             return False
-        out = int((~occupied).argmax())
-        return bool(occupied[out:].any() or occupied.all())
+        first_free = int((~occupied).argmax())
+        return bool(occupied[first_free:].any() or occupied.all())
 
 
 class LocalPath:
     """Pass the plan to the controller in the odom frame.
 
     Nav2's controllers transform the plan in each cycle. Here, the controller gets the plan once, and the rest of it
-    again whenever the transform between map and odom frame has changed, so that it can keep what it computed for the
-    path.
+    again whenever the transform between map and odom frame has changed, so that it can reuse what it has computed for
+    the path.
     """
 
     def __init__(self, controller: Controller) -> None:

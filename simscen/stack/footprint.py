@@ -26,7 +26,7 @@ def distances(costmap: CostmapView, points: Reals) -> npt.NDArray[np.float32]:
 
 
 def distance_at(costmap: CostmapView, x: float, y: float) -> float:
-    """Return the same for one point, in a tenth of the time."""
+    """Return the distance of `distances` for one point, in a tenth of the time."""
     left, low = costmap.origin
     distance, resolution = costmap.distance, costmap.resolution
     row, column = math.floor((y - low) / resolution), math.floor((x - left) / resolution)
@@ -55,8 +55,8 @@ class Footprint:
     def __init__(self, robot: RobotModel, resolution: float) -> None:
         """Prepare checks of this robot on costmaps with this cell size in m."""
         self.inscribed = robot.inscribed_radius
-        self._round = robot.radius is not None
-        self.reach = 0.0 if self._round else robot.circumscribed_radius
+        self._is_round = robot.radius is not None
+        self.reach = 0.0 if self._is_round else robot.circumscribed_radius
         self.circumscribed = robot.circumscribed_radius
         corners = np.array(robot.footprint, dtype=np.float64)
         inner = _inner_points(corners, resolution, self.inscribed)
@@ -68,38 +68,38 @@ class Footprint:
         """Return distances (n, k) from the footprint's edge at poses (n, 3) to points (k, 2); negative inside."""
         cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
         x, y = points[None, :, 0] - poses[:, 0, None], points[None, :, 1] - poses[:, 1, None]
-        if self._round:
+        if self._is_round:
             return np.asarray(np.hypot(x, y) - self.circumscribed)
-        seen = np.stack((cosine * x + sine * y, cosine * y - sine * x), axis=-1).reshape(-1, 2)
-        away = np.where(_inside(self._corners, seen), -1.0, 1.0) * _depths(self._corners, seen)
-        return np.asarray(away.reshape(x.shape))
+        local = np.stack((cosine * x + sine * y, cosine * y - sine * x), axis=-1).reshape(-1, 2)
+        signed = np.where(_inside(self._corners, local), -1.0, 1.0) * _depths(self._corners, local)
+        return np.asarray(signed.reshape(x.shape))
 
     def free(self, costmap: CostmapView, poses: Array) -> Mask:
         """Return which of the poses (n, 3) are free of collisions."""
         distance = distances(costmap, poses[:, :2])
         free: Mask = np.asarray(distance > np.float32(self.inscribed))
-        if self._round:
+        if self._is_round:
             return free
-        unsure = np.flatnonzero(free & (distance <= self.circumscribed + costmap.resolution))
-        if len(unsure):
-            free[unsure] = self._hull_free(costmap, poses[unsure])
+        undecided = np.flatnonzero(free & (distance <= self.circumscribed + costmap.resolution))
+        if len(undecided):
+            free[undecided] = self._hull_free(costmap, poses[undecided])
         return free
 
     def clearance(self, costmap: CostmapView, poses: Array) -> Array:
         """Return the approximate distance (n,) in m from the footprint's edge to the nearest lethal cell.
 
-        In collision, it is the negative depth of the deepest lethal cell inside the footprint, so that it tells whether
+        In collision, it is the negative depth of the deepest lethal cell inside the footprint, so that it shows whether
         a motion leads out of a collision or further into it.
         """
-        middle = distances(costmap, poses[:, :2]).astype(np.float64) - self.inscribed
-        if self._round:
-            return np.asarray(middle)
+        center = distances(costmap, poses[:, :2]).astype(np.float64) - self.inscribed
+        if self._is_round:
+            return np.asarray(center)
         near = distances(costmap, self._placed(poses))
         edge = near.min(axis=1).astype(np.float64)
         touching = np.flatnonzero(edge <= 0.0)
         if len(touching):
             edge[touching] = (near[touching] - self._depth).min(axis=1)
-        return np.asarray(np.minimum(edge, middle))
+        return np.asarray(np.minimum(edge, center))
 
     def gap(self, moving: MovingObstacles, poses: Array, times: Array, sigmas: float = 0.0) -> Array:
         """Return distances (…,) in m from the footprint at poses (…, 3) to moving obstacles, negative in collision.
@@ -138,9 +138,9 @@ class CoveringDiscs:
         (back, right), (front, left) = corners.min(axis=0), corners.max(axis=0)
         half = max(-right, left)
         count = max(1, round((front - back) / (2 * half) * 2))
-        piece = (front - back) / count
-        self.offsets = back + piece * (np.arange(count) + 0.5)
-        self.radius = math.hypot(half, piece / 2)
+        segment = (front - back) / count
+        self.offsets = back + segment * (np.arange(count) + 0.5)
+        self.radius = math.hypot(half, segment / 2)
         self.reach = float(np.abs(self.offsets).max()) + self.radius
         self.centered = self.offsets.tolist() == [0.0]
 
@@ -168,8 +168,8 @@ class CoveringDiscs:
         self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, margin: float
     ) -> tuple[Reals, Mask]:
         """Return the nearness (…,) of the discs to moving obstacles and whether they touch; see MovingObstacles."""
-        places = self._placed(x, y, yaw)
-        (nearest, touched), *others = [moving.nearness(*at, times, self.radius, margin) for at in places]
+        positions = self._placed(x, y, yaw)
+        (nearest, touched), *others = [moving.nearness(*at, times, self.radius, margin) for at in positions]
         for near, touch in others:
             np.maximum(nearest, near, out=nearest)
             touched |= touch

@@ -34,10 +34,14 @@ class Frames(NamedTuple):
 
         `odom_from_map` is the earlier transform to compare with.
         """
-        (x, y, yaw), (mapped_x, mapped_y, mapped_yaw), (now_x, now_y, now_yaw) = odom_from_map, self.pose, self.odometry
+        (x, y, yaw), (mapped_x, mapped_y, mapped_yaw), (odom_x, odom_y, odom_yaw) = (
+            odom_from_map,
+            self.pose,
+            self.odometry,
+        )
         c, s = math.cos(yaw), math.sin(yaw)
-        dx, dy = x + c * mapped_x - s * mapped_y - now_x, y + s * mapped_x + c * mapped_y - now_y
-        return math.hypot(dx, dy) + reach * abs(math.remainder(yaw + mapped_yaw - now_yaw, math.tau))
+        dx, dy = x + c * mapped_x - s * mapped_y - odom_x, y + s * mapped_x + c * mapped_y - odom_y
+        return math.hypot(dx, dy) + reach * abs(math.remainder(yaw + mapped_yaw - odom_yaw, math.tau))
 
 
 def transform_poses(frame: Pose2, poses: Array) -> Array:
@@ -56,22 +60,22 @@ def transform_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
 HISTORY_S = 10
 """Time for which readings are available: the default of tf2's buffer."""
 TRAIL_S = 60
-"""Time for which poses are kept as the trail of the robot, longer than a stuck robot waits between two recoveries."""
+"""Time for which poses are stored as the trail of the robot, longer than a stuck robot waits between two recoveries."""
 # Larger values, as from a broken encoder, are rejected: their squares could overflow.
-_LARGEST = 1e6
+_MAX_VALUE = 1e6
 
 
 def is_plausible(values: tuple[float, float, float]) -> bool:
     """Return whether these values are a plausible pose or velocity: finite and not absurdly large."""
     x, y, yaw = values
-    return -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
+    return -_MAX_VALUE < x < _MAX_VALUE and -_MAX_VALUE < y < _MAX_VALUE and -_MAX_VALUE < yaw < _MAX_VALUE
 
 
 class OdometryHistory:
     """The odometry poses of the last HISTORY_S seconds by tick. Older ones are removed about once per second."""
 
     def __init__(self, tick_rate: int, trail: float = HISTORY_S) -> None:
-        """Create an empty history. `trail` in s: time for which poses are kept for `trail()`."""
+        """Create an empty history. `trail` in s: time for which poses are stored for `trail()`."""
         self._span, self._trail, self._capacity = HISTORY_S * tick_rate, trail * tick_rate, (trail + 1) * tick_rate
         self.clear()
 
@@ -84,14 +88,14 @@ class OdometryHistory:
         """The latest pose; the origin if there is none."""
 
     @property
-    def begun(self) -> bool:
+    def has_pose(self) -> bool:
         """Whether there is any pose."""
         return self._prune_at > -math.inf
 
     def add(self, tick: int, pose: Pose2) -> bool:
         """Add a pose. Return False if it is rejected: not plausible, or not newer than the latest."""
         x, y, yaw = pose
-        plausible = -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
+        plausible = -_MAX_VALUE < x < _MAX_VALUE and -_MAX_VALUE < y < _MAX_VALUE and -_MAX_VALUE < yaw < _MAX_VALUE
         if tick <= self._newest or not plausible:
             return False
         self._newest, self.now = tick, pose
@@ -110,14 +114,14 @@ class OdometryHistory:
         return bisect_left(self._readings, (self._newest - self._span,))
 
     def trail(self) -> list[Pose2]:
-        """Return all poses that are kept, the oldest first."""
+        """Return all stored poses, the oldest first."""
         return [pose for _, pose in self._readings]
 
     def reaches(self, tick: int) -> bool:
         """Return whether there is odometry at `tick` or later."""
         return self._newest >= tick
 
-    def held(self, tick: int) -> Pose2:
+    def latest_until(self, tick: int) -> Pose2:
         """Return the latest pose up to `tick` without interpolation, or the oldest pose if all are later."""
         if tick >= self._newest:
             return self.now
@@ -132,17 +136,17 @@ class OdometryHistory:
         after = bisect_left(self._readings, (tick,), first)
         if after == len(self._readings):
             return None
-        then, there = self._readings[after]
-        if then == tick:
-            return there
+        later_tick, later = self._readings[after]
+        if later_tick == tick:
+            return later
         if after == first:
             return None
-        earlier, before = self._readings[after - 1]
-        share = (tick - earlier) / (then - earlier)
-        step = before.between(there)
-        return before.compose(Pose2(share * step.x, share * step.y, share * step.yaw))
+        earlier_tick, earlier = self._readings[after - 1]
+        fraction = (tick - earlier_tick) / (later_tick - earlier_tick)
+        step = earlier.between(later)
+        return earlier.compose(Pose2(fraction * step.x, fraction * step.y, fraction * step.yaw))
 
-    def then(self, now: Pose2, tick: int) -> Pose2:
+    def past_pose(self, now: Pose2, tick: int) -> Pose2:
         """Return the pose at `tick`, without interpolation, of a robot that is at `now`, in the frame of `now`."""
-        held = self.held(tick)
-        return now if held is self.now else now.compose(self.now.between(held))
+        past = self.latest_until(tick)
+        return now if past is self.now else now.compose(self.now.between(past))

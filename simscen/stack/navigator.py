@@ -1,11 +1,11 @@
 """Navigation to one goal: replanning and recovery of Nav2's default behavior trees as a state machine.
 
-Without errors, one step is: check the goal, check the plan, ask the controller. When planning fails, the global
+Without errors, one step is: check the goal, check the plan, call the controller. When planning fails, the global
 costmap is cleared and planning is tried again; when control fails, the local one is cleared (the contextual recoveries
 of Nav2's tree). When that fails again, the next behavior of the round robin runs. Finding a plan resets the retry of
 planning; control has one retry until the next recovery. After `number_of_retries` behaviors, the goal fails with the
 code of the last failure. A goal outside the map or inside a mapped wall fails after the first retry, because no
-recovery helps.
+recovery can help.
 """
 
 from typing import NamedTuple, Protocol
@@ -29,8 +29,11 @@ class ClearingPolicy(Protocol):
         """Prepare for a new goal."""
         ...
 
-    def entirely(self, now: float, to_go: float) -> bool:
-        """Return whether to clear all of it `now` (s), with the goal `to_go` m away; otherwise around the robot."""
+    def entirely(self, now: float, goal_distance: float) -> bool:
+        """Return whether to clear all of it at the time `now` in s; otherwise only around the robot.
+
+        `goal_distance` is the straight distance to the goal in m.
+        """
         ...
 
 
@@ -40,13 +43,13 @@ class ClearEntirely:
     def reset(self) -> None:
         """Prepare for a new goal."""
 
-    def entirely(self, now: float, to_go: float) -> bool:
+    def entirely(self, now: float, goal_distance: float) -> bool:
         """Return True."""
         return True
 
 
 class Step(NamedTuple):
-    """Result of a step: the wanted velocity, whether the goal is reached or has failed, and the events."""
+    """Result of a step: the requested velocity, whether the goal is reached or has failed, and the events."""
 
     command: Twist = STOP
     reached: bool = False
@@ -89,8 +92,8 @@ class Navigator:
         self.plans.reset(self._clock)
         self._behavior: Behavior | None = None
         self._behavior_since = 0.0
-        self._replanned = self._controlled_again = False
-        self._trouble_since: float | None = None
+        self._planning_retried = self._control_retried = False
+        self._failing_since: float | None = None
 
     def pursue(self, goal: Goal) -> None:
         """Set the goal for the following steps."""
@@ -106,10 +109,10 @@ class Navigator:
         self.goal, self.via = None, ()
         self._reset()
 
-    def step(self, tick: int, frames: Frames, twist: Twist, held: bool = False, periods: int = 1) -> Step:
+    def step(self, tick: int, frames: Frames, twist: Twist, is_held: bool = False, periods: int = 1) -> Step:
         """Run one step, `periods` controller periods after the previous one.
 
-        `held`: the collision monitor has stopped the robot for its hold timeout.
+        `is_held`: the collision monitor has stopped the robot for its hold timeout.
         """
         goal = self.goal
         if goal is None:
@@ -122,49 +125,49 @@ class Navigator:
         events: tuple[Event, ...] = ()
         try:
             events = self.plans.step(tick, self._clock, goal, frames.pose, self.via)
-            command = self._follow(goal, frames, twist, held)
+            command = self._follow(goal, frames, twist, is_held)
         except NavigationFailure as failure:
-            step = self._failed(tick, goal, frames, failure)
+            step = self._handle_failure(tick, goal, frames, failure)
             return step._replace(events=(*events, *step.events))
-        self._trouble_since = None
+        self._failing_since = None
         return Step(command, events=events)
 
-    def _follow(self, goal: Goal, frames: Frames, twist: Twist, held: bool) -> Twist:
+    def _follow(self, goal: Goal, frames: Frames, twist: Twist, is_held: bool) -> Twist:
         """Return the controller's command on the current plan; a stop while the first plan is being computed."""
         plan = self.plans.plan
         if plan is None:
             return STOP
-        self._replanned = False
+        self._planning_retried = False
         following = self.via[0] if self.via else goal  # the final goal may be close while intermediate goals remain
         local = self._path.update(plan, following, frames)
         command = self._controller.command(frames.odometry, twist, self._costmaps.local_costmap.view, local)
-        if held:
+        if is_held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")
         if self._progress.stuck(frames.pose, self._clock):
             self._progress.reset()
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot made no progress")
         return command
 
-    def _failed(self, tick: int, goal: Goal, frames: Frames, failure: NavigationFailure) -> Step:
+    def _handle_failure(self, tick: int, goal: Goal, frames: Frames, failure: NavigationFailure) -> Step:
         """Handle a failure: tolerate it for a while, then clear a costmap and retry, then recover, then give up."""
         planning, events = 200 <= failure.code < 300, tuple[Event, ...]()
         if planning:
-            events = (Event(tick, EventKind.PLAN_FAILED, "", _described(failure)),)
+            events = (Event(tick, EventKind.PLAN_FAILED, "", _failure_data(failure)),)
             if not self._recovery.helps(failure):
                 return Step(failure=failure, events=events)
-            retry, self._replanned = not self._replanned, True
+            retry, self._planning_retried = not self._planning_retried, True
         else:
             if failure.code != ErrorCode.FAILED_TO_MAKE_PROGRESS:
-                if self._tolerable():
+                if self._is_tolerable():
                     return Step()
                 failure = self._patience_exceeded(failure)
             self.plans.report_control_failure()
-            retry, self._controlled_again = not self._controlled_again, True
+            retry, self._control_retried = not self._control_retried, True
         if retry:
-            self._trouble_since = None
+            self._failing_since = None
             if planning:
-                to_go = frames.pose.distance(goal.pose)
-                self._costmaps.clear_global(entirely=self._clearing.entirely(self._clock, to_go))
+                goal_distance = frames.pose.distance(goal.pose)
+                self._costmaps.clear_global(entirely=self._clearing.entirely(self._clock, goal_distance))
             else:
                 self._costmaps.clear_local()
             self.plans.drop("recovery")
@@ -172,20 +175,20 @@ class Navigator:
         if self._is_unreachable(goal, failure):
             return Step(failure=failure, events=events)
         self.plans.drop("recovery")
-        self._replanned, self._controlled_again, self._trouble_since = False, False, None
+        self._planning_retried, self._control_retried, self._failing_since = False, False, None
         self._behavior = self._recovery.next(frames.pose.distance(goal.pose))
         if self._behavior is None:
             return Step(failure=failure, events=events)
         self._behavior_since = self._clock
         self._behavior.start(frames.odometry)
-        started = Event(tick, EventKind.RECOVERY_STARTED, self._behavior.name, _described(failure))
+        started = Event(tick, EventKind.RECOVERY_STARTED, self._behavior.name, _failure_data(failure))
         return Step(events=(*events, started))
 
-    def _tolerable(self) -> bool:
-        if self._trouble_since is None:
-            self._trouble_since = self._clock
-        patience = self._failure_tolerance
-        return patience < 0.0 or self._clock - self._trouble_since < patience
+    def _is_tolerable(self) -> bool:
+        if self._failing_since is None:
+            self._failing_since = self._clock
+        tolerance = self._failure_tolerance
+        return tolerance < 0.0 or self._clock - self._failing_since < tolerance
 
     def _patience_exceeded(self, failure: NavigationFailure) -> NavigationFailure:
         """Return the failure that nav2_controller reports when a controller has failed for too long."""
@@ -201,18 +204,18 @@ class Navigator:
 
     def _recover(self, tick: int, frames: Frames, behavior: Behavior) -> Step:
         """Run the current recovery behavior."""
-        ended: dict[str, Value] = {"outcome": "succeeded"}
+        result: dict[str, Value] = {"outcome": "succeeded"}
         try:
             costmap = self._costmaps.local_costmap.view
             command = behavior.step(frames.odometry, costmap, self._clock - self._behavior_since)
         except NavigationFailure as failure:
-            command, ended = None, {"outcome": "failed", **_described(failure)}
+            command, result = None, {"outcome": "failed", **_failure_data(failure)}
         if command is not None:
             return Step(command)
         self._behavior = None
         self._progress.reset()
-        return Step(events=(Event(tick, EventKind.RECOVERY_ENDED, behavior.name, ended),))
+        return Step(events=(Event(tick, EventKind.RECOVERY_ENDED, behavior.name, result),))
 
 
-def _described(failure: NavigationFailure) -> dict[str, Value]:
+def _failure_data(failure: NavigationFailure) -> dict[str, Value]:
     return {"error_code": int(failure.code), "error_name": failure.code.name, "message": str(failure)}

@@ -1,4 +1,4 @@
-"""Planning half of Nav2's default behavior trees: request a plan, watch it while it is followed, and replace it."""
+"""Planning half of Nav2's default behavior trees: request a plan, monitor it while it is followed, and replace it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ class PlanManager:
         """Take the planner and its costmap.
 
         `plan_seed` returns the seed of the n-th plan, `radius` is the inscribed radius of the robot in m, `steered`
-        tells that it cannot turn in place, and `latency` is the time that planning takes, in ticks.
+        means that it cannot turn in place, and `latency` is the time that planning takes, in ticks.
         """
         self._spec, self.planner, self._costmap = spec, planner, costmap
         self._plan_seed, self._radius, self._steered, self._latency = plan_seed, radius, steered, latency
@@ -89,7 +89,7 @@ class PlanManager:
         self._reason = reason
 
     def report_control_failure(self) -> None:
-        """Take note that the controller could not follow the plan. Without effect here."""
+        """Handle that the controller could not follow the plan. Has no effect here."""
 
     def step(self, tick: int, now: float, goal: Goal, pose: Pose2, via: tuple[Goal, ...] = ()) -> tuple[Event, ...]:
         """Request, receive, or replace the plan, and return an event if a new plan is followed.
@@ -159,15 +159,15 @@ class PlanManager:
             if self._is_blocked(plan):
                 return "blocked"
             return "window" if self._is_partial and self._costmap.view.origin != self._origin else ""
-        keeps = plan.remaining() < GOAL_NEARBY_M and not self._is_partial
-        return "" if keeps and not self._is_blocked(plan) else "rate"
+        may_keep = plan.remaining() < GOAL_NEARBY_M and not self._is_partial
+        return "" if may_keep and not self._is_blocked(plan) else "rate"
 
     def _optional_reason(self, now: float, goal: Goal, pose: Pose2, plan: FollowedPlan) -> str:
         """Return why there may be a better plan; "" if there is no reason."""
         return ""
 
     def _is_blocked(self, plan: FollowedPlan) -> bool:
-        plan.watch(self._costmap)
+        plan.compare_if_changed(self._costmap)
         return plan.blocked()
 
     def _accepts(self, reason: str, result: PlanResult) -> bool:

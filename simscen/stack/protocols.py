@@ -112,7 +112,7 @@ class SupportsPose(Protocol):
 
 
 def supports_pose(localizer: object) -> TypeGuard[SupportsPose]:
-    """Return whether a localizer has `pose`. Looks at the class, because reading the property may compute the pose."""
+    """Return whether a localizer has `pose`. Checks the class, because reading the property may compute the pose."""
     return hasattr(type(localizer), "pose")
 
 
@@ -229,7 +229,7 @@ class Behavior(Protocol):
 class GoalChecker(Protocol):
     """Decides whether a goal is reached.
 
-    *Given* a robot that stands at the goal *then* it returns True within two seconds. *Given* a robot outside the
+    *Given* a robot that stands still at the goal *then* it returns True within two seconds. *Given* a robot outside the
     goal's tolerances *then* it never does.
     """
 
@@ -289,7 +289,7 @@ class Surroundings:
     """Configuration of a stack by its scenario: robot, map (None for mapless navigation), and tick rate in Hz.
 
     `keepout` contains polygons that the robot must not enter, `speed_zones` polygons with a speed limit in m/s; `masks`
-    express the same by cells. `lidars` are the names of the lidars that localize; `has_imu` tells if there is an IMU.
+    express the same by cells. `lidars` are the names of the lidars that localize; `has_imu`: there is an IMU.
     """
 
     robot: RobotModel

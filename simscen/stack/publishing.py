@@ -83,14 +83,14 @@ class Publisher:
 
     def _costmap_updates(self, tick: int, costmaps: Costmaps) -> tuple[CostGrid, ...]:
         """Return the costmaps that are due and have changed."""
-        both = (self._global_costmap, costmaps.global_costmap), (self._local_costmap, costmaps.local_costmap)
-        grids = (each.update(tick, costmap.view, self._tick_rate) for each, costmap in both if tick >= each.due)
+        pairs = (self._global_costmap, costmaps.global_costmap), (self._local_costmap, costmaps.local_costmap)
+        grids = (each.update(tick, costmap.view, self._tick_rate) for each, costmap in pairs if tick >= each.due)
         return tuple(grid for grid in grids if grid is not None)
 
 
 @dataclass
 class _CostmapPublisher:
-    """Revision of a costmap that was published last, and the tick from which on the next may be."""
+    """Revision of a costmap that was last published, and the tick from which it may be published again."""
 
     name: str
     frame: str
@@ -114,29 +114,29 @@ REPORT_AFTER_S = 1.0
 
 
 class StandstillReporter:
-    """Create an event when a component has held the robot for a while, and another when it no longer does."""
+    """Creates an event when a component has held the robot for a while, and another when it releases the robot."""
 
     def __init__(self, tick_rate: int) -> None:
         """Take the tick rate in Hz."""
         self._after = round(REPORT_AFTER_S * tick_rate)
-        self.holds = ""
+        self.holder = ""
         """Name of the component that holds the robot; empty if none does."""
         self._since, self._is_reported = 0, False
 
-    def held(self, tick: int, by: str, why: Callable[[], str]) -> tuple[Event, ...]:
-        """Record that the robot waits for the component `by`. `why` returns the message for the event."""
+    def report_hold(self, tick: int, component: str, reason: Callable[[], str]) -> tuple[Event, ...]:
+        """Record that the robot waits for a component. `reason` returns the message for the event."""
         ended: tuple[Event, ...] = ()
-        if by != self.holds:
-            ended = self.over(tick)
-            self.holds, self._since = by, tick
+        if component != self.holder:
+            ended = self.report_release(tick)
+            self.holder, self._since = component, tick
         if self._is_reported or tick - self._since < self._after:
             return ended
         self._is_reported = True
-        return (*ended, Event(tick, EventKind.ROBOT_HELD, by, {"message": why()}))
+        return (*ended, Event(tick, EventKind.ROBOT_HELD, component, {"message": reason()}))
 
-    def over(self, tick: int) -> tuple[Event, ...]:
+    def report_release(self, tick: int) -> tuple[Event, ...]:
         """Record that nothing holds the robot any more, or that it has no goal."""
-        if not self.holds:
+        if not self.holder:
             return ()
-        by, is_reported, self.holds, self._is_reported = self.holds, self._is_reported, "", False
-        return (Event(tick, EventKind.ROBOT_RELEASED, by),) if is_reported else ()
+        component, is_reported, self.holder, self._is_reported = self.holder, self._is_reported, "", False
+        return (Event(tick, EventKind.ROBOT_RELEASED, component),) if is_reported else ()

@@ -1,4 +1,4 @@
-"""The reference stack: Nav2 in miniature. Readings in, one command out."""
+"""The reference stack: Nav2 in miniature. It processes readings and returns one command."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from simscen.stack.odometry_filter import OdometryFilter
 
 MOTION_READINGS = frozenset((Odometry, Imu, Bump))
-"""Readings that only tell how the robot moves. They can wait until the next scan or the next controller period."""
+"""Readings that only measure the motion of the robot. They can wait for the next scan or controller period."""
 
 
 class ReferenceStack:
@@ -55,7 +55,7 @@ class ReferenceStack:
     ) -> None:
         """Combine the components. `control_period` and `localizer_latency` are in ticks.
 
-        `fuses_odometry`: the localizer's belief is the odom frame, in place of the odometry of the wheels.
+        `fuses_odometry`: the localizer's belief is used as the odom frame, instead of the wheel odometry.
         `odometry_filter`: filter of the wheel odometry; without one, it is used as it is.
         """
         self._speed_filter = SpeedFilter(surroundings)
@@ -74,7 +74,7 @@ class ReferenceStack:
         self._odometry, self._wheel_sensor = odometry, ""
         self._zones: Zones | None = None
         self._standstill = StandstillReporter(surroundings.tick_rate)
-        self._unchanged = Decision(STOP)
+        self._last_decision = Decision(STOP)
         self._pending: Readings = ()
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
@@ -93,12 +93,12 @@ class ReferenceStack:
     def cancel(self, tick: int) -> None:
         """Cancel the current goal and all after it."""
         self._events += self._task.cancel(tick)
-        self._events += self._standstill.over(tick)
+        self._events += self._standstill.report_release(tick)
         self._navigator.stop()
         self._commands.stop(tick)
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """Use these keepout and speed zones from the next costmap update on, and no others."""
+        """Replace all keepout and speed zones from the next costmap update on."""
         self._zones = zones
 
     @property
@@ -130,15 +130,15 @@ class ReferenceStack:
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Process the readings of this beat and return the decision."""
         self._tick, belief = tick, None
-        controls = tick % self._control_period == 0
-        if not controls and self._can_wait(tick, readings):
+        is_control_tick = tick % self._control_period == 0
+        if not is_control_tick and self._can_wait(tick, readings):
             self._pending += readings
             return self._repeated_decision(self._commands.sent)
-        scanned = self._process_readings(tick, readings)
-        plan, local_plan, costmaps = self._control_step(tick) if controls else NO_UPDATES
-        if controls or self._commands.late:
+        has_scan = self._process_readings(tick, readings)
+        plan, local_plan, costmaps = self._control_step(tick) if is_control_tick else NO_UPDATES
+        if is_control_tick or self._commands.has_latency:
             self._commands.step(tick, self._odometry.now)
-        if scanned or (tick >= self._publishing.belief_due and (readings or controls)):
+        if has_scan or (tick >= self._publishing.belief_due and (readings or is_control_tick)):
             belief = self._publishing.belief(tick)
         sent = self._adjust_sent_command(self._commands.sent)
         filtered = self._filtered
@@ -165,12 +165,12 @@ class ReferenceStack:
     def _on_drive(self) -> None:
         """Run before each controller period in which the robot has a goal."""
 
-    def _adjust_wanted_command(self, tick: int, frames: Frames, command: Twist) -> Twist:
-        """Return the command to pass to the velocity smoother in place of the navigator's."""
+    def _adjust_controller_command(self, tick: int, frames: Frames, command: Twist) -> Twist:
+        """Return the command to pass to the velocity smoother instead of the navigator's command."""
         return command
 
     def _adjust_sent_command(self, command: Twist) -> Twist:
-        """Return the command to send to the base in place of the collision monitor's."""
+        """Return the command to send to the base instead of the collision monitor's command."""
         return command
 
     def _on_idle(self, tick: int, pose: Pose2) -> None:
@@ -180,8 +180,8 @@ class ReferenceStack:
     # Readings ---------------------------------------------------------------------------------------------------------
 
     def _can_wait(self, tick: int, readings: Readings) -> bool:
-        """Return whether these readings can be processed together with the next scan. Half of all beats are so."""
-        if self._events or self._commands.late or self._fuses_odometry:
+        """Return whether these readings can be processed together with the next scan, as at half of all beats."""
+        if self._events or self._commands.has_latency or self._fuses_odometry:
             return False
         if tick >= self._publishing.belief_due or tick >= self._localizer_scans.due:
             return False
@@ -189,9 +189,9 @@ class ReferenceStack:
 
     def _repeated_decision(self, sent: Twist) -> Decision:
         """Return a decision without news other than the command; the same object while the command stays."""
-        if sent is not self._unchanged.command:
-            self._unchanged = Decision(sent)
-        return self._unchanged
+        if sent is not self._last_decision.command:
+            self._last_decision = Decision(sent)
+        return self._last_decision
 
     def _process_readings(self, tick: int, readings: Readings) -> bool:
         """Pass the pending and the new readings to the components. Return whether there was a scan."""
@@ -216,7 +216,7 @@ class ReferenceStack:
                     self._costmaps.add_reading(reading)
                 case _:
                     pass
-        for scan in scans:  # after all odometry of this beat, whatever the order of the readings
+        for scan in scans:  # after all odometry of this beat, regardless of the order of the readings
             self._process_scan(tick, scan)
         return bool(scans)
 
@@ -226,9 +226,9 @@ class ReferenceStack:
             self._localizer_scans.put(tick, scan)
             while tick >= self._localizer_scans.due:
                 self._localizer.on_scan(self._localizer_scans.take())
-        marking = self._on_lidar_scan(tick, scan)
-        self._monitor.on_scan(marking, self._odometry.held(scan.tick), tick)
-        self._costmaps.add_reading(marking)
+        processed = self._on_lidar_scan(tick, scan)
+        self._monitor.on_scan(processed, self._odometry.latest_until(scan.tick), tick)
+        self._costmaps.add_reading(processed)
 
     def _process_odometry(self, reading: Odometry) -> None:
         """Pass a reading to the localizer, filtered if there is a filter, and add it to the odometry history."""
@@ -276,7 +276,7 @@ class ReferenceStack:
     def _control_step(self, tick: int) -> Updates:
         """Run one controller period: costmaps, navigation, publishing."""
         pose = self._believed_pose()
-        frames = Frames(pose, self._odometry.now if self._odometry.begun else pose)
+        frames = Frames(pose, self._odometry.now if self._odometry.has_pose else pose)
         self._update_costmaps(tick, frames)
         self._on_costmaps_updated(tick, frames)
         self._control(tick, frames)
@@ -309,23 +309,25 @@ class ReferenceStack:
             self._navigator.pursue(leg[-1])
         self._navigator.via = leg[:-1]
         if goal.timeout is not None and tick - self._task.since > goal.timeout * self._tick_rate:
-            self._fail_goal(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over"))
+            self._fail_goal(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"not reached in {goal.timeout:g} s"))
         elif self._monitor.silent(tick):
             self._commands.stop(tick)
-            self._events += self._standstill.held(tick, "collision_monitor", partial(self._monitor.silence, tick))
+            self._events += self._standstill.report_hold(
+                tick, "collision_monitor", partial(self._monitor.silence_reason, tick)
+            )
         elif not self._commands.busy(tick):
             self._navigate(tick, frames)
         elif self._commands.sent == STOP:
             self._report_waiting(tick, "controller", self._commands.latency)
-        elif self._standstill.holds:
-            self._events += self._standstill.over(tick)
+        elif self._standstill.holder:
+            self._events += self._standstill.report_release(tick)
 
     def _navigate(self, tick: int, frames: Frames) -> None:
         """Run the navigator once and act on its result."""
         if self._speed_filter.used:
             self._controller.set_speed_limit(self._speed_filter.limit(frames.pose, self._controller.full_speed))
-        held, periods = self._commands.held(tick), self._commands.periods(tick)
-        step = self._navigator.step(tick, frames, self._twist, held, periods)
+        is_held, periods = self._commands.hold_timed_out(tick), self._commands.periods(tick)
+        step = self._navigator.step(tick, frames, self._twist, is_held, periods)
         self._events += step.events
         if step.failure is not None:
             self._fail_goal(tick, step.failure)
@@ -333,17 +335,17 @@ class ReferenceStack:
             self._events += self._task.reached(tick)
             self._stop(tick)
         else:
-            self._commands.want(tick, self._adjust_wanted_command(tick, frames, step.command), periods)
+            self._commands.request(tick, self._adjust_controller_command(tick, frames, step.command), periods)
             if waiting := self._navigator.plans.waiting:
                 self._report_waiting(tick, "planner", waiting)
-            elif self._standstill.holds and self._commands.sent != STOP:
-                self._events += self._standstill.over(tick)
+            elif self._standstill.holder and self._commands.sent != STOP:
+                self._events += self._standstill.report_release(tick)
 
     def _report_waiting(self, tick: int, component: str, latency: int) -> None:
         """Report that the robot stands still until a component has finished computing."""
         seconds = f"{latency / self._tick_rate:.3g} s"
-        message = f"the {component} takes {seconds} (stack: latency: {component}), with nothing to follow meanwhile"
-        self._events += self._standstill.held(tick, component, lambda: message)
+        message = f"the {component} takes {seconds} (stack: latency: {component}); the robot waits for it"
+        self._events += self._standstill.report_hold(tick, component, lambda: message)
 
     def _remove_passed_goals(self, tick: int, pose: Pose2) -> Goal | None:
         """Skip the intermediate goals that the robot is close to (Nav2's RemovePassedGoals). Return the next one."""
@@ -359,6 +361,6 @@ class ReferenceStack:
         self._stop(tick)
 
     def _stop(self, tick: int) -> None:
-        self._events += self._standstill.over(tick)
+        self._events += self._standstill.report_release(tick)
         self._navigator.stop()
         self._commands.stop(tick)

@@ -79,7 +79,7 @@ class Setting:
 
     @cached_property
     def footprint(self) -> Footprint:
-        """The footprint checker: `footprint.free(costmap, poses)` tells for poses (n, 3) whether the robot fits."""
+        """The footprint checker: `footprint.free(costmap, poses)` returns for poses (n, 3) whether they are free."""
         return _footprint(self.robot, self.resolution)
 
 

@@ -18,7 +18,7 @@ class LaserOdometry:
         self._matcher = ScanMatcher()
         self._dead_reckoning = OdometryHistory(tick_rate)
         self._x = self._y = 0.0
-        self._before: tuple[str, Pose2] | None = None
+        self._previous: tuple[str, Pose2] | None = None
 
     def add_pose(self, tick: int, pose: Pose2) -> None:
         """Add a pose of dead reckoning, which includes all corrections so far."""
@@ -32,17 +32,17 @@ class LaserOdometry:
         """
         if not self._dead_reckoning:
             return 0.0, 0.0
-        here = self._dead_reckoning.held(scan.tick)
-        sensor, before = self._before or (scan.sensor, here)
+        current = self._dead_reckoning.latest_until(scan.tick)
+        sensor, previous = self._previous or (scan.sensor, current)
         if scan.sensor != sensor:
             return 0.0, 0.0
-        self._before = sensor, here
-        driven = before.between(here)
+        self._previous = sensor, current
+        driven = previous.between(current)
         step = self._matcher.step(scan, driven)
         if step is None or not step.agrees(driven):
             return 0.0, 0.0
-        ahead, left = step.delta.x - driven.x, step.delta.y - driven.y
-        c, s = math.cos(before.yaw), math.sin(before.yaw)
-        x, y = c * ahead - s * left, s * ahead + c * left
+        forward, left = step.delta.x - driven.x, step.delta.y - driven.y
+        c, s = math.cos(previous.yaw), math.sin(previous.yaw)
+        x, y = c * forward - s * left, s * forward + c * left
         self._x, self._y = self._x + x, self._y + y
         return x, y

@@ -20,7 +20,7 @@ MIN_ROTATIONAL_VEL_RAD_S = 0.4
 
 
 class Spin:
-    """Turn in place by `spin_dist`, to see what is around."""
+    """Turn in place by `spin_dist`, so that the lidar sees all surroundings."""
 
     name = "spin"
 
@@ -33,30 +33,30 @@ class Spin:
         self._turned, self._yaw = 0.0, pose.yaw
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Return the command to turn on; None when done. Raises SPIN_COLLISION_AHEAD, SPIN_TIMEOUT."""
+        """Return the command to continue; None when done. Raises SPIN_COLLISION_AHEAD, SPIN_TIMEOUT."""
         self._turned += wrap(pose.yaw - self._yaw)
         self._yaw = pose.yaw
-        left = abs(self._spec.spin_dist) - math.copysign(1.0, self._spec.spin_dist) * self._turned
-        if left <= 0.01 or self._robot.turning_radius > 0.0:
+        remaining = abs(self._spec.spin_dist) - math.copysign(1.0, self._spec.spin_dist) * self._turned
+        if remaining <= 0.01 or self._robot.turning_radius > 0.0:
             return None
         if seconds > TIME_ALLOWANCE_S:
             raise NavigationFailure(ErrorCode.SPIN_TIMEOUT, "spinning took too long")
-        stopping = math.sqrt(2.0 * self._robot.angular_acceleration * left)
-        fastest = min(self._spec.max_rotational_vel, self._robot.max_angular)
+        stopping_rate = math.sqrt(2.0 * self._robot.angular_acceleration * remaining)
+        max_rate = min(self._spec.max_rotational_vel, self._robot.max_angular)
         command = Twist(
-            0.0, 0.0, math.copysign(min(max(stopping, MIN_ROTATIONAL_VEL_RAD_S), fastest), self._spec.spin_dist)
+            0.0, 0.0, math.copysign(min(max(stopping_rate, MIN_ROTATIONAL_VEL_RAD_S), max_rate), self._spec.spin_dist)
         )
-        horizon = min(self._spec.simulate_ahead_time, left / abs(command.wz))
+        horizon = min(self._spec.simulate_ahead_time, remaining / abs(command.wz))
         if time_to_collision(self._footprint, costmap, pose, command, horizon) < horizon:
             raise NavigationFailure(ErrorCode.SPIN_COLLISION_AHEAD, "no room to spin")
         return command
 
 
 class BackUp:
-    """Drive straight back by `backup_dist`, or as far as there is room.
+    """Drive straight back by `backup_dist`, or as far as possible.
 
-    Nav2's fails unless there is room for simulate_ahead_time, as it does here without `backup_partial`; but a few
-    centimeters are often what it takes to turn.
+    Nav2's behavior fails if a collision is nearer than simulate_ahead_time, as this one without `backup_partial`. But a
+    few centimeters often suffice for the robot to turn.
     """
 
     name = "backup"
@@ -72,20 +72,20 @@ class BackUp:
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
         """Return the command to back up; None when done.
 
-        Raises BACKUP_COLLISION_AHEAD when there is not even a cell of room, BACKUP_TIMEOUT, BACKUP_INVALID_INPUT.
+        Raises BACKUP_COLLISION_AHEAD if it cannot move by a single cell, BACKUP_TIMEOUT, BACKUP_INVALID_INPUT.
         """
-        left = self._spec.backup_dist - self._from.distance(pose)
+        remaining = self._spec.backup_dist - self._from.distance(pose)
         speed = min(self._spec.backup_speed, self._robot.max_reverse)
-        if left <= 0.0:
+        if remaining <= 0.0:
             return None
         if speed <= 0.0:
             raise NavigationFailure(ErrorCode.BACKUP_INVALID_INPUT, "the robot cannot drive backward")
         if seconds > TIME_ALLOWANCE_S:
             raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "backing up took too long")
         command = Twist(-speed, 0.0, 0.0)
-        horizon = min(self._spec.simulate_ahead_time, left / speed)
-        free = time_to_collision(self._footprint, costmap, pose, command, horizon)
-        if free >= horizon or (self._spec.backup_partial and free * speed >= costmap.resolution):
+        horizon = min(self._spec.simulate_ahead_time, remaining / speed)
+        free_time = time_to_collision(self._footprint, costmap, pose, command, horizon)
+        if free_time >= horizon or (self._spec.backup_partial and free_time * speed >= costmap.resolution):
             return command
         if self._spec.backup_partial and self._from.distance(pose) >= costmap.resolution:
             return None
@@ -93,7 +93,7 @@ class BackUp:
 
 
 class Wait:
-    """Stand still for `wait_duration`, so that an obstacle can leave by itself."""
+    """Stand still for `wait_duration`, so that a moving obstacle can leave."""
 
     name = "wait"
 
@@ -109,10 +109,10 @@ class Wait:
 
 
 class ClearCostmap:
-    """Clear live obstacles that are no longer seen: around the robot, or everywhere with `clear_entirely`.
+    """Clear live obstacles that are not in current readings: around the robot, or everywhere with `clear_entirely`.
 
-    Far from the robot nothing keeps a controller from driving, and a planner that fails has had all of the global
-    costmap cleared already.
+    Obstacles far from the robot do not stop the controller, and after a planning failure the global costmap has already
+    been cleared.
     """
 
     name = "clear_costmap"
@@ -133,7 +133,7 @@ PLANNER_CODES = frozenset(get_args(PlannerCode))
 
 
 PROGRESS_M = 1.0
-"""Progress is a decrease of the distance to the goal by this much since the closest recovery so far."""
+"""Decrease of the distance to the goal, since the closest recovery so far, that counts as progress."""
 
 
 class BehaviorSequence:
@@ -154,11 +154,11 @@ class BehaviorSequence:
         """Restore all retries for a new goal. The next behavior stays the same, as in Nav2."""
         self._used, self._nearest = 0, math.inf
 
-    def next(self, to_go: float) -> Behavior | None:
-        """Return the next behavior, with the goal `to_go` meters away, or None if the retries are used up."""
-        if self._resets_on_progress and to_go <= self._nearest - PROGRESS_M and self._used:
+    def next(self, goal_distance: float) -> Behavior | None:
+        """Return the next behavior, with the goal `goal_distance` meters away, or None if the retries are used up."""
+        if self._resets_on_progress and goal_distance <= self._nearest - PROGRESS_M and self._used:
             self._used = self._next = 0
-        self._nearest = min(self._nearest, to_go)
+        self._nearest = min(self._nearest, goal_distance)
         if not self._behaviors or self._used >= self._max_retries:
             return None
         behavior = self._behaviors[self._next % len(self._behaviors)]

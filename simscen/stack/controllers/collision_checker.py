@@ -76,7 +76,7 @@ obstacle may be half a cell nearer, and a robot without a rear lidar does not se
 BACKUP_SPEED_M_S, BACKUP_FREE_TIME_S = 0.15, 1.0
 """Speed of backing up (Nav2's backup_speed), and time for which a command to back up must be free."""
 BACKUP_TURN_RATES_RAD_S = (0.0, 0.3, -0.3, 0.6, -0.6)
-"""Turn rates to try in this order: a robot that came in on a curve may not be able to leave straight."""
+"""Turn rates to try in this order: a robot that entered on a curve may not be able to leave in a straight line."""
 
 
 class RotationClearance:
@@ -155,12 +155,12 @@ def _clearly_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist
     required = radius + CELL_DIAGONAL * resolution
     time, at_x, at_y = 0.0, pose.x, pose.y
     while True:
-        room = distance_at(costmap, at_x, at_y) - required
-        if room <= resolution and (room <= 0.0 or speed > 0.0):
+        free_distance = distance_at(costmap, at_x, at_y) - required
+        if free_distance <= resolution and (free_distance <= 0.0 or speed > 0.0):
             return False
         if time >= horizon or speed == 0.0:
             return True
-        time += room / speed
+        time += free_distance / speed
         time = min(time, horizon)
         forward, left = (math.sin(wz * time) / wz, (1.0 - math.cos(wz * time)) / wz) if turns else (time, 0.0)
         x, y = vx * forward - vy * left, vx * left + vy * forward

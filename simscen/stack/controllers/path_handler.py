@@ -216,8 +216,8 @@ def local_plan(tracker: PathTracker, max_length: float, spacing: float = LOCAL_P
     points, along = tracker.ahead(max_length)
     length = float(min(max_length, along[-1]))
     steps = max(1, math.ceil(length / spacing - LENGTH_TOLERANCE_M))
-    at = np.arange(steps + 1) * (length / steps)
-    at[-1] = length
-    x, y = np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])
-    yaw = points[np.minimum(np.searchsorted(along, at + LENGTH_TOLERANCE_M, side="right"), len(points)) - 1, 2]
+    lengths = np.arange(steps + 1) * (length / steps)
+    lengths[-1] = length
+    x, y = np.interp(lengths, along, points[:, 0]), np.interp(lengths, along, points[:, 1])
+    yaw = points[np.minimum(np.searchsorted(along, lengths + LENGTH_TOLERANCE_M, side="right"), len(points)) - 1, 2]
     return LocalPlan(np.stack((x, y, yaw), axis=-1), length / steps, length)

@@ -37,8 +37,8 @@ class Costmaps:
         """
         self.global_costmap = LayeredCostmap(spec.costmap, surroundings)
         local_spec = spec.local_costmap.completed(spec.costmap)
-        needed = lookahead_distance + surroundings.robot.circumscribed_radius + MAX_ROLL_OFFSET_M
-        default_size = max(MIN_LOCAL_SIZE_M, 2.0 * needed)
+        min_half_size = lookahead_distance + surroundings.robot.circumscribed_radius + MAX_ROLL_OFFSET_M
+        default_size = max(MIN_LOCAL_SIZE_M, 2.0 * min_half_size)
         size = spec.local_costmap.width or default_size, spec.local_costmap.height or default_size
         without_map = replace(surroundings, map=None, keepout=(), masks=replace(surroundings.masks, keepout=None))
         self.local_costmap = LayeredCostmap(local_spec, without_map, size, MAX_ROLL_OFFSET_M)
@@ -72,8 +72,8 @@ class Costmaps:
             for base, reading, _ in self._global_schedule.take(tick, frames, frames.pose, odometry):
                 self.global_costmap.update(base, reading)
         if tick >= self._local_schedule.next:
-            for base, reading, frames_then in self._local_schedule.take(tick, frames, frames.odometry, odometry):
-                self._update_local_zones(frames_then)
+            for base, reading, frames_at_start in self._local_schedule.take(tick, frames, frames.odometry, odometry):
+                self._update_local_zones(frames_at_start)
                 self.local_costmap.update(base, reading)
         self.next = min(self._global_schedule.next, self._local_schedule.next)
 
@@ -92,7 +92,7 @@ class Costmaps:
         self.clear_local()
 
     def clear_local(self) -> None:
-        """Clear the local costmap, except for cells that no lidar sees: the robot backs up by this costmap."""
+        """Clear the local costmap, except for cells out of view of all lidars, which backing up relies on."""
         self.local_costmap.clear(unseen=self._local_range)
 
     def clear_global(self, *, entirely: bool) -> None:
@@ -144,7 +144,7 @@ class _UpdateSchedule:
             self._updated_at = tick
             for reading in self.readings.values():
                 if isinstance(reading, Image) or not _is_blind(reading):
-                    self._updates.put(tick, _Update(odometry.then(base, reading.tick), reading, frames))
+                    self._updates.put(tick, _Update(odometry.past_pose(base, reading.tick), reading, frames))
             self.readings.clear()
         complete: list[_Update] = []
         while tick >= self._updates.due:

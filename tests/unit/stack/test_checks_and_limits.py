@@ -204,7 +204,7 @@ def test_a_robot_does_not_drive_off_before_its_lidar_has_been_heard() -> None:
     guard = monitor(source_timeout=0.3)
     guard.start(12)
     assert guard.silent(12)
-    assert guard.silence(24) == "lidar `lidar` has been silent for 0.05 s; source_timeout is 0.3 s"
+    assert guard.silence_reason(24) == "lidar `lidar` has been silent for 0.05 s; source_timeout is 0.3 s"
     guard.on_scan(scan((2.0, 0.0), tick=10), Pose2(0, 0), 30)
     assert not guard.silent(30)
     guard.start(60)
@@ -214,12 +214,14 @@ def test_a_robot_does_not_drive_off_before_its_lidar_has_been_heard() -> None:
 def test_why_a_lidar_counts_as_silent_is_told() -> None:
     guard = monitor(source_timeout=0.3)
     guard.start(0)
-    assert guard.silence(240) == "lidar `lidar` has been silent for 1.00 s; source_timeout is 0.3 s"
+    assert guard.silence_reason(240) == "lidar `lidar` has been silent for 1.00 s; source_timeout is 0.3 s"
     guard.on_scan(scan((2.0, 0.0), tick=120), Pose2(0, 0), 240)
-    assert guard.silence(241) == "scans of lidar `lidar` are 0.50 s old when they arrive; source_timeout is 0.3 s"
+    assert (
+        guard.silence_reason(241) == "scans of lidar `lidar` are 0.50 s old when they arrive; source_timeout is 0.3 s"
+    )
     guard.on_scan(Scan("lidar", 300, np.full(9, np.nan), 0.0, 0.1, 0.05, 12.0), Pose2(0, 0), 300)
-    assert "blind for 0.75 s: its scans contain no returns" in guard.silence(300)
-    assert "silent" in guard.silence(400)
+    assert "blind for 0.75 s: its scans contain no returns" in guard.silence_reason(300)
+    assert "silent" in guard.silence_reason(400)
 
 
 def test_arcs_are_those_of_a_fine_integration() -> None:
@@ -354,7 +356,7 @@ def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> 
     plan = FollowedPlan(Path(line), robot.inscribed_radius, view_of(Flatland(), robot))
     for x, blocked in ((2.0, True), (-0.5, False)):
         plan.locate(Pose2(1.0, 0.0))
-        plan.see(view_of(Flatland(discs=[(x, 0.1, 0.1)]), robot))
+        plan.compare(view_of(Flatland(discs=[(x, 0.1, 0.1)]), robot))
         assert plan.blocked() == blocked
     assert plan.remaining() == pytest.approx(2.95, abs=0.05)
 
@@ -372,7 +374,7 @@ def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_
     roomy, narrow = (view_of(Flatland(discs=discs), robot) for discs in ((), [(2.0, 0.45, 0.1)]))
     for made, now, tighter in ((roomy, narrow, True), (narrow, narrow, False), (narrow, roomy, False)):
         plan = ClearancePlan(line, robot.inscribed_radius, made)
-        plan.see(now)
+        plan.compare(now)
         assert plan.has_lost_clearance() == tighter
 
 

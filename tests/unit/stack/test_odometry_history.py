@@ -20,7 +20,9 @@ def straight(*ticks: int) -> OdometryHistory:
 
 def test_the_held_pose_at_a_tick_is_the_newest_up_to_then() -> None:
     kept = straight(0, 6, 12)
-    assert [kept.held(tick).x for tick in (-5, 0, 5, 6, 11, 12, 99)] == pytest.approx([0, 0, 0, 0.6, 0.6, 1.2, 1.2])
+    assert [kept.latest_until(tick).x for tick in (-5, 0, 5, 6, 11, 12, 99)] == pytest.approx(
+        [0, 0, 0, 0.6, 0.6, 1.2, 1.2]
+    )
 
 
 def test_between_two_readings_it_is_interpolated_across_the_cut_of_the_circle() -> None:
@@ -39,15 +41,15 @@ def test_outside_of_the_readings_there_is_nothing_to_interpolate() -> None:
 
 
 def test_where_the_robot_was_is_told_in_the_frame_in_which_it_is_told_where_it_is() -> None:
-    before = straight(0, 6, 12).then(Pose2(5.0, 5.0, 1.5707963267948966), 6)
+    before = straight(0, 6, 12).past_pose(Pose2(5.0, 5.0, 1.5707963267948966), 6)
     assert before == pytest.approx((5.0, 4.4, 1.5707963267948966))
 
 
 def test_before_any_reading_it_is_at_the_origin() -> None:
     nothing = history()
-    assert not nothing.begun
-    assert nothing.held(5) == nothing.now == Pose2(0.0, 0.0)
-    assert nothing.then(Pose2(1, 2, 0.3), 5) == pytest.approx(Pose2(1, 2, 0.3))
+    assert not nothing.has_pose
+    assert nothing.latest_until(5) == nothing.now == Pose2(0.0, 0.0)
+    assert nothing.past_pose(Pose2(1, 2, 0.3), 5) == pytest.approx(Pose2(1, 2, 0.3))
     assert nothing.at(0) is None
     assert not nothing.reaches(0)
 
@@ -57,14 +59,14 @@ def test_what_is_older_than_tf_keeps_is_forgotten() -> None:
     oldest = 990 - HISTORY_S * RATE
     assert long.at(oldest - 1) is None
     assert long.at(oldest + 1) == pytest.approx((0.1 * (oldest + 1), 0, 0))
-    assert long.held(0).x == pytest.approx(0.1 * oldest)
+    assert long.latest_until(0).x == pytest.approx(0.1 * oldest)
 
 
 @pytest.mark.parametrize("tick", [10, 5])
 def test_a_reading_that_is_not_newer_is_refused(tick: int) -> None:
     given = history((10, Pose2(1, 1, 0)))
     assert not given.add(tick, Pose2(9, 9, 9))
-    assert given.now == given.held(99) == Pose2(1, 1, 0)
+    assert given.now == given.latest_until(99) == Pose2(1, 1, 0)
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf"), 1e200])

@@ -17,21 +17,21 @@ def kinds(events: tuple[Event, ...]) -> list[tuple[str, str]]:
 
 def test_a_reason_is_told_once_after_a_second_and_its_end_as_well() -> None:
     standstill = StandstillReporter(240)
-    assert [kinds(standstill.held(tick, "planner", lambda: "why")) for tick in (12, 251, 252, 264)] == [
+    assert [kinds(standstill.report_hold(tick, "planner", lambda: "why")) for tick in (12, 251, 252, 264)] == [
         [], [], [("robot.held", "planner")], [],
     ]  # fmt: skip
-    assert kinds(standstill.over(300)) == [("robot.released", "planner")]
-    assert standstill.over(301) == ()
-    standstill.held(400, "planner", lambda: "why")
-    assert standstill.over(500) == ()
+    assert kinds(standstill.report_release(300)) == [("robot.released", "planner")]
+    assert standstill.report_release(301) == ()
+    standstill.report_hold(400, "planner", lambda: "why")
+    assert standstill.report_release(500) == ()
 
 
 def test_another_reason_ends_the_one_before() -> None:
     standstill = StandstillReporter(240)
-    standstill.held(0, "planner", lambda: "why")
-    standstill.held(240, "planner", lambda: "why")
-    assert kinds(standstill.held(300, "controller", lambda: "why")) == [("robot.released", "planner")]
-    assert kinds(standstill.held(540, "controller", lambda: "why")) == [("robot.held", "controller")]
+    standstill.report_hold(0, "planner", lambda: "why")
+    standstill.report_hold(240, "planner", lambda: "why")
+    assert kinds(standstill.report_hold(300, "controller", lambda: "why")) == [("robot.released", "planner")]
+    assert kinds(standstill.report_hold(540, "controller", lambda: "why")) == [("robot.held", "controller")]
 
 
 @pytest.mark.parametrize("part", ["planner", "controller"])

@@ -113,8 +113,8 @@ def manhattan_distances(cells: Cells, sources: Cells) -> Array:
     """Return the Manhattan distance (n,) in cells from cells (n, 2) to the nearest source (m, 2); 0 without sources."""
     if not len(sources):
         return np.zeros(len(cells))
-    apart = np.abs(cells[:, None, 0] - sources[None, :, 0]) + np.abs(cells[:, None, 1] - sources[None, :, 1])
-    return np.asarray(apart.min(axis=1), dtype=np.float64)
+    distances = np.abs(cells[:, None, 0] - sources[None, :, 0]) + np.abs(cells[:, None, 1] - sources[None, :, 1])
+    return np.asarray(distances.min(axis=1), dtype=np.float64)
 
 
 class RotateToGoalCritic:

@@ -72,9 +72,9 @@ def _limit_axis(
     (low, high), (up, down) = bounds, changes
     limited, last = [now], now
     for velocity in requested[1:]:
-        wanted = low if velocity < low else min(velocity, high)
-        least, most = (last + down, last + up) if last >= 0.0 else (last - up, last - down)
-        last = least if wanted < least else most if wanted > most else wanted
+        target = low if velocity < low else min(velocity, high)
+        lowest, highest = (last + down, last + up) if last >= 0.0 else (last - up, last - down)
+        last = lowest if target < lowest else highest if target > highest else target
         limited.append(last)
     return limited
 

@@ -29,7 +29,7 @@ ESCAPE_TOLERANCE_M = 0.01
 class CellLookup(NamedTuple):
     """Points (…,) with the index of the costmap cell below each.
 
-    `on_map` tells which points are on the costmap; None if all of them are.
+    `on_map` marks the points that are on the costmap; None if all of them are.
     """
 
     x: Floats
@@ -178,11 +178,11 @@ class CriticData:
         if discs.centered:
             return np.asarray(self._distance(points) - np.float32(discs.radius))
         cosine, sine = np.cos(yaw), np.sin(yaw)
-        least = np.full(points.x.shape, np.inf, np.float32)
+        nearest = np.full(points.x.shape, np.inf, np.float32)
         for offset in discs.offsets.astype(np.float32):
             center = self.lookup(points.x + offset * cosine, points.y + offset * sine)
-            np.minimum(least, self._distance(center), out=least)
-        return np.asarray(least - np.float32(discs.radius))
+            np.minimum(nearest, self._distance(center), out=nearest)
+        return np.asarray(nearest - np.float32(discs.radius))
 
     def _distance(self, points: CellLookup) -> Floats:
         distance = self._flat_distances.take(points.cell)

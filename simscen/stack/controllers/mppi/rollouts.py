@@ -60,8 +60,8 @@ def predict_velocities(now: Floats, controls: Floats, limits: VelocityLimits, dt
 def _limit_changes(velocities: Floats, requested: Floats, change: np.float32) -> None:
     """Limit the changes of one axis (steps, n) in place, without temporary arrays."""
     bound = np.empty_like(velocities[0])
-    for (last, now), wanted in zip(pairwise(velocities), requested, strict=False):
-        np.maximum(wanted, np.subtract(last, change, out=bound), out=now)
+    for (last, now), target in zip(pairwise(velocities), requested, strict=False):
+        np.maximum(target, np.subtract(last, change, out=bound), out=now)
         np.minimum(now, np.add(last, change, out=bound), out=now)
 
 
@@ -69,10 +69,10 @@ def _limit_asymmetric_changes(velocities: Floats, requested: Floats, up: np.floa
     """Limit the changes of one axis whose deceleration differs from its acceleration, in place."""
     bound, forward = np.empty_like(velocities[0]), np.empty(velocities[0].shape, np.bool_)
     lowest, highest = np.array((-up, down)), np.array((-down, up))
-    for (last, now), wanted in zip(pairwise(velocities), requested, strict=False):
+    for (last, now), target in zip(pairwise(velocities), requested, strict=False):
         sign = np.greater(last, 0.0, out=forward).view(np.uint8)
         np.add(lowest.take(sign, out=bound, mode="clip"), last, out=bound)
-        np.maximum(wanted, bound, out=now)
+        np.maximum(target, bound, out=now)
         np.add(highest.take(sign, out=bound, mode="clip"), last, out=bound)
         np.minimum(now, bound, out=now)
 
