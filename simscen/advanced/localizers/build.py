@@ -55,7 +55,7 @@ def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
     """Return the models of a map; cached with the map, since a map of 100 x 100 m takes 0.3 s."""
     grid = replace(grid)  # the cache belongs to the original, which must not be kept alive by its own cache
     field, unmapped = obstacle_field(grid, spec.laser_likelihood_max_dist), beyond_the_map(grid).ravel()
-    fit_field = field if spec.laser_likelihood_max_dist > FIT_DISTANCE_M else obstacle_field(grid, 2 * FIT_DISTANCE_M)
+    trust_field = field if spec.laser_likelihood_max_dist > FIT_DISTANCE_M else obstacle_field(grid, 2 * FIT_DISTANCE_M)
     if spec.laser_model_type == "likelihood_field_prob":
         sensor: SensorModel = TemperedLikelihoodField(
             field, spec.z_hit, spec.z_rand, spec.sigma_hit, beam_skipping(spec), spec.likelihood_exponent,
@@ -66,8 +66,8 @@ def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
     return MapModels(
         sensor=sensor,
         free_space=FreeSpace(grid),
-        trust=MapTrust(fit_field, unmapped, spec.map_trust_none, spec.map_trust_full),
-        residuals=MapResiduals(fit_field, unmapped, spec.z_hit, spec.z_rand, spec.sigma_hit),
+        trust=MapTrust(trust_field, unmapped, spec.map_trust_none, spec.map_trust_full),
+        residuals=MapResiduals(trust_field, unmapped, spec.z_hit, spec.z_rand, spec.sigma_hit),
         search=GlobalSearch(grid, field),
     )
 

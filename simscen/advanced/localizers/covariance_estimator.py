@@ -87,8 +87,8 @@ class CovarianceEstimator:
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
         """Return the covariance (3, 3) of a pose with heading `yaw` after `delta`, measured by odometry."""
         c, s, share = math.cos(yaw), math.sin(yaw), _distance(delta) ** 2 / self._step_square
-        aside = self._odometry_square * share
-        noise = aside, 0.0, 0.0, aside, 0.0, self._yaw_square * share
+        translation_variance = self._odometry_square * share
+        noise = translation_variance, 0.0, 0.0, translation_variance, 0.0, self._yaw_square * share
         return propagate_covariance(covariance, c * delta.x - s * delta.y, s * delta.x + c * delta.y, noise)
 
     def drive(self, base: Pose2, step_covariance: Array | None) -> None:
@@ -107,9 +107,9 @@ class CovarianceEstimator:
         else:
             step_covariance = step_covariance - np.diag(COVARIANCE_FLOOR)  # these errors do not add up over steps
         frame = rotation_matrix(last.yaw)
-        swung = np.array(((1.0, 0.0, last.y - base.y), (0.0, 1.0, base.x - last.x), (0.0, 0.0, 1.0)))
+        lever = np.array(((1.0, 0.0, last.y - base.y), (0.0, 1.0, base.x - last.x), (0.0, 0.0, 1.0)))
         self._drifts = (
-            swung @ self._drifts @ swung.T + frame @ (step_covariance + np.diag(DRIFT_VARIANCE * distance)) @ frame.T
+            lever @ self._drifts @ lever.T + frame @ (step_covariance + np.diag(DRIFT_VARIANCE * distance)) @ frame.T
         )
         self._distances = self._distances + distance
 
@@ -126,24 +126,24 @@ class CovarianceEstimator:
         axes = rotation_matrix(pose.yaw).T
         rotated = axes @ own @ axes.T
         learned = self._ratio_sum / self._ratio_weight
-        scattered = self._scatter_ratio(np.diag(rotated), np.square(learned * residual))
-        self._ratio_sum = FORGETTING_FACTOR * self._ratio_sum + scattered / residual
+        scatter = self._scatter_ratio(np.diag(rotated), np.square(learned * residual))
+        self._ratio_sum = FORGETTING_FACTOR * self._ratio_sum + scatter / residual
         self._ratio_weight = FORGETTING_FACTOR * self._ratio_weight + 1.0
         expected = residual * self._ratio_sum / self._ratio_weight
         student = math.sqrt(DEGREES_OF_FREEDOM / (DEGREES_OF_FREEDOM - 2.0))
-        ratio = (scattered + expected) / 2.0 / explained * student
+        ratio = (scatter + expected) / 2.0 / explained * student
         scaled: Array = axes.T @ (rotated * np.outer(ratio, ratio)) @ axes
         return scaled
 
     def _add(self, pose: Pose2, weight: float) -> None:
         """Add a pose; `weight` in 1/m² is the inverse variance of its particles."""
         assert self._base is not None  # `drive` precedes every correction
-        kept = slice(1 - WINDOW, None)
-        self._poses = np.vstack((self._poses[kept], pose))
-        self._bases = np.vstack((self._bases[kept], self._base))
-        self._drifts = np.concatenate((self._drifts[kept], np.zeros((1, 3, 3))))
-        self._distances = np.append(self._distances[kept], 0.0)
-        self._weights = np.append(self._weights[kept], weight)
+        recent = slice(1 - WINDOW, None)
+        self._poses = np.vstack((self._poses[recent], pose))
+        self._bases = np.vstack((self._bases[recent], self._base))
+        self._drifts = np.concatenate((self._drifts[recent], np.zeros((1, 3, 3))))
+        self._distances = np.append(self._distances[recent], 0.0)
+        self._weights = np.append(self._weights[recent], weight)
 
     def _mean_residuals(self) -> tuple[float, float]:
         """Return the share of explained beams in the last scans, and their root mean square residual in `sigma_hit`."""
@@ -159,19 +159,19 @@ class CovarianceEstimator:
         the more of it is drift. `expected` (3,) are the squared ratios to assume without poses.
         """
         x, y, yaw = self._poses[-1]
-        turned = self._poses[:, 2] - self._bases[:, 2]
-        driven = np.exp(1j * turned) * ((self._bases[-1] - self._bases)[:, :2] @ (1.0, 1j))
-        away = (self._poses[:, :2] @ (1.0, 1j) + driven - complex(x, y)) * np.exp(-1j * yaw)
-        off = np.column_stack((away.real, away.imag, wrap_array(turned - turned[-1])))
+        rotations = self._poses[:, 2] - self._bases[:, 2]
+        driven = np.exp(1j * rotations) * ((self._bases[-1] - self._bases)[:, :2] @ (1.0, 1j))
+        offsets = (self._poses[:, :2] @ (1.0, 1j) + driven - complex(x, y)) * np.exp(-1j * yaw)
+        errors = np.column_stack((offsets.real, offsets.imag, wrap_array(rotations - rotations[-1])))
         c, s = math.cos(self._bases[-1, 2]), math.sin(self._bases[-1, 2])
         (xx, xy, _), (_, yy, _), (_, _, aa) = self._drifts.transpose(1, 2, 0)
         drift = np.column_stack(
             (c * c * xx + 2 * c * s * xy + s * s * yy, s * s * xx - 2 * c * s * xy + c * c * yy, aa)
         )
         weights = np.square(own / (own + drift)) * (self._weights / self._weights.sum())[:, np.newaxis]
-        past = self._distances[:, np.newaxis] / CORRELATION_LENGTHS_M
-        independent = 2.0 * (1.0 - (1.0 + past) * np.exp(-past))  # by Matérn's correlation of smooth errors
-        squares = (weights * np.square(off)).sum(axis=0) / own + EXPECTED_WEIGHT * expected
+        lengths = self._distances[:, np.newaxis] / CORRELATION_LENGTHS_M
+        independent = 2.0 * (1.0 - (1.0 + lengths) * np.exp(-lengths))  # by Matérn's correlation of smooth errors
+        squares = (weights * np.square(errors)).sum(axis=0) / own + EXPECTED_WEIGHT * expected
         ratio: Array = np.sqrt(squares / ((weights * independent).sum(axis=0) + EXPECTED_WEIGHT))
         return ratio
 

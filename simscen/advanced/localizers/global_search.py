@@ -21,7 +21,7 @@ from simscen.stack.localizers.likelihood_field import surfaces
 ENDPOINT_STD_M = 0.2
 """Standard deviation of the distance of an endpoint from its obstacle."""
 MAX_DISTANCE_M = 4 * ENDPOINT_STD_M
-"""Distance from obstacles beyond which an endpoint fits nothing."""
+"""Distance from obstacles beyond which an endpoint has the score 0."""
 COARSE_CELL_M = 0.2
 HEADINGS = 180
 """Number of headings of the coarse grid."""
@@ -55,7 +55,7 @@ class View:
         return View(_thin(self.ends, count), _thin(self.passed, count))
 
 
-def _within_reach(view: View) -> View:
+def _without_far_points(view: View) -> View:
     return View(*(points[np.abs(points) < MAX_RANGE_M] for points in (view.ends, view.passed)))
 
 
@@ -70,47 +70,47 @@ class GlobalSearch:
 
     def __init__(self, grid: OccupancyGrid, field: DistanceField | None = None) -> None:
         """Search this map. `field` is the obstacle field of the same map, if it is already known."""
-        self._grid, self._known = grid, field
+        self._grid, self._given_field = grid, field
 
     def precompute(self) -> None:
-        """Compute the tables of `near` and `fit`, which are otherwise computed when first used."""
-        _ = self._near, self._open
+        """Compute the lookup tables, which are otherwise computed when first used."""
+        _ = self._nearness_table, self._free_table
 
-    def places(self, view: View) -> tuple[Array, Array]:
+    def search(self, view: View) -> tuple[Array, Array]:
         """Return poses (k, 3) in the map frame and their scores (k,) in 0 … 1, best first, at most MAX_RESULTS."""
-        near = _within_reach(view)
-        if not len(near.ends):
+        near_view = _without_far_points(view)
+        if not len(near_view.ends):
             return np.empty((0, 3)), np.empty(0)
-        poses = self._search_coarse_grid(near.thinned(COARSE_POINTS))
-        fine = near.thinned(POINTS)
-        coarse = near.thinned(COARSE_POINTS)
-        poses, _ = distinct(poses, self.fit(poses, coarse), REFINED_POSES)
+        poses = self._search_coarse_grid(near_view.thinned(COARSE_POINTS))
+        fine = near_view.thinned(POINTS)
+        coarse = near_view.thinned(COARSE_POINTS)
+        poses, _ = distinct(poses, self.score(poses, coarse), REFINED_POSES)
         for meters, turn in ((0.1, 1.0), (0.05, 0.5)):
             poses = self._improve(poses, coarse, meters, np.radians(turn))
-        return distinct(poses, self.fit(poses, fine), MAX_RESULTS)
+        return distinct(poses, self.score(poses, fine), MAX_RESULTS)
 
-    def near(self, view: View, pose: Array) -> tuple[Array, Array]:
-        """Return the same within NEARBY_STEPS of `pose` (3,)."""
-        close = _within_reach(view)
-        coarse, fine = close.thinned(COARSE_POINTS), close.thinned(POINTS)
-        aside, turn = (np.arange(-steps, steps + 1) * step for steps, step in NEARBY_STEPS)
-        poses = pose + np.stack(np.meshgrid(aside, aside, turn, indexing="ij"), axis=-1).reshape(-1, 3)
-        poses, _ = distinct(poses, self.fit(poses, coarse), REFINED_NEARBY_POSES)
+    def search_near(self, view: View, pose: Array) -> tuple[Array, Array]:
+        """Return poses and scores like `search`, but within NEARBY_STEPS of `pose` (3,)."""
+        near_view = _without_far_points(view)
+        coarse, fine = near_view.thinned(COARSE_POINTS), near_view.thinned(POINTS)
+        offsets, turn = (np.arange(-steps, steps + 1) * step for steps, step in NEARBY_STEPS)
+        poses = pose + np.stack(np.meshgrid(offsets, offsets, turn, indexing="ij"), axis=-1).reshape(-1, 3)
+        poses, _ = distinct(poses, self.score(poses, coarse), REFINED_NEARBY_POSES)
         for meters, degrees in ((0.1, 1.0), (0.05, 0.5), (0.05, 0.5)):
             poses = self._improve(poses, coarse, meters, np.radians(degrees))
-        return distinct(poses, self.fit(poses, fine), MAX_RESULTS)
+        return distinct(poses, self.score(poses, fine), MAX_RESULTS)
 
-    def fit(self, poses: Array, view: View) -> Array:
+    def score(self, poses: Array, view: View) -> Array:
         """Return the scores (n,) of a view at each of the `poses` (n, 3), in 0 … 1."""
-        parts = [(self._near, view.ends, 1.0), (self._open, view.passed, FREE_WEIGHT)]
+        parts = [(self._nearness_table, view.ends, 1.0), (self._free_table, view.passed, FREE_WEIGHT)]
         nonempty = [(table, points, weight) for table, points, weight in parts if len(points)]
-        score = sum(weight * self._mean(table, poses, points) for table, points, weight in nonempty)
-        fitting: Array = np.asarray(score) / sum(weight for _, _, weight in nonempty)
-        return fitting
+        total = sum(weight * self._mean(table, poses, points) for table, points, weight in nonempty)
+        scores: Array = np.asarray(total) / sum(weight for _, _, weight in nonempty)
+        return scores
 
-    def hits(self, poses: Array, view: View) -> Array:
-        """Return the share (n,) of the endpoints that fit at each of the `poses` (n, 3)."""
-        return self._mean(self._near, poses, view.ends)
+    def matching_share(self, poses: Array, view: View) -> Array:
+        """Return the share (n,) of the endpoints that are near obstacles at each of the `poses` (n, 3)."""
+        return self._mean(self._nearness_table, poses, view.ends)
 
     def _mean(self, table: Levels, poses: Array, points: Plane) -> Array:
         blocks = [
@@ -122,17 +122,17 @@ class GlobalSearch:
 
     @cached_property
     def _field(self) -> DistanceField:
-        if self._known is not None and self._known.limit >= MAX_DISTANCE_M:
-            return self._known
+        if self._given_field is not None and self._given_field.limit >= MAX_DISTANCE_M:
+            return self._given_field
         return DistanceField(self._grid, surfaces(self._grid.cells == OCCUPIED), MAX_DISTANCE_M, walled=False)
 
     @cached_property
-    def _near(self) -> Levels:
+    def _nearness_table(self) -> Levels:
         """Score of an endpoint in each cell by its distance to the nearest obstacle, 0 … 255."""
         return self._field.tabulate(_nearness, np.uint8)
 
     @cached_property
-    def _open(self) -> Levels:
+    def _free_table(self) -> Levels:
         """255 for free cells, 0 for others."""
         levels: Levels = np.pad(np.where(self._grid.cells == FREE, 255, 0).astype(np.uint8), 1).ravel()
         return levels
@@ -140,24 +140,24 @@ class GlobalSearch:
     @cached_property
     def _coarse(self) -> tuple[int, Levels, Levels, npt.NDArray[np.bool_]]:
         """Map cells per coarse cell; for each coarse cell the maximum of both tables, and whether it has free cells."""
-        each = max(1, round(COARSE_CELL_M / self._grid.resolution))
+        factor = max(1, round(COARSE_CELL_M / self._grid.resolution))
         rows, columns = self._grid.shape
         shape = rows + 2, columns + 2
-        near = _pooled(self._near.reshape(shape)[1:-1, 1:-1], each)
-        open_ = _pooled(self._open.reshape(shape)[1:-1, 1:-1], each)
-        return each, near, open_, open_ > 0
+        nearness = _pooled(self._nearness_table.reshape(shape)[1:-1, 1:-1], factor)
+        open_ = _pooled(self._free_table.reshape(shape)[1:-1, 1:-1], factor)
+        return factor, nearness, open_, open_ > 0
 
     def _search_coarse_grid(self, view: View) -> Array:
         """Return the best poses of the coarse grid, unordered."""
-        each, near, open_, room = self._coarse
-        cell = each * self._grid.resolution
-        rows, columns = near.shape
+        factor, nearness, open_, has_free = self._coarse
+        cell = factor * self._grid.resolution
+        rows, columns = nearness.shape
         border = int(MAX_RANGE_M / cell) + 2
-        tables = [np.pad(near, border), np.pad(open_, border)]
+        tables = [np.pad(nearness, border), np.pad(open_, border)]
         weights = [4, max(1, round(4 * FREE_WEIGHT * len(view.ends) / max(1, len(view.passed))))]
         scores = np.empty((HEADINGS, rows, columns), dtype=np.uint16)
         turns = np.arange(HEADINGS, dtype=np.float64) * (2 * np.pi / HEADINGS)
-        for turn, score in zip(turns.tolist(), scores, strict=True):
+        for turn, heading_scores in zip(turns.tolist(), scores, strict=True):
             total = np.zeros((rows, columns), dtype=np.uint32)
             for table, points, weight in zip(tables, (view.ends, view.passed), weights, strict=True):
                 moved = (points * (cmath.rect(1.0, turn) / cell)).view(np.float64).reshape(-1, 2)
@@ -166,49 +166,49 @@ class GlobalSearch:
                 for right, up in offsets.tolist():
                     part += table[up : up + rows, right : right + columns]
                 total += np.uint32(weight) * part
-            score[:] = total >> 3
-        scores *= room
+            heading_scores[:] = total >> 3
+        scores *= has_free
         flat = scores.ravel()
         best = np.argpartition(flat, -min(COARSE_POSES, flat.size))[-COARSE_POSES:]
         heading, row, column = np.unravel_index(np.sort(best), scores.shape)
-        places: Array = (np.column_stack((column, row)).astype(np.float64) + 0.5) * cell
+        positions: Array = (np.column_stack((column, row)).astype(np.float64) + 0.5) * cell
         yaw: Array = turns[heading] + self._grid.origin.yaw
-        return np.column_stack((self._grid.origin.apply(places), wrap_array(yaw)))
+        return np.column_stack((self._grid.origin.apply(positions), wrap_array(yaw)))
 
     def _improve(self, poses: Array, view: View, meters: float, turn: float) -> Array:
         """Return each pose (n, 3), or the best of its neighbors, `meters` and `turn` rad away."""
         steps = np.array([(x, y, a) for x in (0, -1, 1) for y in (0, -1, 1) for a in (0, -1, 1)])
         around = (poses[:, None] + steps * (meters, meters, turn)).reshape(-1, 3)
-        best = self.fit(around, view).reshape(len(poses), -1).argmax(axis=1)
-        climbed: Array = around.reshape(len(poses), -1, 3)[np.arange(len(poses)), best]
-        climbed[:, 2] = wrap_array(climbed[:, 2])
-        return climbed
+        best = self.score(around, view).reshape(len(poses), -1).argmax(axis=1)
+        improved: Array = around.reshape(len(poses), -1, 3)[np.arange(len(poses)), best]
+        improved[:, 2] = wrap_array(improved[:, 2])
+        return improved
 
 
 def _nearness(meters: Float32) -> Levels:
-    fitting = np.exp(np.square(np.minimum(meters, np.float32(MAX_DISTANCE_M))) / (-2 * ENDPOINT_STD_M**2))
-    levels: Levels = np.round(255 * fitting).astype(np.uint8)
+    nearness = np.exp(np.square(np.minimum(meters, np.float32(MAX_DISTANCE_M))) / (-2 * ENDPOINT_STD_M**2))
+    levels: Levels = np.round(255 * nearness).astype(np.uint8)
     return levels
 
 
-def _pooled(levels: Levels, each: int) -> Levels:
-    """Return the maximum of each block of `each` x `each` cells."""
-    rows, columns = (-(-size // each) for size in levels.shape)
-    padded = np.pad(levels, ((0, rows * each - levels.shape[0]), (0, columns * each - levels.shape[1])))
-    pooled: Levels = padded.reshape(rows, each, columns, each).max(axis=(1, 3))
+def _pooled(levels: Levels, factor: int) -> Levels:
+    """Return the maximum of each block of `factor` x `factor` cells."""
+    rows, columns = (-(-size // factor) for size in levels.shape)
+    padded = np.pad(levels, ((0, rows * factor - levels.shape[0]), (0, columns * factor - levels.shape[1])))
+    pooled: Levels = padded.reshape(rows, factor, columns, factor).max(axis=(1, 3))
     return pooled
 
 
-def distinct(poses: Array, scores: Array, most: int) -> tuple[Array, Array]:
-    """Return the best DISTINCT poses of `poses` (n, 3), best first, at most `most`, and their scores."""
+def distinct(poses: Array, scores: Array, max_count: int) -> tuple[Array, Array]:
+    """Return the best DISTINCT poses of `poses` (n, 3), best first, at most `max_count`, and their scores."""
     order = np.argsort(-scores, kind="stable")
-    left = poses[order]
-    kept: list[int] = []
-    while len(order) and len(kept) < most:
-        kept.append(int(order[0]))
-        off = np.abs(left - left[0])
-        off[:, 2] = np.abs(wrap_array(off[:, 2]))
-        other = (np.hypot(off[:, 0], off[:, 1]) > DISTINCT[0]) | (off[:, 2] > DISTINCT[1])
-        order, left = order[other], left[other]
-    chosen = np.array(kept, dtype=np.int64)
+    remaining = poses[order]
+    chosen_indices: list[int] = []
+    while len(order) and len(chosen_indices) < max_count:
+        chosen_indices.append(int(order[0]))
+        difference = np.abs(remaining - remaining[0])
+        difference[:, 2] = np.abs(wrap_array(difference[:, 2]))
+        other = (np.hypot(difference[:, 0], difference[:, 1]) > DISTINCT[0]) | (difference[:, 2] > DISTINCT[1])
+        order, remaining = order[other], remaining[other]
+    chosen = np.array(chosen_indices, dtype=np.int64)
     return poses[chosen], scores[chosen]

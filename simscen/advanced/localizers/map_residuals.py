@@ -36,12 +36,12 @@ class MapResiduals:
         self._field, self._beyond = field, beyond
         self._z_hit, self._z_rand, self._sigma_hit = z_hit, z_rand, sigma_hit
 
-    def of(self, beams: Beams, pose: Pose2) -> ScanResiduals | None:
+    def residuals(self, beams: Beams, pose: Pose2) -> ScanResiduals | None:
         """Return the residuals of a scan taken at `pose`; None if the map explains none of its beams."""
         cells = self._field.endpoint_cells(np.array([pose]), beams.ends)[0]
-        away = self._field.table.take(cells, mode="clip")[~self._beyond.take(cells, mode="clip")] / self._sigma_hit
-        hit = self._z_hit * np.exp(-0.5 * np.square(away, dtype=np.float64))
+        distances = self._field.table.take(cells, mode="clip")[~self._beyond.take(cells, mode="clip")] / self._sigma_hit
+        hit = self._z_hit * np.exp(-0.5 * np.square(distances, dtype=np.float64))
         if not len(hit) or not hit.any():
             return None
         explained = hit / (hit + self._z_rand / beams.range_max)
-        return ScanResiduals(float(explained.mean()), float(np.mean(np.square(explained * away))))
+        return ScanResiduals(float(explained.mean()), float(np.mean(np.square(explained * distances))))

@@ -55,7 +55,7 @@ class MapTrust:
         mapped = np.where(field.table < FIT_DISTANCE_M, _FITS, _MISSES)
         self._class_table = np.where(beyond, _UNMAPPED, mapped).astype(np.uint8)
 
-    def of(self, particles: Particles, beams: Beams) -> ScanWeight:
+    def weight(self, particles: Particles, beams: Beams) -> ScanWeight:
         """Return the weight of a scan.
 
         For a narrow cluster, only beams that end on the mapped area for most particles are used. The others would move
@@ -71,7 +71,7 @@ class MapTrust:
             counting = np.add.reduce(classes != _UNMAPPED, axis=0) > MIN_PARTICLE_SHARE * len(classes)
         return ScanWeight(exponent * _ramp(fitting, self._none, self._full), fitting, counting)
 
-    def fit(self, poses: Array, ends: Plane, min_mapped: float) -> float | None:
+    def fitting_share(self, poses: Array, ends: Plane, min_mapped: float) -> float | None:
         """Return the share of the beams that fit at `poses` (n, 3), of those that end on the mapped area.
 
         None if fewer than the share `min_mapped` end there.
@@ -94,8 +94,8 @@ class MapTrust:
 
 def _shares(classes: npt.NDArray[np.uint8]) -> tuple[float, float]:
     """Return the share of beams that end on the mapped area, and the share of these that fit."""
-    known_share, fit = int(np.count_nonzero(classes)), int(np.count_nonzero(classes == _FITS))
-    return known_share / max(classes.size, 1), fit / max(known_share, 1)
+    mapped, fitting = int(np.count_nonzero(classes)), int(np.count_nonzero(classes == _FITS))
+    return mapped / max(classes.size, 1), fitting / max(mapped, 1)
 
 
 def _ramp(value: float, none: float, full: float) -> float:

@@ -62,17 +62,17 @@ class ScanMatchingParticleFilter(ParticleFilter):
         self._settle(delta)
         super().move(delta)
 
-    def follow(self, seen: Step, delta: Pose2) -> None:
+    def follow(self, step: Step, delta: Pose2) -> None:
         """Move each particle by its own sample of a motion from scan matching. `delta` is the same by odometry.
 
         Where the two disagree, wheels slip, people walk beside the robot, or the match is wrong. Some particles then
         follow the motion model of odometry, and the map decides, unless it does not show the surroundings.
         """
         self._settle(delta)
-        poses = apply_step(self.particles.poses, seen, self._rng)
-        if self._map_weight > 0 and not seen.agrees(delta):
-            some = self._rng.random(len(poses)) < ODOMETRY_SHARE
-            poses[some] = self._motion.sample(self.particles.poses[some], delta, self._rng)
+        poses = apply_step(self.particles.poses, step, self._rng)
+        if self._map_weight > 0 and not step.agrees(delta):
+            by_odometry = self._rng.random(len(poses)) < ODOMETRY_SHARE
+            poses[by_odometry] = self._motion.sample(self.particles.poses[by_odometry], delta, self._rng)
         self.particles = Particles(poses, self.particles.weights)
 
     def _settle(self, delta: Pose2) -> None:
@@ -86,7 +86,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
 
     def redistribute(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
         """Put all particles around `poses` (k, 3), each with its share (k,). Return the new pose and covariance."""
-        drawn = sample_around(poses, shares, self._bound.most, self._rng)
+        drawn = sample_around(poses, shares, self._bound.max_samples, self._rng)
         self.particles = Particles.equal(drawn)
         self._random = self._descendants = None
         self._scan_weight = 1.0
@@ -95,7 +95,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
         """Return the exponent of the scan's likelihood by map trust and settling, and the beams the map covers."""
         if self._trust is not None and len(beams.ends):
-            self._map_weight, self.fitting, counting = self._trust.of(self.particles, beams)
+            self._map_weight, self.fitting, counting = self._trust.weight(self.particles, beams)
             if counting is not None and self._map_weight > 0:
                 beams = beams.keeping_hits(counting)
         return self._map_weight * self._scan_weight, beams

@@ -17,7 +17,7 @@ ODOMETRY_DRIFT = (0.03, 0.01)
 MOVING_SCENE = 0.1, 0.5
 """Difference between a step by scans and by wheels, in m and as share of the latter, that slip does not explain.
 
-Then people walk beside the robot, and the scans show them. Slipping wheels differ by at most 40 %, except if they spin
+Then people walk next to the robot, and the scans show them. Slipping wheels differ by at most 40 %, except if they spin
 on the spot, where scans show nothing new.
 """
 KNOWN_STEP_STD_M = 0.012
@@ -102,7 +102,7 @@ class PosePrior:
         frame = rotation_matrix(self.pose.yaw - self.base.yaw)
         meter, rad = self.systematic
         std = np.square(self.std + np.array((meter, meter, rad)))
-        off = pose_errors(self.expected(base), poses)
+        errors = pose_errors(self.expected(base), poses)
         information = np.linalg.inv(frame @ self.covariance @ frame.T + np.diag(std))
-        negative: Array = 0.5 * np.einsum("ni,ij,nj->n", off, information, off)
+        negative: Array = 0.5 * np.einsum("ni,ij,nj->n", errors, information, errors)
         return negative

@@ -15,9 +15,9 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane
 from simscen.stack.localizers.clusters import pose_errors
 
-# All distances driven include rotations (scan_memory.METERS_PER_RAD). A score is that of GlobalSearch.fit.
+# All distances driven include rotations (scan_memory.METERS_PER_RAD). A score is that of GlobalSearch.score.
 
-RECENT_SCANS, MIN_FIT = 5, 0.6
+RECENT_SCANS, MIN_FITTING_SHARE = 5, 0.6
 """The robot may be lost if the mean share of fitting beams in this many scans is below the second value."""
 MIN_MAPPED = 0.6
 """Share of the beams that must end on the mapped area for the fit of a scan to be known."""
@@ -69,7 +69,7 @@ class Relocalizer:
         self._has_pose, self._estimate, self._settling = estimate.pose is not None, estimate, settling
         self._initial: PosePrior | None = None
         self._certain: PosePrior | None = None
-        self._fits: deque[float] = deque(maxlen=RECENT_SCANS)
+        self._fitting_shares: deque[float] = deque(maxlen=RECENT_SCANS)
         self._driven, self._since_search, self._since_check, self._since_candidate = 0.0, 0.0, 0.0, 0.0
         self._interval, self._was_in_doubt = 0.0, False
         self._last: Pose2 | None = None
@@ -78,36 +78,36 @@ class Relocalizer:
 
     def update(
         self, scan: Scan, base: Pose2, estimated: Pose2, limits: tuple[float, float],
-        motion: ObservedMotion = NO_MOTION, fit: float | None = None,
+        motion: ObservedMotion = NO_MOTION, fitting_share: float | None = None,
     ) -> tuple[Array, Array] | None:  # fmt: skip
         """Return poses (k, 3) where the robot may be, with their shares (k,); None if the estimate should be kept.
 
-        base:       pose of the robot when the scan was taken, in a frame that drifts slowly
-        estimated:  pose of the robot in the map
-        limits:     minimum and maximum range of beams to use, in m
-        motion:     motion since the last scan
-        fit:        share of the beams that fit at the estimated pose, if it is already known
+        base:           pose of the robot when the scan was taken, in a frame that drifts slowly
+        estimated:      pose of the robot in the map
+        limits:         minimum and maximum range of beams to use, in m
+        motion:         motion since the last scan
+        fitting_share:  share of the beams that fit at the estimated pose, if it is already known
         """
         ends = self.add_scan(scan, base, limits, motion)
         if not len(ends):
             return None
-        here = np.array([estimated])
+        current = np.array([estimated])
         if self._initial is not None and self._driven < self._settling:
-            by_initial_pose = self._search_by_initial_pose(self._initial, base, here)
+            by_initial_pose = self._search_by_initial_pose(self._initial, base, current)
             if by_initial_pose is not None:
                 return by_initial_pose
-        if fit is None:
-            fit = self._trust.fit(here, ends, MIN_MAPPED)
-        if fit is not None:
-            self._fits.append(fit)
+        if fitting_share is None:
+            fitting_share = self._trust.fitting_share(current, ends, MIN_MAPPED)
+        if fitting_share is not None:
+            self._fitting_shares.append(fitting_share)
             self._mapped_at = self._driven
-        if self._has_pose and (near := self._search_nearby(base, here)) is not None:
-            return near
+        if self._has_pose and (found := self._search_nearby(base, current)) is not None:
+            return found
         if self._has_pose and not (self._is_in_doubt() or self._is_unmapped):
             return None
         if self._since_search < self._interval:
             return None
-        return self._search_map(self._memory.view_from(base), base, here)
+        return self._search_map(self._memory.view_from(base), base, current)
 
     def add_scan(self, scan: Scan, base: Pose2, limits: tuple[float, float], motion: ObservedMotion) -> Plane:
         """Add a scan without checking the pose. Return its endpoints in the base frame. Arguments as in `update`."""
@@ -135,7 +135,7 @@ class Relocalizer:
         self._initial = self._initial and self._initial.after(last, base, distance, motion)
         self._certain = self._certain and self._certain.after(last, base, distance, motion)
 
-    def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+    def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, current: Array) -> tuple[Array, Array] | None:
         """Return the pose that the initial pose and all scans since give, if the particles are elsewhere.
 
         In a room whose furniture was moved, one scan may fit a wrong pose, and the next scans, which show the same,
@@ -145,61 +145,63 @@ class Relocalizer:
         if not self._memory.length:
             return None
         view, expected = self._memory.view_from(base), initial.expected(base)[None]
-        if not len(view.ends) or (score := self._search.fit(here, view))[0] > CERTAIN_SCORE:
+        if not len(view.ends) or (score := self._search.score(current, view))[0] > CERTAIN_SCORE:
             return None
-        is_mapped = self._trust.fit(expected, view.ends, MIN_MAPPED) is not None
+        is_mapped = self._trust.fitting_share(expected, view.ends, MIN_MAPPED) is not None
         poses, scores = (
-            self._search.near(view, expected[0]) if is_mapped else (expected, self._search.fit(expected, view))
+            self._search.search_near(view, expected[0]) if is_mapped else (expected, self._search.score(expected, view))
         )
         likelihoods = scores / SCORE_SCALE - initial.negative_log_likelihood(poses, base)
-        own = score[0] / SCORE_SCALE - initial.negative_log_likelihood(here, base)[0]
+        own = score[0] / SCORE_SCALE - initial.negative_log_likelihood(current, base)[0]
         best = int(likelihoods.argmax())
-        off = pose_errors(here[0], poses[best : best + 1])[0]
+        difference = pose_errors(current[0], poses[best : best + 1])[0]
         if likelihoods[best] - own < MIN_LOG_RATIO or (
-            math.hypot(off[0], off[1]) < DISTINCT[0] and abs(off[2]) < DISTINCT[1]
+            math.hypot(difference[0], difference[1]) < DISTINCT[0] and abs(difference[2]) < DISTINCT[1]
         ):
             return None
-        self._fits.clear()
+        self._fitting_shares.clear()
         return poses[best : best + 1], np.ones(1)
 
-    def _search_nearby(self, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+    def _search_nearby(self, base: Pose2, current: Array) -> tuple[Array, Array] | None:
         """Return the pose if it is near the current one, after an inexact initial pose or after drift without a map."""
         if min(self._since_check, self._memory.length) < CHECK_INTERVAL_M:
             return None
         self._since_check, view = 0.0, self._memory.view_from(base)
-        if not len(view.ends) or self._trust.fit(here, view.ends, MIN_MAPPED) is None:
+        if not len(view.ends) or self._trust.fitting_share(current, view.ends, MIN_MAPPED) is None:
             return None
-        score = float(self._reduced(self._search.fit(here, view), here, base)[0])
+        score = float(self._reduce_scores(self._search.score(current, view), current, base)[0])
         if score > CERTAIN_SCORE:
-            self._certain = PosePrior.at(here[0], base)
+            self._certain = PosePrior.at(current[0], base)
             return None
-        poses, scores = self._sorted(*self._search.near(view, here[0]), base)
+        poses, scores = self._sort_by_score(*self._search.search_near(view, current[0]), base)
         gain = CERTAIN_GAIN if scores[0] > CERTAIN_SCORE else MIN_GAIN
         if not _leads(scores, MIN_LEAD) or scores[0] < max(MIN_NEAR_SCORE, score + gain):
             return None
-        return self._found(poses[:1], base)
+        return self._accept(poses[:1], base)
 
-    def _sorted(self, poses: Array, scores: Array, base: Pose2) -> tuple[Array, Array]:
+    def _sort_by_score(self, poses: Array, scores: Array, base: Pose2) -> tuple[Array, Array]:
         """Return poses (n, 3) and their reduced scores (n,), best first."""
-        reduced = self._reduced(scores, poses, base)
+        reduced = self._reduce_scores(scores, poses, base)
         order = np.argsort(-reduced, kind="stable")
         return poses[order], reduced[order]
 
-    def _reduced(self, scores: Array, poses: Array, base: Pose2) -> Array:
+    def _reduce_scores(self, scores: Array, poses: Array, base: Pose2) -> Array:
         """Return the scores (n,) of `poses` (n, 3), reduced by how unlikely the drift to them is."""
         if self._certain is None:
             return scores
         return scores - np.minimum(SCORE_SCALE * self._certain.negative_log_likelihood(poses, base), MAX_REDUCTION)
 
-    def _found(self, poses: Array, base: Pose2) -> tuple[Array, Array]:
+    def _accept(self, poses: Array, base: Pose2) -> tuple[Array, Array]:
         """Return `poses` (1, 3) with all particles, and mark it as certain."""
-        self._fits.clear()
+        self._fitting_shares.clear()
         self._certain = PosePrior.at(poses[0], base)
         return poses, np.ones(1)
 
     def _is_in_doubt(self) -> bool:
-        """Return whether recent scans do not fit. At the begin of doubt, earlier scans may be from another place."""
-        is_in_doubt = len(self._fits) == RECENT_SCANS and sum(self._fits) < RECENT_SCANS * MIN_FIT
+        """Return whether recent scans do not fit. When the doubt begins, earlier scans may be from another place."""
+        is_in_doubt = (
+            len(self._fitting_shares) == RECENT_SCANS and sum(self._fitting_shares) < RECENT_SCANS * MIN_FITTING_SHARE
+        )
         if is_in_doubt and not self._was_in_doubt:
             if not self._knows_overlap:
                 self._memory.forget(1)
@@ -217,9 +219,9 @@ class Relocalizer:
         """The robot drove out of the mapped area. If it had been carried there, it could be anywhere."""
         return self._is_unmapped and self._certain is not None
 
-    def _search_map(self, view: View, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+    def _search_map(self, view: View, base: Pose2, current: Array) -> tuple[Array, Array] | None:
         """Return the poses that fit, or for a robot that had a pose, the one that two searches agree on."""
-        poses, scores = self._search.places(view)
+        poses, scores = self._search.search(view)
         last_interval, self._interval, self._since_search = self._interval, SEARCH_INTERVAL_M, 0.0
         if not len(poses):
             return None
@@ -230,8 +232,8 @@ class Relocalizer:
             shares = np.exp((scores - scores[0]) / SCORE_SCALE)
             return poses, shares / shares.sum()
         min_score, lead = (RETURN_SCORE, RETURN_LEAD) if self._has_left_map else (MIN_SCORE, MIN_LEAD)
-        poses, scores = self._sorted(poses, scores, base)
-        own = self._reduced(self._search.fit(here, view), here, base)[0]
+        poses, scores = self._sort_by_score(poses, scores, base)
+        own = self._reduce_scores(self._search.score(current, view), current, base)[0]
         if _leads(scores, lead) and scores[0] > min_score and scores[0] > own + MIN_GAIN:
             found = Pose2(*poses[0].tolist())
             if self._candidate is None or not _agree(*self._candidate, found, base):
@@ -239,7 +241,7 @@ class Relocalizer:
             elif self._since_candidate >= AGREEMENT_LENGTH_M:
                 self._candidate = None
                 self._mapped_at = self._driven
-                return self._found(poses[:1], base)
+                return self._accept(poses[:1], base)
         else:
             interval = MAX_SEARCH_INTERVAL_M if self._has_left_map else 2 * max(last_interval, SEARCH_INTERVAL_M)
             self._candidate, self._interval = None, min(MAX_SEARCH_INTERVAL_M, interval)
@@ -253,8 +255,8 @@ def _leads(scores: Array, lead: float) -> bool:
 
 def _agree(first: Pose2, first_base: Pose2, second: Pose2, second_base: Pose2) -> bool:
     """Return whether the motion of the base leads from the first pose to the second."""
-    off = first.compose(first_base.between(second_base)).between(second)
-    return math.hypot(off.x, off.y) < SAME_POSE[0] and abs(off.yaw) < SAME_POSE[1]
+    difference = first.compose(first_base.between(second_base)).between(second)
+    return math.hypot(difference.x, difference.y) < SAME_POSE[0] and abs(difference.yaw) < SAME_POSE[1]
 
 
 def sample_around(poses: Array, shares: Array, count: int, rng: np.random.Generator) -> Array:

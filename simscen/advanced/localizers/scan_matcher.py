@@ -92,8 +92,8 @@ class _Reference:
         None if too few points have a neighbor within `gate` m with a similar normal.
         """
         turn = cmath.rect(1.0, pose.yaw)
-        about = own.points * turn
-        ends = about + complex(pose.x, pose.y)
+        rotated = own.points * turn
+        ends = rotated + complex(pose.x, pose.y)
         compared = np.ones((len(ends), 3))
         compared[:, :2] = (ends - self._middle).view(np.float64).reshape(-1, 2)
         nearest = (compared @ self._compared).argmax(axis=1)
@@ -113,7 +113,7 @@ class _Reference:
         slope = np.empty((4, len(ends)))
         slope[0] = against.real
         np.negative(against.imag, out=slope[1])
-        np.negative((about * against).imag, out=slope[2])
+        np.negative((rotated * against).imag, out=slope[2])
         slope[3] = (gap * against).real
         equations: Equations = tuple(map(tuple, (slope @ slope.T).tolist()))
         return equations
@@ -128,11 +128,11 @@ class Step:
 
     def agrees(self, odometry: Pose2) -> bool:
         """Return whether odometry measured nearly the same motion."""
-        off = odometry.between(self.delta)
-        far, turned = math.hypot(odometry.x, odometry.y), abs(odometry.yaw)
+        difference = odometry.between(self.delta)
+        distance, turned = math.hypot(odometry.x, odometry.y), abs(odometry.yaw)
         return (
-            math.hypot(off.x, off.y) < AGREEMENT[0] + AGREEMENT[1] * far
-            and abs(off.yaw) < AGREEMENT[2] + AGREEMENT[3] * turned
+            math.hypot(difference.x, difference.y) < AGREEMENT[0] + AGREEMENT[1] * distance
+            and abs(difference.yaw) < AGREEMENT[2] + AGREEMENT[3] * turned
         )
 
 
@@ -211,8 +211,8 @@ class ScanMatcher:
 
 def _prior_information(guess: Pose2) -> tuple[float, float]:
     """Return the information of the guess about each coordinate and about the yaw, in units of 1 / POINT_STD_M²."""
-    far, turned = math.hypot(guess.x, guess.y), abs(guess.yaw)
-    return (POINT_STD_M / (GUESS_STD[0] * far + GUESS_STD[1])) ** 2, (
+    distance, turned = math.hypot(guess.x, guess.y), abs(guess.yaw)
+    return (POINT_STD_M / (GUESS_STD[0] * distance + GUESS_STD[1])) ** 2, (
         POINT_STD_M / (GUESS_STD[2] * turned + GUESS_STD[3])
     ) ** 2
 

@@ -91,7 +91,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         if estimate is not None:
             pose, covariance = estimate
             if self._covariance_estimator is not None and self._residuals is not None:
-                residuals = self._residuals.of(self._filter.beams(scan), pose)
+                residuals = self._residuals.residuals(self._filter.beams(scan), pose)
                 covariance = self._covariance_estimator.estimate(pose, covariance, residuals)
             self._correction = Correction(pose, covariance, odometry, scan.tick)
         else:
@@ -104,13 +104,13 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             self._consistent_updates = self._consistent_updates + 1 if consistent else 0
 
     def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
-        """Return the motion since the last update by scan matching of the first lidar; None if it cannot tell."""
-        sensor, before = self._matched or (scan.sensor, odometry)
+        """Return the motion since the last update by scan matching of the first lidar; None if scans do not show it."""
+        sensor, previous = self._matched or (scan.sensor, odometry)
         if scan.sensor != sensor:
             return None
-        step = matcher.step(scan, before.between(odometry))
+        step = matcher.step(scan, previous.between(odometry))
         self._matched = sensor, odometry
-        return step if before == self._last_update else None
+        return step if previous == self._last_update else None
 
     def _relocalize(self, relocalizer: Relocalizer, scan: Scan, odometry: Pose2) -> None:
         """Redistribute the particles if the relocalizer finds the robot elsewhere."""
@@ -120,10 +120,10 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             relocalizer.add_scan(scan, base, range_limits, self._motion_observed)
             return
         believed = self._correction.map_from_odom.compose(odometry)
-        fit = self._filter.fitting if self._consistent_updates else None
-        places = relocalizer.update(scan, base, believed, range_limits, self._motion_observed, fit)
-        if places is not None:
-            self._correction = Correction(*self._filter.redistribute(*places), odometry, scan.tick)
+        fitting_share = self._filter.fitting if self._consistent_updates else None
+        found = relocalizer.update(scan, base, believed, range_limits, self._motion_observed, fitting_share)
+        if found is not None:
+            self._correction = Correction(*self._filter.redistribute(*found), odometry, scan.tick)
             self._last_update, self._belief, self._consistent_updates = odometry, None, 0
             if self._covariance_estimator is not None:
                 self._covariance_estimator.forget_poses()

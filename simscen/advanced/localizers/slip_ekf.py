@@ -2,7 +2,7 @@
 
 Source: Probabilistic Robotics, section 3.3, with filterpy's ExtendedKalmanFilter. As in robot_localization, the turn
 rate is a state that both sensors measure. The bias of the gyroscope is also a state; it is measured while the robot
-stands.
+stands still.
 """
 
 import math
@@ -117,17 +117,17 @@ class SlipEkfLocalizer:
     def _step(self, pose: Pose2, seconds: float) -> Step:
         """Return the step from one odometry message to the next, and whether the wheels slipped."""
         speed = math.hypot(pose.x, pose.y) / seconds
-        held = Step(pose, seconds, speed)
+        without_slip = Step(pose, seconds, speed)
         if not self._readings:
-            return held
+            return without_slip
         turn = self._turn_rate - float(self._filter.x[BIAS])
-        innovation, noise = turn - pose.yaw / seconds, self._wheel_noise(held) + self._gyro_noise
+        innovation, noise = turn - pose.yaw / seconds, self._wheel_noise(without_slip) + self._gyro_noise
         undetected = self._slip_detector.update(innovation, noise, float(self._filter.P[BIAS, BIAS]), seconds)
         if undetected == 0.0:
-            return held
-        pushed = PUSHED_SPEED if abs(turn) > abs(pose.yaw / seconds) else 0.0
-        possible = max(self._speed, speed, SLIP_LEVER_M * abs(innovation), pushed)
-        return Step(pose, seconds, possible, slips=True, undetected_slip=undetected)
+            return without_slip
+        pushed_speed = PUSHED_SPEED if abs(turn) > abs(pose.yaw / seconds) else 0.0
+        possible_speed = max(self._speed, speed, SLIP_LEVER_M * abs(innovation), pushed_speed)
+        return Step(pose, seconds, possible_speed, slips=True, undetected_slip=undetected)
 
     def _measure(self, step: Step) -> None:
         """Estimate the turn rate from the wheels, unless they slip, and from the gyroscope."""

@@ -18,34 +18,34 @@ from simscen.stack.localizers.likelihood_field import MAX_RANDOM_SHARE_OF_SUMS, 
 
 
 def opaque_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
-    """Return distances to what stops a ray: occupied and unknown cells, and everything off the map, as in nav2_amcl."""
+    """Return distances to opaque cells: occupied, unknown, and outside the map, as in nav2_amcl."""
     return DistanceField(grid, grid.cells != FREE, max_distance, walled=True)
 
 
 def cast_rays(field: DistanceField, poses: Array, beams: Beams) -> Array:
     """Return the ranges (n, b) in m that `beams` would measure at `poses` (n, 3), to within half a cell."""
-    places, heading = (values.astype(np.float64)[..., None] for values in field.coordinates(poses))
+    positions, heading = (values.astype(np.float64)[..., None] for values in field.coordinates(poses))
     forward, left, c, s = beams.origin.real, beams.origin.imag, np.cos(heading), np.sin(heading)
     angle, cell = heading + beams.bearings, field.resolution
-    x = np.broadcast_to(places[0] + (forward * c - left * s) / cell, angle.shape).ravel()
-    y = np.broadcast_to(places[1] + (forward * s + left * c) / cell, angle.shape).ravel()
-    flown = _march(field, x, y, angle.ravel(), beams.range_max / cell)
-    ranges: Array = flown.reshape(angle.shape) * cell
+    x = np.broadcast_to(positions[0] + (forward * c - left * s) / cell, angle.shape).ravel()
+    y = np.broadcast_to(positions[1] + (forward * s + left * c) / cell, angle.shape).ravel()
+    traveled = _march(field, x, y, angle.ravel(), beams.range_max / cell)
+    ranges: Array = traveled.reshape(angle.shape) * cell
     return ranges
 
 
 def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float) -> Array:
-    """Return how far rays (r,) get from x, y along `angle`, at most `limit`; all lengths in cells."""
-    cos, sin, flown, flying = np.cos(angle), np.sin(angle), np.zeros_like(x), np.arange(x.size)
-    while flying.size:
-        column = (x[flying] + cos[flying] * flown[flying]).astype(np.float32)
-        row = (y[flying] + sin[flying] * flown[flying]).astype(np.float32)
+    """Return the free lengths of rays (r,) from x, y along `angle`, at most `limit`; all lengths in cells."""
+    cos, sin, traveled, active = np.cos(angle), np.sin(angle), np.zeros_like(x), np.arange(x.size)
+    while active.size:
+        column = (x[active] + cos[active] * traveled[active]).astype(np.float32)
+        row = (y[active] + sin[active] * traveled[active]).astype(np.float32)
         free = field.table.take(field.cells(column, row)) / field.resolution
-        flying, free = flying[free > 0], free[free > 0]
+        active, free = active[free > 0], free[free > 0]
         # Distances are between centers: both the ray and the obstacle may be half a diagonal nearer.
-        flown[flying] += np.maximum(free - np.sqrt(2), 0.5)
-        flying = flying[flown[flying] < limit]
-    return np.minimum(flown, limit)
+        traveled[active] += np.maximum(free - np.sqrt(2), 0.5)
+        active = active[traveled[active] < limit]
+    return np.minimum(traveled, limit)
 
 
 @dataclass(frozen=True, eq=False)

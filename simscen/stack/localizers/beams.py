@@ -61,9 +61,9 @@ class Beams:
 
     def keeping_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
         """Return the beams without those that hit something and are not `chosen` (m,)."""
-        kept = self.ranges >= self.range_max
-        kept[(~kept).nonzero()[0][chosen]] = True
-        return Beams(self.ranges[kept], self.towards[kept], self.origin, self.range_max)
+        is_kept = self.ranges >= self.range_max
+        is_kept[(~is_kept).nonzero()[0][chosen]] = True
+        return Beams(self.ranges[is_kept], self.towards[is_kept], self.origin, self.range_max)
 
 
 def directions(scan: Scan) -> Plane:
@@ -72,9 +72,9 @@ def directions(scan: Scan) -> Plane:
 
 
 @lru_cache(maxsize=1024)
-def evenly_spaced(count: int, most: int) -> npt.NDArray[np.int64]:
-    """Return `most` read-only indices, evenly spaced over `count` items."""
-    chosen: npt.NDArray[np.int64] = np.linspace(0, count - 1, most).astype(np.int64)
+def evenly_spaced(count: int, chosen_count: int) -> npt.NDArray[np.int64]:
+    """Return `chosen_count` read-only indices, evenly spaced over `count` items."""
+    chosen: npt.NDArray[np.int64] = np.linspace(0, count - 1, chosen_count).astype(np.int64)
     chosen.flags.writeable = False
     return chosen
 
@@ -88,16 +88,16 @@ def _directions(first: float, increment: float, count: int, turn: float) -> Plan
     return towards
 
 
-def select_beams(scan: Scan, count: int, least: float, most: float) -> Beams:
+def select_beams(scan: Scan, count: int, min_range: float, max_range: float) -> Beams:
     """Return every k-th beam, so that there are at most `count`, without invalid (nan) ones.
 
-    Ranges are limited to `most` and the lidar's maximum. As in nav2_amcl, ranges that are not above `least` and the
-    lidar's minimum, including -inf, count as the maximum.
+    Ranges are limited to `max_range` and the lidar's maximum. As in nav2_amcl, ranges that are not above `min_range`
+    and the lidar's minimum, including -inf, count as the maximum.
     """
     step = -(-len(scan.ranges) // count) or 1
     ranges, towards = scan.ranges[::step], directions(scan)[::step]
-    range_max, range_min = min(scan.range_max, most), max(scan.range_min, least)
-    if np.count_nonzero(silent := np.isnan(ranges)):
-        ranges, towards = ranges[~silent], towards[~silent]
+    range_max, range_min = min(scan.range_max, max_range), max(scan.range_min, min_range)
+    if np.count_nonzero(is_invalid := np.isnan(ranges)):
+        ranges, towards = ranges[~is_invalid], towards[~is_invalid]
     ranges = np.where((ranges > range_min) & (ranges < range_max), ranges, range_max)
     return Beams(ranges, towards, complex(scan.mount.x, scan.mount.y), range_max)

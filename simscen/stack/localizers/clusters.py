@@ -20,16 +20,16 @@ def cluster_labels(keys: Keys) -> Keys:
     of the lowest bin of its cluster. For the few bins of a localized robot, scipy's connected_components is three times
     as slow.
     """
-    occupied, bin_of = np.unique(keys, return_inverse=True)
+    occupied, bin_index = np.unique(keys, return_inverse=True)
     x, y, yaw = split(occupied)
-    wanted = join(x + _NEIGHBORS[:, :1], y + _NEIGHBORS[:, 1:2], (yaw + _NEIGHBORS[:, 2:]) % YAW_BINS)
-    found = np.minimum(np.searchsorted(occupied, wanted), len(occupied) - 1)
-    itself = np.arange(len(occupied))
-    neighbors, labels = np.where(occupied[found] == wanted, found, itself), itself
+    neighbor_keys = join(x + _NEIGHBORS[:, :1], y + _NEIGHBORS[:, 1:2], (yaw + _NEIGHBORS[:, 2:]) % YAW_BINS)
+    found = np.minimum(np.searchsorted(occupied, neighbor_keys), len(occupied) - 1)
+    own = np.arange(len(occupied))
+    neighbors, labels = np.where(occupied[found] == neighbor_keys, found, own), own
     while True:
         lowest = labels[neighbors].min(axis=0)
         if np.array_equal(lowest, labels):
-            return labels[bin_of]
+            return labels[bin_index]
         labels = lowest[lowest]
 
 
@@ -67,10 +67,12 @@ def summarize(particles: Particles, peak_power: float = 1.0) -> tuple[Pose2, Arr
 def _summarize_compact(particles: Particles) -> tuple[Pose2, Array]:
     """Return the same for compact particles, in one matrix product. Their headings need no average on the circle."""
     first: tuple[float, float, float] = tuple(particles.poses[0].tolist())
-    off = np.ones((4, len(particles.weights)))
-    np.subtract(particles.poses.T, np.array([first]).T, off[:3])
-    off[2] = wrapped(off[2])
-    (xx, xy, xa, x), (_, yy, ya, y), (_, _, aa, a), (*_, total) = np.dot(off * particles.weights, off.T).tolist()
+    offsets = np.ones((4, len(particles.weights)))
+    np.subtract(particles.poses.T, np.array([first]).T, offsets[:3])
+    offsets[2] = wrapped(offsets[2])
+    (xx, xy, xa, x), (_, yy, ya, y), (_, _, aa, a), (*_, total) = np.dot(
+        offsets * particles.weights, offsets.T
+    ).tolist()
     dx, dy, turn = x / total, y / total, a / total
     xy, xa, ya = xy - dx * y, xa - dx * a, ya - dy * a
     pose = Pose2(first[0] + dx, first[1] + dy, wrap(first[2] + turn))

@@ -37,7 +37,7 @@ def evaluate_in_blocks(evaluate: Callable[[Array], Array], poses: Array) -> Arra
 class DistanceField:
     """Distances in m between cell centers, as a flat table with a border of one cell.
 
-    Coordinates off the map are clipped to the border, so that all lookups are alike.
+    Coordinates outside the map are clipped to the border, so that no lookup needs a check.
     """
 
     def __init__(self, grid: OccupancyGrid, obstacles: npt.NDArray[np.bool_], limit: float, *, walled: bool) -> None:
@@ -64,17 +64,17 @@ class DistanceField:
         self._axes = np.array([[c, -s], [s, c]]) / grid.resolution
         self._corner = np.array([[x], [y]]) / grid.resolution + 1
 
-    def tabulate(self, of: Callable[[Float32], npt.NDArray[Kind]], kind: type[Kind]) -> npt.NDArray[Kind]:
+    def tabulate(self, function: Callable[[Float32], npt.NDArray[Kind]], kind: type[Kind]) -> npt.NDArray[Kind]:
         """Return a function of each distance, as a flat table. Computed in blocks to save memory on large maps."""
         result = np.empty(len(self.table), kind)
         for begin in range(0, len(result), BLOCK_CELLS):
-            result[begin : begin + BLOCK_CELLS] = of(self.table[begin : begin + BLOCK_CELLS])
+            result[begin : begin + BLOCK_CELLS] = function(self.table[begin : begin + BLOCK_CELLS])
         return result
 
     def coordinates(self, poses: Array) -> tuple[Float32, Float32]:
         """Return positions (2, n) in cells of the bordered table, and headings (n,), of `poses` (n, 3)."""
-        places = self._axes @ poses.T[:2] + self._corner
-        return places.astype(np.float32), (poses[:, 2] + self._turn).astype(np.float32)
+        positions = self._axes @ poses.T[:2] + self._corner
+        return positions.astype(np.float32), (poses[:, 2] + self._turn).astype(np.float32)
 
     def cells(self, x: Float32, y: Float32) -> Cells:
         """Return indices into `table` of points given in cells, which may be off the map. Overwrites `x` and `y`."""
@@ -86,7 +86,7 @@ class DistanceField:
 
     def endpoint_cells(self, poses: Array, points: Plane) -> Cells:
         """Return indices (n, b) into `table` of `points` (b,) in the base frame, for each of the `poses` (n, 3)."""
-        places, heading = self.coordinates(poses)
+        positions, heading = self.coordinates(poses)
         count = len(heading)
         ends = np.ones((3, len(points)), dtype=np.float32)
         ends[0], ends[1] = points.real, points.imag
@@ -95,6 +95,6 @@ class DistanceField:
         axes[0, 0] = axes[1, 1] = np.cos(heading)
         axes[0, 1] = np.sin(heading)
         np.negative(axes[0, 1], out=axes[1, 0])
-        axes[2] = places
+        axes[2] = positions
         x_and_y = axes.reshape(3, -1).T @ ends
         return self.cells(x_and_y[:count], x_and_y[count:])

@@ -16,7 +16,7 @@ _COVARIANCE = np.diag([1e-6, 1e-6, 1e-6])
 
 
 class GroundTruthLocalizer:
-    """Reports the pose of the sensor `ground_truth`, to separate faults of localization from others.
+    """Reports the pose of the sensor `ground_truth`, so that localization errors are excluded.
 
     The true pose arrives as odometry readings of a sensor called "ground_truth", in the map frame. Other odometry moves
     the pose in between. Without such readings the localizer is dead reckoning.

@@ -19,9 +19,9 @@ Keys = npt.NDArray[np.int64]
 
 def bins(poses: Array) -> Keys:
     """Return the keys (n,) of the histogram bins of `poses` (n, 3). Headings a full turn apart share one."""
-    places = np.clip(np.floor(poses[:, :2] / BIN_SIZE_M), -_HALF + 2, _HALF - 2).astype(np.int64)
+    cells = np.clip(np.floor(poses[:, :2] / BIN_SIZE_M), -_HALF + 2, _HALF - 2).astype(np.int64)
     yaw = np.floor(poses[:, 2] * (YAW_BINS / (2 * np.pi))).astype(np.int64) % YAW_BINS
-    return join(places[:, 0], places[:, 1], yaw)
+    return join(cells[:, 0], cells[:, 1], yaw)
 
 
 def join(x: Keys, y: Keys, yaw: Keys) -> Keys:
@@ -31,8 +31,8 @@ def join(x: Keys, y: Keys, yaw: Keys) -> Keys:
 
 def split(keys: Keys) -> tuple[Keys, Keys, Keys]:
     """Return the integer coordinates x, y, yaw of bins."""
-    places, yaw = np.divmod(keys, YAW_BINS)
-    x, y = np.divmod(places, 2 * _HALF)
+    cells, yaw = np.divmod(keys, YAW_BINS)
+    x, y = np.divmod(cells, 2 * _HALF)
     return x - _HALF, y - _HALF, yaw
 
 
@@ -46,26 +46,26 @@ class KldBound:
 
     error: float
     z: float
-    least: int
-    most: int
+    min_samples: int
+    max_samples: int
 
     def samples(self, occupied: npt.ArrayLike) -> Keys:
-        """Return the samples needed for a number of occupied bins, between `least` and `most`.
+        """Return the samples needed for a number of occupied bins, between `min_samples` and `max_samples`.
 
-        Fox's bound is zero for a single bin. nav2_amcl uses `most` there, although one bin
+        Fox's bound is zero for a single bin. nav2_amcl uses `max_samples` there, although one bin
         means that the pose is certain.
         """
-        free = np.maximum(np.asarray(occupied, dtype=np.float64) - 1, 1e-9)
-        spread = 2 / (9 * free)
-        needed = np.where(free >= 1, free / (2 * self.error) * (1 - spread + np.sqrt(spread) * self.z) ** 3, 0)
-        return np.clip(np.ceil(needed), self.least, self.most).astype(np.int64)
+        degrees = np.maximum(np.asarray(occupied, dtype=np.float64) - 1, 1e-9)
+        spread = 2 / (9 * degrees)
+        needed = np.where(degrees >= 1, degrees / (2 * self.error) * (1 - spread + np.sqrt(spread) * self.z) ** 3, 0)
+        return np.clip(np.ceil(needed), self.min_samples, self.max_samples).astype(np.int64)
 
-    def enough(self, keys: Keys) -> int | None:
+    def sufficient_count(self, keys: Keys) -> int | None:
         """Return the first sufficient number of samples, given their bins (n,) in order; None if there is none."""
-        if len(keys) == self.least:  # no smaller number can be sufficient
-            return self.least if self.least >= self.samples(len(np.unique(keys))) else None
-        new = np.zeros(len(keys), dtype=np.int64)
-        new[np.unique(keys, return_index=True)[1]] = 1
+        if len(keys) == self.min_samples:  # no smaller number can be sufficient
+            return self.min_samples if self.min_samples >= self.samples(len(np.unique(keys))) else None
+        is_new = np.zeros(len(keys), dtype=np.int64)
+        is_new[np.unique(keys, return_index=True)[1]] = 1
         counts = np.arange(1, len(keys) + 1)
-        satisfied = counts >= self.samples(np.cumsum(new))
+        satisfied = counts >= self.samples(np.cumsum(is_new))
         return int(counts[satisfied.argmax()]) if satisfied.any() else None

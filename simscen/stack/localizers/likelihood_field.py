@@ -48,7 +48,7 @@ class SensorModel(Protocol):
 
 
 def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
-    """Return distances to the surfaces of occupied areas; off the map is far from everything, as in nav2_amcl.
+    """Return distances to the surfaces of occupied areas; the maximum outside the map, as in nav2_amcl.
 
     Maps from SLAM contain surfaces only. A map that was drawn from a model is filled. Beams cannot end inside of it,
     but if they could, particles would be attracted to the inside.
@@ -127,11 +127,13 @@ class LikelihoodFieldProb:
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Return the logarithms (n,) of the product."""
-        kept = self._kept(poses, beams, self._skipping) if self._skipping is not None and converged else slice(None)
-        logarithms, exponents = self._logarithms(beams.range_max), self._beam_exponents(len(beams.ends))[kept]
+        used = (
+            self._used_beams(poses, beams, self._skipping) if self._skipping is not None and converged else slice(None)
+        )
+        logarithms, exponents = self._logarithms(beams.range_max), self._beam_exponents(len(beams.ends))[used]
 
         def weigh(block: Array) -> Array:
-            cells = beams.cells(self._field, block)[:, kept]
+            cells = beams.cells(self._field, block)[:, used]
             # All indices are valid; mode="wrap" skips the check.
             return (logarithms.take(cells, mode="wrap") @ exponents).astype(np.float64)
 
@@ -161,7 +163,7 @@ class LikelihoodFieldProb:
         """Return the likelihood of a hit in each cell, without the random part."""
         return _hit_likelihoods(self._field, self._z_hit, self._sigma_hit)
 
-    def _kept(self, poses: Array, beams: Beams, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
+    def _used_beams(self, poses: Array, beams: Beams, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
         """Return which beams enough particles can explain; all of them if too few beams are left."""
         near = self._field.table.take(beams.cells(self._field, poses)) < skipping.distance
         explained: npt.NDArray[np.bool_] = near.mean(axis=0) > skipping.threshold

@@ -25,11 +25,11 @@ CONVERGED_WITHIN_M = 0.5
 """All particles are this near to their mean when the filter has converged (nav2_amcl's pf.dist_threshold)."""
 
 _DESCENDANT, _RANDOM = 1.0, 2.0
-"""Marks in the fourth column of drawn particles: descends from a random particle of the recovery; is one itself."""
+"""Marks in the fourth column of drawn particles: descendant of a random particle of the recovery; random particle."""
 
 
 class ParticleFilter:
-    """Particles in the map frame that odometry moves and scans weigh. Knows neither time nor the odom frame.
+    """Particles in the map frame that odometry moves and scans weigh. Independent of time and of the odom frame.
 
     Subclasses may override `begin`, `_trusted_beams` and `_resample`.
     """
@@ -42,17 +42,17 @@ class ParticleFilter:
             spec, motion, sensor, free_space, rng,
         )  # fmt: skip
         self._bound = KldBound(spec.pf_err, spec.pf_z, spec.min_particles, spec.max_particles)
-        self._few_suffice = bool(self._bound.samples(MAX_COMPACT_BINS) <= self._bound.least)
+        self._has_small_bound = bool(self._bound.samples(MAX_COMPACT_BINS) <= self._bound.min_samples)
         self.begin(Estimate(None))
 
     def begin(self, estimate: Estimate) -> None:
         """Restart with particles around the estimate's pose, or over all free space if it has none."""
-        self.particles = self._free_space.begin(estimate, self._bound.most, self._rng)
+        self.particles = self._free_space.begin(estimate, self._bound.max_samples, self._rng)
         self._recovery = Recovery(
             self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.max_random_share
         )
-        self._random: npt.NDArray[np.bool_] | None = None  # (n,) put anywhere after the last scan
-        self._descendants: npt.NDArray[np.bool_] | None = None  # (n,) these and what descends from such
+        self._random: npt.NDArray[np.bool_] | None = None  # (n,) drawn at random after the last scan
+        self._descendants: npt.NDArray[np.bool_] | None = None  # (n,) these and descendants of earlier ones
         self._corrections = 0
 
     def beams(self, scan: Scan) -> Beams:
@@ -84,7 +84,7 @@ class ParticleFilter:
         weights = self.particles.weights * np.exp(logarithm - shift)
         total = float(np.add.reduce(weights))
         if self._recovery.is_enabled:
-            self._observe(beams, weights, shift, exponent)
+            self._update_recovery(beams, weights, shift, exponent)
         weights = weights / total if total > 0 else equal_weights(len(poses))
         self.particles = self.particles.weighted(weights)
         estimate = summarize(self.particles, self._sensor.peak_power) if total > 0 else None
@@ -95,18 +95,18 @@ class ParticleFilter:
         """Return the exponent of the scan's likelihood, 0 … 1, and the beams that count. Here: 1, and all of them."""
         return 1.0, beams
 
-    def _observe(self, beams: Beams, weights: Array, shift: float, exponent: float) -> None:
-        """Tell the recovery how well the particles explain a scan, without those that were random one scan ago.
+    def _update_recovery(self, beams: Beams, weights: Array, shift: float, exponent: float) -> None:
+        """Pass to the recovery how well the particles explain a scan, without those that were random one scan ago.
 
-        `weights` (n,) are not normalized; their logarithms are lower by `shift` than they should be.
+        `weights` (n,) are not normalized; `shift` was subtracted from their logarithms.
         """
-        kept = slice(None) if self._random is None or self._random.all() else ~self._random
-        likely = float(weights[kept].sum() / self.particles.weights[kept].sum())
-        tracked = math.log(likely) + shift if likely > 0 else -math.inf
+        tracked = slice(None) if self._random is None or self._random.all() else ~self._random
+        likelihood = float(weights[tracked].sum() / self.particles.weights[tracked].sum())
+        log_likelihood = math.log(likelihood) + shift if likelihood > 0 else -math.inf
         probes = self._free_space.draw(PROBE_COUNT, self._rng)
         anywhere = exponent * self._sensor.log_likelihood(probes, beams, False)
         scale = self._sensor.tempering(beams)
-        self._recovery.observe(tracked * scale, anywhere * scale)
+        self._recovery.observe(log_likelihood * scale, anywhere * scale)
 
     def _resample(self) -> None:
         """Resample on every `resample_interval`-th scan and, if selective, only when few particles carry weight."""
@@ -116,8 +116,8 @@ class ParticleFilter:
             return
         if self._spec.selective_resampling and self.particles.effective > len(self.particles.weights) / 2:
             return
-        if self._few_suffice and self._recovery.share == 0 and are_compact(self.particles):
-            chosen = systematic(self.particles.weights, self._bound.least, self._rng)
+        if self._has_small_bound and self._recovery.share == 0 and are_compact(self.particles):
+            chosen = systematic(self.particles.weights, self._bound.min_samples, self._rng)
             self.particles = Particles.equal(self.particles.poses.T.take(chosen, axis=1).T)
             self._descendants = None
             return
@@ -125,7 +125,7 @@ class ParticleFilter:
             self._descendants = None
         if self._descendants is not None:
             weights = self.particles.weights.copy()
-            weights[self._descendants] *= self._recovery.kept(float(weights[self._descendants].sum()))
+            weights[self._descendants] *= self._recovery.kept_share(float(weights[self._descendants].sum()))
             self.particles = self.particles.weighted(weights / weights.sum())
         drawn = adaptive(self._draw, self._bound).T.copy()
         self._random, self._descendants = drawn[3] == _RANDOM, drawn[3] > 0
@@ -142,7 +142,7 @@ class ParticleFilter:
         if self._descendants is not None:
             drawn[self._descendants[chosen], 3] = _DESCENDANT
         if (share := self._recovery.share) > 0:
-            lost = self._rng.random(count) < share
-            drawn[lost, :3] = self._free_space.draw(int(lost.sum()), self._rng)
-            drawn[lost, 3] = _RANDOM
+            is_random = self._rng.random(count) < share
+            drawn[is_random, :3] = self._free_space.draw(int(is_random.sum()), self._rng)
+            drawn[is_random, 3] = _RANDOM
         return self._rng.permutation(drawn)

@@ -58,11 +58,11 @@ class Particles:
         """Return whether each particle is at most this far from their mean, in x and in y."""
         if max(self.extent[:2]) <= distance:
             return True
-        places = self.poses[:, :2]
-        return bool((np.abs(places - places.mean(axis=0)) <= distance).all())
+        positions = self.poses[:, :2]
+        return bool((np.abs(positions - positions.mean(axis=0)) <= distance).all())
 
 
-def around(pose: Pose2, std: tuple[float, float, float], count: int, rng: np.random.Generator) -> Array:
+def sample_around(pose: Pose2, std: tuple[float, float, float], count: int, rng: np.random.Generator) -> Array:
     """Return poses (count, 3) drawn from a normal distribution about `pose`, as nav2_amcl's pf_init does."""
     poses = columns(count)
     poses[:] = rng.normal(pose, std, (count, 3))
@@ -118,4 +118,4 @@ class FreeSpace:
         """Return particles around the estimate's pose, or over all free space if it has none."""
         if estimate.pose is None:
             return Particles.equal(self.draw(count, rng))
-        return Particles.equal(around(estimate.pose, estimate.std, count, rng))
+        return Particles.equal(sample_around(estimate.pose, estimate.std, count, rng))

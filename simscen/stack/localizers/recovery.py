@@ -14,7 +14,7 @@ PROBE_COUNT = 200
 MIN_BETTER_SHARE = 0.1
 """Minimum share of random poses that explain recent scans better than the particles if the filter is lost."""
 MAX_STRAY_SCANS = 4.0
-"""Random particles and their descendants are at most as many as this number of scans may add."""
+"""Limit of random particles and their descendants: as many as this number of scans may add."""
 _MAX_LOG_RATIO = 50.0
 """Maximum logarithm of a likelihood ratio, so that its exponential stays finite."""
 
@@ -40,7 +40,7 @@ class Recovery:
     def __init__(self, alpha_slow: float, alpha_fast: float, max_share: float = 1.0) -> None:
         self.is_enabled, self._max_share = alpha_fast > 0, max_share
         self._slow, self._fast = RunningAverage(alpha_slow), RunningAverage(alpha_fast)
-        self._better = RunningAverage(alpha_fast)
+        self._better_share = RunningAverage(alpha_fast)
 
     def observe(self, tracked: float, anywhere: Array) -> None:
         """Add a scan, by the log likelihoods of the mean over the particles (`tracked`) and at random poses (n,).
@@ -49,23 +49,23 @@ class Recovery:
         """
         best = float(anywhere.max())
         average = best + math.log(float(np.mean(np.exp(anywhere - best)))) if best > -np.inf else -np.inf
-        likelier = math.exp(min(tracked - average, _MAX_LOG_RATIO)) if tracked > -np.inf else 0.0
-        self._slow.add(likelier)
-        self._fast.add(likelier)
-        self._better.add(float(np.mean(anywhere > tracked)))
+        ratio = math.exp(min(tracked - average, _MAX_LOG_RATIO)) if tracked > -np.inf else 0.0
+        self._slow.add(ratio)
+        self._fast.add(ratio)
+        self._better_share.add(float(np.mean(anywhere > tracked)))
 
     @property
     def share(self) -> float:
         """Share of new particles to draw at random: 1 - fast / slow, limited to the maximum; 0 if not lost."""
         slow, fast = self._slow.value, self._fast.value
-        if slow <= 0 or self._better.value < MIN_BETTER_SHARE:
+        if slow <= 0 or self._better_share.value < MIN_BETTER_SHARE:
             return 0.0
         return min(self._max_share, max(0.0, 1 - fast / slow))
 
-    def kept(self, straying: float) -> float:
+    def kept_share(self, stray_weight: float) -> float:
         """Return the share of earlier random particles and descendants to keep, given their weight (0 … 1)."""
-        room = min(1.0, MAX_STRAY_SCANS * self._max_share) - self.share
-        return 1.0 if straying <= room else max(0.0, room / straying)
+        allowed = min(1.0, MAX_STRAY_SCANS * self._max_share) - self.share
+        return 1.0 if stray_weight <= allowed else max(0.0, allowed / stray_weight)
 
 
 class RunningAverage:
@@ -79,8 +79,8 @@ class RunningAverage:
 
     def add(self, value: float) -> None:
         """Add a value."""
-        kept = 1 - self._alpha
-        self._sum, self._weight = kept * self._sum + value, kept * self._weight + 1
+        decay = 1 - self._alpha
+        self._sum, self._weight = decay * self._sum + value, decay * self._weight + 1
 
     @property
     def value(self) -> float:

@@ -16,11 +16,11 @@ def systematic(weights: Array, count: int, rng: np.random.Generator) -> Indices:
 
     The low-variance sampler of Probabilistic Robotics, table 4.4: an index is drawn ⌊count·w⌋ or ⌈count·w⌉ times.
     """
-    cumulated = weights.cumsum()
-    positions = (np.arange(count) + rng.random()) * (cumulated[-1] / count)
-    drawn = cumulated.searchsorted(positions, side="right")
-    # The last position can round up to the very end; the last index that has any weight is meant.
-    clipped: Indices = np.minimum(drawn, cumulated.searchsorted(cumulated[-1]))
+    cumulative = weights.cumsum()
+    positions = (np.arange(count) + rng.random()) * (cumulative[-1] / count)
+    drawn = cumulative.searchsorted(positions, side="right")
+    # The last position can be rounded up to the total; it then belongs to the last index with any weight.
+    clipped: Indices = np.minimum(drawn, cumulative.searchsorted(cumulative[-1]))
     return clipped
 
 
@@ -30,7 +30,7 @@ def adaptive(draw: Callable[[int], Array], bound: KldBound) -> Array:
     Fox (2003), table 3, in blocks instead of one by one: the sequence of draws is cut where it first satisfies the
     bound. `draw` must return its poses in an order that does not matter.
     """
-    poses = draw(bound.least)
-    while (count := bound.enough(bins(poses))) is None:
-        poses = np.concatenate((poses, draw(min(len(poses), bound.most - len(poses)))))
+    poses = draw(bound.min_samples)
+    while (count := bound.sufficient_count(bins(poses))) is None:
+        poses = np.concatenate((poses, draw(min(len(poses), bound.max_samples - len(poses)))))
     return poses[:count]

@@ -19,7 +19,7 @@ def scanned(pose: Pose2) -> View:
 
 @pytest.mark.parametrize("pose", PLACES)
 def test_the_place_that_fits_best_is_where_the_scan_was_taken(pose: Pose2) -> None:
-    poses, fits = GlobalSearch(grid()).places(scanned(pose))
+    poses, fits = GlobalSearch(grid()).search(scanned(pose))
     off = pose.between(Pose2(*poses[0].tolist()))
     assert np.hypot(off.x, off.y) < 0.1
     assert abs(off.yaw) < 0.03
@@ -31,22 +31,22 @@ def test_the_place_that_fits_best_is_where_the_scan_was_taken(pose: Pose2) -> No
 @pytest.mark.parametrize("pose", PLACES)
 def test_a_robot_that_is_told_a_place_half_a_meter_off_is_found_nearby(pose: Pose2) -> None:
     estimate = np.array(pose.compose(Pose2(0.4, -0.3, 0.2)))
-    poses, fits = GlobalSearch(grid()).near(scanned(pose), estimate)
+    poses, fits = GlobalSearch(grid()).search_near(scanned(pose), estimate)
     off = pose.between(Pose2(*poses[0].tolist()))
     assert np.hypot(off.x, off.y) < 0.1
     assert abs(off.yaw) < 0.03
-    assert fits[0] > GlobalSearch(grid()).fit(estimate[np.newaxis], scanned(pose))[0] + 0.05
+    assert fits[0] > GlobalSearch(grid()).score(estimate[np.newaxis], scanned(pose))[0] + 0.05
 
 
 def test_the_same_view_gives_the_same_places_bit_for_bit() -> None:
     view = scanned(PLACES[0])
-    first, again = (GlobalSearch(grid()).places(view) for _ in range(2))
+    first, again = (GlobalSearch(grid()).search(view) for _ in range(2))
     assert np.array_equal(first[0], again[0])
     assert np.array_equal(first[1], again[1])
 
 
 def test_nothing_seen_finds_nothing() -> None:
-    poses, fits = GlobalSearch(grid()).places(View(np.empty(0, dtype=np.complex128), np.empty(0, dtype=np.complex128)))
+    poses, fits = GlobalSearch(grid()).search(View(np.empty(0, dtype=np.complex128), np.empty(0, dtype=np.complex128)))
     assert poses.shape == (0, 3)
     assert fits.shape == (0,)
 

@@ -22,7 +22,7 @@ def misfit(*ends: float, beyond: bool = False) -> ScanResiduals | None:
     says = np.full(field.table.shape, beyond)
     ranges = np.array(ends)
     beams = Beams(ranges, np.ones(len(ends), dtype=np.complex128), 0j, 10.0)
-    return MapResiduals(field, says, 0.5, 0.5, SIGMA).of(beams, Pose2(0.0, 2.0, 0.0))
+    return MapResiduals(field, says, 0.5, 0.5, SIGMA).residuals(beams, Pose2(0.0, 2.0, 0.0))
 
 
 def explained(away: float) -> float:

@@ -53,7 +53,7 @@ def test_enough_is_where_one_by_one_counting_stops(keys: list[int], least: int) 
         if count >= bound.samples(len(seen)):
             stop = count
             break
-    assert bound.enough(np.array(keys)) == stop
+    assert bound.sufficient_count(np.array(keys)) == stop
 
 
 @pytest.mark.parametrize(("pf_err", "pf_z"), [(0.01, 0.99), (0.05, 0.5)])

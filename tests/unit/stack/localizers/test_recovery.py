@@ -64,8 +64,8 @@ def test_all_that_stray_are_at_most_what_a_few_scans_put_anywhere() -> None:
     for likelihood in [6.0] * 50 + [0.8] * 50:
         recovery.observe(np.log(likelihood), ANYWHERE)
     assert recovery.share == 0.05
-    assert recovery.kept(0.1) == 1.0
-    assert recovery.kept(0.6) == pytest.approx(0.25)
+    assert recovery.kept_share(0.1) == 1.0
+    assert recovery.kept_share(0.6) == pytest.approx(0.25)
 
 
 def test_with_nav2s_default_of_zero_nobody_asks() -> None:
