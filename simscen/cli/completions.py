@@ -8,9 +8,9 @@ from simscen.core.version import PACKAGE
 
 def scenarios(incomplete: str) -> list[str]:
     """Complete scenario files and folders."""
-    from simscen.loading.files.discovery import SCENARIO
+    from simscen.loading.files.discovery import SCENARIO_SUFFIXES
 
-    return list(_files(incomplete, SCENARIO))
+    return list(_files(incomplete, SCENARIO_SUFFIXES))
 
 
 def logs(incomplete: str) -> list[str]:

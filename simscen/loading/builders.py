@@ -12,7 +12,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry.shapes import Mesh
-from simscen.loading.loaded import JudgedMask, LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
+from simscen.loading.loaded import CriterionMask, LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.tree import Key, MappingNode, key_position, value_position
 from simscen.model.robot import RobotSpec
@@ -65,18 +65,19 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
-    """Load the specification of the robot (inferred for a bare URDF) and its body, including the payload.
+    """Load the specification of the robot (inferred if it is only a URDF) and its body, including the payload.
 
     Raises InvalidInput for unusable files and for a payload that would tip the robot over.
     """
     try:
         spec, body = robot_from_file(loaded.robot, (loaded.root, *loaded.world_path))
-        return spec, _as_entered(loaded, body)
+        return spec, _with_payload_and_torque(loaded, body)
     except InvalidInput as error:
-        raise InvalidInput([p if p.source else loaded.sourced(p) for p in error.problems]) from error
+        raise InvalidInput([p if p.source else loaded.with_source_line(p) for p in error.problems]) from error
 
 
-def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
+def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
+    """Return the body with the payload and the motor torque that the scenario sets."""
     entry = loaded.spec.only_robot
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
@@ -99,22 +100,22 @@ def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotS
     from simscen.sim.urdf.xacro.expand import UnknownArgument
     from simscen.sim.urdf.xml_source import RobotFiles
 
-    spec = robot.spec or _inferred(robot.path, roots)
-    found = RobotFiles(robot.urdf, robot.packages) if robot.urdf else None
+    spec = robot.spec or _infer_spec(robot.path, roots)
+    files = RobotFiles(robot.urdf, robot.packages) if robot.urdf else None
     try:
-        return spec, build_robot_body(spec, robot.path, roots, read_mesh, found)
+        return spec, build_robot_body(spec, robot.path, roots, read_mesh, files)
     except UnknownArgument as error:
-        raise InvalidInput([_unknown(robot, error.name, error.declared)]) from error
+        raise InvalidInput([_unknown_argument(robot, error.name, error.declared)]) from error
 
 
-def _unknown(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Problem:
-    assert robot.tree is not None and robot.urdf is not None  # who else would give arguments
+def _unknown_argument(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Problem:
+    assert robot.tree is not None and robot.urdf is not None  # only robot files with xacro have arguments
     message = f"{quoted(robot.urdf.name)} declares no argument {quoted(argument)}"
     hint = suggestion(argument, declared) or "it has no <xacro:arg>"
     return Problem(*key_position(robot.tree, ("arguments", argument)), "SC403", message, hint)
 
 
-def _inferred(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:
+def _infer_spec(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:
     from simscen.sim.urdf.infer_spec import infer_robot_spec
 
     return infer_robot_spec(urdf, roots, read_mesh)
@@ -132,39 +133,41 @@ AddSource = Callable[[Problem], Problem]
 
 def load_masks(loaded: LoadedScenario) -> FilterMasks:
     """Load the masks of the stack. Raises InvalidInput at the line that names an unreadable mask."""
-    keepout = _of_stack(loaded, KEEPOUT_KEYS, loaded.keepout_mask)
-    grid, spec = _of_stack(loaded, SPEED_KEYS, loaded.speed_mask), loaded.spec.stack.speed_mask
+    keepout = _stack_mask_grid(loaded, KEEPOUT_KEYS, loaded.keepout_mask)
+    grid, spec = _stack_mask_grid(loaded, SPEED_KEYS, loaded.speed_mask), loaded.spec.stack.speed_mask
     if grid is None or spec is None:
         return FilterMasks(keepout)
     return FilterMasks(keepout, spec.over(grid))
 
 
 def load_criterion_masks(
-    masks: Mapping[str, JudgedMask], tree: MappingNode, sourced: AddSource
+    masks: Mapping[str, CriterionMask], tree: MappingNode, with_source_line: AddSource
 ) -> dict[str, MaskBlocks]:
     """Load the masks of criteria. Raises InvalidInput at the line that names an unusable mask."""
-    return {name: _judged(mask, tree, sourced) for name, mask in masks.items()}
+    return {name: _criterion_mask_blocks(mask, tree, with_source_line) for name, mask in masks.items()}
 
 
-def _judged(mask: JudgedMask, tree: MappingNode, sourced: AddSource) -> MaskBlocks:
-    cells = mask_blocks(_grid(mask.map, mask.keys, tree, sourced))
+def _criterion_mask_blocks(mask: CriterionMask, tree: MappingNode, with_source_line: AddSource) -> MaskBlocks:
+    cells = mask_blocks(_mask_grid(mask.map, mask.keys, tree, with_source_line))
     if len(cells.blocks) > MAX_BLOCKS:
         message = f"mask image {mask.map.image.name} falls into {len(cells.blocks)} rectangles of equal cells"
         hint = f"criteria judge by masks of {MAX_BLOCKS} at most; is it a photograph, or a map with noise?"
-        raise InvalidInput([sourced(Problem(*value_position(tree, mask.keys), "SC320", message, hint))])
+        raise InvalidInput([with_source_line(Problem(*value_position(tree, mask.keys), "SC320", message, hint))])
     return cells
 
 
-def _of_stack(loaded: LoadedScenario, keys: tuple[Key, ...], source: LoadedMap | None) -> OccupancyGrid | None:
-    return None if source is None else _grid(source, keys, loaded.tree, loaded.sourced)
+def _stack_mask_grid(loaded: LoadedScenario, keys: tuple[Key, ...], source: LoadedMap | None) -> OccupancyGrid | None:
+    return None if source is None else _mask_grid(source, keys, loaded.tree, loaded.with_source_line)
 
 
-def _grid(source: LoadedMap, keys: tuple[Key, ...], tree: MappingNode, sourced: AddSource) -> OccupancyGrid:
+def _mask_grid(
+    source: LoadedMap, keys: tuple[Key, ...], tree: MappingNode, with_source_line: AddSource
+) -> OccupancyGrid:
     try:
         return load_map(source)
     except InvalidInput as error:
         place, image = value_position(tree, keys), source.image.name
-        told = [replace(problem, path=place.path, line=place.line, col=place.col) for problem in error.problems]
+        moved = [replace(problem, path=place.path, line=place.line, col=place.col) for problem in error.problems]
         raise InvalidInput(
-            [sourced(replace(problem, message=f"mask image {image}: {problem.message}")) for problem in told]
+            [with_source_line(replace(problem, message=f"mask image {image}: {problem.message}")) for problem in moved]
         ) from error

@@ -13,14 +13,17 @@ from simscen.model.stack_base import StackBase
 
 def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
     """Return all goals in order, with names and tolerances; names in further loops end in `#2`, `#3`, …"""
-    once = [_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True)]
+    goals = [_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True)]
     if spec.navigation.mode == "navigate_through_poses":
-        passed = [_passed(goal, entry, spec.navigation.radius) for goal, entry in zip(once, spec.goals, strict=True)]
-        once = [*passed[:-1], *once[-1:]]
+        via = [
+            _intermediate_goal(goal, entry, spec.navigation.radius)
+            for goal, entry in zip(goals, spec.goals, strict=True)
+        ]
+        goals = [*via[:-1], *goals[-1:]]
     return tuple(
         replace(goal, name=loop_goal_name(goal.name, loop))
         for loop in range(1, spec.navigation.loops + 1)
-        for goal in once
+        for goal in goals
     )
 
 
@@ -35,7 +38,8 @@ def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, 
     return found
 
 
-def _passed(goal: Goal, entry: GoalEntry, radius: float) -> Goal:
+def _intermediate_goal(goal: Goal, entry: GoalEntry, radius: float) -> Goal:
+    """Return a goal as navigate_through_poses passes it: within `radius` m, at any heading."""
     return replace(goal, via=True, xy_tolerance=entry.xy_tolerance or radius, yaw_tolerance=math.pi)
 
 

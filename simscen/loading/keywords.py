@@ -37,18 +37,18 @@ def select(scenarios: Iterable[Item], keyword: str = "", tags: Sequence[str] = (
     `keyword` is an expression like pytest's -k: parts of titles, ignoring case, and `and`, `or`, `not`, parentheses.
     Raises UsageError for an invalid expression, and NothingSelected if nothing matches.
     """
-    everything = list(scenarios)
+    candidates = list(scenarios)
     matches = keyword_matcher(keyword) if keyword.strip() else lambda _: True
-    chosen = [s for s in everything if matches(s.title) and (not tags or not set(tags).isdisjoint(s.spec.tags))]
+    chosen = [s for s in candidates if matches(s.title) and (not tags or not set(tags).isdisjoint(s.spec.tags))]
     if not chosen:
-        raise NothingSelected(_nothing(everything, keyword, tags))
+        raise NothingSelected(_describe_no_match(candidates, keyword, tags))
     return chosen
 
 
 def keyword_matcher(expression: str) -> Matcher:
     """Return the test for titles that an expression describes. Raises UsageError for an invalid expression."""
     reader = _Reader(_TOKEN.findall(expression), expression)
-    matcher = reader.either(0)
+    matcher = reader.parse_or(0)
     if reader.tokens:
         raise reader.error(f"unexpected {quoted(reader.tokens[0])}")
     return matcher
@@ -60,27 +60,27 @@ class _Reader:
     def __init__(self, tokens: list[str], expression: str) -> None:
         self.tokens, self._expression = tokens, expression
 
-    def either(self, depth: int) -> Matcher:
+    def parse_or(self, depth: int) -> Matcher:
         """Parse terms joined by `or`."""
-        options = [self._both(depth)]
+        options = [self._parse_and(depth)]
         while self._next_is("or"):
-            options.append(self._both(depth))
+            options.append(self._parse_and(depth))
         return lambda text: any(option(text) for option in options)
 
-    def _both(self, depth: int) -> Matcher:
-        parts = [self._one(depth)]
+    def _parse_and(self, depth: int) -> Matcher:
+        parts = [self._parse_term(depth)]
         while self._next_is("and"):
-            parts.append(self._one(depth))
+            parts.append(self._parse_term(depth))
         return lambda text: all(part(text) for part in parts)
 
-    def _one(self, depth: int) -> Matcher:
+    def _parse_term(self, depth: int) -> Matcher:
         if depth > MAX_DEPTH:
             raise self.error(f"it is nested deeper than {MAX_DEPTH}")
         if self._next_is("not"):
-            inner = self._one(depth + 1)
+            inner = self._parse_term(depth + 1)
             return lambda text: not inner(text)
         if self._next_is("("):
-            inner = self.either(depth + 1)
+            inner = self.parse_or(depth + 1)
             if not self._next_is(")"):
                 raise self.error("a parenthesis is not closed")
             return inner
@@ -100,10 +100,10 @@ class _Reader:
         return UsageError(f"cannot read -k {quoted(self._expression)}: {why}")
 
 
-def _nothing(everything: Sequence[Selectable], keyword: str, tags: Sequence[str]) -> str:
-    known = sorted({tag for scenario in everything for tag in scenario.spec.tags})
+def _describe_no_match(candidates: Sequence[Selectable], keyword: str, tags: Sequence[str]) -> str:
+    known = sorted({tag for scenario in candidates for tag in scenario.spec.tags})
     unknown = [tag for tag in tags if tag not in known]
     if unknown:
         return f"no scenario has the tag {quoted(unknown[0])}; {suggestion(unknown[0], known) or 'there are no tags'}"
-    wanted = " and ".join([*([f"-k {quoted(keyword)}"] if keyword.strip() else []), *(f"--tag {tag}" for tag in tags)])
-    return f"none of {len(everything)} scenarios matches {wanted}"
+    filters = " and ".join([*([f"-k {quoted(keyword)}"] if keyword.strip() else []), *(f"--tag {tag}" for tag in tags)])
+    return f"none of {len(candidates)} scenarios matches {filters}"

@@ -35,11 +35,11 @@ Names = Mapping[str, list[str] | None]
 
 def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
     """Return all names that a scenario can refer to; those of an imported world need the built `world`."""
-    there = _of_files(loaded) if world is None else _of_world(loaded, world)
-    movable = there["movable"]
+    world_names = _names_in_files(loaded) if world is None else _names_in_built_world(loaded, world)
+    movable = world_names["movable"]
     happening = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
     return {
-        **there,
+        **world_names,
         "mover": None if movable is None else [*movable, *loaded.other_robots],
         "goal": goal_names(loaded),
         "event": _distinct(event_names(loaded), mark_names(loaded)),
@@ -69,7 +69,7 @@ def mark_names(loaded: LoadedScenario) -> list[str]:
     return _distinct(_defined(loaded, "mark"))
 
 
-def _of_files(loaded: LoadedScenario) -> Names:
+def _names_in_files(loaded: LoadedScenario) -> Names:
     world = loaded.world.spec
     imported = world is None or loaded.world.map is not None or loaded.world.sdf is not None
     spawned = spawned_names(loaded)
@@ -79,12 +79,12 @@ def _of_files(loaded: LoadedScenario) -> Names:
         "door": [door.name for door in world.doors] if world else [],
         "object": None
         if imported or world is None
-        else _distinct(_standing(world), spawned, list(loaded.other_robots)),
-        "movable": None if imported or world is None else _distinct(_moving(world), spawned),
+        else _distinct(_object_names(world), spawned, list(loaded.other_robots)),
+        "movable": None if imported or world is None else _distinct(_movable_names(world), spawned),
     }
 
 
-def _of_world(loaded: LoadedScenario, world: World) -> Names:
+def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
     moving, spawned = [body.name for body in world.bodies], spawned_names(loaded)
     return {
         "place": list(world.places),
@@ -96,14 +96,14 @@ def _of_world(loaded: LoadedScenario, world: World) -> Names:
 
 
 def world_object_names(loaded: LoadedScenario, world: World | None = None) -> list[str]:
-    """Return the names of objects in the world, as far as they are known."""
+    """Return the names of objects in the world; without the built `world`, those of its file."""
     if world is not None:
         return [*(body.name for body in world.bodies), *(solid.name for solid in world.solids)]
-    return _standing(loaded.world.spec) if loaded.world.spec is not None else []
+    return _object_names(loaded.world.spec) if loaded.world.spec is not None else []
 
 
 def spawned_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of what events add to the world: objects and pedestrians, also those of crowds."""
+    """Return the names of objects and pedestrians, also those of crowds, that events add to the world."""
     return _defined(loaded, "spawn") + pedestrian_names(loaded)
 
 
@@ -121,20 +121,20 @@ def pedestrian_names(loaded: LoadedScenario) -> list[str]:
 def _defined(loaded: LoadedScenario, kind: str) -> list[str]:
     """Return the names that actions of one kind define; goals of other robots are skipped."""
     actions = [action for step in loaded.spec.steps for action in step.actions]
-    mine = [action for action in actions if kind != "new_goal" or loaded.concerns(action.robot)]
-    return [str(getattr(action.chosen, "name", "")) for action in mine if action.kind == kind]
+    relevant = [action for action in actions if kind != "new_goal" or loaded.concerns(action.robot)]
+    return [str(getattr(action.chosen, "name", "")) for action in relevant if action.kind == kind]
 
 
-def _moving(world: WorldSpec) -> list[str]:
+def _movable_names(world: WorldSpec) -> list[str]:
     return [*(thing.name for thing in world.objects), *(door.name for door in world.doors)]
 
 
-def _standing(world: WorldSpec) -> list[str]:
+def _object_names(world: WorldSpec) -> list[str]:
     return [
-        *_moving(world),
+        *_movable_names(world),
         *(obstacle.name for obstacle in world.obstacles),
         *(ramp.name for ramp in world.ramps),
-        *(wall.called(number) for number, wall in enumerate(world.walls, start=1)),
+        *(wall.label(number) for number, wall in enumerate(world.walls, start=1)),
     ]
 
 
@@ -144,10 +144,10 @@ def _distinct(*names: list[str]) -> list[str]:
 
 Spec = TypeVar("Spec", bound=BaseModel)
 Places = Mapping[str, PoseSpec]
-NOWHERE = PoseSpec(x=0.0, y=0.0)
+PLACEHOLDER_POSE = PoseSpec(x=0.0, y=0.0)
 """Pose that replaces an unknown place, which is reported as a problem."""
-NO_WORLD = "name its world with `world:`"
-NO_PLACES = "the world has no places"
+NO_WORLD_HINT = "name its world with `world:`"
+NO_PLACES_HINT = "the world has no places"
 
 
 def places_of(world: LoadedWorld | None) -> Places:
@@ -157,20 +157,20 @@ def places_of(world: LoadedWorld | None) -> Places:
 
 def resolve_places(spec: Spec, places: Places) -> Spec:
     """Return the specification with poses and points instead of names of places."""
-    for reference, pose in _named(spec, places):
-        spec = _put(spec, reference.keys, pose)
+    for reference, pose in _poses_of_references(spec, places):
+        spec = _replace_at(spec, reference.keys, pose)
     return spec
 
 
 def resolve_criteria_places(plain: dict[str, Any], spec: BaseModel, places: Places) -> dict[str, Any]:
     """Return the data of `spec` with poses and points instead of the names of places in its criteria.
 
-    Logs are judged with it, without a world that knows the places.
+    Logs are judged without a world, so criteria in logs cannot refer to its places.
     """
-    for reference, pose in _named(spec, places):
+    for reference, pose in _poses_of_references(spec, places):
         if "pass" in reference.keys[:3:2]:  # of the scenario, or of one of its robots
             written = pose.model_dump() if isinstance(pose, BaseModel) else pose
-            plain = _put(plain, reference.keys, written)
+            plain = _replace_at(plain, reference.keys, written)
     return plain
 
 
@@ -179,7 +179,9 @@ def place_references(spec: BaseModel) -> Iterator[Reference]:
     return (reference for reference in references(spec) if isinstance(reference.mark, PlaceAllowed))
 
 
-def unknown_places(spec: BaseModel, tree: Node, known: Iterable[str], nothing: str = NO_PLACES) -> Iterator[Problem]:
+def unknown_places(
+    spec: BaseModel, tree: Node, known: Iterable[str], nothing: str = NO_PLACES_HINT
+) -> Iterator[Problem]:
     """Yield a problem for each unknown place; `nothing` is the hint if there are no places at all."""
     names = tuple(known)
     for reference in place_references(spec):
@@ -189,22 +191,23 @@ def unknown_places(spec: BaseModel, tree: Node, known: Iterable[str], nothing: s
             yield Problem(*value_position(tree, reference.keys), code="SC030", message=message, hint=hint)
 
 
-def _named(spec: BaseModel, places: Places) -> Iterator[tuple[Reference, Any]]:
+def _poses_of_references(spec: BaseModel, places: Places) -> Iterator[tuple[Reference, Any]]:
+    """Yield each reference to a place with the value that replaces it."""
     for reference in place_references(spec):
         assert isinstance(reference.mark, PlaceAllowed)
-        yield reference, reference.mark.value_at(places.get(reference.name, NOWHERE).at(reference.name))
+        yield reference, reference.mark.value_at(places.get(reference.name, PLACEHOLDER_POSE).at(reference.name))
 
 
-def _put(holder: Any, keys: tuple[Key, ...], value: Any) -> Any:
-    """Return the holder with another value at `keys`."""
+def _replace_at(holder: Any, keys: tuple[Key, ...], value: Any) -> Any:
+    """Return a copy of `holder` (model, list or dict) with `value` at `keys`."""
     if isinstance(holder, RootModel):
-        return holder.model_copy(update={"root": _put(holder.root, keys, value)})
+        return holder.model_copy(update={"root": _replace_at(holder.root, keys, value)})
     if not keys:
         return value
     key, *below = keys
     if isinstance(holder, BaseModel):
         name = next(name for name, field in type(holder).model_fields.items() if key == (field.alias or name))
-        return holder.model_copy(update={name: _put(getattr(holder, name), tuple(below), value)})
+        return holder.model_copy(update={name: _replace_at(getattr(holder, name), tuple(below), value)})
     changed = holder.copy()
-    changed[key] = _put(holder[key], tuple(below), value)
+    changed[key] = _replace_at(holder[key], tuple(below), value)
     return changed

@@ -19,7 +19,7 @@ from simscen.model.world import WorldSpec
 
 @dataclass(frozen=True)
 class LoadedMap:
-    """ROS map: `path` of its YAML file, `image` file, and `notes` (warnings about keys without a meaning)."""
+    """ROS map: `path` of its YAML file, `image` file, and `notes` (warnings about keys that have no effect)."""
 
     path: Path
     spec: RosMapSpec
@@ -27,8 +27,8 @@ class LoadedMap:
     notes: tuple[Problem, ...] = ()
 
 
-class JudgedMask(NamedTuple):
-    """Filter mask of a criterion: keys where it is named first, and the map."""
+class CriterionMask(NamedTuple):
+    """Filter mask of a criterion: the map, and the keys of the first criterion that uses it."""
 
     keys: tuple[Key, ...]
     map: LoadedMap
@@ -51,7 +51,7 @@ class LoadedWorld:
 
 @dataclass(frozen=True)
 class LoadedRobot:
-    """Robot: `spec` of its `*.robot.yaml`, and `urdf` if it has one. A robot from a bare `.urdf` has no `spec`.
+    """Robot: `spec` of its `*.robot.yaml`, and `urdf` if it has one. A robot that is only a `.urdf` has no `spec`.
 
     `path` is the file that the scenario names; `bundled` robots ship with simscen; `packages` are the folders of ROS
     packages that its file names.
@@ -71,18 +71,20 @@ class LoadedScenario:
     """Valid scenario, checked as far as possible without building its world.
 
     `id` is its path relative to the root, without suffix; `file` is absolute, and `path` relative to the root, as in
-    problems. `text` is the file as read; `sources` are the texts of all files, by the names that problems use, and
-    `files` their absolute paths. `read` are further files that world and robot were built from. `notes` are warnings.
+    problems. `text` is the content of that file; `sources` are the texts of all files, by the names that problems use,
+    and `files` their absolute paths. `read_files` are the other files from which world and robot were built. `notes`
+    are warnings.
 
     `map` is the map of the robot: a ROS map, "none" for driving without a map, or None for the map of the world.
-    `keepout_mask` and `speed_mask` are those of the stack, `judged_masks` those of criteria, by file as written.
+    `keepout_mask` and `speed_mask` belong to the stack, `criterion_masks` to criteria (by file name as written).
     With `lenient`, unusable parts of an SDF world are skipped with a note.
 
     `choice` is the stack selected on the command line; it is part of the run keys if the session has `several_stacks`.
-    `runs` is the command of an external stack, if defined. `variation` is the name of the variation ("" without
-    variations), `varied` has its values by path, and `set_by` the path that set a value, by the position of the value.
+    `external_command` starts its external stack, if defined. `variation` is the name of the variation ("" without
+    variations), `varied_values` has its values by path, and `set_by` the path that set a value, by the position of the
+    value.
 
-    `robots` are the views of a scenario of several robots: each is a scenario of that robot alone, with its name as
+    For several robots, `robots` contains one view per robot: a scenario of that robot alone, with its name as
     `robot_name` and the others as `other_robots`. The scenario itself then describes the first robot.
     """
 
@@ -99,34 +101,34 @@ class LoadedScenario:
     tree: MappingNode = field(repr=False)
     sources: Mapping[str, str] = field(repr=False, default_factory=dict)
     files: Mapping[str, Path] = field(default_factory=dict)
-    read: tuple[Path, ...] = ()
+    read_files: tuple[Path, ...] = ()
     notes: tuple[Problem, ...] = ()
     lenient: bool = False
     keepout_mask: LoadedMap | None = None
     speed_mask: LoadedMap | None = None
-    judged_masks: Mapping[str, JudgedMask] = field(default_factory=dict)
+    criterion_masks: Mapping[str, CriterionMask] = field(default_factory=dict)
     choice: StackChoice | None = None
     several_stacks: bool = False
-    runs: ExternalCommand | None = None
+    external_command: ExternalCommand | None = None
     variation: str = ""
-    varied: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    varied_values: Mapping[str, Any] = field(default_factory=dict, repr=False)
     set_by: Mapping[Position, str] = field(default_factory=dict, repr=False)
     robots: Mapping[str, "LoadedScenario"] = field(default_factory=dict)
     robot_name: str = ""
     other_robots: tuple[str, ...] = ()
 
     @property
-    def each(self) -> Mapping[str, "LoadedScenario"]:
+    def robot_views(self) -> Mapping[str, "LoadedScenario"]:
         """The views of all robots by name; a single robot has no name."""
         return self.robots or {self.robot_name: self}
 
-    def having(self, **changes: Any) -> "LoadedScenario":
-        """Return the scenario, and the views of its robots, with other values of fields."""
-        robots = {name: view.having(**changes) for name, view in self.robots.items()}
+    def with_changes(self, **changes: Any) -> "LoadedScenario":
+        """Return the scenario with changed fields, also in the views of its robots."""
+        robots = {name: view.with_changes(**changes) for name, view in self.robots.items()}
         return replace(self, **changes, robots=robots)
 
     def concerns(self, robot: str | None) -> bool:
-        """Return whether something about a robot (None: about the only robot or the world) applies to this robot."""
+        """Return whether a part of the scenario that names `robot` (None: names no robot) applies to this robot."""
         return robot is None or not self.robot_name or robot == self.robot_name
 
     @property
@@ -142,19 +144,19 @@ class LoadedScenario:
     @property
     def stack(self) -> str:
         """NAME=VALUE of the selected stack, with the file relative to the root; "" for its own stack."""
-        return "" if self.choice is None else self.choice.seen_from(self.root)
+        return "" if self.choice is None else self.choice.relative_to_folder(self.root)
 
     @property
     def expectation(self) -> ExpectedFailure | None:
-        """Its expected failure, with the line if that is in its own file."""
-        said = self.spec.expected
-        if said is None:
+        """Its expected failure; the line is 0 if `expected` is not in its own file."""
+        expected = self.spec.expected
+        if expected is None:
             return None
         place = self.key_place_of("expected")
-        return ExpectedFailure(said.fail, tuple(said.criteria), place.line if place.path == self.path else 0)
+        return ExpectedFailure(expected.fail, tuple(expected.criteria), place.line if place.path == self.path else 0)
 
     def key(self, seed: int) -> RunKey:
-        """Return the key of its run with this seed."""
+        """Return the key of the run with this seed."""
         return RunKey(self.id, seed, self.variation, self.stack_name)
 
     def place_of(self, *keys: Key) -> Position:
@@ -171,9 +173,9 @@ class LoadedScenario:
 
     def problem_at(self, place: Position, code: str, message: str, hint: str = "") -> Problem:
         """Return a problem at a position in any of the files, with the text of its line."""
-        return self.sourced(Problem(*place, code=code, message=message, hint=hint))
+        return self.with_source_line(Problem(*place, code=code, message=message, hint=hint))
 
-    def sourced(self, problem: Problem) -> Problem:
-        """Return a problem in any of the files with the text of its line."""
+    def with_source_line(self, problem: Problem) -> Problem:
+        """Return the problem, which may be in any of the files, with the text of its line."""
         lines = self.sources.get(problem.path, "").split("\n")
         return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem

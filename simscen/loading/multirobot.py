@@ -10,7 +10,7 @@ from simscen.model.scenario import RobotEntry
 
 ROBOT, ROBOTS, PASS, EXPECTED, STACK = "robot", "robots", "pass", "expected", "stack"
 ROBOT_KEYS = ("goals", "faults")
-"""Keys at top level of a scenario of one robot, and under each robot if there are several."""
+"""Keys that are at top level for one robot, and under each robot if there are several."""
 
 
 def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
@@ -20,24 +20,24 @@ def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
     """
     robots = child(tree, ROBOTS)
     entries = robots.entries if isinstance(robots, MappingNode) else {}
-    return {name: _of_one(tree, entries[name]) for name in sorted(entries)}
+    return {name: _single_robot_tree(tree, entries[name]) for name in sorted(entries)}
 
 
 def has_multiple_robots(tree: MappingNode) -> bool:
     """Return whether `robots` is a valid mapping of robots."""
     robots = child(tree, ROBOTS)
     return isinstance(robots, MappingNode) and all(
-        isinstance(said.value, MappingNode) for said in robots.entries.values()
+        isinstance(entry.value, MappingNode) for entry in robots.entries.values()
     )
 
 
-def _of_one(tree: MappingNode, entry: Entry) -> MappingNode:
-    said, place = entry.value, entry.value.place
-    assert isinstance(said, MappingNode)
-    robot = {key: value for key, value in said.entries.items() if key in RobotEntry.model_fields}
-    own = {key: value for key, value in said.entries.items() if key not in robot and key != PASS}
+def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
+    own_tree, place = entry.value, entry.value.place
+    assert isinstance(own_tree, MappingNode)
+    robot = {key: value for key, value in own_tree.entries.items() if key in RobotEntry.model_fields}
+    own = {key: value for key, value in own_tree.entries.items() if key not in robot and key != PASS}
     whole = merge_mappings(MappingNode(tree.place, own), _without(tree, ROBOTS, EXPECTED))
-    criteria = SequenceNode(tree.place, (*_items(child(tree, PASS)), *_items(child(said, PASS))))
+    criteria = SequenceNode(tree.place, (*_items(child(tree, PASS)), *_items(child(own_tree, PASS))))
     return MappingNode(
         tree.place,
         {**whole.entries, ROBOT: Entry(entry.key, MappingNode(place, robot)), PASS: Entry(entry.key, criteria)},
@@ -45,32 +45,32 @@ def _of_one(tree: MappingNode, entry: Entry) -> MappingNode:
 
 
 def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
-    """Return a scenario with the selected stack instead of its own, or of those of all its robots.
+    """Return a scenario with the selected stack in place of its own stack, or of the stacks of all its robots.
 
-    A command for the external stack of one robot defines only what that stack runs.
+    A command for an external stack that one of the robots already has changes nothing in the tree.
     """
     robots = child(tree, ROBOTS)
     if robots is None:
         return replace_stack(tree, choice)
     if not isinstance(robots, MappingNode) or not has_multiple_robots(tree):
         return tree  # validation reports the wrong type
-    each = split_by_robot(tree)
-    if choice.runs is not None and choice.name in map(external_stack_name, each.values()):
+    parts = split_by_robot(tree)
+    if choice.external_command is not None and choice.name in map(external_stack_name, parts.values()):
         return tree
-    chosen = {name: replace_stack(part, choice) for name, part in each.items()}
-    if all(chosen[name] is part for name, part in each.items()):
+    chosen = {name: replace_stack(part, choice) for name, part in parts.items()}
+    if all(chosen[name] is part for name, part in parts.items()):
         return tree
-    own = {name: Entry(entry.key, _with(entry.value, chosen[name])) for name, entry in robots.entries.items()}
+    own = {name: Entry(entry.key, _with_stack_of(entry.value, chosen[name])) for name, entry in robots.entries.items()}
     rest = _without(tree, STACK)
     return MappingNode(
         tree.place, {**rest.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.place, own))}
     )
 
 
-def _with(said: Node, part: MappingNode) -> MappingNode:
-    """Return the entry of a robot with its complete stack, since the common `stack` is removed."""
-    assert isinstance(said, MappingNode)
-    return MappingNode(said.place, said.entries | {key: entry for key, entry in part.entries.items() if key == STACK})
+def _with_stack_of(robot: Node, part: MappingNode) -> MappingNode:
+    """Return the tree of a robot with the complete stack of `part`, since the common `stack` is removed."""
+    assert isinstance(robot, MappingNode)
+    return MappingNode(robot.place, robot.entries | {key: entry for key, entry in part.entries.items() if key == STACK})
 
 
 def external_stack_name(tree: MappingNode) -> str | None:
@@ -90,21 +90,21 @@ def _without(tree: MappingNode, *keys: str) -> MappingNode:
 
 def missing_in_scenario(tree: MappingNode) -> list[Problem]:
     """Return problems with missing or contradicting `robot`, `robots` and `pass` in a scenario."""
-    return [*(_of_several(tree) if ROBOTS in tree.entries else _of_the_only(tree))]
+    return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _single_robot_problems(tree))]
 
 
 def missing_in_criteria(tree: MappingNode) -> list[Problem]:
     """Return problems with missing or contradicting `robots` and `pass` in a file of criteria."""
-    return [*(_of_several(tree) if ROBOTS in tree.entries else _nothing_holds(tree))]
+    return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _missing_criteria(tree))]
 
 
-def _of_the_only(tree: MappingNode) -> Iterator[Problem]:
+def _single_robot_problems(tree: MappingNode) -> Iterator[Problem]:
     if ROBOT not in tree.entries:
         yield Problem(*tree.place, "SC010", f"missing key `{ROBOT}`")
-    yield from _nothing_holds(tree)
+    yield from _missing_criteria(tree)
 
 
-def _nothing_holds(tree: MappingNode) -> Iterator[Problem]:
+def _missing_criteria(tree: MappingNode) -> Iterator[Problem]:
     criteria = child(tree, PASS)
     if criteria is None and ROBOTS not in tree.entries:
         yield Problem(*tree.place, "SC010", f"missing key `{PASS}`")
@@ -112,7 +112,7 @@ def _nothing_holds(tree: MappingNode) -> Iterator[Problem]:
         yield Problem(*criteria.place, "SC017", "expected 1 or more values, got 0")
 
 
-def _of_several(tree: MappingNode) -> Iterator[Problem]:
+def _multi_robot_problems(tree: MappingNode) -> Iterator[Problem]:
     if ROBOT in tree.entries:
         hint = "use `robot` for one robot; for several, list each under its name in `robots`"
         yield Problem(*tree.entries[ROBOT].key, "SC016", "`robot` and `robots` exclude each other", hint)
@@ -120,7 +120,7 @@ def _of_several(tree: MappingNode) -> Iterator[Problem]:
         if key in tree.entries:
             message = f"`{key}` belong to one robot, but the scenario has several"
             yield Problem(*tree.entries[key].key, "SC016", message, f"move them to each robot in `{ROBOTS}`")
-    yield from _nothing_holds(tree)
+    yield from _missing_criteria(tree)
     robots = child(tree, ROBOTS)
     for name, entry in robots.entries.items() if isinstance(robots, MappingNode) else ():
         if (

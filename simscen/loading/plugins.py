@@ -9,16 +9,16 @@ from simscen.loading.spec_walk import Keys, walk
 from simscen.spec.choice import Choice
 from simscen.spec.registry import Entry, find, origin_of
 
-_FACT = "plugin."
+_HEADER_PREFIX = "plugin."
 
 
 def plugins_of(loaded: LoadedScenario) -> tuple[Entry, ...]:
     """Return the plugins that a scenario and its robots use, sorted."""
-    return used_by(loaded.spec, *(view.robot.spec for view in loaded.each.values()))
+    return used_by(loaded.spec, *(view.robot.spec for view in loaded.robot_views.values()))
 
 
 def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[Entry, ...]:
-    """Return the plugins that any of the scenarios uses, sorted."""
+    """Return the plugins that at least one of the scenarios uses, sorted."""
     different = {id(scenario): scenario for scenario in scenarios}.values()
     return _sorted({entry for scenario in different for entry in plugins_of(scenario)})
 
@@ -30,8 +30,8 @@ def used_by(*specs: Any) -> tuple[Entry, ...]:
 
 
 def fact_of(entry: Entry) -> str:
-    """Return the name of a plugin in the header of a log."""
-    return f"{_FACT}{entry.group}.{entry.name}"
+    """Return the key of a plugin in the header of a log."""
+    return f"{_HEADER_PREFIX}{entry.group}.{entry.name}"
 
 
 def requirement_of(entry: Entry) -> str:
@@ -40,21 +40,21 @@ def requirement_of(entry: Entry) -> str:
 
 
 def missing_plugins(facts: Mapping[str, str], kinds: Container[str]) -> list[Problem]:
-    """Return problems with plugins of these kinds that a log was made with and that are not installed in that version.
+    """Return a problem for each plugin of these kinds that a log used and that is not installed in the same version.
 
-    `facts` are those of the header of the log.
+    `facts` are the entries in the header of the log.
     """
     missing = []
-    for fact, then in sorted(facts.items()):
-        kind, _, name = fact.removeprefix(_FACT).partition(".")
-        if not fact.startswith(_FACT) or kind not in kinds:
+    for fact, recorded in sorted(facts.items()):
+        kind, _, name = fact.removeprefix(_HEADER_PREFIX).partition(".")
+        if not fact.startswith(_HEADER_PREFIX) or kind not in kinds:
             continue
         entry = find(kind, name)
-        now = requirement_of(entry) if entry is not None else ""
-        if now != then:
-            instead = f"{now} is installed" if now else "it is not installed"
-            message = f"the run was judged with {kind} `{name}` of {then}, but {instead}"
-            missing.append((message, f"`pip install {then}`, or judge with another file: --scenario"))
+        installed = requirement_of(entry) if entry is not None else ""
+        if installed != recorded:
+            difference = f"{installed} is installed" if installed else "it is not installed"
+            message = f"the run was judged with {kind} `{name}` of {recorded}, but {difference}"
+            missing.append((message, f"`pip install {recorded}`, or judge with another file: --scenario"))
     return [Problem("", 0, 0, "SC805", message, hint) for message, hint in missing]
 
 

@@ -9,25 +9,25 @@ from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.scalars import Dumper, to_yaml
 from simscen.loading.yaml.tree import MappingNode, SequenceNode
 
-WIDTH = 100
+LINE_WIDTH = 100
 
 
 def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str = "") -> str:
     """Return `content` as YAML, with the lines of `text` for each top-level key and list item that is the same.
 
-    `path` is the name of the text in positions. `comment` is put in front, one line of it per line.
+    `path` is the name of the text in positions. `comment` is put at the top, with `# ` before each of its lines.
     """
-    own, _ = parse_yaml(text, path)
+    original, _ = parse_yaml(text, path)
     lines = text.splitlines()
-    known = own.plain if isinstance(own, MappingNode) else {}
-    segments = _segments(own, lines) if isinstance(own, MappingNode) else {}
+    known = original.plain if isinstance(original, MappingNode) else {}
+    segments = _segments(original, lines) if isinstance(original, MappingNode) else {}
     head = "".join(f"# {line}\n" for line in comment.splitlines())
     parts = [head]
     for key, value in content.items():
         if key in segments and known.get(key) == value:
             parts.append(_block(segments[key]))
-        elif isinstance(own, MappingNode) and key in segments and isinstance(value, list):
-            parts.append(_list_text(key, value, own, lines, segments[key]))
+        elif isinstance(original, MappingNode) and key in segments and isinstance(value, list):
+            parts.append(_list_text(key, value, original, lines, segments[key]))
         else:
             parts.append(_dumped({key: value}))
     whole = "".join(parts)
@@ -37,12 +37,12 @@ def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str 
     return whole
 
 
-def _segments(own: MappingNode, lines: Sequence[str]) -> dict[str, list[str]]:
+def _segments(original: MappingNode, lines: Sequence[str]) -> dict[str, list[str]]:
     """Return the lines of each top-level key, with the comments directly above it."""
-    keys = sorted(own.entries, key=lambda key: own.entries[key].key.line)
-    if any(own.entries[key].key.col != 1 for key in keys):
+    keys = sorted(original.entries, key=lambda key: original.entries[key].key.line)
+    if any(original.entries[key].key.col != 1 for key in keys):
         return {}  # in braces
-    starts = [_with_comments(own.entries[key].key.line - 1, lines) for key in keys]
+    starts = [_with_comments(original.entries[key].key.line - 1, lines) for key in keys]
     ends = [*starts[1:], len(lines)]
     return {key: list(lines[start:end]) for key, start, end in zip(keys, starts, ends, strict=True)}
 
@@ -54,10 +54,10 @@ def _with_comments(start: int, lines: Sequence[str]) -> int:
     return start
 
 
-def _list_text(key: str, value: list[Any], own: MappingNode, lines: Sequence[str], segment: Sequence[str]) -> str:
+def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequence[str], segment: Sequence[str]) -> str:
     """Return a list whose unchanged items keep their lines."""
-    node = own.entries[key].value
-    start = own.entries[key].key.line - 1
+    node = original.entries[key].value
+    start = original.entries[key].key.line - 1
     if not isinstance(node, SequenceNode) or not value or not node.items:
         return _dumped({key: value})
     first_lines = [item.place.line - 1 for item in node.items]
@@ -72,23 +72,23 @@ def _list_text(key: str, value: list[Any], own: MappingNode, lines: Sequence[str
     indent = len(lines[first_lines[0]]) - len(lines[first_lines[0]].lstrip())
     texts = [_block(lines[first:last]) for first, last in zip(starts, ends, strict=True)]
     head = _block(lines[_with_comments(start, lines) : starts[0]])
-    shown, rest = [], list(zip((item.plain for item in node.items), texts, strict=True))
+    parts, rest = [], list(zip((item.plain for item in node.items), texts, strict=True))
     for item in value:
         same = next((index for index, (plain, _) in enumerate(rest) if plain == item), None)
         if same is None:
-            shown.append(_indented(_dumped([item]), indent))
+            parts.append(_indented(_dumped([item]), indent))
         else:
-            shown.append(rest[same][1])
+            parts.append(rest[same][1])
             rest = rest[same + 1 :]
-    return head + "".join(shown)
+    return head + "".join(parts)
 
 
 def _block(lines: Sequence[str]) -> str:
     """Return lines as text, without blank lines at the end."""
-    kept = list(lines)
-    while kept and not kept[-1].strip():
-        kept.pop()
-    return "".join(f"{line}\n" for line in kept)
+    trimmed = list(lines)
+    while trimmed and not trimmed[-1].strip():
+        trimmed.pop()
+    return "".join(f"{line}\n" for line in trimmed)
 
 
 def _indented(text: str, columns: int) -> str:
@@ -111,6 +111,6 @@ def _entry(key: str, value: Any) -> str:
 
 def _flow(data: Any) -> str:
     text: str = yaml.dump(
-        data, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=WIDTH, default_flow_style=None
+        data, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=LINE_WIDTH, default_flow_style=None
     )
     return text

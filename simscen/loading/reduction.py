@@ -19,14 +19,14 @@ from simscen.spec.quantities import NUMBER_AND_UNIT
 
 Keys = tuple[Key, ...]
 """Keys from the top of a scenario to a part of it."""
-KEPT = frozenset({"simscen", "world", "robot", "robots", "seed", "pass", "time_limit"})
+REQUIRED_KEYS = frozenset({"simscen", "world", "robot", "robots", "seed", "pass", "time_limit"})
 """Top-level keys that are never left out as a whole."""
-FIXED = frozenset({"simscen", "seed", "pass", "time_limit"})
-"""Top-level keys of which no part is left out or simplified: they say what fails, and how long a run may take."""
-STRUCTURE = frozenset({("world", "walls"), ("world", "map"), ("world", "sdf")})
-"""Parts of a world that are never left out: without them, another test would fail in the same criterion."""
-NOT_RUN = frozenset({"acceptance", "description", "expected", "metrics", "skip", "tags", "variations"})
-"""Top-level keys that a minimal scenario does not need, whatever fails."""
+FIXED_KEYS = frozenset({"simscen", "seed", "pass", "time_limit"})
+"""Top-level keys of which no part is left out or simplified: they define the failure and the length of the run."""
+FIXED_WORLD_PARTS = frozenset({("world", "walls"), ("world", "map"), ("world", "sdf")})
+"""Parts of a world that are never left out: without them, the same criterion would fail for another reason."""
+UNNEEDED_KEYS = frozenset({"acceptance", "description", "expected", "metrics", "skip", "tags", "variations"})
+"""Top-level keys that no minimal scenario needs."""
 MAX_DIGITS = 3
 
 
@@ -38,26 +38,26 @@ class Rounding(NamedTuple):
 
 
 def removable_parts(tree: MappingNode, depth: int) -> list[Keys]:
-    """Return the parts with so many keys that can be left out, in the order of the file."""
+    """Return the parts that can be left out and whose paths have `depth` keys, in the order of the file."""
     return [
         keys
         for keys, _ in _parts(tree)
         if len(keys) == depth
-        and keys[0] not in FIXED
-        and keys[:2] not in STRUCTURE
-        and not (depth == 1 and keys[0] in KEPT)
+        and keys[0] not in FIXED_KEYS
+        and keys[:2] not in FIXED_WORLD_PARTS
+        and not (depth == 1 and keys[0] in REQUIRED_KEYS)
     ]
 
 
-def deepest(tree: MappingNode) -> int:
-    """Return the largest number of keys of a part."""
+def max_depth(tree: MappingNode) -> int:
+    """Return the largest number of keys in the path of a part."""
     return max(len(keys) for keys, _ in _parts(tree))
 
 
-def without(tree: MappingNode, parts: Collection[Keys]) -> MappingNode:
+def without_parts(tree: MappingNode, parts: Collection[Keys]) -> MappingNode:
     """Return the scenario without these parts. Mappings and lists that become empty are left out, too."""
-    left = _without(tree, frozenset(parts), ())
-    return left if isinstance(left, MappingNode) else replace(tree, entries={})
+    remaining = _remove_parts(tree, frozenset(parts), ())
+    return remaining if isinstance(remaining, MappingNode) else replace(tree, entries={})
 
 
 def with_values(tree: MappingNode, values: Mapping[Keys, Node | None]) -> MappingNode:
@@ -66,17 +66,17 @@ def with_values(tree: MappingNode, values: Mapping[Keys, Node | None]) -> Mappin
     changed = tree
     for keys, value in values.items():
         if value is not None:
-            put = _with_value(changed, keys, value)
-            assert isinstance(put, MappingNode)
-            changed = put
-    return without(changed, removed) if removed else changed
+            result = _with_value(changed, keys, value)
+            assert isinstance(result, MappingNode)
+            changed = result
+    return without_parts(changed, removed) if removed else changed
 
 
 def roundings(tree: MappingNode, digits: int) -> list[Rounding]:
-    """Return the numbers that become simpler when they are rounded to so many significant digits."""
+    """Return the numbers that become simpler when they are rounded to `digits` significant digits."""
     found = []
     for keys, node in _parts(tree):
-        if isinstance(node, ScalarNode) and keys[0] not in FIXED and keys[:2] not in STRUCTURE:
+        if isinstance(node, ScalarNode) and keys[0] not in FIXED_KEYS and keys[:2] not in FIXED_WORLD_PARTS:
             rounded = _rounded(node.value, digits)
             if rounded is not None:
                 found.append(Rounding(keys, rounded))
@@ -97,18 +97,18 @@ def with_seed(tree: MappingNode, seed: int) -> MappingNode:
 
 
 def removed_parts(before: MappingNode, after: MappingNode) -> list[str]:
-    """Return the parts of a scenario that are not in a reduced version of it; not the parts of these parts."""
-    left = {node.place for _, node in _parts(after)}
+    """Return the parts of a scenario that a reduced version lacks; a removed part is listed without its own parts."""
+    remaining = {node.place for _, node in _parts(after)}
     found: list[Keys] = []
     for keys, node in _parts(before):
         is_part_of_found = bool(found) and keys[: len(found[-1])] == found[-1]
-        if not is_part_of_found and not any(each.place in left for each in (node, *(n for _, n in _parts(node)))):
+        if not is_part_of_found and not any(each.place in remaining for each in (node, *(n for _, n in _parts(node)))):
             found.append(keys)
     return [part_text(before, keys) for keys in found]
 
 
 def changed_values(before: MappingNode, after: MappingNode) -> list[str]:
-    """Return the values that a reduced version of a scenario has changed: `time_limit: 61.7 s -> 60 s`."""
+    """Return the values that differ in a reduced version of a scenario: `time_limit: 61.7 s -> 60 s`."""
     values = {node.place: (keys, node.value) for keys, node in _parts(before) if isinstance(node, ScalarNode)}
     return [
         f"{dotted_path(values[node.place][0])}: {values[node.place][1]} -> {node.value}"
@@ -121,7 +121,7 @@ def part_text(tree: MappingNode, keys: Keys) -> str:
     """Return a part as messages show it: its keys, and its name or type if it has one."""
     node: Node | None = tree
     for key in keys:
-        node = _below(node, key)
+        node = _child(node, key)
     text = dotted_path(keys)
     if isinstance(node, MappingNode) and isinstance(keys[-1], int):
         named = [
@@ -134,18 +134,18 @@ def part_text(tree: MappingNode, keys: Keys) -> str:
     return text
 
 
-def _parts(node: Node, above: Keys = ()) -> Iterator[tuple[Keys, Node]]:
-    if above:
-        yield above, node
+def _parts(node: Node, prefix: Keys = ()) -> Iterator[tuple[Keys, Node]]:
+    if prefix:
+        yield prefix, node
     if isinstance(node, MappingNode):
         for key, entry in node.entries.items():
-            yield from _parts(entry.value, (*above, key))
+            yield from _parts(entry.value, (*prefix, key))
     elif isinstance(node, SequenceNode):
         for index, item in enumerate(node.items):
-            yield from _parts(item, (*above, index))
+            yield from _parts(item, (*prefix, index))
 
 
-def _below(node: Node | None, key: Key) -> Node | None:
+def _child(node: Node | None, key: Key) -> Node | None:
     if isinstance(node, MappingNode):
         entry = node.entries.get(str(key))
         return None if entry is None else entry.value
@@ -154,22 +154,22 @@ def _below(node: Node | None, key: Key) -> Node | None:
     return None
 
 
-def _without(node: Node, parts: frozenset[Keys], above: Keys) -> Node | None:
+def _remove_parts(node: Node, parts: frozenset[Keys], prefix: Keys) -> Node | None:
     """Return the node without the parts, None if nothing of a mapping or list is left."""
     if isinstance(node, MappingNode):
         entries = {}
         for key, entry in node.entries.items():
-            if (*above, key) in parts:
+            if (*prefix, key) in parts:
                 continue
-            left = _without(entry.value, parts, (*above, key))
-            if left is not None:
-                entries[key] = Entry(entry.key, left)
+            remaining = _remove_parts(entry.value, parts, (*prefix, key))
+            if remaining is not None:
+                entries[key] = Entry(entry.key, remaining)
         return replace(node, entries=entries) if entries or not node.entries else None
     if isinstance(node, SequenceNode):
         items = [
-            left
+            remaining
             for index, item in enumerate(node.items)
-            if (*above, index) not in parts and (left := _without(item, parts, (*above, index))) is not None
+            if (*prefix, index) not in parts and (remaining := _remove_parts(item, parts, (*prefix, index))) is not None
         ]
         return replace(node, items=tuple(items)) if items or not node.items else None
     return node
@@ -191,7 +191,7 @@ def _with_value(node: Node | None, keys: Keys, value: Node) -> Node:
 
 
 def _rounded(value: object, digits: int) -> str | float | int | None:
-    """Return a number or quantity with so many significant digits, None if that is not shorter."""
+    """Return a number or quantity with `digits` significant digits, None if that changes nothing."""
     if isinstance(value, bool):
         return None
     if isinstance(value, int | float):

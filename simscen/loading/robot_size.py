@@ -67,8 +67,8 @@ def robot_size(loaded: LoadedScenario) -> RobotSize:
 
 
 def _round(radius: float) -> Polygon:
-    turns = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
-    return tuple((radius * math.cos(turn), radius * math.sin(turn)) for turn in turns)
+    angles = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
+    return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
 
 
 def _height_of_shapes(spec: RobotSpec) -> float:

@@ -1,4 +1,4 @@
-"""Load a scenario with everything it names, or report all its problems."""
+"""Load a scenario with all files that it refers to, or report all its problems."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -8,7 +8,7 @@ from typing import Literal
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.loading import multirobot
 from simscen.loading.checks.runner import check_robot_names, check_scenario
-from simscen.loading.files.assets import Assets, load_judged_masks
+from simscen.loading.files.assets import Assets, find_criterion_masks
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.known_names import places_of, resolve_places, unknown_places
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
@@ -35,7 +35,7 @@ def load_scenario(
     choice: StackChoice | None = None,
     variation: str = "",
 ) -> LoadedScenario:
-    """Load the scenario in the file `path`; paths in it must be inside `root` or a folder of `world_path`.
+    """Load the scenario in the file `path`; paths in it must lead into `root` or a folder of `world_path`.
 
     `choice` replaces its stack. `variation` selects one of its variations. Raises InvalidInput with all problems of the
     scenario and of the files it names, and UsageError if the variation is unknown or missing.
@@ -71,7 +71,7 @@ def try_variations(
     """Return all variations of the scenario in a file in order, or all problems of any of them.
 
     A file without variations yields one scenario whose variation has no name. `numbers` selects variations by their
-    numbers from 1; those that do not exist, or do not meet the conditions in `require`, are missing.
+    numbers from 1, without those that do not exist or do not meet the conditions in `require`.
     """
     library = Library(PathSandbox.around(root, world_path))
     read = _read(path, library, choice)
@@ -106,8 +106,8 @@ def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()
 class ChangedScenario:
     """A scenario file whose content is changed in memory, for example to find a smaller scenario.
 
-    `whole_tree` is the content of the file, of what it extends, and of `defaults.yaml`. `tree` is the same without
-    `variations`, as one of the variations sets it. `unvaried` lacks the values of the variation, which `changes` has.
+    `whole_tree` is the content of the file merged with what it extends and with `defaults.yaml`. `unvaried` is the same
+    without `variations`, and `tree` has the values of one variation (`changes`) as well.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class ChangedScenario:
         if isinstance(read, list):
             raise InvalidInput(read)
         self.file, self.whole_tree = read
-        self.path = self._library.fence.shown(self.file)
+        self.path = self._library.sandbox.display_name(self.file)
         self.text = self._library.texts[self.path]
         entries = {key: one for key, one in self.whole_tree.entries.items() if key != VARIATIONS}
         self.unvaried = self.tree = replace(self.whole_tree, entries=entries)
@@ -141,7 +141,7 @@ class ChangedScenario:
             self.tree, self.changes = varied.tree, varied.changes
 
     def load(self, tree: MappingNode) -> LoadedScenario | list[Problem]:
-        """Load the scenario with this content in place of that of the file; or return all its problems."""
+        """Load the scenario with this content instead of the content of the file; or return all its problems."""
         merged, problems = self._library.with_defaults(self.file, tree, [])
         if problems or not isinstance(merged, MappingNode):
             return problems
@@ -152,16 +152,18 @@ class ChangedScenario:
 
 def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Path, MappingNode] | list[Problem]:
     """Read a scenario file and the files that it extends, or return all problems."""
-    fence = library.fence
-    file = fence.entered(path)
+    sandbox = library.sandbox
+    file = sandbox.resolve_argument(path)
     if isinstance(file, Problem):
         return [file]
-    if is_unusable_name(name := scenario_id(file, fence.root).rpartition("/")[2]):
+    if is_unusable_name(name := scenario_id(file, sandbox.root).rpartition("/")[2]):
         message, hint = f"its id would end in {name!r}: not a folder name", "give the file a name before the suffix"
-        return [Problem(fence.shown(file), 0, 0, "SC041", message, hint)]
+        return [Problem(sandbox.display_name(file), 0, 0, "SC041", message, hint)]
     tree, problems = library.read(file, defaults=True)
-    if kind := recognize_stack_file(tree, library.texts.get(shown := fence.shown(file), ""), shown):
-        return [not_a_scenario(kind, shown)]
+    if kind := recognize_stack_file(
+        tree, library.texts.get(name_in_problems := sandbox.display_name(file), ""), name_in_problems
+    ):
+        return [not_a_scenario(kind, name_in_problems)]
     if choice is not None:
         library.add(choice.texts, choice.files)
     if problems or not isinstance(tree, MappingNode):
@@ -173,24 +175,28 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
 def _with_choice(
     one: Variation, library: Library, file: Path, choice: StackChoice | None
 ) -> LoadedScenario | list[Problem]:
-    """Load one variation, with the selected stack instead of its own; or return all its problems."""
+    """Load one variation with the selected stack, or with its own if `choice` is None; or return all its problems."""
     tree = one.tree if choice is None else multirobot.apply_stack_choice(one.tree, choice)
-    if choice is not None and (lost := list(_without_effect(one, tree, choice))):
-        return library.with_source(lost)
-    taken = with_nav2_parameters(tree, library)
-    if taken.problems:
-        return library.with_source(sorted(taken.problems))
-    tree = taken.tree
+    if choice is not None and (without_effect := list(_without_effect(one, tree, choice))):
+        return library.with_source(without_effect)
+    expanded_tree = with_nav2_parameters(tree, library)
+    if expanded_tree.problems:
+        return library.with_source(sorted(expanded_tree.problems))
+    tree = expanded_tree.tree
     spec = check(ScenarioSpec, tree, multirobot.missing_in_scenario)
     if isinstance(spec, list):
         return library.with_source(sorted([*spec, *_problems_of_world(tree, library)]))
     if problems := check_robot_names(spec, tree):
         return library.with_source(problems)
-    loaded = _several(spec, tree, library, file) if spec.robots else _one(spec, tree, library, file)
+    loaded = (
+        _load_multi_robot(spec, tree, library, file) if spec.robots else _load_single_robot(spec, tree, library, file)
+    )
     if isinstance(loaded, list):
         return loaded
-    notes = (*loaded.notes, *library.with_source(taken.notes), *(choice.notes if choice is not None else ()))
-    return replace(loaded, notes=notes).having(choice=choice, variation=one.name, set_by=one.set_by, varied=one.values)
+    notes = (*loaded.notes, *library.with_source(expanded_tree.notes), *(choice.notes if choice is not None else ()))
+    return replace(loaded, notes=notes).with_changes(
+        choice=choice, variation=one.name, set_by=one.set_by, varied_values=one.values
+    )
 
 
 def _without_effect(one: Variation, tree: MappingNode, choice: StackChoice) -> Iterator[Problem]:
@@ -211,14 +217,16 @@ def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
     return assets.problems
 
 
-def _several(spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path) -> LoadedScenario | list[Problem]:
-    """Load a scenario of several robots; problems that several robots share are returned once."""
+def _load_multi_robot(
+    spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path
+) -> LoadedScenario | list[Problem]:
+    """Load a scenario of several robots; a problem that several robots share is returned once."""
     views: dict[str, LoadedScenario] = {}
     problems: list[Problem] = []
     for name, own in multirobot.split_by_robot(tree).items():
         one = check(ScenarioSpec, own)
         others = tuple(other for other in sorted(spec.robots or ()) if other != name)
-        found = one if isinstance(one, list) else _one(one, own, library, file, name, others)
+        found = one if isinstance(one, list) else _load_single_robot(one, own, library, file, name, others)
         if isinstance(found, list):
             problems += found
         else:
@@ -237,7 +245,7 @@ def _several(spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path
     )
 
 
-def _one(
+def _load_single_robot(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path, name: str = "", others: tuple[str, ...] = ()
 ) -> LoadedScenario | list[Problem]:
     """Load a scenario of one robot, or as one of several robots sees it."""
@@ -247,19 +255,19 @@ def _one(
     keepout_mask = _mask(spec.stack.keepout_mask, tree, ("stack", "keepout_mask"), assets)
     limits = spec.stack.speed_mask
     speed_mask = _mask(limits.file if limits else None, tree, ("stack", "speed_mask", "file"), assets)
-    judged = load_judged_masks(spec, tree, assets)
+    judged = find_criterion_masks(spec, tree, assets)
     robot = assets.robot(spec.only_robot.model, value_position(tree, ("robot", "model")))
     if world is None or robot is None or assets.problems:
         return library.with_source(sorted(assets.problems))
-    fence, shown, places = library.fence, library.fence.shown(file), places_of(world)
-    strangers = library.with_source(list(unknown_places(spec, tree, places)))
+    sandbox, name_in_problems, places = library.sandbox, library.sandbox.display_name(file), places_of(world)
+    unknown = library.with_source(list(unknown_places(spec, tree, places)))
     loaded = LoadedScenario(
-        id=scenario_id(file, fence.root),
-        path=shown,
+        id=scenario_id(file, sandbox.root),
+        path=name_in_problems,
         file=file,
-        root=fence.root,
-        world_path=fence.world_path,
-        text=library.texts[shown],
+        root=sandbox.root,
+        world_path=sandbox.world_path,
+        text=library.texts[name_in_problems],
         spec=resolve_places(spec, places),
         world=world,
         map=robot_map,
@@ -276,11 +284,11 @@ def _one(
         ),
         keepout_mask=keepout_mask,
         speed_mask=speed_mask,
-        judged_masks=judged,
+        criterion_masks=judged,
         robot_name=name,
         other_robots=others,
     )
-    problems = sorted(check_scenario(loaded, unknown_places=strangers))
+    problems = sorted(check_scenario(loaded, unknown_places=unknown))
     if any(problem.severity == "error" for problem in problems):
         return problems
     return replace(loaded, notes=(*loaded.notes, *problems))
@@ -312,11 +320,14 @@ def _notes(*maps: LoadedMap | None) -> tuple[Problem, ...]:
 
 
 def is_unusable_name(name: str) -> bool:
-    """Return whether a name cannot be a folder in the output."""
+    """Return whether a name cannot be the name of an output folder."""
     return name in ("", ".", "..")
 
 
 def scenario_id(file: Path, root: Path) -> str:
     """Return the id of a scenario: its path relative to the root, without suffix."""
-    shown = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
-    return next((shown.removesuffix(suffix) for suffix in SUFFIXES if shown.endswith(suffix)), shown)
+    name_in_problems = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
+    return next(
+        (name_in_problems.removesuffix(suffix) for suffix in SUFFIXES if name_in_problems.endswith(suffix)),
+        name_in_problems,
+    )

@@ -20,9 +20,9 @@ from simscen.loading.yaml.tree import Key, MappingNode, Node, node_at
 from simscen.model.criteria_file import CriteriaSpec
 from simscen.model.scenario import ScenarioSpec
 
-JUDGING = frozenset({"criterion", "metric"})
+JUDGING_PLUGINS = frozenset({"criterion", "metric"})
 """Kinds of plugins that are needed to judge a log."""
-_JUDGED = frozenset({"simscen", "pass", "metrics", "expected"})
+_JUDGING_KEYS = frozenset({"simscen", "pass", "metrics", "expected"})
 
 
 def resolved_text(loaded: LoadedScenario) -> str:
@@ -31,7 +31,7 @@ def resolved_text(loaded: LoadedScenario) -> str:
     Names of places in criteria are replaced by poses, because logs are judged without the world.
     """
     own, _ = parse_yaml(loaded.text, loaded.path)
-    plain = resolve_criteria_places(loaded.tree.plain, _checked(ScenarioSpec, loaded.tree), places_of(loaded.world))
+    plain = resolve_criteria_places(loaded.tree.plain, _validated(ScenarioSpec, loaded.tree), places_of(loaded.world))
     if isinstance(own, MappingNode) and own.plain == plain:
         return loaded.text
     return to_yaml(plain)
@@ -48,7 +48,7 @@ def unexpanded_text(loaded: LoadedScenario) -> str:
 
 def spec_of_text(text: str, name: str) -> ScenarioSpec:
     """Return the specification in a resolved text; `name` is its name in problems. Raises InvalidInput."""
-    return _checked(ScenarioSpec, _read(text, name))
+    return _validated(ScenarioSpec, _read(text, name))
 
 
 def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, MappingNode]:
@@ -59,7 +59,7 @@ def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, 
     tree = _read(text, name)
     if isinstance(tree, MappingNode) and robot:
         tree = split_by_robot(tree).get(robot, tree)
-    spec = _checked(CriteriaSpec, tree)
+    spec = _validated(CriteriaSpec, tree)
     assert isinstance(tree, MappingNode)
     return spec, tree
 
@@ -67,17 +67,17 @@ def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, 
 def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str = "") -> CriteriaSpec:
     """Return the criteria in the resolved text of a log, for `robot` if there are several.
 
-    `name` is the name of the text in problems, `facts` are those of the header of the log. Other parts of the scenario
-    are ignored, so plugins other than criteria and metrics need not be installed. Raises InvalidInput, also if a
-    criterion is not installed in the version of the log.
+    `name` is the name of the text in problems, `facts` are the entries in the header of the log. Other parts of the
+    scenario are ignored, so plugins other than criteria and metrics need not be installed. Raises InvalidInput, also if
+    a criterion is not installed in the version of the log.
     """
-    if missing := missing_plugins(facts, JUDGING):
+    if missing := missing_plugins(facts, JUDGING_PLUGINS):
         raise InvalidInput([replace(problem, path=name) for problem in missing])
     tree = _read(text, name)
     if isinstance(tree, MappingNode):
         tree = split_by_robot(tree)[robot] if robot else tree
-        tree = replace(tree, entries={key: entry for key, entry in tree.entries.items() if key in _JUDGED})
-    return _checked(CriteriaSpec, tree)
+        tree = replace(tree, entries={key: entry for key, entry in tree.entries.items() if key in _JUDGING_KEYS})
+    return _validated(CriteriaSpec, tree)
 
 
 def _read(text: str, name: str) -> Node:
@@ -87,7 +87,7 @@ def _read(text: str, name: str) -> Node:
     return tree
 
 
-def _checked(model: type[Model], tree: Node) -> Model:
+def _validated(model: type[Model], tree: Node) -> Model:
     spec = check(model, tree)
     if isinstance(spec, list):
         raise InvalidInput(spec)
@@ -101,18 +101,18 @@ def disturbances_of(loaded: LoadedScenario) -> tuple[Disturbance, ...]:
 
 def _events(loaded: LoadedScenario) -> Iterator[Disturbance]:
     for step in loaded.spec.steps:
-        when = "" if step.when is None else _written(loaded, *step.keys, "when")
+        when = "" if step.when is None else _one_line_yaml(loaded, *step.keys, "when")
         yield Disturbance(step.name, "event", when, step.required, _line(loaded, *step.keys), step.after)
 
 
 def _faults(loaded: LoadedScenario) -> Iterator[Disturbance]:
     for index, entry in enumerate(loaded.spec.faults):
         keys = ("faults", index)
-        when = "" if entry.when is None else _written(loaded, *keys, "when")
+        when = "" if entry.when is None else _one_line_yaml(loaded, *keys, "when")
         yield Disturbance(entry.label, "fault", when, entry.required, _line(loaded, *keys))
 
 
-def _written(loaded: LoadedScenario, *keys: Key) -> str:
+def _one_line_yaml(loaded: LoadedScenario, *keys: Key) -> str:
     """Return a mapping on one line of YAML, without its braces."""
     text = yaml.safe_dump(
         node_at(loaded.tree, keys).plain, default_flow_style=True, sort_keys=False, allow_unicode=True, width=10**9
@@ -121,6 +121,6 @@ def _written(loaded: LoadedScenario, *keys: Key) -> str:
 
 
 def _line(loaded: LoadedScenario, *keys: Key) -> int:
-    """Return the line in the scenario file; 0 for what is written in a file that it extends."""
+    """Return the line in the scenario file; 0 if the keys are in a file that it extends."""
     place = loaded.place_of(*keys)
     return place.line if place.path == loaded.path else 0

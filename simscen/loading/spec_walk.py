@@ -12,26 +12,26 @@ from simscen.spec.quantities import Quantity
 
 
 class Reference(NamedTuple):
-    """Name at `keys` of a scenario that refers to something; `mark` says to what kind of thing."""
+    """Name at `keys` of a scenario that refers to something; `mark` defines the kind of thing."""
 
     keys: tuple[Key, ...]
     mark: ReferenceTo
     name: str
 
     @property
-    def to(self) -> str:
-        """The kind of thing that it refers to."""
+    def kind(self) -> str:
+        """The kind of thing that the name refers to, such as "place" or "door"."""
         return self.mark.to
 
 
 Concerns = Callable[[str | None], bool]
-"""Whether something that names this robot (None: no robot) is about the robot in question."""
+"""Predicate: does a part that names this robot (None: names no robot) apply to the robot that is checked?"""
 
 
 def references(spec: BaseModel, keys: tuple[Key, ...] = (), concerns: Concerns | None = None) -> Iterator[Reference]:
-    """Yield every reference below `spec`, in the order of its fields; parts about other robots are skipped."""
-    about = getattr(spec, "robot", None)
-    if concerns is not None and isinstance(about, str) and not concerns(about):
+    """Yield every reference below `spec`, in the order of its fields; parts that name other robots are skipped."""
+    robot = getattr(spec, "robot", None)
+    if concerns is not None and isinstance(robot, str) and not concerns(robot):
         return
     for name, key, mark in _fields_of(type(spec)):
         below = keys if isinstance(spec, RootModel) else (*keys, key)
@@ -40,7 +40,7 @@ def references(spec: BaseModel, keys: tuple[Key, ...] = (), concerns: Concerns |
 
 @cache
 def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | None]]:
-    """Return name and key of each field, and what text in it refers to."""
+    """Return name and key of each field, and what a text in the field refers to."""
     found = []
     for name, field in model.model_fields.items():
         marks = [mark for mark in field.metadata if isinstance(mark, ReferenceTo)]
@@ -79,9 +79,9 @@ Keys = tuple[Key, ...]
 
 
 def walk(spec: Any, keys: Keys = (), concerns: Callable[[str], bool] | None = None) -> Iterator[tuple[Keys, BaseModel]]:
-    """Yield every mapping of a specification, itself included, with its keys; parts about other robots are skipped."""
-    about = getattr(spec, "robot", None)
-    if concerns is not None and isinstance(about, str) and not concerns(about):
+    """Yield a specification and every mapping in it, with their keys; parts that name other robots are skipped."""
+    robot = getattr(spec, "robot", None)
+    if concerns is not None and isinstance(robot, str) and not concerns(robot):
         return
     if isinstance(spec, RootModel):
         yield from walk(spec.root, keys, concerns)
@@ -100,28 +100,28 @@ def walk(spec: Any, keys: Keys = (), concerns: Callable[[str], bool] | None = No
 def quantities_of(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float]]:
     """Yield the numbers of one dimension in a specification, with their keys."""
     for keys, part in walk(spec):
-        for name, key in _measured(type(part), dimension):
+        for name, key in _quantity_fields(type(part), dimension):
             if isinstance(value := getattr(part, name), int | float):
                 yield (*keys, key), value
 
 
 @cache
-def _measured(model: type[BaseModel], dimension: str) -> list[tuple[str, str]]:
+def _quantity_fields(model: type[BaseModel], dimension: str) -> list[tuple[str, str]]:
     """Return name and key of the fields with quantities of the dimension."""
     return [
         (name, field.alias or name)
         for name, field in model.model_fields.items()
-        if any(_has(mark, dimension) for mark in field.metadata) or _measures(field.annotation, dimension)
+        if any(_has_dimension(mark, dimension) for mark in field.metadata) or _is_quantity(field.annotation, dimension)
     ]
 
 
-def _measures(kind: Any, dimension: str) -> bool:
+def _is_quantity(kind: Any, dimension: str) -> bool:
     """Return whether a type, or a member of a union, is a quantity of the dimension."""
     if get_origin(kind) is Annotated:
         inner, *marks = get_args(kind)
-        return any(_has(mark, dimension) for mark in marks) or _measures(inner, dimension)
-    return any(_measures(member, dimension) for member in get_args(kind))
+        return any(_has_dimension(mark, dimension) for mark in marks) or _is_quantity(inner, dimension)
+    return any(_is_quantity(member, dimension) for member in get_args(kind))
 
 
-def _has(mark: Any, dimension: str) -> bool:
+def _has_dimension(mark: Any, dimension: str) -> bool:
     return isinstance(mark, Quantity) and mark.dimension == dimension

@@ -22,11 +22,13 @@ Bounds = tuple[float, float, float, float]
 
 @dataclass
 class WorldCache:
-    """Caches worlds by the content of their files, and the shortest paths of discs in them."""
+    """Caches built worlds, and the shortest paths of discs in them."""
 
     _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
-    _plain: list[tuple[tuple[Solid, ...], float, tuple[float, float], SimplePaths | None]] = field(default_factory=list)
-    _ways: list[tuple[tuple[Solid, ...], Bounds, float, tuple[float, float], ShortestPaths]] = field(
+    _simple_paths: list[tuple[tuple[Solid, ...], float, tuple[float, float], SimplePaths | None]] = field(
+        default_factory=list
+    )
+    _shortest_paths: list[tuple[tuple[Solid, ...], Bounds, float, tuple[float, float], ShortestPaths]] = field(
         default_factory=list
     )
 
@@ -42,35 +44,37 @@ class WorldCache:
             record_read_file(file)
         return known[1]
 
-    def plain_ways(self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]) -> SimplePaths | None:
-        """Return the paths of a disc between simple solids without numpy; None if a solid is not simple."""
-        for known in self._plain:
+    def simple_paths(
+        self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]
+    ) -> SimplePaths | None:
+        """Return the paths of a disc of radius m between simple solids; None if a solid is not simple."""
+        for known in self._simple_paths:
             if known[0] is solids and known[1:3] == (radius, z_range):
                 return known[3]
-        ways = simple_paths_between(solids, radius, z_range)
-        self._plain = [*self._plain[-7:], (solids, radius, z_range, ways)]
-        return ways
+        paths = simple_paths_between(solids, radius, z_range)
+        self._simple_paths = [*self._simple_paths[-7:], (solids, radius, z_range, paths)]
+        return paths
 
-    def ways(
+    def shortest_paths(
         self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]
     ) -> ShortestPaths:
         """Return the shortest paths of a disc between solids."""
-        for known in self._ways:
+        for known in self._shortest_paths:
             if known[0] is solids and known[1:4] == (bounds, radius, z_range):
                 return known[4]
         from simscen.worlds.geometry.triangulation import merge_solids
         from simscen.worlds.routes.shortest_paths import ShortestPaths
 
-        ways = ShortestPaths(merge_solids(solids), bounds, radius, z_range)
-        self._ways = [
-            *self._ways[-3:],
-            (solids, bounds, radius, z_range, ways),
+        paths = ShortestPaths(merge_solids(solids), bounds, radius, z_range)
+        self._shortest_paths = [
+            *self._shortest_paths[-3:],
+            (solids, bounds, radius, z_range, paths),
         ]  # large objects: keep only the last four
-        return ways
+        return paths
 
 
-def bounds_with(bounds: Bounds, places: list[Pose2]) -> Bounds:
+def extend_bounds(bounds: Bounds, places: list[Pose2]) -> Bounds:
     """Return the bounds, enlarged to contain the places."""
-    left, low, right, high = bounds
+    left, bottom, right, top = bounds
     xs, ys = [place.x for place in places], [place.y for place in places]
-    return min([left, *xs]), min([low, *ys]), max([right, *xs]), max([high, *ys])
+    return min([left, *xs]), min([bottom, *ys]), max([right, *xs]), max([top, *ys])

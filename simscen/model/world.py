@@ -22,7 +22,7 @@ class Wall(Spec):
     height: PositiveLength = 1.0
     """Height above the ground."""
 
-    def called(self, number: int) -> str:
+    def label(self, number: int) -> str:
         """Return the name, or `wall_3` for the third wall of a world."""
         return self.name if "name" in self.model_fields_set else f"wall_{number}"
 

@@ -56,7 +56,7 @@ class ScenarioFile(pytest.File):
             scenarios, problems = checks.scenario(self.path, choice)
             _raise_errors(problems)
             for scenario in scenarios:
-                loaded = scenario.having(several_stacks=len(checks.choices) > 1)
+                loaded = scenario.with_changes(several_stacks=len(checks.choices) > 1)
                 for seed in scenario_seeds(loaded, options):
                     every_seed = options.repeat > 1
                     yield ScenarioRun.create(self, loaded, seed, every_seed)

@@ -142,7 +142,7 @@ def _prepare_robot(loaded: LoadedScenario, build: BuildWorld, find_legs: FindLeg
         time_limit=spec.time_limit,
         clearance_range=_clearance_range(spec),
         disturbances=disturbances_of(loaded),
-        masks=load_criterion_masks(loaded.judged_masks, loaded.tree, loaded.sourced),
+        masks=load_criterion_masks(loaded.criterion_masks, loaded.tree, loaded.with_source_line),
     )
     return PreparedScenario(
         loaded=loaded,
@@ -210,15 +210,15 @@ def effective_stack(spec: ScenarioSpec) -> AnyStack:
 
 def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
     """Return the case of a criteria file; without a robot it has no footprint. Raises InvalidInput."""
-    loaded_world, loaded_robot = criteria.surroundings()
-    root = criteria.library.fence.root
+    loaded_world, loaded_robot = criteria.load_world_and_robot()
+    root = criteria.library.sandbox.root
     world = (
         world_from_spec(WorldSpec(simscen=1), "")
         if loaded_world is None
         else world_from_file(loaded_world, root, world_path)
     )
     body = (
-        None if loaded_robot is None else robot_from_file(loaded_robot, (root, *criteria.library.fence.world_path))[1]
+        None if loaded_robot is None else robot_from_file(loaded_robot, (root, *criteria.library.sandbox.world_path))[1]
     )
     goals = scenario_goals(criteria.spec)
     return Case(

@@ -237,14 +237,14 @@ def _stacks(loaded: LoadedScenario) -> dict[str, object]:
     """Return stacks that were chosen on the command line or in the user's configuration."""
     return {
         **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
-        **({} if loaded.runs is None else {"runs": loaded.runs.digest}),
+        **({} if loaded.external_command is None else {"runs": loaded.external_command.digest}),
         **({"robots": {name: _stacks(view) for name, view in loaded.robots.items()}} if loaded.robots else {}),
     }
 
 
 def referenced_files(loaded: LoadedScenario) -> list[Path]:
     """Return the map images, SDF files, and URDF files of a scenario."""
-    views = list(loaded.each.values())
+    views = list(loaded.robot_views.values())
     maps = [loaded.world.map, *(view.map for view in views if view.map != "none")]
     return [
         *(found.image for found in maps if isinstance(found, LoadedMap)),
@@ -268,12 +268,14 @@ def scenario_files(loaded: LoadedScenario) -> set[Path]:
     A `defaults.yaml` next to the scenario is included even if it does not exist yet.
     """
     choice = loaded.choice
-    programs = [part for view in loaded.each.values() if view.runs is not None for part in _program(view)]
+    programs = [
+        part for view in loaded.robot_views.values() if view.external_command is not None for part in _program(view)
+    ]
     return {
         loaded.file,
         loaded.file.with_name(DEFAULTS_FILE),
         *loaded.files.values(),
-        *loaded.read,
+        *loaded.read_files,
         *referenced_files(loaded),
         *plugin_files(plugins_of(loaded)),
         *(() if choice is None else choice.files.values()),

@@ -37,7 +37,7 @@ def world_from_spec(
 
         solids += walls_from_map(grid, spec.map_height)
     for number, wall in enumerate(spec.walls, start=1):
-        solids += wall_solids(_corners(wall), wall.thickness, wall.height, wall.called(number))
+        solids += wall_solids(_corners(wall), wall.thickness, wall.height, wall.label(number))
     solids += [_obstacle(obstacle) for obstacle in spec.obstacles]
     solids += [_ramp(ramp) for ramp in spec.ramps]
     bodies = (*base.bodies, *map(_movable, spec.objects), *map(_door, spec.doors))

@@ -33,7 +33,7 @@ def follower(tmp_path_factory: pytest.TempPathFactory) -> ExternalCommand:
 def test_it_drives_a_shipped_scenario_and_is_judged_by_the_truth(follower: ExternalCommand, name: str) -> None:
     prepared = prepare(load_scenario(ROOT / f"scenarios/{name}.scenario.yaml", ROOT))
     stack = ExternalStackSpec(external="gaps")
-    run = simulate(replace(prepared, stack=stack, loaded=replace(prepared.loaded, runs=follower)))
+    run = simulate(replace(prepared, stack=stack, loaded=replace(prepared.loaded, external_command=follower)))
     assert run.result.outcome is Outcome.PASSED
     assert run.result.ended == "navigation ended"
     assert len(run.trace.belief) > 100

@@ -139,6 +139,11 @@ def test_another_stack_gives_other_bits(tmp_path: Path) -> None:
     """The comparison can fail."""
     prepared = prepare(load_scenario(ROOT / "scenarios/navigation/goal.scenario.yaml", ROOT))
     other = with_external_reference(prepared)
-    argv = other.loaded.runs and (*other.loaded.runs.argv[:-1], '{"controller": {"desired_linear_vel": 0.3}}')
-    other = replace(other, loaded=replace(other.loaded, runs=replace(other.loaded.runs, argv=argv)))
+    argv = other.loaded.external_command and (
+        *other.loaded.external_command.argv[:-1],
+        '{"controller": {"desired_linear_vel": 0.3}}',
+    )
+    other = replace(
+        other, loaded=replace(other.loaded, external_command=replace(other.loaded.external_command, argv=argv))
+    )
     assert simulate(other).result.metrics != simulate(prepared).result.metrics

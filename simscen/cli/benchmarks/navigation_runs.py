@@ -120,7 +120,7 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
 
 def _top_speed(scenario: LoadedScenario) -> float | None:
     """Return the speed in m/s of the fastest robot; None if a robot is not defined by a robot file."""
-    robots = [view.robot.spec for view in scenario.each.values()]
+    robots = [view.robot.spec for view in scenario.robot_views.values()]
     return max(robot.top_speed for robot in robots if robot) if all(robots) else None
 
 

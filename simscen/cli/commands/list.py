@@ -52,7 +52,7 @@ def _expectation(scenario: LoadedScenario) -> str:
 
 
 def _stack(scenario: LoadedScenario) -> str:
-    stacks = [view.spec.stack for view in scenario.each.values()]
+    stacks = [view.spec.stack for view in scenario.robot_views.values()]
     names = dict.fromkeys(stack.external for stack in stacks if isinstance(stack, ExternalStackSpec))
     return f"({'stack' if len(names) == 1 else 'stacks'} {', '.join(names)})" if names else ""
 

@@ -11,7 +11,7 @@ from simscen.cli.completions import shipped_scenarios
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
-from simscen.loading.files.discovery import BASE, SCENARIO, default_root
+from simscen.loading.files.discovery import BASE_SUFFIXES, SCENARIO_SUFFIXES, default_root
 from simscen.loading.scenario import is_unusable_name, try_variations
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.library import DEFAULTS_FILE
@@ -37,12 +37,14 @@ def command(
     Existing files are never overwritten.
     """
     last = name.rpartition("/")[2]
-    if is_unusable_name(next((last.removesuffix(suffix) for suffix in SCENARIO if last.endswith(suffix)), last)):
+    if is_unusable_name(
+        next((last.removesuffix(suffix) for suffix in SCENARIO_SUFFIXES if last.endswith(suffix)), last)
+    ):
         raise UsageError(f"{name!r} is not a valid scenario name")
-    partial = last == DEFAULTS_FILE or last.endswith(BASE)
+    partial = last == DEFAULTS_FILE or last.endswith(BASE_SUFFIXES)
     if partial and like:
         raise UsageError(f"{name!r} is a base file; --like copies only scenarios")
-    file = Path(name if partial or name.endswith(SCENARIO) else f"{name}{SCENARIO[0]}")
+    file = Path(name if partial or name.endswith(SCENARIO_SUFFIXES) else f"{name}{SCENARIO_SUFFIXES[0]}")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.open("x").close()

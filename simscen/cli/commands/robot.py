@@ -48,7 +48,7 @@ def check(
     Exit code 0: all checks passed; 1: a check failed; 2: the robot is unusable.
     """
     file = load_robot_file(robot, root or default_root([Path(robot)]), world_path or ())
-    home = file.library.fence.root
+    home = file.library.sandbox.root
     try:
         failed = _checked(file, robot, picture, as_json)
     except InvalidInput as error:
@@ -66,7 +66,7 @@ def _checked(file: RobotFile, named: str, picture: Path | None, as_json: bool) -
     spec, body = robot_from_file(file.robot, file.roots)
     library = file.library
     notes = library.with_source_where_missing(geometry_warnings(file.robot, spec, body, file.roots))
-    notes = from_here(notes, library.fence.root)
+    notes = from_here(notes, library.sandbox.root)
     with engine_output_on_stderr():
         checked = check_robot(body)
     if as_json:

@@ -14,8 +14,8 @@ from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, prin
 from simscen.cli.session.selection import Checks
 from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import Exit, Problem
-from simscen.loading.checks.files import CHECKED_DRAWS, STACKS, check_file, file_kind
-from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, STUDY, WORLD, default_root, discover
+from simscen.loading.checks.files import CHECKED_DRAWS, STACK_KINDS, check_file, file_kind
+from simscen.loading.files.discovery import SUFFIXES, default_root, discover
 
 
 class Format(str, Enum):
@@ -59,7 +59,7 @@ def command(
     stacks = stacks_of(stack or [], home, world_path or [])
     checks = Checks(home, world_path or [], lenient, fast, picture, stacks=stacks, runs=bool(stack))
     checked = _Checked()
-    for file in discover(paths, home, SCENARIO + STUDY + WORLD + ROBOT + STACK + BASE):
+    for file in discover(paths, home, SUFFIXES):
         kind = file_kind(file, home)
         checked.add(kind, from_here(_problems(kind, file, checks), home))
     _PRINT[format_](checked)
@@ -74,7 +74,7 @@ def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
         found = [problem for choice in checks.choices for problem in checks.scenario(file, choice, numbers)[1]]
         return list(dict.fromkeys(found))
     found = check_file(kind, file, checks.root, checks.world_path)
-    if kind in (*STACKS, "base") or any(problem.severity == "error" for problem in found):
+    if kind in (*STACK_KINDS, "base") or any(problem.severity == "error" for problem in found):
         return found
     built = checks.robot if kind == "robot" else checks.world
     return [*found, *built(file)]

@@ -84,7 +84,7 @@ class CandidateRuns:
         return None if isinstance(found, list) else self.checks.variation(found)[0]
 
     def _run(self, scenarios: Sequence[LoadedScenario]) -> list[RunResult]:
-        named = [scenario.having(variation=f"candidate-{number}") for number, scenario in enumerate(scenarios)]
+        named = [scenario.with_changes(variation=f"candidate-{number}") for number, scenario in enumerate(scenarios)]
         with TemporaryDirectory(prefix="simscen-") as folder:
             jobs = [
                 Job(number, scenario, scenario.key(self.seed), Path(folder, str(number)), self.options.wall_limit)

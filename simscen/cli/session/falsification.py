@@ -202,7 +202,7 @@ class Falsification:
         if isinstance(loaded, list):
             self._problems = loaded
             return None
-        checked, problems = self._checks.variation(loaded.having(variation=name, varied=variation.values))
+        checked, problems = self._checks.variation(loaded.with_changes(variation=name, varied_values=variation.values))
         if checked is None:
             self._problems = problems
         return checked

@@ -103,7 +103,7 @@ class LogJudge:
             result = judge_run(key, str(log), spec.pass_, read.trace, case, (), read.coverage, spec.metrics, expected)
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         with _scenario_errors(self._criteria):
-            criteria = self._criteria.of(robot)
+            criteria = self._criteria.for_robot(robot)
         # The disturbances are in the scenario of the log, at lines that the criteria file does not have.
         case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
         case = replace(case, masks={**case.masks, **self._masks(criteria)})
@@ -122,7 +122,7 @@ class LogJudge:
         """Return a foreign log and its result by the criteria file."""
         assert self._criteria is not None
         with _scenario_errors(self._criteria):
-            criteria = self._criteria.of("")
+            criteria = self._criteria.for_robot("")
         case = self._foreign_case()
         goals = tuple(goal.name for goal in case.goals if not goal.via)
         read = read_foreign_log(log, replace(self._wanted, goals=goals), with_sensors)
@@ -177,7 +177,7 @@ def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
     try:
         yield
     except InvalidInput as error:
-        raise UnusableScenario(from_here(error.problems, criteria.library.fence.root)) from error
+        raise UnusableScenario(from_here(error.problems, criteria.library.sandbox.root)) from error
 
 
 def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:

@@ -78,7 +78,7 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
         scenario_seeds(scenario, options)
     if request.last_failed:
         options = replace(options, only=_last_failed(scenarios, request))
-    inputs = {file for each in scenarios for file in (*each.files.values(), *each.read)}
+    inputs = {file for each in scenarios for file in (*each.files.values(), *each.read_files)}
     require_writable(request.junit, request.out or request.resume, inputs)
     folder, journal = output_folder(request.out, request.resume)
     used = {"plugins": plugin_packages(plugins_of_all(scenarios)), "stacks": commands_of(scenarios)}

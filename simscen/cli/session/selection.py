@@ -67,7 +67,7 @@ def load_all(
     for file, choice in product(discover(paths, home), choices):
         variations, found = checks.scenario(file, choice, wanted.numbers)
         for scenario in variations:
-            loaded.setdefault(scenario.title, []).append(scenario.having(several_stacks=len(choices) > 1))
+            loaded.setdefault(scenario.title, []).append(scenario.with_changes(several_stacks=len(choices) > 1))
             warnings.setdefault(scenario.id, []).extend(found)
         problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):
@@ -130,13 +130,13 @@ class Checks:
 
     def variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
         """Return a loaded variation with all its checks passed, or None, and the problems."""
-        loaded, undefined = self.stacks.with_command(loaded.having(lenient=self.lenient))
+        loaded, undefined = self.stacks.with_command(loaded.with_changes(lenient=self.lenient))
         if undefined and self.runs:
             return None, [*loaded.notes, *undefined]
         with collect_read_files() as read:
             problems = [*loaded.notes, *([] if self.fast else checked(loaded, self.cache, self.pictures))]
         problems += [replace(problem, severity="warning") for problem in undefined]
-        loaded = loaded.having(read=tuple(sorted(read)))
+        loaded = loaded.with_changes(read_files=tuple(sorted(read)))
         usable = not any(problem.severity == "error" for problem in problems)
         return (loaded if usable else None), list(dict.fromkeys(problems))
 

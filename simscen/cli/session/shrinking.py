@@ -11,16 +11,16 @@ from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.verdict import Status, Verdict
 from simscen.loading.reduction import (
     MAX_DIGITS,
-    NOT_RUN,
+    UNNEEDED_KEYS,
     Keys,
     Rounding,
-    deepest,
+    max_depth,
     removable_parts,
     rounded_tree,
     roundings,
     with_seed,
     with_values,
-    without,
+    without_parts,
 )
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child
 
@@ -91,11 +91,11 @@ class Shrinking:
     def _leave_out(self) -> None:
         """Leave out parts, those near the top first, because they may be large."""
         depth = 1
-        while depth <= deepest(self.tree):
+        while depth <= max_depth(self.tree):
             before, parts = self.tree, removable_parts(self.tree, depth)
 
             def build(kept: Sequence[Keys], parts: Sequence[Keys] = parts, tree: MappingNode = before) -> MappingNode:
-                return without(tree, [keys for keys in parts if keys not in kept])
+                return without_parts(tree, [keys for keys in parts if keys not in kept])
 
             self.tree = build(self._minimize(parts, build))
             depth += 1
@@ -146,7 +146,7 @@ def smallest_margin(verdict: Verdict) -> float | None:
 
 def only_failing(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
     """Return the scenario with this seed, only the failing criterion, and without what does not change the run."""
-    entries = {key: entry for key, entry in tree.entries.items() if key not in NOT_RUN}
+    entries = {key: entry for key, entry in tree.entries.items() if key not in UNNEEDED_KEYS}
     criteria = tree.entries.get("pass")
     if failure.criterion and criteria is not None and isinstance(criteria.value, SequenceNode):
         items = [item for item in criteria.value.items if child(item, failure.criterion) is not None]

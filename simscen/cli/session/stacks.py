@@ -17,7 +17,7 @@ from simscen.cli.process import caller_environment, config_file
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.external_command import ExternalCommand
 from simscen.core.records.run_result import RunKey
-from simscen.loading.files.discovery import STACK, default_root
+from simscen.loading.files.discovery import STACK_SUFFIXES, default_root
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.loading.schema.messages import quoted, suggestion
@@ -62,7 +62,7 @@ class Stacks:
         """
         if loaded.robots:
             tried = {name: self.with_command(view) for name, view in loaded.robots.items()}
-            given = [choice.name for choice in self.chosen if choice.runs]
+            given = [choice.name for choice in self.chosen if choice.external_command]
             problems = [
                 *(one for _, found in tried.values() for one in found),
                 *conflicting_stacks(loaded, given, config_file()),
@@ -73,22 +73,25 @@ class Stacks:
         if not isinstance(stack, ExternalStackSpec):
             return loaded, []
         if (command := self.command(stack.external)) is not None:
-            return replace(loaded, runs=command), []
-        names = [*(choice.name for choice in self.chosen if choice.runs), *self.config.spec.stacks]
+            return replace(loaded, external_command=command), []
+        names = [*(choice.name for choice in self.chosen if choice.external_command), *self.config.spec.stacks]
         problem = undefined_stack(loaded, names, self.config.file)
         return loaded, [problem] if problem is not None else []
 
     def command(self, name: str) -> ExternalCommand | None:
         """Return the command of an external stack as defined by --stack, else by the configuration."""
         if name not in self._commands:
-            given = next((choice.runs for choice in self.chosen if choice.name == name and choice.runs), None)
+            given = next(
+                (choice.external_command for choice in self.chosen if choice.name == name and choice.external_command),
+                None,
+            )
             self._commands[name] = given or self.config.command(name, caller_environment(), Path.cwd())
         return self._commands[name]
 
 
 def commands_of(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, object]]:
     """Return the commands of the scenarios' external stacks by name, without environment variables (secrets)."""
-    stacks = ((view.spec.stack, view.runs) for loaded in scenarios for view in loaded.each.values())
+    stacks = ((view.spec.stack, view.external_command) for loaded in scenarios for view in loaded.robot_views.values())
     found = {stack.external: runs for stack, runs in stacks if isinstance(stack, ExternalStackSpec) and runs}
     return {
         name: {"command": list(runs.argv), "cwd": runs.cwd, "digest": runs.digest}
@@ -138,14 +141,14 @@ def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -
     value = value if equals else name
     if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):
         return StackChoice(name, value, type=value)
-    if value.endswith(STACK) or (value.endswith(YAML) and Path(value).is_file()):
+    if value.endswith(STACK_SUFFIXES) or (value.endswith(YAML) and Path(value).is_file()):
         from simscen.loading.stacks.stackfile import load_stack_file
 
         try:
             return load_stack_file(name, value, Path(value), root, world_path)
         except InvalidInput as error:
             raise InvalidInput(from_here(error.problems, root)) from error
-    return StackChoice(name, value, runs=_command(text, value, bool(equals), stacks))
+    return StackChoice(name, value, external_command=_command(text, value, bool(equals), stacks))
 
 
 def _command(text: str, value: str, may_be_new: bool, stacks: Stacks) -> ExternalCommand:

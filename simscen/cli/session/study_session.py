@@ -229,7 +229,7 @@ class _StudySession:
                 raise UsageError(f"{request.file} has changed since the study began")
             self._text = found[0].text
             self._loaded = {number_of(one.variation) if one.variation else None: one for one in found}
-            self.inputs |= {file for each in found for file in (*each.files.values(), *each.read)}
+            self.inputs |= {file for each in found for file in (*each.files.values(), *each.read_files)}
         return [self._loaded[number] for number in numbers]
 
     def _jobs(self, first: int, folder: Path) -> list[Job]:

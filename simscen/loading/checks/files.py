@@ -5,8 +5,15 @@ from pathlib import Path
 
 from simscen.core.errors import Problem
 from simscen.loading.checks.runner import check_world_file
-from simscen.loading.files.assets import GAZEBO, URDF, Assets, is_ros_map
-from simscen.loading.files.discovery import BASE, ROBOT, SCENARIO, STACK, STUDY, WORLD
+from simscen.loading.files.assets import SDF_SUFFIXES, URDF_SUFFIXES, Assets, is_ros_map
+from simscen.loading.files.discovery import (
+    BASE_SUFFIXES,
+    ROBOT_SUFFIXES,
+    SCENARIO_SUFFIXES,
+    STACK_SUFFIXES,
+    STUDY_SUFFIXES,
+    WORLD_SUFFIXES,
+)
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.validate import check_partial
@@ -18,18 +25,18 @@ from simscen.model.scenario import ScenarioSpec
 
 CHECKED_DRAWS = range(1, 21)
 """Numbers of the variations of a study that are checked; the others are checked before they run."""
-STACKS = ("stack", NAV2_FILE_KIND)
+STACK_KINDS = ("stack", NAV2_FILE_KIND)
 """Kinds of files with the parameters of a stack."""
 _ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
 _ONLY_WORLDS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
 _ONLY_SCENARIOS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
 _SUFFIXES = (
-    ("scenario", SCENARIO),
-    ("study", STUDY),
-    ("base", BASE),
-    ("world", (*WORLD, *GAZEBO)),
-    ("robot", (*ROBOT, *URDF)),
-    ("stack", STACK),
+    ("scenario", SCENARIO_SUFFIXES),
+    ("study", STUDY_SUFFIXES),
+    ("base", BASE_SUFFIXES),
+    ("world", (*WORLD_SUFFIXES, *SDF_SUFFIXES)),
+    ("robot", (*ROBOT_SUFFIXES, *URDF_SUFFIXES)),
+    ("stack", STACK_SUFFIXES),
 )
 
 
@@ -44,24 +51,24 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
             return loaded
         return merge_problems([VariationProblems(one.variation, one.set_by, one.notes) for one in loaded])
     library = Library(PathSandbox.around(root, world_path))
-    if isinstance(path := library.fence.entered(file), Problem):
+    if isinstance(path := library.sandbox.resolve_argument(file), Problem):
         return [path]
-    if kind in STACKS:
+    if kind in STACK_KINDS:
         from simscen.loading.stacks.stackfile import read_stack_file
 
         return found if isinstance(found := read_stack_file(path, library), list) else found[1]
     if kind == "base":
         return check_base_file(path, library)
     assets = Assets(library)
-    senses: list[Problem] = []
+    world_problems: list[Problem] = []
     if kind == "world":
         world = assets.world_file(path)
-        senses = check_world_file(world) if world is not None else []
+        world_problems = check_world_file(world) if world is not None else []
     elif kind == "robot":
         assets.robot_file(path)
     else:
         assets.map_file(path)
-    return library.with_source(sorted([*assets.problems, *senses]))
+    return library.with_source(sorted([*assets.problems, *world_problems]))
 
 
 def file_kind(file: Path, root: Path) -> str:
@@ -78,8 +85,10 @@ def file_kind(file: Path, root: Path) -> str:
     tree, _ = library.read(file.absolute())
     if is_ros_map(tree):
         return "map"
-    if strange := recognize_stack_file(tree, "".join(library.texts.values()), library.fence.shown(file.absolute())):
-        return "stack" if strange == STACK_FILE_KIND else strange
+    if kind := recognize_stack_file(
+        tree, "".join(library.texts.values()), library.sandbox.display_name(file.absolute())
+    ):
+        return "stack" if kind == STACK_FILE_KIND else kind
     keys = set(tree.entries) if isinstance(tree, MappingNode) else set()
     if keys & _ONLY_SCENARIOS:
         return "scenario"
@@ -96,7 +105,7 @@ def check_base_file(file: Path, library: Library) -> list[Problem]:
         return library.with_source(problems)
     problems = check_partial(ScenarioSpec, _with_lists(tree))
     return library.with_source(
-        sorted([*problems, *(_of_files(tree, library) if isinstance(tree, MappingNode) else [])])
+        sorted([*problems, *(_named_file_problems(tree, library) if isinstance(tree, MappingNode) else [])])
     )
 
 
@@ -112,7 +121,7 @@ def _with_lists(tree: Node) -> Node:
     )
 
 
-def _of_files(tree: MappingNode, library: Library) -> list[Problem]:
+def _named_file_problems(tree: MappingNode, library: Library) -> list[Problem]:
     assets = Assets(library)
     world, model = child(tree, "world"), node_at(tree, ("robot", "model"))
     if isinstance(world, ScalarNode) and isinstance(world.value, str):

@@ -31,9 +31,9 @@ def stack_masks(scene: Scene) -> FilterMasks:
     return load_masks(scene.loaded)
 
 
-def judged_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
+def criterion_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
     """Return the masks of criteria, by file. Raises InvalidInput for a mask that cannot be read."""
-    return load_criterion_masks(scene.loaded.judged_masks, scene.loaded.tree, scene.loaded.sourced)
+    return load_criterion_masks(scene.loaded.criterion_masks, scene.loaded.tree, scene.loaded.with_source_line)
 
 
 @WORLD.check("SC302")
@@ -94,9 +94,9 @@ def shades_in_keepout_mask(scene: Scene) -> Iterator[Finding]:
 
 
 @WORLD.check("SC055", severity="warning")
-def judged_masks_without_effect(scene: Scene) -> Iterator[Finding]:
+def criterion_masks_without_effect(scene: Scene) -> Iterator[Finding]:
     """Find masks of criteria that forbid or limit nothing."""
-    masks = scene.once(judged_masks)
+    masks = scene.once(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         match entry.chosen:
             case Keepout(mask=str(name)) if not len(masks[name].forbidden):
@@ -111,7 +111,7 @@ def judged_masks_without_effect(scene: Scene) -> Iterator[Finding]:
 @WORLD.check("SC051")
 def keepout_masks_on_goals(scene: Scene) -> Iterator[Finding]:
     """Find keepout criteria whose mask forbids the start or a goal."""
-    masks = scene.once(judged_masks)
+    masks = scene.once(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         if not isinstance(entry.chosen, Keepout) or entry.chosen.mask is None:
             continue

@@ -22,10 +22,10 @@ def unknown_names(scope: NameScope) -> Iterator[Finding]:
     loaded = scope.loaded
     known = known_names(loaded, scope.world)
     for reference in references(loaded.spec, concerns=loaded.concerns):
-        names = known.get(reference.to)
+        names = known.get(reference.kind)
         if names is not None and reference.name not in names and not _is_immovable(scope, reference):
             hint = suggestion(reference.name, dict.fromkeys(names)) or "there is none"
-            message = f"no {NOUNS[reference.to]} is called {quoted(reference.name)}"
+            message = f"no {NOUNS[reference.kind]} is called {quoted(reference.name)}"
             yield Finding(reference.keys, message, hint)
 
 
@@ -35,7 +35,7 @@ def immovable_names(scope: NameScope) -> Iterator[Finding]:
     loaded = scope.loaded
     known = known_names(loaded, scope.world)
     for reference in references(loaded.spec, concerns=loaded.concerns):
-        names = known.get(reference.to)
+        names = known.get(reference.kind)
         if names is None or reference.name in names or not _is_immovable(scope, reference):
             continue
         what = "one of the robots" if reference.name in _robots(scope, reference) else "a fixed part of the world"
@@ -44,7 +44,7 @@ def immovable_names(scope: NameScope) -> Iterator[Finding]:
 
 
 def _is_immovable(scope: NameScope, reference: Reference) -> bool:
-    if reference.to not in ("movable", "mover"):
+    if reference.kind not in ("movable", "mover"):
         return False
     objects = known_names(scope.loaded, scope.world)["object"] or ()
     return reference.name in (*_robots(scope, reference), *objects)
@@ -52,7 +52,7 @@ def _is_immovable(scope: NameScope, reference: Reference) -> bool:
 
 def _robots(scope: NameScope, reference: Reference) -> tuple[str, ...]:
     """Return the robots that cannot be meant by a reference."""
-    own = (scope.loaded.robot_name,) if reference.to == "movable" else ()
+    own = (scope.loaded.robot_name,) if reference.kind == "movable" else ()
     return (*own, *scope.loaded.other_robots)
 
 

@@ -17,7 +17,7 @@ from simscen.loading.checks.events import MAX_OVERSHOOT
 from simscen.loading.checks.placement import blocked_poses
 from simscen.loading.checks.registry import Finding, Keys
 from simscen.loading.checks.scene import START, WORLD, Scene
-from simscen.loading.world_cache import bounds_with
+from simscen.loading.world_cache import extend_bounds
 from simscen.triggers.base import AnyCondition
 from simscen.triggers.robot_state import RobotIn, RobotWithin
 from simscen.worlds.geometry.overlaps import place_polygon, polygons_overlap
@@ -74,11 +74,11 @@ class RobotRoutes:
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
         """Bounds of the world and of all stops, with room to drive around them."""
-        return bounds_with(self.scene.world.bounds, list(self.stops))
+        return extend_bounds(self.scene.world.bounds, list(self.stops))
 
     @cached_property
     def _fixed(self) -> SimplePaths | None:
-        return self.scene.cache.plain_ways(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
+        return self.scene.cache.simple_paths(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
 
     def _plain(self, solids: tuple[Solid, ...]) -> SimplePaths | None:
         if solids is self.scene.world.solids:
@@ -86,7 +86,7 @@ class RobotRoutes:
         return simple_paths_between(solids, self.scene.size.inscribed, self.z_range)
 
     def _exact(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
-        return self.scene.cache.ways(solids, self.bounds, self.scene.size.inscribed, self.z_range)
+        return self.scene.cache.shortest_paths(solids, self.bounds, self.scene.size.inscribed, self.z_range)
 
 
 class TriggerArea(NamedTuple):

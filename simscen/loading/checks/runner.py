@@ -25,7 +25,7 @@ def check_scenario(
     problems = [*unknown_places, *NAMES.problems(NameScope(loaded, world)), *check_world_file(loaded.world)]
     if all(problem.severity == "warning" for problem in problems):
         problems += MEANING.problems(loaded)
-    return [loaded.sourced(problem) for problem in problems]
+    return [loaded.with_source_line(problem) for problem in problems]
 
 
 def check_world_file(world: LoadedWorld) -> list[Problem]:

@@ -50,7 +50,7 @@ def _check_robot(loaded: LoadedScenario, cache: WorldCache, pictures: Path | Non
     loaded = _with_robot_spec(loaded)
     blocking = blocking_world(loaded, world)
     problems = [*_check_names_again(loaded, world), *_too_large(loaded, world)]
-    problems += [loaded.sourced(problem) for problem in check_built_world(blocking, loaded.world)]
+    problems += [loaded.with_source_line(problem) for problem in check_built_world(blocking, loaded.world)]
     problems += _robot_file_mismatches(loaded)
     if not _has_errors(problems):
         problems += _check_scene(Scene(loaded, blocking, robot_size(loaded), cache), pictures)
@@ -61,7 +61,7 @@ def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
     problems = WORLD.problems(scene)
     if not _has_errors(problems):
         problems += TIMING.problems(scene)
-    problems = [scene.loaded.sourced(problem) for problem in sorted(problems)]
+    problems = [scene.loaded.with_source_line(problem) for problem in sorted(problems)]
     if problems and pictures is not None:
         gaps = [gap.position for _, gap in scene.once(reachability.closed_gaps)]
         file = draw_picture(scene, gaps, pictures)
@@ -119,7 +119,7 @@ def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:
         return
     from simscen.loading.checks.robot_geometry import dimension_warnings
 
-    yield from map(loaded.sourced, dimension_warnings(loaded.robot, load_robot(loaded)[1]))
+    yield from map(loaded.with_source_line, dimension_warnings(loaded.robot, load_robot(loaded)[1]))
 
 
 def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:

@@ -29,8 +29,8 @@ def shared_names(world: LoadedWorld) -> Iterator[Finding]:
             yield Finding(keys, message, warning=True)
         seen.add(obstacle.name)
     for number, wall in enumerate(spec.walls, start=1):
-        if wall.called(number) in moving:
-            message = f"an object or a door is also called {quoted(wall.called(number))}"
+        if wall.label(number) in moving:
+            message = f"an object or a door is also called {quoted(wall.label(number))}"
             yield Finding(("walls", number - 1, "name"), message, "rename one of them")
 
 

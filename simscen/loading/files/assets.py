@@ -12,7 +12,7 @@ from simscen.core.errors import Problem
 from simscen.core.version import PACKAGE
 from simscen.loading.files.paths import PathProblem
 from simscen.loading.known_names import resolve_places, unknown_places
-from simscen.loading.loaded import JudgedMask, LoadedMap, LoadedRobot, LoadedWorld
+from simscen.loading.loaded import CriterionMask, LoadedMap, LoadedRobot, LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.spec_walk import references
@@ -26,9 +26,9 @@ from simscen.model.world import WorldSpec
 Model = TypeVar("Model", bound=BaseModel)
 Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
 
-GAZEBO = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
-URDF = (".urdf", ".xacro")
-ROBOT = ".robot.yaml"
+SDF_SUFFIXES = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
+URDF_SUFFIXES = (".urdf", ".xacro")
+ROBOT_SUFFIX = ".robot.yaml"
 
 
 @dataclass
@@ -41,11 +41,11 @@ class Assets:
     def world(self, written: ScalarNode) -> LoadedWorld | None:
         """Load the world in the file that a scenario names."""
         path = self._find(str(written.value), written.place)
-        return None if path is None else self._once(self.world_file, path)
+        return None if path is None else self._load_cached(self.world_file, path)
 
     def world_file(self, path: Path) -> LoadedWorld | None:
         """Load the world in a file: SDF by suffix, a ROS map by its keys, else a world file of simscen."""
-        if path.name.endswith(GAZEBO):
+        if path.name.endswith(SDF_SUFFIXES):
             return LoadedWorld(path.name.split(".")[0], path, sdf=path)
         tree = self._tree(path)
         if is_ros_map(tree):
@@ -55,7 +55,7 @@ class Assets:
         return self.own_world(spec, tree, path) if spec and tree else None
 
     def own_world(self, spec: WorldSpec, tree: Node, path: Path) -> LoadedWorld | None:
-        """Load the map or SDF that a world of simscen builds on, and replace names of places by poses."""
+        """Load the map or SDF that a simscen world extends, and replace names of places by poses."""
         before = len(self.problems)
         loaded_map = sdf = None
         if spec.map is not None:
@@ -73,7 +73,7 @@ class Assets:
     def map(self, written: ScalarNode) -> LoadedMap | None:
         """Load the ROS map in the file that a scenario names."""
         path = self._find(str(written.value), written.place)
-        return None if path is None else self._once(self.map_file, path)
+        return None if path is None else self._load_cached(self.map_file, path)
 
     def map_file(self, path: Path) -> LoadedMap | None:
         """Load the ROS map in a file."""
@@ -81,21 +81,21 @@ class Assets:
 
     def robot(self, written: str, place: Position) -> LoadedRobot | None:
         """Load a robot by the path of its file, or by the name of a robot that ships with simscen."""
-        if "/" in written or written.endswith((*URDF, ".yaml", ".yml")):
+        if "/" in written or written.endswith((*URDF_SUFFIXES, ".yaml", ".yml")):
             path = self._find(written, place)
-            return None if path is None else self._once(self.robot_file, path)
-        shipped = shipped_robots()
-        if written in shipped:
-            return self._once(partial(self.robot_file, bundled=True), shipped[written])
-        hint = f"{suggestion(written, shipped)} (or the path of a *.robot.yaml or .urdf file)"
+            return None if path is None else self._load_cached(self.robot_file, path)
+        bundled_files = shipped_robots()
+        if written in bundled_files:
+            return self._load_cached(partial(self.robot_file, bundled=True), bundled_files[written])
+        hint = f"{suggestion(written, bundled_files)} (or the path of a *.robot.yaml or .urdf file)"
         self._add(place, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
         return None
 
     def robot_file(self, path: Path, bundled: bool = False) -> LoadedRobot | None:
         """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file."""
         name = path.name.split(".")[0]
-        if path.suffix in URDF:
-            text = read_text(path, self.library.fence.shown(path))
+        if path.suffix in URDF_SUFFIXES:
+            text = read_text(path, self.library.sandbox.display_name(path))
             if isinstance(text, Problem) and text.message != "larger than 1 MiB":
                 self.problems.append(text)
                 return None
@@ -113,8 +113,8 @@ class Assets:
         found = {package: folder for package, folder in packages.items() if folder is not None}
         return LoadedRobot(name, path, spec, urdf, bundled, body, found)
 
-    def _once(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
-        """Load a file; one without problems is loaded once for all variations of a scenario."""
+    def _load_cached(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
+        """Load a file; a file without problems is cached for all variations of a scenario."""
         name = getattr(load, "func", load).__name__, path
         if name in self.library.loaded:
             known: Loaded = self.library.loaded[name]
@@ -130,7 +130,11 @@ class Assets:
         if spec is None or tree is None:
             return None
         image = self._find(spec.image, value_position(tree, ("image",)))
-        return LoadedMap(path, spec, image, tuple(self.library.with_source(_unread(tree)))) if image else None
+        return (
+            LoadedMap(path, spec, image, tuple(self.library.with_source(_ignored_key_warnings(tree))))
+            if image
+            else None
+        )
 
     def _tree(self, path: Path) -> Node | None:
         tree, problems = self.library.read(path)
@@ -161,7 +165,7 @@ class Assets:
         return found
 
     def _existing(self, written: str, place: Position) -> Path | None:
-        found = self.library.fence.find(written, self.library.folder_of(place))
+        found = self.library.sandbox.find(written, self.library.folder_of(place))
         if isinstance(found, PathProblem):
             self._add(place, found.code, found.message, found.hint)
             return None
@@ -176,20 +180,24 @@ def is_ros_map(tree: Node | None) -> bool:
     return isinstance(tree, MappingNode) and "image" in tree.entries and "resolution" in tree.entries
 
 
-def _unread(tree: Node) -> list[Problem]:
+def _ignored_key_warnings(tree: Node) -> list[Problem]:
     """Return warnings about keys that map_server ignores."""
     if not isinstance(tree, MappingNode):
         return []
-    unread = [key for key in tree.entries if key not in RosMapSpec.model_fields]
+    ignored = [key for key in tree.entries if key not in RosMapSpec.model_fields]
     return [
         Problem(
-            *key_position(tree, (key,)), "SC311", f"{quoted(key)} has no meaning in a ROS map", _meant(key), "warning"
+            *key_position(tree, (key,)),
+            "SC311",
+            f"{quoted(key)} has no meaning in a ROS map",
+            _ignored_key_hint(key),
+            "warning",
         )
-        for key in unread
+        for key in ignored
     ]
 
 
-def _meant(key: str) -> str:
+def _ignored_key_hint(key: str) -> str:
     near = suggestion(key, RosMapSpec.model_fields)
     return near if near.startswith("did you mean") else "it is ignored, as by map_server"
 
@@ -197,19 +205,19 @@ def _meant(key: str) -> str:
 def shipped_robots() -> dict[str, Path]:
     """Return the files of the robots that ship with simscen, by name."""
     folder = PACKAGE / "data" / "robots"
-    return {path.name.removesuffix(ROBOT): path for path in sorted(folder.glob(f"*{ROBOT}"))}
+    return {path.name.removesuffix(ROBOT_SUFFIX): path for path in sorted(folder.glob(f"*{ROBOT_SUFFIX}"))}
 
 
-def load_judged_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, JudgedMask]:
-    """Return the filter masks of the criteria under `pass`, by file as written; problems are added to `assets`.
+def find_criterion_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, CriterionMask]:
+    """Load the filter masks of the criteria under `pass`, by file name as written; problems are added to `assets`.
 
-    Lists are never merged, so all masks are named in one file, and a path always means the same mask.
+    Lists are never merged, so all masks are named in one file, and equal paths refer to the same mask.
     """
-    found: dict[str, JudgedMask] = {}
+    found: dict[str, CriterionMask] = {}
     for reference in references(spec):
         node = node_at(tree, reference.keys)
-        if reference.to == "mask" and reference.keys[0] == "pass" and isinstance(node, ScalarNode):
+        if reference.kind == "mask" and reference.keys[0] == "pass" and isinstance(node, ScalarNode):
             loaded = assets.map(node)
             if loaded is not None:
-                found.setdefault(reference.name, JudgedMask(reference.keys, loaded))
+                found.setdefault(reference.name, CriterionMask(reference.keys, loaded))
     return found

@@ -12,28 +12,28 @@ from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 _MODELINE = "# yaml-language-server:"
-_READABLE = (".yaml", ".yml")
-_WITH_OTHER_REFERENCES = (".sdf", ".world", ".urdf", ".xacro")
-"""Files that refer to models, packages and meshes in formats that are not searched."""
+_SEARCHED_SUFFIXES = (".yaml", ".yml")
+_UNSEARCHED_SUFFIXES = (".sdf", ".world", ".urdf", ".xacro")
+"""Formats that can refer to further files, but are not searched for them."""
 
 
 def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path]:
-    """Copy a scenario to `target`, and the files it needs to a folder with its name next to it; return the new files.
+    """Copy a scenario to `target`, and the files it needs to a folder of the same name next to it; return the copies.
 
-    If `target` is in the root of the scenario, the other files stay and only their paths are adapted. The text is that
-    of the file with its comments; a scenario that extends others is merged with them. Raises UsageError if a file
+    If `target` is in the root of the scenario, the other files stay and only their paths are adapted. The text keeps
+    its comments, except that a scenario that extends other files is merged with them. Raises UsageError if a file
     cannot be copied.
     """
     text, tree = _text_of(loaded)
     named = {leaf: _file_of(leaf, loaded) for leaf in _leaves(tree)}
     files = {leaf: file for leaf, file in named.items() if file is not None}
-    needed = sorted({one for file in files.values() for one in _needed(file)})
-    stays = root == loaded.root
-    home = Path(commonpath([file.parent for file in needed])) if needed else loaded.root
+    needed = sorted({one for file in files.values() for one in _with_dependencies(file)})
+    same_root = root == loaded.root
+    common_folder = Path(commonpath([file.parent for file in needed])) if needed else loaded.root
     folder = target.parent / target.name.partition(".")[0]
-    copies = {} if stays else {file: folder / file.relative_to(home) for file in needed}
-    if taken := next((copy for copy in copies.values() if copy.exists()), None):
-        raise UsageError(f"{taken} already exists; choose another name")
+    copies = {} if same_root else {file: folder / file.relative_to(common_folder) for file in needed}
+    if existing := next((copy for copy in copies.values() if copy.exists()), None):
+        raise UsageError(f"{existing} already exists; choose another name")
     for file, copy in copies.items():
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, copy)
@@ -65,28 +65,28 @@ def _leaves(node: Node | None) -> Iterator[ScalarNode]:
 
 def _file_of(leaf: ScalarNode, loaded: LoadedScenario) -> Path | None:
     """Return the file that a text names, relative to one of the files of the scenario."""
-    return _named(leaf, {file.parent for file in loaded.files.values()})
+    return _existing_file(leaf, {file.parent for file in loaded.files.values()})
 
 
-def _named(leaf: ScalarNode, folders: set[Path]) -> Path | None:
+def _existing_file(leaf: ScalarNode, folders: set[Path]) -> Path | None:
     if not isinstance(leaf.value, str) or "." not in leaf.value or "\n" in leaf.value or len(leaf.value) > 4096:
         return None
     return next((file for folder in sorted(folders) if (file := (folder / leaf.value).resolve()).is_file()), None)
 
 
-def _needed(file: Path, known: frozenset[Path] = frozenset()) -> Iterator[Path]:
+def _with_dependencies(file: Path, known: frozenset[Path] = frozenset()) -> Iterator[Path]:
     """Yield a file and the files that it names, recursively."""
     if file in known:
         return
-    if file.name.endswith(_WITH_OTHER_REFERENCES):
+    if file.name.endswith(_UNSEARCHED_SUFFIXES):
         raise UsageError(f"{file.name} may refer to models and meshes: copy its folder yourself")
     yield file
-    if file.name.endswith(_READABLE):
+    if file.name.endswith(_SEARCHED_SUFFIXES):
         tree, _ = parse_yaml(file.read_text(encoding="utf-8"), file.name)
         for leaf in _leaves(tree):
-            other = _named(leaf, {file.parent})
+            other = _existing_file(leaf, {file.parent})
             if other is not None:
-                yield from _needed(other, known | {file})
+                yield from _with_dependencies(other, known | {file})
 
 
 def _with_path(text: str, leaf: ScalarNode, path: str) -> str:

@@ -1,4 +1,4 @@
-"""Load criteria from a scenario, or from a file with nothing else, to judge logs."""
+"""Load criteria from a scenario or from a file with criteria only, to judge logs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -6,10 +6,10 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading import multirobot
-from simscen.loading.files.assets import Assets, load_judged_masks
+from simscen.loading.files.assets import Assets, find_criterion_masks
 from simscen.loading.files.paths import PathSandbox
-from simscen.loading.known_names import NO_WORLD, place_references, places_of, resolve_places, unknown_places
-from simscen.loading.loaded import JudgedMask, LoadedRobot, LoadedWorld
+from simscen.loading.known_names import NO_WORLD_HINT, place_references, places_of, resolve_places, unknown_places
+from simscen.loading.loaded import CriterionMask, LoadedRobot, LoadedWorld
 from simscen.loading.schema.messages import quoted
 from simscen.loading.schema.validate import check
 from simscen.loading.yaml.library import Library
@@ -22,7 +22,7 @@ from simscen.model.world import WorldSpec
 class LoadedCriteria:
     """Criteria of a file; `lines` are their lines in `file`, 0 for criteria of a file that it extends.
 
-    `masks` are their filter masks, by file as written.
+    `masks` are their filter masks, by file name as written.
     """
 
     file: Path
@@ -30,9 +30,9 @@ class LoadedCriteria:
     lines: tuple[int, ...]
     tree: MappingNode = field(repr=False)
     library: Library = field(repr=False)
-    masks: Mapping[str, JudgedMask] = field(default_factory=dict)
+    masks: Mapping[str, CriterionMask] = field(default_factory=dict)
 
-    def of(self, robot: str) -> "LoadedCriteria":
+    def for_robot(self, robot: str) -> "LoadedCriteria":
         """Return the criteria for one of several robots, or "" for the only robot of a log. Raises InvalidInput.
 
         A file without `robots` applies to every robot.
@@ -47,7 +47,7 @@ class LoadedCriteria:
         problem = Problem(*key_position(self.tree, (multirobot.ROBOTS,)), code="SC030", message=message)
         raise InvalidInput(self.library.with_source([problem]))
 
-    def surroundings(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
+    def load_world_and_robot(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
         """Load the world and the robot that the file names, if any. Raises InvalidInput."""
         assets, robot = Assets(self.library), None
         world = _world(self.spec, self.tree, self.file, assets)
@@ -64,16 +64,16 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
     Raises InvalidInput with all problems.
     """
     library = Library(PathSandbox.around(root, world_path))
-    file = library.fence.entered(path)
+    file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):
         raise InvalidInput([file])
     tree, problems = library.read(file, defaults=True)
     if problems or not isinstance(tree, MappingNode):
         spec = [] if problems or tree is None else check(CriteriaSpec, tree, multirobot.missing_in_criteria)
         raise InvalidInput(library.with_source([*problems, *(spec if isinstance(spec, list) else ())]))
-    wrong = check(CriteriaSpec, tree, multirobot.missing_in_criteria)
-    if isinstance(wrong, list):
-        raise InvalidInput(library.with_source(wrong))
+    spec = check(CriteriaSpec, tree, multirobot.missing_in_criteria)
+    if isinstance(spec, list):
+        raise InvalidInput(library.with_source(spec))
     return _loaded(file, tree, library)
 
 
@@ -83,14 +83,14 @@ def _loaded(file: Path, tree: MappingNode, library: Library) -> LoadedCriteria:
     if isinstance(spec, list):
         raise InvalidInput(library.with_source(spec))
     assets = Assets(library)
-    masks = load_judged_masks(spec, tree, assets)
+    masks = find_criterion_masks(spec, tree, assets)
     if any(place_references(spec)):
         known = places_of(_world(spec, tree, file, assets))
-        assets.problems += unknown_places(spec, tree, known, NO_WORLD)
+        assets.problems += unknown_places(spec, tree, known, NO_WORLD_HINT)
         spec = resolve_places(spec, known)
     if assets.problems:
         raise InvalidInput(library.with_source(sorted(assets.problems)))
-    shown = library.fence.shown(file)
+    shown = library.sandbox.display_name(file)
     places = [value_position(tree, ("pass", index)) for index in range(len(spec.pass_))]
     return LoadedCriteria(file, spec, tuple(p.line if p.path == shown else 0 for p in places), tree, library, masks)
 

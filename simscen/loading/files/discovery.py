@@ -10,27 +10,28 @@ from simscen.loading.scenario import scenario_id
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 
-SCENARIO = (".scenario.yaml", ".scenario.yml")
-WORLD = (".world.yaml", ".world.yml")
-ROBOT = (".robot.yaml", ".robot.yml")
-STUDY = (".study.yaml", ".study.yml")
-STACK = (".stack.yaml", ".stack.yml")
-BASE = (".base.yaml", ".base.yml")
+SCENARIO_SUFFIXES = (".scenario.yaml", ".scenario.yml")
+WORLD_SUFFIXES = (".world.yaml", ".world.yml")
+ROBOT_SUFFIXES = (".robot.yaml", ".robot.yml")
+STUDY_SUFFIXES = (".study.yaml", ".study.yml")
+STACK_SUFFIXES = (".stack.yaml", ".stack.yml")
+BASE_SUFFIXES = (".base.yaml", ".base.yml")
+SUFFIXES = SCENARIO_SUFFIXES + STUDY_SUFFIXES + WORLD_SUFFIXES + ROBOT_SUFFIXES + STACK_SUFFIXES + BASE_SUFFIXES
 
-REPOSITORY = (".git", ".hg", ".jj", ".svn")
-PROJECT = ("pyproject.toml", "package.xml", "setup.py")
+REPOSITORY_FOLDERS = (".git", ".hg", ".jj", ".svn")
+PROJECT_FILES = ("pyproject.toml", "package.xml", "setup.py")
 """Files at the top of a Python project or a ROS package, for copies without a repository."""
-SCENARIOS = "scenarios"
+SCENARIOS_FOLDER = "scenarios"
 
 
-def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCENARIO) -> list[Path]:
-    """Return the scenario files that `paths` select, sorted: files as given, and `*.scenario.yaml` in folders.
+def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCENARIO_SUFFIXES) -> list[Path]:
+    """Return the files that `paths` select, sorted: files as given, and files with one of `suffixes` in folders.
 
     Raises InvalidInput if a path is missing or two scenarios have the same id up to case, and NothingSelected if there
     are no scenarios.
     """
-    problems = [problem for path in paths if (problem := _missing(path))]
-    found = dict.fromkeys(file.absolute() for path in paths for file in _files(path, suffixes, problems))
+    problems = [problem for path in paths if (problem := _missing_path_problem(path))]
+    found = dict.fromkeys(file.absolute() for path in paths for file in _selected_files(path, suffixes, problems))
     if problems:
         raise InvalidInput(problems)
     if not found:
@@ -38,16 +39,16 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
         raise NothingSelected(f"no scenarios found in {where}; folders are searched for *{suffixes[0]}")
     files = sorted(found, key=lambda file: file.parts)
     home = Path(os.path.realpath(root))
-    if problems := [*_folder_conflicts(files, home), *_same_ids(files, home)]:
+    if problems := [*_output_folder_conflicts(files, home), *_duplicate_ids(files, home)]:
         raise InvalidInput(sorted(problems))
     return files
 
 
 def sibling(file: Path, label: str) -> Path:
     """Return a scenario file beside another, such as `goal.minimal.scenario.yaml` beside `goal.scenario.yaml`."""
-    suffixes = (*SCENARIO, *STUDY)
+    suffixes = (*SCENARIO_SUFFIXES, *STUDY_SUFFIXES)
     name = next((file.name.removesuffix(end) for end in suffixes if file.name.endswith(end)), file.stem)
-    return file.with_name(f"{name}.{label}{SCENARIO[0]}")
+    return file.with_name(f"{name}.{label}{SCENARIO_SUFFIXES[0]}")
 
 
 def default_root(paths: Iterable[Path]) -> Path:
@@ -61,15 +62,15 @@ def default_root(paths: Iterable[Path]) -> Path:
     common = Path(os.path.commonpath(folders)) if folders else Path.cwd()
     above = (common, *common.parents)
     candidates = (
-        *(folder for folder in above if _holds(folder, REPOSITORY)),
-        *(folder for folder in above if _holds(folder, PROJECT)),
-        *(folder.parent for folder in above if folder.name == SCENARIOS and not _is_too_wide(folder.parent)),
+        *(folder for folder in above if _contains_any(folder, REPOSITORY_FOLDERS)),
+        *(folder for folder in above if _contains_any(folder, PROJECT_FILES)),
+        *(folder.parent for folder in above if folder.name == SCENARIOS_FOLDER and not _is_too_wide(folder.parent)),
         *(folder for folder in (Path.cwd(),) if common.is_relative_to(folder) and not _is_too_wide(folder)),
     )
     return next(iter(candidates), common)
 
 
-def _holds(folder: Path, names: tuple[str, ...]) -> bool:
+def _contains_any(folder: Path, names: tuple[str, ...]) -> bool:
     return any(exists(folder / name) for name in names)
 
 
@@ -78,7 +79,7 @@ def _is_too_wide(folder: Path) -> bool:
     return folder == folder.parent or Path(os.path.realpath(Path("~").expanduser())).is_relative_to(folder)
 
 
-def _missing(path: Path) -> Problem | None:
+def _missing_path_problem(path: Path) -> Problem | None:
     try:
         path.lstat()
     except (OSError, ValueError) as error:
@@ -87,7 +88,7 @@ def _missing(path: Path) -> Problem | None:
     return None
 
 
-def _files(path: Path, suffixes: tuple[str, ...], problems: list[Problem]) -> Iterator[Path]:
+def _selected_files(path: Path, suffixes: tuple[str, ...], problems: list[Problem]) -> Iterator[Path]:
     """Yield the files that `path` selects; add a problem for each folder that cannot be searched."""
     if not is_folder(path):
         yield path
@@ -106,7 +107,7 @@ def _files(path: Path, suffixes: tuple[str, ...], problems: list[Problem]) -> It
         problems.append(Problem(str(path), 0, 0, "SC001", "is a folder, but has the name of a file", "rename it"))
 
 
-def _folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]:
+def _output_folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]:
     """Yield problems with ids whose output folder would be the folder of a run (seed-…) of another scenario."""
     ids = {scenario_id(file, root).casefold() for file in files}
     for file in files:
@@ -115,18 +116,18 @@ def _folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]:
         for depth, part in enumerate(above[1:], start=1):
             if part.startswith("seed-") and (other := "/".join(above[:depth])) in ids:
                 message = f"its output folder would be the folder of a run of {quoted(other)}"
-                yield Problem(_shown(file, root), 0, 0, "SC041", message, "rename one of them")
+                yield Problem(_display_name(file, root), 0, 0, "SC041", message, "rename one of them")
 
 
-def _shown(file: Path, root: Path) -> str:
+def _display_name(file: Path, root: Path) -> str:
     return str(file.relative_to(root)) if file.is_relative_to(root) else str(file)
 
 
-def _same_ids(files: list[Path], root: Path) -> Iterator[Problem]:
-    """Yield problems with ids that are equal up to case: some file systems cannot distinguish their output folders."""
+def _duplicate_ids(files: list[Path], root: Path) -> Iterator[Problem]:
+    """Yield problems with ids that differ only in case: some file systems cannot distinguish their output folders."""
     seen: dict[str, Path] = {}
     for file in files:
         other = seen.setdefault(scenario_id(file, root).casefold(), file)
         if other != file:
-            message = f"has the same id as {quoted(_shown(other, root))}, except for case or suffix"
-            yield Problem(_shown(file, root), 0, 0, "SC040", message, "rename one of them")
+            message = f"has the same id as {quoted(_display_name(other, root))}, except for case or suffix"
+            yield Problem(_display_name(file, root), 0, 0, "SC040", message, "rename one of them")

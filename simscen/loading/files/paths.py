@@ -11,7 +11,7 @@ from simscen.core.errors import Problem
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.textfile import os_error_reason
 
-MODEL = "model://"
+MODEL_SCHEME = "model://"
 
 _INVALID_IN_NAMES = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
 """Control and bidirectional characters, and surrogates for bytes that are not UTF-8 (PEP 383)."""
@@ -26,51 +26,51 @@ class PathSandbox:
 
     @classmethod
     def around(cls, root: Path, world_path: Sequence[Path] = ()) -> "PathSandbox":
-        """Return the sandbox of these folders, made absolute with symbolic links resolved."""
-        return cls(_real(root), tuple(_real(folder) for folder in world_path))
+        """Return the sandbox of these folders, as absolute paths with symbolic links resolved."""
+        return cls(_resolved(root), tuple(_resolved(folder) for folder in world_path))
 
     def find(self, written: str, folder: Path) -> "Path | PathProblem":
         """Return the existing file or folder for a path written in a file in `folder`.
 
         The path is resolved relative to `folder` first, and must stay inside the root. `model://name/…` and relative
-        paths are then searched in the folders of `--world-path`. Problems do not reveal what exists outside.
+        paths are then searched in the folders of `--world-path`. Problems do not reveal which files exist outside.
         """
-        if refusal := _refused_form(written):
-            return refusal
-        if written.startswith(MODEL):
+        if problem := _invalid_form(written):
+            return problem
+        if written.startswith(MODEL_SCHEME):
             message = f"{quoted(written)} was not found in any folder of --world-path"
             missing = PathProblem("SC023", message, _world_path_hint(self))
-            return self._in_world_path(written.removeprefix(MODEL)) or missing
-        inside = _real(folder / written)
-        if self.holds(inside):
+            return self._in_world_path(written.removeprefix(MODEL_SCHEME)) or missing
+        inside = _resolved(folder / written)
+        if self.contains(inside):
             try:
                 inside.stat()
             except OSError as error:
-                refusal = _unusable(error, written, inside)
+                problem = _unusable(error, written, inside)
             else:
                 return inside
-        return self._in_world_path(written) or refusal or _outside(written)
+        return self._in_world_path(written) or problem or _outside(written)
 
-    def entered(self, path: Path) -> Path | Problem:
-        """Return the absolute path of a file named on the command line if it is inside, else a problem."""
-        file = _real(path.parent) / path.name
-        if self.holds(file):
-            return _name_problem(path, self.shown(file)) or file
+    def resolve_argument(self, path: Path) -> Path | Problem:
+        """Return the absolute path of a file named on the command line; a problem if it is outside the sandbox."""
+        file = _resolved(path.parent) / path.name
+        if self.contains(file):
+            return _name_problem(path, self.display_name(file)) or file
         return Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose the root with --root")
 
-    def holds(self, path: Path) -> bool:
+    def contains(self, path: Path) -> bool:
         """Return whether a file, with symbolic links resolved, is inside the root or an allowed folder."""
-        real = _real(path)
+        real = _resolved(path)
         return any(real.is_relative_to(allowed) for allowed in (self.root, *self.world_path))
 
-    def shown(self, path: Path) -> str:
+    def display_name(self, path: Path) -> str:
         """Return the name of a file in messages: relative to the root if it is inside."""
         return path.relative_to(self.root).as_posix() if path.is_relative_to(self.root) else str(path)
 
     def _in_world_path(self, written: str) -> Path | None:
         if ".." in PurePosixPath(written).parts:
             return None
-        candidates = ((folder, _real(folder / written)) for folder in self.world_path)
+        candidates = ((folder, _resolved(folder / written)) for folder in self.world_path)
         return next((found for folder, found in candidates if found.is_relative_to(folder) and exists(found)), None)
 
 
@@ -93,12 +93,12 @@ class PathProblem:
     hint: str = ""
 
 
-def _refused_form(written: str) -> PathProblem | None:
+def _invalid_form(written: str) -> PathProblem | None:
     if any(not c.isprintable() for c in written):
         return PathProblem("SC017", f"control character in the path {quoted(written)}")
     if written.startswith(("/", "~")) or (len(written) > 1 and written[1] == ":"):
         return PathProblem("SC021", f"{quoted(written)} is an absolute path", "write it relative to this file")
-    if "://" in written and not written.startswith(MODEL):
+    if "://" in written and not written.startswith(MODEL_SCHEME):
         return PathProblem("SC021", f"{quoted(written)} is a URL", "use a relative path or model://name")
     return None
 
@@ -114,7 +114,7 @@ def _name_problem(path: Path, name: str) -> Problem | None:
     return Problem(str(path), 0, 0, "SC017", message, "rename the file")
 
 
-def _real(path: Path) -> Path:
+def _resolved(path: Path) -> Path:
     """Return the path with symbolic links resolved; Path.resolve raises RuntimeError on a loop."""
     return Path(os.path.realpath(path))
 
@@ -129,8 +129,8 @@ def _unusable(error: OSError, written: str, path: Path) -> PathProblem:
     return PathProblem(code, f"{os_error_reason(error)}: {quoted(written)}", _sibling(path))
 
 
-def _world_path_hint(fence: PathSandbox) -> str:
-    return "" if fence.world_path else "allow its folder with --world-path"
+def _world_path_hint(sandbox: PathSandbox) -> str:
+    return "" if sandbox.world_path else "allow its folder with --world-path"
 
 
 def _sibling(missing: Path) -> str:

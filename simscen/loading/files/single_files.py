@@ -1,4 +1,4 @@
-"""Load a robot file or a world file by itself, and write worlds as `*.world.yaml`."""
+"""Load a robot file or a world file without a scenario, and write worlds as `*.world.yaml`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class RobotFile:
     @property
     def roots(self) -> tuple[Path, ...]:
         """The root and the folders of `--world-path`."""
-        return (self.library.fence.root, *self.library.fence.world_path)
+        return (self.library.sandbox.root, *self.library.sandbox.world_path)
 
 
 def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -> RobotFile:
@@ -38,7 +38,7 @@ def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -
     shipped = shipped_robots()
     library = Library(PathSandbox.around(root, world_path))
     bundled = written in shipped and not Path(written).exists()
-    path = shipped[written] if bundled else library.fence.entered(Path(written))
+    path = shipped[written] if bundled else library.sandbox.resolve_argument(Path(written))
     if isinstance(path, Problem):
         raise InvalidInput([path])
     if not path.is_file():
@@ -54,7 +54,7 @@ def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -
 def load_world_file(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedWorld:
     """Load the world in a `*.world.yaml`, a ROS map or an SDF file. Raises InvalidInput with all problems."""
     library = Library(PathSandbox.around(root, world_path))
-    file = library.fence.entered(path)
+    file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):
         raise InvalidInput([file])
     if not file.exists():

@@ -46,18 +46,18 @@ IGNORED_PARAMETERS = frozenset(
         "always_reset_initial_pose", "polygons", "controller_plugin_types",
     }
 )  # fmt: skip
-"""Parameters without a meaning in simulation: transport, visualization, lists of plugins that follow."""
+"""Parameters that have no effect in simulation: transport, visualization, lists of plugins."""
 IGNORED_NAME_PARTS = (
     "frame", "topic", "plugin", "use_sim_time", "transform_t", "introspection_mode", "publish", "visualize", "bond",
     "qos", "realtime_priority", "stamp", "transport",
 )  # fmt: skip
-"""Parameters with one of these in their names have no meaning in simulation either."""
+"""Parameters whose names contain one of these have no effect in simulation either."""
 EQUIVALENT_VALUES: Mapping[str, tuple[object, ...]] = {
     "enabled": (True,), "marking": (True,), "clearing": (True,), "use_astar": (False,), "scale_velocities": (False,),
     "feedback": ("OPEN_LOOP",), "base_shift_correction": (True,), "deadband_velocity": ([0.0, 0.0, 0.0],),
     "combination_method": (1,), "footprint_clearing_enabled": (True,),
 }  # fmt: skip
-"""Parameters that simscen does not have, with the values that describe what it does anyway."""
+"""Parameters that simscen does not have, with the values that match its behavior."""
 SCENARIO_PARAMETERS: Mapping[str, str] = {
     **dict.fromkeys(("footprint", "robot_radius"), "the robot file defines the size of the robot"),
     **dict.fromkeys(("initial_pose", "set_initial_pose"), "the scenario defines the initial pose"),
@@ -73,7 +73,7 @@ IGNORED_NODES = frozenset(
         "speed_costmap_filter_info_server", "loopback_simulator", "rviz2", "robot_state_publisher",
     }
 )  # fmt: skip
-"""Nodes whose tasks the scenario, its map and its zones take over."""
+"""Nodes that the scenario, its map and its zones replace."""
 
 
 def class_of(plugin: object) -> str:
@@ -93,25 +93,25 @@ Known = Mapping[str, Sequence[str]]
 class Translation:
     """Nav2 parameter, and the keys and value below `stack:` that it becomes.
 
-    `why` is a note for the user. A parameter with neither path nor note already matches what simscen does. Parameters
-    whose names begin with `covers` are treated the same way, without a note of their own.
+    `note` is for the user. A parameter with neither path nor note already matches the behavior of simscen. Parameters
+    whose names begin with `covers` are treated the same way, without notes of their own.
     """
 
     node: str
     parameter: str
     path: Path
     value: Any
-    why: str = ""
+    note: str = ""
     covers: str | None = None
 
 
 def translate_same_name(
-    node: str, name: str, value: Any, section: Path, known: Sequence[str], own: str = ""
+    node: str, name: str, value: Any, section: Path, known: Sequence[str], simscen_name: str = ""
 ) -> Iterator[Translation]:
-    """Yield the translation of a parameter that exists in simscen under the same name, or under `own`."""
-    here = own or name
-    if here in known:
-        yield Translation(node, name, (*section, *here.split(".")), value)
+    """Yield the translation of a parameter that exists in simscen under the same name, or under `simscen_name`."""
+    target = simscen_name or name
+    if target in known:
+        yield Translation(node, name, (*section, *target.split(".")), value)
 
 
 def strings(value: Any) -> list[str]:

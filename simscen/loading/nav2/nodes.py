@@ -33,15 +33,15 @@ def costmap(node: str, parameters: Parameters, known: Known) -> Iterator[Transla
     """Translate the parameters of the global or the local costmap."""
     section = "local_costmap" if node == "local_costmap" else "costmap"
     layers = _layers(parameters)
-    besides = {*layers, *strings(parameters.get("filters"))}
+    handled = {*layers, *strings(parameters.get("filters"))}
     for name, value in parameters.items():
         layer, _, rest = name.partition(".")
         if not rest:
-            yield from _own(node, name, value, section, known[section])
+            yield from _translate_costmap_parameter(node, name, value, section, known[section])
         elif layer in layers:
-            yield from _of_layer(node, name, parameters, layers, section, known)
-        elif layer not in besides:
-            besides.add(layer)
+            yield from _translate_layer_parameter(node, name, parameters, layers, section, known)
+        elif layer not in handled:
+            handled.add(layer)
             yield Translation(node, name, (), value, f"`plugins` does not list {layer}", covers=f"{layer}.")
     for zones in strings(parameters.get("filters")):
         yield Translation(node, "filters", (), None, covers=f"{zones}.")  # zones are part of the scenario
@@ -53,7 +53,9 @@ def _layers(parameters: Parameters) -> Mapping[str, str]:
     return {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(parameters["plugins"])}
 
 
-def _own(node: str, name: str, value: object, section: str, known: Sequence[str]) -> Iterator[Translation]:
+def _translate_costmap_parameter(
+    node: str, name: str, value: object, section: str, known: Sequence[str]
+) -> Iterator[Translation]:
     if name == "rolling_window":
         rolls = section == "local_costmap"
         why = "" if bool(value) == rolls else "the local costmap always rolls, the global one with `map: none`"
@@ -61,7 +63,7 @@ def _own(node: str, name: str, value: object, section: str, known: Sequence[str]
     yield from translate_same_name(node, name, value, (section,), known)
 
 
-def _of_layer(
+def _translate_layer_parameter(
     node: str, name: str, parameters: Parameters, layers: Mapping[str, str], section: str, known: Known
 ) -> Iterator[Translation]:
     layer, _, rest = name.partition(".")
@@ -74,24 +76,33 @@ def _of_layer(
 
 
 def velocity_smoother(node: str, parameters: Parameters, _: Known) -> Iterator[Translation]:
-    """Translate limits; the lateral limit is always the forward limit, and so is the limit backward."""
+    """Translate velocity and acceleration limits; lateral and backward motion have the limits of forward motion."""
     for name, turning in (
         ("max_velocity", "max_angular_velocity"),
         ("max_accel", "max_angular_accel"),
         ("max_decel", ""),
     ):
-        limits = _axes(parameters.get(name))
-        for ours, limit in zip((name, turning), limits[::2], strict=True) if limits else ():
-            if ours and limit:
-                yield Translation(node, name, ("velocity_smoother", ours), abs(limit))
+        limits = _xy_and_rotation(parameters.get(name))
+        for simscen_name, limit in zip((name, turning), limits[::2], strict=True) if limits else ():
+            if simscen_name and limit:
+                yield Translation(node, name, ("velocity_smoother", simscen_name), abs(limit))
         if limits and limits[1] and abs(limits[1]) != abs(limits[0]):
             yield Translation(node, name, (), limits, "lateral motion has the same limit as forward motion")
-    least, most = _axes(parameters.get("min_velocity")), _axes(parameters.get("max_velocity"))
-    if least and most and all(low == -high or not low for low, high in zip(least, most, strict=True)):
-        yield Translation(node, "min_velocity", (), least)
-    elif least:
-        yield Translation(node, "min_velocity", (), least, "backward motion has the same limit as forward motion")
-    faster, slower = _axes(parameters.get("max_accel")), _axes(parameters.get("max_decel"))
+    min_velocity, max_velocity = (
+        _xy_and_rotation(parameters.get("min_velocity")),
+        _xy_and_rotation(parameters.get("max_velocity")),
+    )
+    if (
+        min_velocity
+        and max_velocity
+        and all(low == -high or not low for low, high in zip(min_velocity, max_velocity, strict=True))
+    ):
+        yield Translation(node, "min_velocity", (), min_velocity)
+    elif min_velocity:
+        yield Translation(
+            node, "min_velocity", (), min_velocity, "backward motion has the same limit as forward motion"
+        )
+    faster, slower = _xy_and_rotation(parameters.get("max_accel")), _xy_and_rotation(parameters.get("max_decel"))
     if faster and slower and abs(slower[2]) != abs(faster[2]):
         why = "angular deceleration has the same limit as angular acceleration"
         yield Translation(node, "max_decel", (), slower, why)
@@ -109,7 +120,7 @@ def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[T
             why = f"action_type {action} of {polygon} is not supported"
             yield Translation(node, "polygons", (), action, why, covers=f"{polygon}.")
             continue
-        yield from (Translation(node, f"{polygon}.{said}", (), None) for said in ("action_type", "enabled"))
+        yield from (Translation(node, f"{polygon}.{setting}", (), None) for setting in ("action_type", "enabled"))
         approaching.append(parameters.get(f"{polygon}.enabled", True))
         yield from _approach(node, parameters, polygon)
     on = on and (any(approaching) or not approaching)
@@ -120,19 +131,19 @@ def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[T
 
 
 def _approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Translation]:
-    for theirs, ours, more in (
+    for nav2_name, simscen_name, offset in (
         ("time_before_collision", "time_before_collision", 0),
         ("max_points", "min_points", 1),  # Humble: the action starts at one point more
         ("min_points", "min_points", 0),
     ):
-        value = parameters.get(f"{polygon}.{theirs}")
+        value = parameters.get(f"{polygon}.{nav2_name}")
         if value is not None:
-            value = value + more if isinstance(value, int) and not isinstance(value, bool) else value
-            yield Translation(node, f"{polygon}.{theirs}", ("collision_monitor", ours), value)
+            value = value + offset if isinstance(value, int) and not isinstance(value, bool) else value
+            yield Translation(node, f"{polygon}.{nav2_name}", ("collision_monitor", simscen_name), value)
 
 
-def _axes(value: Any) -> list[float]:
-    """Return the values for x, y and rotation; an empty list unless there are three numbers."""
+def _xy_and_rotation(value: Any) -> list[float]:
+    """Return the values for x, y and rotation; an empty list if the value is not a list of three numbers."""
     fits = isinstance(value, list) and len(value) == 3 and all(isinstance(one, int | float) for one in value)
     return value if fits else []
 
@@ -140,13 +151,13 @@ def _axes(value: Any) -> list[float]:
 def translate(nodes: Mapping[str, Parameters], known: Known) -> Iterator[Translation]:
     """Yield the translation of each parameter of all nodes. `known` are the parameters of simscen."""
     for node, parameters in nodes.items():
-        reader = NODES.get(OLD_NODE_NAMES.get(node, node))
-        if reader is None:
+        translator = NODES.get(OLD_NODE_NAMES.get(node, node))
+        if translator is None:
             continue
-        taken = list(reader(node, parameters, known))
-        yield from (one for one in taken if one.path or one.why)
-        translated = {one.parameter for one in taken}
-        covered = tuple(one.covers for one in taken if one.covers)
+        translations = list(translator(node, parameters, known))
+        yield from (one for one in translations if one.path or one.note)
+        translated = {one.parameter for one in translations}
+        covered = tuple(one.covers for one in translations if one.covers)
         for name, value in parameters.items():
             if name not in translated and not name.startswith(covered) and _matters(name, value):
                 yield Translation(node, name, (), value, SCENARIO_PARAMETERS.get(name.partition(".")[0], ""))

@@ -23,7 +23,7 @@ from simscen.loading.yaml.tree import (
     value_position,
 )
 
-KEY, STACK, ROBOTS = "nav2_params", "stack", "robots"
+NAV2_PARAMS, STACK, ROBOTS = "nav2_params", "stack", "robots"
 
 
 @dataclass
@@ -36,48 +36,51 @@ class ExpandedTree:
 
 
 def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
-    """Return a scenario with the parameters that its stacks, or those of its robots, take from Nav2 files."""
-    taken = ExpandedTree(tree)
+    """Return a scenario in which each stack, also those of its robots, has the parameters of its Nav2 file."""
+    result = ExpandedTree(tree)
     robots = child(tree, ROBOTS)
     if isinstance(robots, MappingNode):
-        own = {name: Entry(said.key, _filled(said.value, library, taken)) for name, said in robots.entries.items()}
+        own = {
+            name: Entry(entry.key, _with_expanded_stack(entry.value, library, result))
+            for name, entry in robots.entries.items()
+        }
         tree = MappingNode(
             tree.place, {**tree.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.place, own))}
         )
-    taken.tree = _filled(tree, library, taken)
-    return taken
+    result.tree = _with_expanded_stack(tree, library, result)
+    return result
 
 
-def _filled(said: Node, library: Library, taken: ExpandedTree) -> Any:
-    stack = child(said, STACK)
-    if not isinstance(said, MappingNode) or not isinstance(stack, MappingNode) or KEY not in stack.entries:
-        return said
-    filled = with_parameters(stack, library, taken)
-    return MappingNode(said.place, {**said.entries, STACK: Entry(said.entries[STACK].key, filled)})
+def _with_expanded_stack(tree: Node, library: Library, result: ExpandedTree) -> Any:
+    stack = child(tree, STACK)
+    if not isinstance(tree, MappingNode) or not isinstance(stack, MappingNode) or NAV2_PARAMS not in stack.entries:
+        return tree
+    filled = _merge_parameters(stack, library, result)
+    return MappingNode(tree.place, {**tree.entries, STACK: Entry(tree.entries[STACK].key, filled)})
 
 
-def with_parameters(stack: MappingNode, library: Library, taken: ExpandedTree) -> MappingNode:
+def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree) -> MappingNode:
     """Return a `stack:` section merged onto its parameter file, which is merged onto Nav2's defaults."""
-    written, place = stack.entries[KEY].value, value_position(stack, (KEY,))
+    written, place = stack.entries[NAV2_PARAMS].value, value_position(stack, (NAV2_PARAMS,))
     if not isinstance(written, ScalarNode) or not isinstance(written.value, str):
         return stack  # validation reports the wrong type
-    file = library.fence.find(written.value, library.folder_of(place))
+    file = library.sandbox.find(written.value, library.folder_of(place))
     if isinstance(file, PathProblem):
-        taken.problems.append(Problem(*place, file.code, file.message, file.hint))
+        result.problems.append(Problem(*place, file.code, file.message, file.hint))
         return stack
-    shown = library.fence.shown(file)
+    shown = library.sandbox.display_name(file)
     parameters = read_nav2_parameters(file, shown)
     if not isinstance(parameters, Nav2Parameters):
-        taken.problems += parameters
+        result.problems += parameters
         return stack
     library.add({shown: parameters.text}, {shown: file})
     profile = MappingNode(place, {"profile": Entry(place, ScalarNode(place, "nav2"))})
-    found_here = list(translate(parameters.nodes, _known()))
+    translations = list(translate(parameters.nodes, _known_parameters()))
     below = profile
-    for one in found_here:
+    for one in translations:
         if one.path:
             below = merge_mappings(below, _nested(one, parameters))
-    taken.notes += sorted({*parameters.notes, *_notes(found_here, parameters)})
+    result.notes += sorted({*parameters.notes, *_notes(translations, parameters)})
     return merge_mappings(stack, below)
 
 
@@ -96,19 +99,19 @@ def _node(value: Any, place: Position) -> Node:
     return ScalarNode(place, value)
 
 
-def _notes(found_here: Sequence[Translation], parameters: Nav2Parameters) -> Iterator[Problem]:
+def _notes(translations: Sequence[Translation], parameters: Nav2Parameters) -> Iterator[Problem]:
     """Yield notes on unused parameters: one for each with a reason, one per node for all others."""
-    for one in found_here:
-        if one.why:
-            yield _note(parameters.places[one.node, one.parameter], f"{one.node}: `{one.parameter}`: {one.why}")
-    used = {parameters.places[one.node, one.parameter] for one in found_here if one.path}
+    for one in translations:
+        if one.note:
+            yield _note(parameters.places[one.node, one.parameter], f"{one.node}: `{one.parameter}`: {one.note}")
+    used = {parameters.places[one.node, one.parameter] for one in translations if one.path}
     for node in parameters.nodes:
         places = [
             (parameters.places[node, one.parameter], one.parameter)
-            for one in found_here
+            for one in translations
             if one.node == node
             and not one.path
-            and not one.why
+            and not one.note
             and parameters.places[node, one.parameter] not in used  # parameters of `/**` may be used by another node
         ]
         if places:
@@ -123,7 +126,7 @@ def _note(place: Position, message: str) -> Problem:
     return Problem(*place, code="SC341", message=message, hint="it is ignored", severity="warning")
 
 
-def _known() -> Known:
+def _known_parameters() -> Known:
     """Return the parameters of the reference stack, by section or by type; `a.b` is `b` in the mapping `a`."""
     from simscen.model import checkers, controllers, costmaps, localizers, mppi, planners, recovery
 
@@ -145,7 +148,7 @@ def _known() -> Known:
 
 
 def _names(model: type[BaseModel]) -> Iterator[str]:
-    for name, about in model.model_fields.items():
+    for name, model_field in model.model_fields.items():
         yield name
-        if isinstance(about.annotation, type) and issubclass(about.annotation, BaseModel):
-            yield from (f"{name}.{part}" for part in about.annotation.model_fields)
+        if isinstance(model_field.annotation, type) and issubclass(model_field.annotation, BaseModel):
+            yield from (f"{name}.{part}" for part in model_field.annotation.model_fields)

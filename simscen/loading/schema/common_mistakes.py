@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from pydantic import BaseModel, ValidationError
 
-from simscen.loading.schema.lookup import keys_of, models_at, needs_nothing
+from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at
 from simscen.loading.schema.messages import suggestion
 from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, SequenceNode, dotted_path, existing_keys
 from simscen.spec.choice import Choice
@@ -13,7 +13,7 @@ from simscen.spec.places import PoseSpec
 HINTS_FOR_BOUNDS: dict[tuple[Key, ...], str] = {
     ("physics", "truth_rate"): "criteria are judged at these samples; lower rates miss short violations",
 }
-"""Reasons for bounds that a user may not expect, by the path of the value."""
+"""Reasons for bounds that may surprise users, by the path of the value."""
 MAX_SEARCH_DEPTH = 3
 """Levels below a mapping in which a misplaced key is searched."""
 
@@ -23,17 +23,17 @@ def hint_for_wrong_type(kind: str, model: type[BaseModel], loc: Sequence[Key], n
     models = models_at(model, loc)
     in_list = isinstance(next((part for part in reversed(loc) if not _is_tag(part)), ""), int)
     if kind == "list_type":
-        return _as_list(node, in_list)
+        return _list_hint(node, in_list)
     if isinstance(node, SequenceNode):
-        return _as_mapping(models, node)
+        return _sequence_for_mapping_hint(models, node)
     if isinstance(node, ScalarNode):
-        word = _as_word(models, node.value, in_list) if isinstance(node.value, str) else ""
-        return word or _as_value(models, node) or _explain_hint(model, loc)
+        word = _missing_colon_hint(models, node.value, in_list) if isinstance(node.value, str) else ""
+        return word or _scalar_for_mapping_hint(models, node) or _explain_hint(model, loc)
     return ""
 
 
 def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key], key: str) -> str:
-    """Return where a key belongs that is on the wrong level; "" if no level knows it.
+    """Return where a key on the wrong level belongs; "" if it is valid on no level.
 
     Keys in an item of a list are not searched outside of this item.
     """
@@ -44,7 +44,7 @@ def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key
             return f"move it one level up, to `{above}`" if above else "move it to the top level of the file"
     starts = ((loc, models_at(model, loc)), ((), [model]))
     for start, models in starts[:1] if item else starts:
-        if (below := _deeper(models, key)) is not None:
+        if (below := _find_key_below(models, key)) is not None:
             return f"move it to `{dotted_path([*existing_keys(tree, start), *below])}`"
     return ""
 
@@ -58,7 +58,7 @@ def hint_for_reserved_key(loc: Sequence[Key], key: str) -> str:
     return ""
 
 
-def _as_list(node: Node, in_list: bool) -> str:
+def _list_hint(node: Node, in_list: bool) -> str:
     if in_list and isinstance(node, ScalarNode) and isinstance(node.value, int | float):
         return "write each point as a list: `[[1, 2], [3, 4]]`"
     if isinstance(node, MappingNode):
@@ -66,7 +66,7 @@ def _as_list(node: Node, in_list: bool) -> str:
     return f"write `[{node.value}]`" if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
 
 
-def _as_mapping(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
+def _sequence_for_mapping_hint(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
     if all(isinstance(item, MappingNode) for item in node.items):
         return "remove the `-`: a mapping is expected, not a list"
     values = [str(item.value) for item in node.items if isinstance(item, ScalarNode)]
@@ -81,16 +81,16 @@ def _as_mapping(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
     return ""
 
 
-def _as_value(models: Iterable[type[BaseModel]], node: ScalarNode) -> str:
+def _scalar_for_mapping_hint(models: Iterable[type[BaseModel]], node: ScalarNode) -> str:
     """Return a hint if a value was written instead of a mapping with one key, or with none."""
-    plain = [model for model in models if not issubclass(model, Choice)]
-    fitting = {key for model in plain for key in keys_of([model]) if _holds(model, {key: node.value})}
-    if len(fitting) == 1 and not isinstance(node.value, bool):
-        return f"write `{{{fitting.pop()}: {node.value}}}`"
-    return "write `{}`" if node.value is True and plain and all(map(needs_nothing, plain)) else ""
+    plain_models = [model for model in models if not issubclass(model, Choice)]
+    matching = {key for model in plain_models for key in keys_of([model]) if _is_valid(model, {key: node.value})}
+    if len(matching) == 1 and not isinstance(node.value, bool):
+        return f"write `{{{matching.pop()}: {node.value}}}`"
+    return "write `{}`" if node.value is True and plain_models and all(map(has_no_required_keys, plain_models)) else ""
 
 
-def _holds(model: type[BaseModel], value: dict[str, object]) -> bool:
+def _is_valid(model: type[BaseModel], value: dict[str, object]) -> bool:
     try:
         model.model_validate(value, by_alias=True, by_name=False)
     except ValidationError:
@@ -104,7 +104,7 @@ def _explain_hint(model: type[BaseModel], loc: Sequence[Key]) -> str:
     return f"`simscen explain {loc[-1]}` shows its keys" if chosen else ""
 
 
-def _as_word(models: Iterable[type[BaseModel]], word: str, in_list: bool) -> str:
+def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: bool) -> str:
     """Return a hint if the key of a choice was written without a colon."""
     for choice in (model for model in models if issubclass(model, Choice)):
         keys = [*choice.choices()]
@@ -112,14 +112,14 @@ def _as_word(models: Iterable[type[BaseModel]], word: str, in_list: bool) -> str
             near = suggestion(word, keys)
             return near.replace("`?", ": …`?") if near.startswith("did") else ""
         chosen = models_at(choice, [word])
-        body = "{}" if chosen and all(needs_nothing(model) for model in chosen) else "…"
+        body = "{}" if chosen and all(has_no_required_keys(model) for model in chosen) else "…"
         written = f"`{word}: {body}`" if in_list else f"`{{{word}: {body}}}`"
         return f"write {written}" + ("" if body == "{}" else f"; `simscen explain {word}` shows its keys")
     return ""
 
 
-def _deeper(models: Iterable[type[BaseModel]], key: str, depth: int = 1) -> list[Key] | None:
-    """Return the keys of the nearest mapping below that knows `key`."""
+def _find_key_below(models: Iterable[type[BaseModel]], key: str, depth: int = 1) -> list[Key] | None:
+    """Return the keys of the nearest mapping below in which `key` is valid."""
     holders = [(name, models_at(model, [name])) for model in models if not issubclass(model, Choice)
                for name in keys_of([model])]  # fmt: skip
     for name, below in holders:
@@ -127,7 +127,7 @@ def _deeper(models: Iterable[type[BaseModel]], key: str, depth: int = 1) -> list
             return [name]
     if depth < MAX_SEARCH_DEPTH:
         for name, below in holders:
-            if (found := _deeper(below, key, depth + 1)) is not None:
+            if (found := _find_key_below(below, key, depth + 1)) is not None:
                 return [name, *found]
     return None
 

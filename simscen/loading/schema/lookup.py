@@ -1,7 +1,7 @@
 """Find the models and keys that are valid at a position, including those of installed packages.
 
-A pydantic `loc` mixes keys of the file with tags of unions. Both are followed along the types, and every model that
-may be meant is kept.
+A pydantic `loc` mixes keys of the file with tags of unions. Both are resolved against the types, and every model that
+fits is kept.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,26 +21,26 @@ def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel
     """Return the models that a mapping at `loc` below `model` may be an instance of."""
     candidates: list[Any] = [model]
     for part in loc:
-        options = [option for candidate in candidates for option in _options(candidate)]
-        below = [kind for option in options for kind in _below(option, part)]
+        options = [option for candidate in candidates for option in _union_members(candidate)]
+        matches = [kind for option in options for kind in _types_below(option, part)]
         narrowed = [option for option in options if part in _tags(option)]
-        candidates = below or narrowed or candidates
-    found = [_bare(option) for candidate in candidates for option in _options(candidate)]
+        candidates = matches or narrowed or candidates
+    found = [_unwrapped(option) for candidate in candidates for option in _union_members(candidate)]
     return list(dict.fromkeys(kind for kind in found if _is_model(kind) and not issubclass(kind, RootModel)))
 
 
 def types_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
     """Return the valid values of `type` in a mapping at `loc`."""
-    return [str(value) for kind in models_at(model, loc) for value in _types(kind)]
+    return [str(value) for kind in models_at(model, loc) for value in _literal_types(kind)]
 
 
 def types_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -> list[str]:
-    """Return the other types that the mapping at `loc` could have instead of its own, and that have this key."""
+    """Return the other values of `type` with which the mapping at `loc` could have this key."""
     own = types_at(model, loc)
     if not loc or loc[-1] not in own:
         return []
     having = [kind for kind in models_at(model, loc[:-1]) if key in keys_of([kind])]
-    return [name for kind in having for name in map(str, _types(kind)) if name not in own]
+    return [name for kind in having for name in map(str, _literal_types(kind)) if name not in own]
 
 
 def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
@@ -49,7 +49,7 @@ def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
     return list(dict.fromkeys(keys))
 
 
-def needs_nothing(model: type[BaseModel]) -> bool:
+def has_no_required_keys(model: type[BaseModel]) -> bool:
     """Return whether `{}` is a complete specification."""
     return not issubclass(model, RootModel | Choice) and not any(f.is_required() for f in model.model_fields.values())
 
@@ -73,46 +73,50 @@ def _type_of(field: FieldInfo) -> Any:
         return None
 
 
-def _options(kind: Any) -> list[Any]:
+def _union_members(kind: Any) -> list[Any]:
     """Return the members of a union; for any other type, the type itself."""
-    if mark := _by_type(kind):
-        return [*_options(mark.own), *(Annotated[model, Tag(name)] for name, model in installed_specs(mark.group))]
-    bare = _bare(kind)
-    if get_origin(bare) in (Union, UnionType):
-        return [option for member in get_args(bare) if member is not NoneType for option in _options(member)]
-    if _is_model(bare) and issubclass(bare, RootModel):
-        inner = _inner(bare)
+    if mark := _extensible_union(kind):
+        return [
+            *_union_members(mark.own),
+            *(Annotated[model, Tag(name)] for name, model in installed_specs(mark.group)),
+        ]
+    unwrapped = _unwrapped(kind)
+    if get_origin(unwrapped) in (Union, UnionType):
+        return [option for member in get_args(unwrapped) if member is not NoneType for option in _union_members(member)]
+    if _is_model(unwrapped) and issubclass(unwrapped, RootModel):
+        inner = _root_type(unwrapped)
         holds_models = _is_model(inner) or get_origin(inner) in (Union, UnionType)
-        return _options(bare.model_fields["root"].annotation) if holds_models else [kind]
+        return _union_members(unwrapped.model_fields["root"].annotation) if holds_models else [kind]
     return [kind]
 
 
-def _inner(model: Any) -> Any:
-    return _bare(model.model_fields["root"].annotation)
+def _root_type(model: Any) -> Any:
+    return _unwrapped(model.model_fields["root"].annotation)
 
 
-def _below(kind: Any, part: Key) -> list[Any]:
-    bare = _bare(kind)
-    if _is_model(bare) and isinstance(part, str):
-        below = field_type(bare, part)
-        return [] if below is None else [below]
-    if get_origin(bare) is list and isinstance(part, int):
-        return [get_args(bare)[0]]
-    if get_origin(bare) is dict and part not in _tags(kind):
-        return [get_args(bare)[1]]
+def _types_below(kind: Any, part: Key) -> list[Any]:
+    """Return the types of the value at a key or index of a value of this type."""
+    unwrapped = _unwrapped(kind)
+    if _is_model(unwrapped) and isinstance(part, str):
+        matches = field_type(unwrapped, part)
+        return [] if matches is None else [matches]
+    if get_origin(unwrapped) is list and isinstance(part, int):
+        return [get_args(unwrapped)[0]]
+    if get_origin(unwrapped) is dict and part not in _tags(kind):
+        return [get_args(unwrapped)[1]]
     return []
 
 
 def _tags(option: Any) -> set[str]:
     """Return the names that pydantic may use for this member of a union in a `loc`."""
     tags = {meta.tag for meta in _metadata(option) if isinstance(meta, Tag)}
-    bare = _bare(option)
-    if _is_model(bare):
-        tags |= {bare.__name__, *(str(value) for value in _types(bare))}
+    unwrapped = _unwrapped(option)
+    if _is_model(unwrapped):
+        tags |= {unwrapped.__name__, *(str(value) for value in _literal_types(unwrapped))}
     return tags
 
 
-def _types(model: type[BaseModel]) -> tuple[Any, ...]:
+def _literal_types(model: type[BaseModel]) -> tuple[Any, ...]:
     field = model.model_fields.get("type")
     return get_args(field.annotation) if field is not None and get_origin(field.annotation) is Literal else ()
 
@@ -121,17 +125,18 @@ def _metadata(kind: Any) -> tuple[Any, ...]:
     return tuple(get_args(kind)[1:]) if get_origin(kind) is Annotated else ()
 
 
-def _by_type(kind: Any) -> ExtensibleUnion | None:
+def _extensible_union(kind: Any) -> ExtensibleUnion | None:
     return next((mark for mark in _metadata(kind) if isinstance(mark, ExtensibleUnion)), None)
 
 
-def _bare(kind: Any) -> Any:
+def _unwrapped(kind: Any) -> Any:
+    """Return a type without `Annotated`, with lazy specifications loaded and choices of installed packages added."""
     while get_origin(kind) is Annotated:
         kind = next((mark.load() for mark in _metadata(kind) if isinstance(mark, LazySpec)), get_args(kind)[0])
-    return _widened(kind) if _is_model(kind) and issubclass(kind, Choice) else kind
+    return _with_installed(kind) if _is_model(kind) and issubclass(kind, Choice) else kind
 
 
-def _widened(choice: type[Choice]) -> type[Choice]:
+def _with_installed(choice: type[Choice]) -> type[Choice]:
     from simscen.spec.choice import (
         with_installed_choices,  # searches installed packages, so only used to explain problems
     )

@@ -40,7 +40,7 @@ _TEXTS = {
 
 
 class Message(NamedTuple):
-    """Stable error code, message and hint."""
+    """Error code, message and hint."""
 
     code: str
     text: str
@@ -63,19 +63,19 @@ def describe_node(node: Node) -> str:
     return f"the {'integer' if isinstance(value, int) else 'number'} {value}"
 
 
-def quoted(text: str, most: int = 60) -> str:
-    """Return user text for a message: in backquotes, on one line, printable, shortened to `most` characters."""
+def quoted(text: str, max_chars: int = 60) -> str:
+    """Return user text for a message: in backquotes, on one line, printable, shortened to `max_chars` characters."""
     printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    return f"`{printable if len(printable) <= most else printable[: most - 1] + '…'}`"
+    return f"`{printable if len(printable) <= max_chars else printable[: max_chars - 1] + '…'}`"
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Return "did you mean …?" if a known word is similar, else a list of the known words."""
     choices = list(known)
     lowered = {choice.lower(): choice for choice in reversed(choices)}
-    near = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
-    if near:
-        return f"did you mean `{lowered[near[0]]}`?"
+    matches = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    if matches:
+        return f"did you mean `{lowered[matches[0]]}`?"
     return f"expected one of: {_listed(choices)}" if choices else ""
 
 
@@ -111,12 +111,12 @@ def translate_error(kind: str, context: Mapping[str, Any], node: Node, text: str
     if kind == "quantity":
         units = f"units: {context['units']}; a number without a unit is in SI units"
         written = str(node.value) if isinstance(node, ScalarNode) else ""
-        return Message("SC015", str(context["problem"]), lookalike_hint(written) or _bare_number(node) or units)
+        return Message("SC015", str(context["problem"]), lookalike_hint(written) or _quoted_number_hint(node) or units)
     if "names" in context:
         hint = suggestion(str(context["value"]), str(context["names"]).split(", "))
         return Message("SC014", f"{short_value(node)} is not one of the choices", hint)
     is_name = kind == "string_pattern_mismatch"
-    return _bad_name(node, str(context["pattern"])) if is_name else Message("SC011", text[:1].lower() + text[1:])
+    return _invalid_name(node, str(context["pattern"])) if is_name else Message("SC011", text[:1].lower() + text[1:])
 
 
 def _type_hint(kind: str, node: Node) -> str:
@@ -125,9 +125,9 @@ def _type_hint(kind: str, node: Node) -> str:
     if not isinstance(node, ScalarNode) or not isinstance(node.value, str):
         return ""
     if kind in ("int_type", "float_type"):
-        return _bare_number(node)
-    if odd := lookalike_hint(node.value):
-        return odd
+        return _quoted_number_hint(node)
+    if hint := lookalike_hint(node.value):
+        return hint
     if kind == "bool_type" and node.value.lower() in ("true", "false"):
         return "remove the quotes"
     if kind == "bool_type" and node.value.lower() in ("yes", "no", "on", "off", "y", "n"):
@@ -135,7 +135,7 @@ def _type_hint(kind: str, node: Node) -> str:
     return ""
 
 
-def _bare_number(node: Node) -> str:
+def _quoted_number_hint(node: Node) -> str:
     """Return how to correct text that is a number with quotes or leading zeros."""
     if not isinstance(node, ScalarNode) or not isinstance(node.value, str) or not _NUMBER.fullmatch(node.value):
         return ""
@@ -158,7 +158,7 @@ def _choices(expected: str) -> list[str]:
     return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
 
 
-def _bad_name(node: Node, pattern: str) -> Message:
+def _invalid_name(node: Node, pattern: str) -> Message:
     value = node.value if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
     control = next((c for c in value if not c.isprintable()), None)
     if control is not None:

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ValidationError
 
 from simscen.core.errors import Problem
 from simscen.loading.schema import common_mistakes, messages
-from simscen.loading.schema.lookup import keys_of, models_at, needs_nothing, types_at, types_with_key
+from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at, types_at, types_with_key
 from simscen.loading.yaml import textfile
 from simscen.loading.yaml.tree import (
     Key,
@@ -31,49 +31,51 @@ LANGUAGE_VERSION = 1
 
 
 MissingKeys = Callable[[MappingNode], list[Problem]]
-"""Finds problems that depend on several keys, which no model can express."""
+"""Finds problems that depend on several keys, which a model cannot express."""
 
 
-def check(model: type[Model], tree: Node, also: MissingKeys | None = None) -> Model | list[Problem]:
-    """Return the specification in `tree`, or all its problems; `also` finds problems that the model does not."""
+def check(model: type[Model], tree: Node, find_missing_keys: MissingKeys | None = None) -> Model | list[Problem]:
+    """Return the specification in `tree`, or all its problems, including those that `find_missing_keys` finds."""
     if not isinstance(tree, MappingNode):
         return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")]
-    if problem := _other_version(tree):
+    if problem := _wrong_version(tree):
         return [problem]
-    empty = [_no_value(model, tree, loc) for loc in _empty(tree)]
-    more = also(tree) if also is not None else []
+    empty = [_empty_value_problem(model, tree, loc) for loc in _empty_values(tree)]
+    missing = find_missing_keys(tree) if find_missing_keys is not None else []
     try:
         spec = model.model_validate(tree.plain, by_alias=True, by_name=False)
     except ValidationError as error:
         errors = error.errors(include_input=False, include_url=False)
-        found = [_translate(model, tree, dict(e)) for e in errors if not _follows_from_empty(tree, dict(e))]
-        return _without_duplicates([*empty, *more, *found])
-    return [*empty, *more] or spec
+        found = [_translate(model, tree, dict(e)) for e in errors if not _is_caused_by_empty_value(tree, dict(e))]
+        return _without_duplicates([*empty, *missing, *found])
+    return [*empty, *missing] or spec
 
 
 def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
-    """Return the problems of a file that other files extend; they may add missing keys, except inside of lists."""
+    """Return the problems of a file that other files extend; missing keys are allowed, except inside of lists."""
     if not isinstance(tree, MappingNode):
         return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")]
-    if problem := _other_version(tree):
+    if problem := _wrong_version(tree):
         return [problem]
-    empty = [_no_value(model, tree, loc) for loc in _empty(tree)]
+    empty = [_empty_value_problem(model, tree, loc) for loc in _empty_values(tree)]
     try:
         model.model_validate(tree.plain, by_alias=True, by_name=False)
     except ValidationError as error:
         errors = [dict(found) for found in error.errors(include_input=False, include_url=False)]
-        relevant = [found for found in errors if not _may_be_added(found) and not _follows_from_empty(tree, found)]
+        relevant = [
+            found for found in errors if not _is_missing_key(found) and not _is_caused_by_empty_value(tree, found)
+        ]
         return _without_duplicates([*empty, *(_translate(model, tree, found) for found in relevant)])
     return empty
 
 
-def _may_be_added(error: dict[str, Any]) -> bool:
+def _is_missing_key(error: dict[str, Any]) -> bool:
     """Return whether an error is a missing key outside of lists."""
     in_a_list = any(isinstance(part, int) for part in error["loc"])
     return error["type"] in ("missing", "union_tag_not_found") and not in_a_list
 
 
-def _other_version(tree: MappingNode) -> Problem | None:
+def _wrong_version(tree: MappingNode) -> Problem | None:
     version = child(tree, "simscen")
     if not isinstance(version, ScalarNode) or version.value == LANGUAGE_VERSION or isinstance(version.value, bool):
         return None
@@ -112,16 +114,18 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
     where = f" in `{holder}`" if holder else ""
     models = models_at(model, loc[:-1])
     hint = messages.suggestion(key, keys_of(models))
-    if mended := textfile.lookalike_hint(key):
-        hint = mended
+    if lookalike := textfile.lookalike_hint(key):
+        hint = lookalike
     elif key in Trigger.modifiers and models == [AnyCondition]:
         hint = f"`{key}` applies to the whole trigger: write it next to `all`, `any` or `not` under `when`"
     elif others := types_with_key(model, loc[:-1], key):
         hint = f"`{key}` is a parameter of type {' and '.join(f'`{name}`' for name in others)}"
-    elif elsewhere := common_mistakes.hint_for_reserved_key(loc[:-1], key):
-        hint = elsewhere
-    elif not hint.startswith("did") and (belongs := common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key)):
-        hint = belongs
+    elif reserved_key_hint := common_mistakes.hint_for_reserved_key(loc[:-1], key):
+        hint = reserved_key_hint
+    elif not hint.startswith("did") and (
+        correct_place := common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key)
+    ):
+        hint = correct_place
     elif not hint.startswith("did") and any(issubclass(one, Choice) and one.group for one in models):
         hint = "; ".join(filter(None, (hint, "`simscen plugins` lists what installed packages add")))
     return _problem(key_position(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
@@ -148,37 +152,37 @@ def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error:
     return _problem(value_position(tree, (*loc, "type")), "SC014", message, messages.suggestion(written, types))
 
 
-def _empty(node: Node, loc: tuple[Key, ...] = ()) -> Iterator[tuple[Key, ...]]:
+def _empty_values(node: Node, loc: tuple[Key, ...] = ()) -> Iterator[tuple[Key, ...]]:
     """Yield the keys of empty values: `off:` instead of `off: {}`, or a forgotten value."""
     if isinstance(node, MappingNode):
         for key, entry in node.entries.items():
-            yield from _empty(entry.value, (*loc, key))
+            yield from _empty_values(entry.value, (*loc, key))
     elif isinstance(node, SequenceNode):
         for index, item in enumerate(node.items):
-            yield from _empty(item, (*loc, index))
+            yield from _empty_values(item, (*loc, index))
     elif node.value is None:
         yield loc
 
 
-def _no_value(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
+def _empty_value_problem(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
     *holder, key = loc
     if isinstance(key, int):
         return _problem(
             key_position(tree, loc), "SC018", f"item {key + 1} of `{dotted_path(holder)}` is empty", "remove it"
         )
     models = models_at(model, loc)
-    complete = models and all(needs_nothing(option) for option in models)
+    complete = models and all(has_no_required_keys(option) for option in models)
     hint = f"write `{key}: {{}}`" if complete else "give it a value or remove the key"
     return _problem(key_position(tree, loc), "SC018", f"{messages.quoted(key)} has no value", hint)
 
 
-def _follows_from_empty(tree: Node, error: dict[str, Any]) -> bool:
-    """Return whether an error of pydantic only repeats that a value is empty."""
+def _is_caused_by_empty_value(tree: Node, error: dict[str, Any]) -> bool:
+    """Return whether an error of pydantic is only a consequence of an empty value."""
     node = node_at(tree, error["loc"])
     if isinstance(node, ScalarNode):
         return node.value is None
-    holds_nothing = isinstance(node, MappingNode) and any(e.value.plain is None for e in node.entries.values())
-    return holds_nothing and error["type"] == "value_error"
+    has_empty_value = isinstance(node, MappingNode) and any(e.value.plain is None for e in node.entries.values())
+    return has_empty_value and error["type"] == "value_error"
 
 
 def _without_duplicates(problems: list[Problem]) -> list[Problem]:
@@ -188,10 +192,10 @@ def _without_duplicates(problems: list[Problem]) -> list[Problem]:
         key = problem.code if problem.code == "SC010" else ""
         places.setdefault((problem.path, problem.line, problem.col, key and problem.message), problem)
     misspelled = {problem.hint for problem in problems if problem.code == "SC012"}
-    return [p for p in places.values() if not (p.code == "SC010" and p.hint == "" and _meant(p) in misspelled)]
+    return [p for p in places.values() if not (p.code == "SC010" and p.hint == "" and _spelling_hint(p) in misspelled)]
 
 
-def _meant(missing: Problem) -> str:
+def _spelling_hint(missing: Problem) -> str:
     return f"did you mean {missing.message.split()[2]}?"
 
 

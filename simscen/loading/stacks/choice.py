@@ -9,10 +9,10 @@ from simscen.core.external_command import ExternalCommand
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child
 
 SCENARIO_KEYS = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
-"""Keys of a `stack:` section that describe the world: they stay for every stack."""
+"""Keys of a `stack:` section that describe the world; they are kept whichever stack is selected."""
 COMMON_STACK_KEYS = ("controller_frequency",)
 """Keys that all types of stacks have."""
-CHECKER, TOLERANCES = "goal_checker", ("xy_goal_tolerance", "yaw_goal_tolerance")
+GOAL_CHECKER, TOLERANCES = "goal_checker", ("xy_goal_tolerance", "yaw_goal_tolerance")
 REFERENCE, EXTERNAL = "reference", "external"
 
 
@@ -21,7 +21,7 @@ class StackChoice:
     """Stack given as `--stack NAME=VALUE`: a stack file, a type of stack, or the command of an external stack.
 
     `section` is the `stack:` section of the stack file `file`. `texts` and `files` are those of the stack file and the
-    files it extends (see Library); `notes` are warnings about them. `runs` is the command.
+    files it extends (see Library); `notes` are warnings about them. `external_command` starts an external stack.
     """
 
     name: str
@@ -31,15 +31,15 @@ class StackChoice:
     section: MappingNode | None = field(default=None, repr=False)
     texts: Mapping[str, str] = field(default_factory=dict, repr=False)
     files: Mapping[str, Path] = field(default_factory=dict, repr=False)
-    runs: ExternalCommand | None = field(default=None, repr=False)
+    external_command: ExternalCommand | None = field(default=None, repr=False)
     notes: tuple[Problem, ...] = field(default=(), repr=False)
 
     @property
     def written(self) -> str:
-        """NAME=VALUE."""
+        """The option as given: NAME=VALUE."""
         return f"{self.name}={self.value}"
 
-    def seen_from(self, folder: Path) -> str:
+    def relative_to_folder(self, folder: Path) -> str:
         """Return NAME=VALUE for a command called in `folder`; a file outside of it is absolute."""
         if self.file is None:
             return self.written
@@ -50,8 +50,9 @@ class StackChoice:
 def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
     """Return a scenario with the selected stack instead of its own.
 
-    Zones, masks and goal tolerances of the scenario stay. A command or a type of stack has no parameters: those of the
-    scenario stay if its own stack is of the same kind, else only those that all stacks have. A file replaces them all.
+    Zones, masks and goal tolerances of the scenario are kept. A stack file replaces all other parameters. A command or
+    a type of stack has no parameters: those of the scenario are kept if its own stack is of the same kind, else only
+    those that all stacks have.
     """
     own = child(tree, "stack")
     if own is not None and not isinstance(own, MappingNode):
@@ -64,30 +65,32 @@ def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
 
 
 def _section(own: MappingNode, choice: StackChoice) -> MappingNode:
-    kept = {name: own.entries[name] for name in SCENARIO_KEYS if name in own.entries}
+    scenario_entries = {name: own.entries[name] for name in SCENARIO_KEYS if name in own.entries}
     if choice.section is not None:
-        return _asked(MappingNode(choice.section.place, {**choice.section.entries, **kept}), own)
+        return _with_goal_tolerances(
+            MappingNode(choice.section.place, {**choice.section.entries, **scenario_entries}), own
+        )
     place = Position(f"--stack {choice.written}", 0, 0)
-    if choice.runs is not None:
+    if choice.external_command is not None:
         named = {EXTERNAL: Entry(place, ScalarNode(place, choice.name))}
         if child(own, EXTERNAL) is not None:
             return MappingNode(own.place, {**own.entries, **named})
     else:
         named = {"type": Entry(place, ScalarNode(place, choice.type))}
     rate = {name: own.entries[name] for name in COMMON_STACK_KEYS if name in own.entries}
-    return _asked(MappingNode(place, {**named, **rate, **kept}), own)
+    return _with_goal_tolerances(MappingNode(place, {**named, **rate, **scenario_entries}), own)
 
 
-def _asked(section: MappingNode, own: MappingNode) -> MappingNode:
-    """Return the section with the goal tolerances of the scenario, by which every stack is judged."""
-    checker, below = child(own, CHECKER), child(section, CHECKER)
+def _with_goal_tolerances(section: MappingNode, own: MappingNode) -> MappingNode:
+    """Return the section with the goal tolerances of the scenario, so that all stacks are judged by the same ones."""
+    checker, below = child(own, GOAL_CHECKER), child(section, GOAL_CHECKER)
     if not isinstance(checker, MappingNode) or not isinstance(below, MappingNode | None):
         return section
-    asked = {name: checker.entries[name] for name in TOLERANCES if name in checker.entries}
-    if not asked:
+    tolerances = {name: checker.entries[name] for name in TOLERANCES if name in checker.entries}
+    if not tolerances:
         return section
-    whole = MappingNode(checker.place, {**(below.entries if below else {}), **asked})
-    return MappingNode(section.place, {**section.entries, CHECKER: Entry(own.entries[CHECKER].key, whole)})
+    whole = MappingNode(checker.place, {**(below.entries if below else {}), **tolerances})
+    return MappingNode(section.place, {**section.entries, GOAL_CHECKER: Entry(own.entries[GOAL_CHECKER].key, whole)})
 
 
 def stack_type(section: Node) -> str | None:

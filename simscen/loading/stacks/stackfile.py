@@ -6,8 +6,7 @@ from pathlib import Path
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.nav2.parameterfile import is_nav2_parameter_file
-from simscen.loading.nav2.stack import KEY as NAV2_PARAMS
-from simscen.loading.nav2.stack import with_nav2_parameters
+from simscen.loading.nav2.stack import NAV2_PARAMS, with_nav2_parameters
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import SCENARIO_KEYS, StackChoice
 from simscen.loading.yaml.library import Library
@@ -34,10 +33,10 @@ def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: S
 def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:
     """Return the `stack:` section of a stack file and warnings about it, or all problems of the file.
 
-    A Nav2 parameter file counts as a stack file with `nav2_params`. The section contains the Nav2 parameters, but no
-    longer the path of their file, which may be outside the root of the scenarios.
+    A Nav2 parameter file counts as a stack file with `nav2_params`. The section contains the Nav2 parameters
+    instead of the path of their file, which may be outside the root of the scenarios.
     """
-    file = library.fence.entered(path)
+    file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):
         return [file]
     tree, problems = _read(file, library)
@@ -45,23 +44,23 @@ def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Pro
         return library.with_source(problems)
     notes: list[Problem] = []
     if isinstance(tree, MappingNode):
-        taken = with_nav2_parameters(tree, library)
-        notes = library.with_source(taken.notes)
-        if taken.problems:
-            return library.with_source(sorted(taken.problems))
-        tree = taken.tree
+        expanded = with_nav2_parameters(tree, library)
+        notes = library.with_source(expanded.notes)
+        if expanded.problems:
+            return library.with_source(sorted(expanded.problems))
+        tree = expanded.tree
     spec = check(StackFileSpec, tree)
     section = child(tree, "stack")
     misplaced = _misplaced(section) if isinstance(section, MappingNode) else []
     if isinstance(spec, list) or misplaced or not isinstance(section, MappingNode):
         return library.with_source(sorted([*misplaced, *(spec if isinstance(spec, list) else [])]))
-    kept = {key: entry for key, entry in section.entries.items() if key != NAV2_PARAMS}
-    return MappingNode(section.place, kept), notes
+    entries = {key: entry for key, entry in section.entries.items() if key != NAV2_PARAMS}
+    return MappingNode(section.place, entries), notes
 
 
 def _read(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
     """Return the tree of a stack file; for a Nav2 parameter file, of a stack file with `nav2_params`."""
-    shown = library.fence.shown(file)
+    shown = library.sandbox.display_name(file)
     text = read_text(file, shown)
     if isinstance(text, Problem) or not is_nav2_parameter_file(text, shown):
         return library.read(file)
@@ -76,7 +75,7 @@ def _read(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
 
 
 def _misplaced(section: MappingNode) -> list[Problem]:
-    """Return problems with zones and masks, which belong to a world and so to a scenario."""
+    """Return problems with zones and masks, which belong to a scenario because they describe a world."""
     hint = "write it under `stack:` of the scenario, where it applies to every stack"
     return [
         Problem(*key_position(section, (name,)), "SC016", f"`{name}` belongs to a scenario, not to a stack file", hint)
@@ -86,7 +85,7 @@ def _misplaced(section: MappingNode) -> list[Problem]:
 
 
 STACK_FILE_KIND, NAV2_FILE_KIND = "stack file", "parameter file of Nav2"
-_OF_A_STACK_FILE = frozenset({"simscen", "name", "description", "stack"})
+_STACK_FILE_KEYS = frozenset({"simscen", "name", "description", "stack"})
 
 
 def recognize_stack_file(tree: Node | None, text: str, shown: str) -> str:
@@ -94,11 +93,11 @@ def recognize_stack_file(tree: Node | None, text: str, shown: str) -> str:
     if is_nav2_parameter_file(text, shown):
         return NAV2_FILE_KIND
     keys = set(tree.entries) if isinstance(tree, MappingNode) else set()
-    return STACK_FILE_KIND if "stack" in keys <= _OF_A_STACK_FILE else ""
+    return STACK_FILE_KIND if "stack" in keys <= _STACK_FILE_KEYS else ""
 
 
 def not_a_scenario(kind: str, shown: str) -> Problem:
     """Return the problem that a file of this kind is not a scenario, with a hint how to use it."""
-    written = f", or name it in a scenario: `stack: {{nav2_params: {shown.rpartition('/')[2]}}}`"
-    hint = f"run scenarios with `--stack NAME={shown}`{written if kind == NAV2_FILE_KIND else ''}"
+    alternative = f", or name it in a scenario: `stack: {{nav2_params: {shown.rpartition('/')[2]}}}`"
+    hint = f"run scenarios with `--stack NAME={shown}`{alternative if kind == NAV2_FILE_KIND else ''}"
     return Problem(shown, 0, 0, "SC025", f"this is a {kind}, not a scenario", hint)

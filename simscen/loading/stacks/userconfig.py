@@ -35,24 +35,26 @@ class UserConfig:
     library: Library | None = field(repr=False, default=None)
 
     def command(self, name: str, environment: Mapping[str, str], folder: Path) -> ExternalCommand | None:
-        """Return the command of an external stack, called from `folder`; None if the configuration has none.
+        """Return the command of an external stack for a call from `folder`; None if the configuration has none.
 
         Raises InvalidInput if it cannot be run.
         """
         if name not in self.spec.stacks:
             return None
-        said = self.spec.stacks[name]
-        home = folder if said.cwd is None else Path(said.cwd).expanduser()
-        if not home.is_dir():
-            raise self._wrong((name, "cwd"), "no such folder", "")
+        stack = self.spec.stacks[name]
+        working_folder = folder if stack.cwd is None else Path(stack.cwd).expanduser()
+        if not working_folder.is_dir():
+            raise self._invalid((name, "cwd"), "no such folder", "")
         try:
-            return parse_command(said.command, environment, home, said.env, (said.start_limit, said.answer_limit))
+            return parse_command(
+                stack.command, environment, working_folder, stack.env, (stack.start_limit, stack.answer_limit)
+            )
         except ValueError as error:
-            hint = "" if said.cwd is None else f"it starts in {home}"
-            raise self._wrong((name, "command"), str(error), hint) from error
+            hint = "" if stack.cwd is None else f"it starts in {working_folder}"
+            raise self._invalid((name, "command"), str(error), hint) from error
 
-    def _wrong(self, keys: tuple[str, str], message: str, hint: str) -> InvalidInput:
-        assert self.tree is not None and self.library is not None, "a stack that is not in a file"
+    def _invalid(self, keys: tuple[str, str], message: str, hint: str) -> InvalidInput:
+        assert self.tree is not None and self.library is not None, "only stacks from a file can be invalid"
         place = value_position(self.tree, ("stacks", *keys))
         problem = Problem(*place, code="SC061", message=message, hint=hint)
         return InvalidInput(self.library.with_source([problem]))
@@ -77,7 +79,7 @@ def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: P
     `known` are the names of stacks with a command; `config` is the user configuration.
     """
     stack = loaded.spec.stack
-    if not isinstance(stack, ExternalStackSpec) or loaded.runs is not None:
+    if not isinstance(stack, ExternalStackSpec) or loaded.external_command is not None:
         return None
     name = stack.external
     near = suggestion(name, known)
@@ -88,25 +90,25 @@ def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: P
 
 
 def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config: Path) -> list[Problem]:
-    """Return the problem that several --stack name external stacks of one run; each --stack makes its own runs.
+    """Return a problem if several --stack define external stacks of the same run, which can have only one --stack.
 
-    `given` are the names with a command on the command line.
+    `given` are the names of external stacks with a command on the command line.
     """
     own = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
-    said = [name for name in given if name in own]
-    stacks = " and ".join(map(quoted, said))
+    conflicting = [name for name in given if name in own]
+    stacks = " and ".join(map(quoted, conflicting))
     message = f"robots of this scenario have the stacks {stacks}, but a run can have only one --stack"
     hint = f"define the commands of all but one under `stacks:` in {config}"
-    return [own[said[1]].problem(("stack", EXTERNAL), "SC042", message, hint)] if len(said) > 1 else []
+    return [own[conflicting[1]].problem(("stack", EXTERNAL), "SC042", message, hint)] if len(conflicting) > 1 else []
 
 
 CHUNK_BYTES = 1 << 20
-ENVIRONMENTS = frozenset({"__pycache__", "venv", "node_modules", "site-packages"})
-"""Folders whose Python files are not a stack's own."""
+EXCLUDED_FOLDERS = frozenset({"__pycache__", "venv", "node_modules", "site-packages"})
+"""Folders whose Python files are not part of a stack."""
 MAX_FOLDERS, MAX_SOURCES = 500, 1000
 """Folders searched and Python files read for the digest of a stack."""
-OWN = "simscen"
-"""If the PATH has no simscen, the program that was called is used: its virtual environment is not activated."""
+SIMSCEN_PROGRAM = "simscen"
+"""If PATH has no simscen (virtual environment not activated), the simscen that is running is used instead."""
 
 
 def parse_command(
@@ -123,10 +125,10 @@ def parse_command(
     program, *arguments = split_command(text)
     program = str(Path(program).expanduser()) if program.startswith("~") else program
     env = {**environment, **(own or {})}
-    if program == OWN and why_not_executable(program, env, folder):
-        program = str(Path(sys.executable).parent / OWN)
-    if why := why_not_executable(program, env, folder):
-        raise ValueError(why)
+    if program == SIMSCEN_PROGRAM and why_not_executable(program, env, folder):
+        program = str(Path(sys.executable).parent / SIMSCEN_PROGRAM)
+    if reason := why_not_executable(program, env, folder):
+        raise ValueError(reason)
     argv = (program, *arguments)
     digest = _digest(argv, own or {}, env, folder)
     return ExternalCommand(argv, env, str(folder), *limits, digest=digest)
@@ -146,10 +148,10 @@ def why_not_executable(program: str, env: Mapping[str, str], folder: Path) -> st
         return f"{quoted(program)} is {'a folder' if stat.S_ISDIR(mode) else 'not a regular file'}, not a program"
     if not os.access(file, os.X_OK):
         return f"permission denied: {quoted(program)} is not executable"
-    return _without_interpreter(program, file)
+    return _why_no_interpreter(program, file)
 
 
-def _without_interpreter(program: str, file: Path) -> str:
+def _why_no_interpreter(program: str, file: Path) -> str:
     """Return why the interpreter of a script is missing; the kernel would report the script itself as missing."""
     try:
         with file.open("rb") as stream:
@@ -173,7 +175,7 @@ def _path(env: Mapping[str, str], folder: Path) -> str:
 
 
 def _digest(argv: Sequence[str], own: Mapping[str, str], env: Mapping[str, str], folder: Path) -> str:
-    """Return the SHA-256 of the words, own variables, and contents of the program and of files named by words."""
+    """Return the SHA-256 of the arguments, own variables, program, files named by arguments, and their source files."""
     sha = hashlib.sha256(json.dumps([list(argv), sorted(own.items())]).encode())
     found = shutil.which(argv[0], path=_path(env, folder)) if "/" not in argv[0] else None
     for word in (found or argv[0], *argv[1:]):
@@ -183,9 +185,9 @@ def _digest(argv: Sequence[str], own: Mapping[str, str], env: Mapping[str, str],
                 while data := stream.read(CHUNK_BYTES):
                     sha.update(data)
         sha.update(b"\0")
-    for home in _source_folders(argv, folder):
-        for file in itertools.islice(_python_files(home), MAX_SOURCES):
-            sha.update(f"{file.relative_to(home).as_posix()}\0".encode() + file.read_bytes() + b"\0")
+    for working_folder in _source_folders(argv, folder):
+        for file in itertools.islice(_python_files(working_folder), MAX_SOURCES):
+            sha.update(f"{file.relative_to(working_folder).as_posix()}\0".encode() + file.read_bytes() + b"\0")
     return sha.hexdigest()
 
 
@@ -203,10 +205,10 @@ def _source_folders(argv: Sequence[str], folder: Path) -> list[Path]:
     return sorted(homes)
 
 
-def _python_files(home: Path) -> Iterator[Path]:
+def _python_files(working_folder: Path) -> Iterator[Path]:
     """Yield the readable Python files in and below a folder, without those of hidden folders and environments."""
-    for folder, below, names in itertools.islice(os.walk(home), MAX_FOLDERS):
-        below[:] = sorted(name for name in below if not name.startswith(".") and name not in ENVIRONMENTS)
+    for folder, below, names in itertools.islice(os.walk(working_folder), MAX_FOLDERS):
+        below[:] = sorted(name for name in below if not name.startswith(".") and name not in EXCLUDED_FOLDERS)
         for file in (Path(folder) / name for name in sorted(names) if name.endswith(".py")):
             if file.is_file() and os.access(file, os.R_OK):
                 yield file

@@ -40,7 +40,7 @@ class AxisBuilder:
             found.append(self._list(child(node, "list")))
         if block.sampled is not None:
             found.append(self._sampled(block.sampled, node_at(node, ("sampled", "values"))))
-        self._require_apart(found)
+        self._report_overlaps(found)
         return found
 
     def _columns(self, node: Node | None, distinct: bool) -> list[list[Change]]:
@@ -51,7 +51,7 @@ class AxisBuilder:
         for path, entry in node.entries.items():
             assert isinstance(entry.value, SequenceNode)
             if distinct:
-                self._refuse_equal(entry.value)
+                self._report_duplicates(entry.value)
             if (target := self._target(path, entry)) is not None:
                 found.append([Change(target, value, n) for n, value in enumerate(entry.value.items, start=1)])
         return found
@@ -67,10 +67,10 @@ class AxisBuilder:
             return Option(tuple(column[value] for column, value in zip(columns, row, strict=True)))
 
         paths = {column[0].target.path for column in columns}
-        own = [one for one in conditions if paths.issuperset(set(one.paths) & set(self.targets))]
+        relevant = [one for one in conditions if paths.issuperset(set(one.paths) & set(self.targets))]
 
         def is_allowed(row: Row) -> bool:
-            return all_hold(own, plain_values(self.tree, own, option(row).changes))
+            return all_hold(relevant, plain_values(self.tree, relevant, option(row).changes))
 
         return [option(row) for row in covering_array([len(column) for column in columns], is_allowed)]
 
@@ -101,7 +101,7 @@ class AxisBuilder:
                 self.add(item.place, "SC010", "this variation changes nothing", "add a path and its value")
             targets = [(self._target(path, entry), entry) for path, entry in entries]
             changes = [Change(target, entry.value, number) for target, entry in targets if target is not None]
-            self._require_apart([[Option((change,))] for change in changes])
+            self._report_overlaps([[Option((change,))] for change in changes])
             found.append(Option(tuple(changes), name))
         return found
 
@@ -111,8 +111,8 @@ class AxisBuilder:
             return ""
         place, value = entry.value.place, entry.value.plain
         name = value if isinstance(value, str) else str(value) if isinstance(value, int | float) else ""
-        if (flaw := name_error(name)) is not None:
-            self.add(place, "SC017", flaw, NAME_HINT)
+        if (error := name_error(name)) is not None:
+            self.add(place, "SC017", error, NAME_HINT)
         first = self._names.setdefault(name.casefold(), place)
         if first != place:
             self.add(place, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
@@ -152,14 +152,14 @@ class AxisBuilder:
         self.targets.setdefault(path, target)
         return target
 
-    def _refuse_equal(self, items: SequenceNode) -> None:
+    def _report_duplicates(self, items: SequenceNode) -> None:
         seen: list[object] = []
         for item in items.items:
             if item.plain in seen:
                 self.add(item.place, "SC054", "this value is listed twice", "remove one of them")
             seen.append(item.plain)
 
-    def _require_apart(self, axes: Sequence[Sequence[Option]]) -> None:
+    def _report_overlaps(self, axes: Sequence[Sequence[Option]]) -> None:
         """Report axes that change the same value, or a part of each other's values."""
         targets = [
             {change.target.path: change.target for option in typical_options(axis) for change in option.changes}

@@ -19,7 +19,7 @@ VARIATIONS, ACCEPTANCE = "variations", "acceptance"
 MAX_TOTAL_VALUES = 5_000_000
 """Limit on the number of values of all variations of a scenario together."""
 MAX_REJECTED_DRAWS = 10_000
-"""Draws in a row that may miss the conditions of `require` before they count as impossible to meet."""
+"""Consecutive draws that do not meet `require`, after which the conditions count as impossible to meet."""
 _DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
 """Keys that do not change the run, and so do not appear in names of variations."""
 
@@ -57,7 +57,7 @@ class Block:
 
     @property
     def count(self) -> int:
-        """Number of combinations, whether they meet the conditions or not."""
+        """Number of combinations, including those that do not meet the conditions."""
         return math.prod(map(len, self.axes))
 
     def options(self, index: int) -> list[Option]:
@@ -73,9 +73,9 @@ class Block:
 
 @dataclass(frozen=True)
 class VariationSpace:
-    """All variations of a scenario, made when they are asked for. Variations are numbered from 1.
+    """All variations of a scenario, built on demand. Variations are numbered from 1.
 
-    `is_random`: they are independent random draws, of which there are as many as wanted.
+    `is_random`: they are independent random draws, and any number of them can be drawn.
     """
 
     tree: MappingNode
@@ -85,11 +85,11 @@ class VariationSpace:
 
     @property
     def count(self) -> int:
-        """Number of variations, of which some may not meet the conditions. Random draws are not limited by it."""
+        """Number of variations, including those that do not meet the conditions. It does not limit random draws."""
         return sum(block.count for block in self.blocks)
 
     def variation(self, number: int) -> Variation | None:
-        """Return the variation with this number, named after it; None if it does not meet the conditions.
+        """Return the variation with this number, called `variation-<number>`; None if it does not meet the conditions.
 
         Raises ConditionError if a condition cannot be evaluated, and IndexError if there is no such variation.
         """
@@ -117,7 +117,7 @@ class VariationSpace:
             elif (rejected := rejected + 1) == MAX_REJECTED_DRAWS:
                 raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions")
 
-    def named(self) -> list[Variation]:
+    def all_named(self) -> list[Variation]:
         """Return all variations, named after the values that differ. Raises ConditionError."""
         numbers = list(self.numbers())
         chosen = [options for number in numbers if (options := self._options(number)) is not None]
@@ -125,12 +125,12 @@ class VariationSpace:
             {change.target.path: change.value.plain for o in options for change in o.changes} for options in chosen
         ]
         differ = {path for path in self.targets if any(one.get(path) != values[0].get(path) for one in values)}
-        everything = list(self.targets.values())
-        named = [target for target in everything if target.keys[0] not in _DESCRIPTIVE_KEYS] or everything
-        keys = short_names([target for target in named if target.path in differ] or named)
+        all_targets = list(self.targets.values())
+        named_targets = [target for target in all_targets if target.keys[0] not in _DESCRIPTIVE_KEYS] or all_targets
+        keys = short_names([target for target in named_targets if target.path in differ] or named_targets)
         names = [_name(options, keys, number) for number, options in zip(numbers, chosen, strict=True)]
-        given = [len(options) == 1 and bool(options[0].name) for options in chosen]
-        return [self._build(name, options) for options, name in zip(chosen, make_unique(names, given), strict=True)]
+        is_named = [len(options) == 1 and bool(options[0].name) for options in chosen]
+        return [self._build(name, options) for options, name in zip(chosen, make_unique(names, is_named), strict=True)]
 
     def _options(self, number: int) -> list[Option] | None:
         index = number - 1
@@ -154,7 +154,7 @@ class VariationSpace:
 def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -> list[Variation] | list[Problem]:
     """Return all variations of a scenario in order, or those with these `numbers`; or the problems of `variations`.
 
-    Of the numbered ones, those that do not exist or do not meet the conditions are missing.
+    Numbers that do not exist, or whose variations do not meet the conditions, are skipped.
     """
     space = variation_space(tree)
     if not isinstance(space, VariationSpace):
@@ -165,7 +165,7 @@ def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -
             return [one for number in numbers if (one := _numbered(space, number)) is not None]
         if problem := _too_many(space, place):
             return [problem]
-        found = space.named()
+        found = space.all_named()
     except ConditionError as error:
         return [Problem(*_require_place(tree), "SC016", str(error), "")]
     if not found and space.count:

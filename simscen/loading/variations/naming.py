@@ -14,15 +14,15 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.variations.paths import Target, split_path
 from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, SequenceNode
 
-MAX_NAME_CHARS, _LONGEST_VALUE = 100, 40
-_GIVEN = re.compile(r"[^\W][\w.,=+%-]*")
+MAX_NAME_CHARS, _MAX_VALUE_CHARS = 100, 40
+_VALID_NAME = re.compile(r"[^\W][\w.,=+%-]*")
 _NUMBERED = re.compile(r"variation-([1-9][0-9]{0,8})")
 _UNSAFE = re.compile(r"[^\w.+%-]+")
 
 
 def name_error(name: str) -> str | None:
     """Return why a name of a variation is invalid; None if it is valid."""
-    if len(name) <= MAX_NAME_CHARS and _GIVEN.fullmatch(name):
+    if len(name) <= MAX_NAME_CHARS and _VALID_NAME.fullmatch(name):
         return None
     return f"{quoted(name)} is not a valid name of a variation"
 
@@ -35,14 +35,16 @@ NAME_HINT = (
 def short_names(targets: Sequence[Target]) -> dict[str, str]:
     """Return a short unique name for each path: its last part, and as many parts before it as needed."""
     parts = {target.path: split_path(target.path) for target in targets}
-    named = dict.fromkeys(parts, 1)
+    part_counts = dict.fromkeys(parts, 1)
     while True:
-        short = {path: ".".join(parts[path][-count:]) for path, count in named.items()}
-        times = Counter(short.values())
-        again = [path for path, name in short.items() if times[name] > 1 and named[path] < len(parts[path])]
-        if not again:
+        short = {path: ".".join(parts[path][-count:]) for path, count in part_counts.items()}
+        occurrences = Counter(short.values())
+        ambiguous = [
+            path for path, name in short.items() if occurrences[name] > 1 and part_counts[path] < len(parts[path])
+        ]
+        if not ambiguous:
             return {path: _safe(name) for path, name in short.items()}
-        named |= {path: named[path] + 1 for path in again}
+        part_counts |= {path: part_counts[path] + 1 for path in ambiguous}
 
 
 def derive_name(keys: dict[str, str], values: dict[str, Node], numbers: dict[str, int], number: int) -> str:
@@ -66,11 +68,11 @@ def number_of(name: str) -> int | None:
     return int(match[1]) if match else None
 
 
-def make_unique(names: Sequence[str], given: Sequence[bool]) -> list[str]:
-    """Return the names; derived ones get a number if another name is the same up to case."""
-    taken = {name.casefold() for name, fixed in zip(names, given, strict=True) if fixed}
+def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
+    """Return the names; a derived name gets a number if it differs from another name only in case, or not at all."""
+    taken = {name.casefold() for name, fixed in zip(names, is_fixed, strict=True) if fixed}
     found = []
-    for name, fixed in zip(names, given, strict=True):
+    for name, fixed in zip(names, is_fixed, strict=True):
         candidate, number = name, 2
         while not fixed and candidate.casefold() in taken:
             candidate, number = f"{name}+{number}", number + 1
@@ -96,7 +98,7 @@ def _value(node: Node) -> str:
             text = "_".join(_value(entry.value) for entry in entries.values())
         case _:
             return ""
-    return text if len(text := _safe(text)) <= _LONGEST_VALUE else ""
+    return text if len(text := _safe(text)) <= _MAX_VALUE_CHARS else ""
 
 
 def _safe(text: str) -> str:
@@ -112,21 +114,23 @@ class VariationProblems(NamedTuple):
 
 
 def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
-    """Return the problems of all variations; those shared by all and not caused by a varied value are not annotated."""
+    """Return the problems of all variations, with the names of the affected variations where not all are affected."""
     if len(variations) == 1 and not variations[0].name:
         return list(dict.fromkeys(variations[0].problems))
-    having: dict[Problem, list[VariationProblems]] = {}
+    variations_by_problem: dict[Problem, list[VariationProblems]] = {}
     for one in variations:
         for problem in dict.fromkeys(one.problems):
-            having.setdefault(problem, []).append(one)
-    return sorted(_named(problem, those, len(variations)) for problem, those in having.items())
+            variations_by_problem.setdefault(problem, []).append(one)
+    return sorted(
+        _with_variation_names(problem, affected, len(variations)) for problem, affected in variations_by_problem.items()
+    )
 
 
-def _named(problem: Problem, having: Sequence[VariationProblems], all_of_them: int) -> Problem:
-    path = having[0].set_by.get(Position(problem.path, problem.line, problem.col))
-    names = [one.name for one in having if one.name]
-    if not names or (path is None and len(names) == all_of_them):
+def _with_variation_names(problem: Problem, affected: Sequence[VariationProblems], variation_count: int) -> Problem:
+    path = affected[0].set_by.get(Position(problem.path, problem.line, problem.col))
+    names = [one.name for one in affected if one.name]
+    if not names or (path is None and len(names) == variation_count):
         return problem
     several = f" and {len(names) - 1} more" if len(names) > 1 else ""
-    where = "in all variations" if len(names) == all_of_them else f"in the variation {quoted(names[0])}{several}"
+    where = "in all variations" if len(names) == variation_count else f"in the variation {quoted(names[0])}{several}"
     return replace(problem, message=f"{problem.message} ({f'{quoted(path)}, ' if path else ''}{where})")

@@ -29,9 +29,9 @@ class Option:
 
 
 class RandomOptions(Sequence[Option]):
-    """Options of `sampled` with random values, which are drawn when they are asked for.
+    """Options of `sampled` with random values, which are drawn on demand.
 
-    Its length is the `count`, but an index may exceed it.
+    The length is the `count`, but an index may exceed it.
     """
 
     def __init__(self, sampled: "Sampled", ranges: MappingNode, targets: Sequence[Target]) -> None:
@@ -46,7 +46,7 @@ class RandomOptions(Sequence[Option]):
     def __getitem__(self, index: slice) -> list[Option]: ...
     def __getitem__(self, index: int | slice) -> Option | list[Option]:
         if isinstance(index, slice):
-            return [self[each] for each in range(*index.indices(len(self)))]
+            return [self[i] for i in range(*index.indices(len(self)))]
         from simscen.loading.variations.sampling import draw_value
 
         drawn = [(target, draw_value(self._sampled, target.path, index)) for target in self._targets]
@@ -62,7 +62,7 @@ class RandomOptions(Sequence[Option]):
 
 
 def value_node(distribution: Node, value: object) -> Node:
-    """Return the node of a drawn value: one of the choices, or a new one at the place of its distribution."""
+    """Return the node of a drawn value: one of the choices, or a new node at the position of its distribution."""
     from simscen.loading.variations.sampling import Pick
 
     if isinstance(value, Pick):

@@ -43,7 +43,7 @@ class Target:
 
 
 def resolve_path(path: str, place: Position, tree: MappingNode) -> Target:
-    """Return the value that a path leads to, which need not be written yet. Raises PathError."""
+    """Return the target of a path, whose value need not exist in the scenario. Raises PathError."""
     parts = split_path(path)
     if parts[0] in FIXED_KEYS:
         raise PathError(f"a variation cannot change `{parts[0]}`", FIXED_KEYS[parts[0]])
@@ -52,7 +52,7 @@ def resolve_path(path: str, place: Position, tree: MappingNode) -> Target:
 
 def set_value(tree: MappingNode, target: Target, value: Node) -> MappingNode:
     """Return the scenario with the value set. New nodes have the position of the path."""
-    changed = _put(tree, target.keys, value, target.place)
+    changed = _with_value(tree, target.keys, value, target.place)
     assert isinstance(changed, MappingNode)
     return changed
 
@@ -109,15 +109,15 @@ def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list
             count = f"{len(items.items)} item{'' if len(items.items) == 1 else 's'}"
             raise PathError(f"{quoted(path)} leads to nothing: `{holder}` has {count}", "the first item is [0]")
         return [int(part)]
-    called = [index for index, item in enumerate(items.items) if part in _names(item)]
-    if len(called) > 1 and rest:
-        called = [index for index in called if _child(items.items[index], rest[0]) is not None] or called
+    matches = [index for index, item in enumerate(items.items) if part in _names(item)]
+    if len(matches) > 1 and rest:
+        matches = [index for index in matches if _child(items.items[index], rest[0]) is not None] or matches
     kinds = [
         index
         for index, item in enumerate(items.items)
-        if keys and keys[0] in KEYS_BY_KIND and not called and _child(item, part) is not None
+        if keys and keys[0] in KEYS_BY_KIND and not matches and _child(item, part) is not None
     ]
-    found = called or kinds
+    found = matches or kinds
     if len(found) > 1:
         hint = f"use the index: {', '.join(f'{holder}[{index}]' for index in found[:5])}"
         raise PathError(
@@ -163,15 +163,15 @@ def _file_hint(keys: list[Key]) -> str:
     return ""
 
 
-def _put(node: Node | None, keys: tuple[Key, ...], value: Node, place: Position) -> Node:
+def _with_value(node: Node | None, keys: tuple[Key, ...], value: Node, place: Position) -> Node:
     if not keys:
         return value
     first, *rest = keys
     if isinstance(node, SequenceNode) and isinstance(first, int):
         items = list(node.items)
-        items[first] = _put(items[first], tuple(rest), value, place)
+        items[first] = _with_value(items[first], tuple(rest), value, place)
         return SequenceNode(node.place, tuple(items))
     fields = node if isinstance(node, MappingNode) else MappingNode(place, {})
     below = fields.entries.get(str(first))
-    entry = Entry(below.key if below else place, _put(below.value if below else None, tuple(rest), value, place))
+    entry = Entry(below.key if below else place, _with_value(below.value if below else None, tuple(rest), value, place))
     return MappingNode(fields.place, {**fields.entries, str(first): entry})

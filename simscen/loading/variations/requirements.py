@@ -1,4 +1,4 @@
-"""Check of the conditions in `require:` for the values of a variation."""
+"""Check the conditions in `require:` with the values of a variation."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any

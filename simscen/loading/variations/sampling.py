@@ -19,7 +19,7 @@ class Pick(NamedTuple):
 
 def draw_values(sampled: Sampled, path: str) -> list[Any]:
     """Return the values of one path, in the order of the variations. Raises ValueError for an invalid range."""
-    return [value_at(sampled.values[path], u) for u in _chances(sampled, path)]
+    return [value_at(sampled.values[path], u) for u in _probabilities(sampled, path)]
 
 
 def draw_value(sampled: Sampled, path: str, index: int) -> Any:
@@ -27,19 +27,19 @@ def draw_value(sampled: Sampled, path: str, index: int) -> Any:
     return value_at(sampled.values[path], _hash(sampled.seed, path, "value", index))
 
 
-def _chances(sampled: Sampled, path: str) -> list[float]:
-    """Return numbers between 0 and 1, both excluded."""
+def _probabilities(sampled: Sampled, path: str) -> list[float]:
+    """Return a cumulative probability for each variation, 0 and 1 excluded."""
     count = sampled.count
     if sampled.method == "sobol":
-        return _sobol_chances(sampled, path)
-    chances = [_hash(sampled.seed, path, "value", number) for number in range(count)]
+        return _sobol_probabilities(sampled, path)
+    probabilities = [_hash(sampled.seed, path, "value", number) for number in range(count)]
     if sampled.method == "random":
-        return chances
+        return probabilities
     order = sorted(range(count), key=lambda number: _hash(sampled.seed, path, "stratum", number))
-    return [(stratum + rng) / count for stratum, rng in zip(order, chances, strict=True)]
+    return [(stratum + offset) / count for stratum, offset in zip(order, probabilities, strict=True)]
 
 
-def _sobol_chances(sampled: Sampled, path: str) -> list[float]:
+def _sobol_probabilities(sampled: Sampled, path: str) -> list[float]:
     """Return the coordinates of a path in a Sobol sequence, shifted by a random number modulo 1.
 
     (Joe and Kuo: Constructing Sobol Sequences with Better Two-Dimensional Projections, 2008; Cranley and Patterson:
@@ -60,8 +60,8 @@ def _sobol_points(dimensions: int, count: int) -> Any:
     return Sobol(dimensions, scramble=False).random_base2(exponent)[:count]
 
 
-def _hash(seed: int, path: str, what: str, number: int) -> float:
-    digest = hashlib.sha256(f"{seed}\0{path}\0{what}\0{number}".encode()).digest()
+def _hash(seed: int, path: str, purpose: str, number: int) -> float:
+    digest = hashlib.sha256(f"{seed}\0{path}\0{purpose}\0{number}".encode()).digest()
     return ((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / 2**52
 
 
@@ -101,15 +101,17 @@ def _normal(normal: Normal, u: float) -> Any:
     (mean, std, *bounds), unit = to_common_unit((normal.mean, normal.std, *ends))
     if std <= 0:
         raise ValueError("`std` must be greater than 0")
-    spread = NormalDist(mean, std)
+    distribution = NormalDist(mean, std)
     low = bounds[0] if normal.min is not None else -math.inf
     high = bounds[-1] if normal.max is not None else math.inf
     if low >= high:
         raise ValueError(f"`min` {low:g} is not less than `max` {high:g}")
-    least, most = spread.cdf(low) if ends else 0.0, spread.cdf(high) if ends else 1.0
-    if most - least < 1e-12:
+    min_probability, max_probability = distribution.cdf(low) if ends else 0.0, distribution.cdf(high) if ends else 1.0
+    if max_probability - min_probability < 1e-12:
         raise ValueError("the range from `min` to `max` is too many `std` away from `mean`")
-    return _with_unit(min(max(spread.inv_cdf(least + u * (most - least)), low), high), unit)
+    return _with_unit(
+        min(max(distribution.inv_cdf(min_probability + u * (max_probability - min_probability)), low), high), unit
+    )
 
 
 def _with_unit(number: float, unit: str) -> Any:

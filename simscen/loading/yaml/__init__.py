@@ -1,1 +1,1 @@
-"""YAML files as trees whose nodes know their position in the file."""
+"""YAML files as trees with the positions of keys and values."""

@@ -23,42 +23,42 @@ APPEND_SUFFIX = "+"
 class Library:
     """Reader of the files of one scenario; keeps their texts so that problems can show their lines.
 
-    `texts` and `files` are by the names that problems use. `loaded` caches what was loaded from files.
+    The keys of `texts` and `files` are the names that problems use. `loaded` caches worlds, maps and robots.
     """
 
-    fence: PathSandbox
+    sandbox: PathSandbox
     texts: dict[str, str] = field(default_factory=dict)
     files: dict[str, Path] = field(default_factory=dict)
     loaded: dict[tuple[str, Path], Any] = field(default_factory=dict)
 
     def read(self, path: Path, defaults: bool = False) -> tuple[Node | None, list[Problem]]:
-        """Return the tree of `path` merged with what it extends and, with `defaults`, the `defaults.yaml` beside it."""
-        tree, problems = self._with_base(path, ())
+        """Return the tree of `path` merged with what it extends and, if `defaults`, the `defaults.yaml` next to it."""
+        tree, problems = self._read_with_base(path, ())
         return self.with_defaults(path, tree, problems) if defaults else (tree, problems)
 
     def with_defaults(
         self, path: Path, tree: Node | None, problems: list[Problem]
     ) -> tuple[Node | None, list[Problem]]:
-        """Return a tree in the place of the file `path` merged with the `defaults.yaml` beside it."""
-        beside = path.parent / DEFAULTS_FILE
+        """Return a tree, used as the content of the file `path`, merged with the `defaults.yaml` next to it."""
+        defaults_file = path.parent / DEFAULTS_FILE
         # A defaults.yaml that cannot be read is a problem; ignoring it would change the scenario silently.
-        if isinstance(tree, MappingNode) and os.path.lexists(beside) and path.name != DEFAULTS_FILE:
-            below, more = self._defaults(beside)
+        if isinstance(tree, MappingNode) and os.path.lexists(defaults_file) and path.name != DEFAULTS_FILE:
+            below, more = self._read_defaults(defaults_file)
             problems = [*problems, *more]
             if isinstance(below, MappingNode):
                 tree = extend_mapping(tree, below)
             elif not more and below is not None:
                 message = "expected a mapping at top level"
-                problems = [*problems, Problem(self.fence.shown(beside), 0, 0, "SC004", message)]
+                problems = [*problems, Problem(self.sandbox.display_name(defaults_file), 0, 0, "SC004", message)]
         return tree, problems
 
     def add(self, texts: Mapping[str, str], files: Mapping[str, Path]) -> None:
-        """Add files that were read elsewhere, by the names that problems use."""
+        """Add files that were read without this library, by the names that problems use."""
         self.texts |= texts
         self.files |= files
 
     def folder_of(self, place: Position) -> Path:
-        """Return the folder of the file of a position; paths in that file are relative to it."""
+        """Return the folder of the file that contains a position; paths in that file are relative to it."""
         return self.files[place.path].parent
 
     def with_source(self, problems: list[Problem]) -> list[Problem]:
@@ -73,42 +73,46 @@ class Library:
         lines = self.texts.get(problem.path, "").split("\n")
         return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem
 
-    def _with_base(self, path: Path, chain: tuple[Path, ...]) -> tuple[Node | None, list[Problem]]:
-        tree, problems = self._one(path)
+    def _read_with_base(self, path: Path, chain: tuple[Path, ...]) -> tuple[Node | None, list[Problem]]:
+        tree, problems = self._read_file(path)
         if not isinstance(tree, MappingNode) or EXTENDS not in tree.entries:
             return tree, problems
         entry = tree.entries[EXTENDS]
         own = MappingNode(tree.place, {key: value for key, value in tree.entries.items() if key != EXTENDS})
-        base = self._base(entry, path, (*chain, path))
+        base = self._base_file(entry, path, (*chain, path))
         if isinstance(base, Problem):
             return own, [*problems, base]
-        below, more = self._with_base(base, (*chain, path))
+        below, more = self._read_with_base(base, (*chain, path))
         if isinstance(below, MappingNode):
             return extend_mapping(own, below), problems + more
         return own, problems + more
 
-    def _defaults(self, beside: Path) -> tuple[Node | None, list[Problem]]:
-        entered = self.fence.entered(beside)
-        return (None, [entered]) if isinstance(entered, Problem) else self._with_base(entered, ())
+    def _read_defaults(self, defaults_file: Path) -> tuple[Node | None, list[Problem]]:
+        path_or_problem = self.sandbox.resolve_argument(defaults_file)
+        return (
+            (None, [path_or_problem])
+            if isinstance(path_or_problem, Problem)
+            else self._read_with_base(path_or_problem, ())
+        )
 
-    def _one(self, path: Path) -> tuple[Node | None, list[Problem]]:
-        shown = self.fence.shown(path)
-        self.files[shown] = path
-        text = read_text(path, shown)
+    def _read_file(self, path: Path) -> tuple[Node | None, list[Problem]]:
+        name = self.sandbox.display_name(path)
+        self.files[name] = path
+        text = read_text(path, name)
         if isinstance(text, Problem):
             return None, [text]
-        self.texts[shown] = text
-        return parse_yaml(text, shown)
+        self.texts[name] = text
+        return parse_yaml(text, name)
 
-    def _base(self, entry: Entry, path: Path, chain: tuple[Path, ...]) -> Path | Problem:
+    def _base_file(self, entry: Entry, path: Path, chain: tuple[Path, ...]) -> Path | Problem:
         place = entry.value.place
         if not isinstance(entry.value, ScalarNode) or not isinstance(entry.value.value, str):
             return Problem(*place, "SC011", f"`{EXTENDS}` must be the path of one file")
-        base = self.fence.find(entry.value.value, path.parent)
+        base = self.sandbox.find(entry.value.value, path.parent)
         if isinstance(base, PathProblem):
             return Problem(*place, base.code, base.message, base.hint)
         if base in chain:
-            names = " → ".join(self.fence.shown(file) for file in (*chain[chain.index(base) :], base))
+            names = " → ".join(self.sandbox.display_name(file) for file in (*chain[chain.index(base) :], base))
             return Problem(*place, "SC024", f"circular `extends`: {names}")
         if len(self.files) >= MAX_FILES:
             return Problem(*place, "SC024", f"a scenario can extend at most {MAX_FILES} files")
@@ -156,7 +160,8 @@ def merge_mappings(over: MappingNode, under: MappingNode) -> MappingNode:
 
 def _same_type(key: str, above: Entry, below: Entry) -> bool:
     if key == "stack" and (
-        (_has(above, "external") and not _has(below, "external")) or (_has(above, "type") and _has(below, "external"))
+        (_has_key(above, "external") and not _has_key(below, "external"))
+        or (_has_key(above, "type") and _has_key(below, "external"))
     ):
         return False
     types = [
@@ -167,5 +172,5 @@ def _same_type(key: str, above: Entry, below: Entry) -> bool:
     return len(types) < 2 or types[0] == types[1]
 
 
-def _has(entry: Entry, key: str) -> bool:
+def _has_key(entry: Entry, key: str) -> bool:
     return isinstance(entry.value, MappingNode) and key in entry.value.entries

@@ -1,7 +1,7 @@
 """Parse YAML to a tree with positions, within limits on depth and size.
 
 The tree is built from PyYAML's events. Its constructors are not used: they overwrite duplicate keys silently, raise
-bare ValueErrors, expand alias bombs, and overflow the C stack at 30 000 brackets.
+plain ValueErrors, expand alias bombs, and overflow the C stack at 30 000 brackets.
 """
 
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _LIBYAML_TOO_DEEP = "exceeded maximum nesting depth"
 
 
-class _Refused(Exception):
+class _ParseError(Exception):
     """Parsing cannot continue because of `problem`."""
 
     def __init__(self, problem: Problem) -> None:
@@ -33,19 +33,19 @@ class _Refused(Exception):
 def parse_yaml(text: str, path: str, *, last_wins: bool = False) -> tuple[Node | None, list[Problem]]:
     """Return the only document of `text` as a tree (None if it cannot be parsed), and all problems.
 
-    With `last_wins`, duplicate keys are warnings and the last one counts, as in parameter files of ROS 2.
+    With `last_wins`, duplicate keys are warnings and the last one is used, as in parameter files of ROS 2.
     """
     composer = _Composer(path, text, last_wins)
     try:
         root = composer.document()
-    except _Refused as refused:
-        return None, [*composer.problems, refused.problem]
+    except _ParseError as error:
+        return None, [*composer.problems, error.problem]
     return root, composer.problems
 
 
 @dataclass(frozen=True)
 class _Anchor:
-    """Anchored node, the number of its values, and its depth: an alias adds as much."""
+    """Anchored node with the number of its values and its depth; each alias counts them again."""
 
     node: Node
     values: int
@@ -68,14 +68,14 @@ class _Composer:
         """Return the root of the first document. Raises _Refused if there is none, or a second one."""
         next(self._events)  # the start of the stream
         if isinstance(next(self._events), ev.StreamEndEvent):
-            raise _Refused(self._problem(None, "SC004", "the file is empty"))
+            raise _ParseError(self._problem(None, "SC004", "the file is empty"))
         start = next(self._events)
         root, _ = self._node(start, 1)
         next(self._events)  # the end of the document
         after = next(self._events)
         if not isinstance(after, ev.StreamEndEvent):
             message = f"more than one YAML document (line {self._place(after).line})"
-            raise _Refused(self._problem(after, "SC004", message, "put each scenario into its own file"))
+            raise _ParseError(self._problem(after, "SC004", message, "put each scenario into its own file"))
         return root
 
     def _parse(self, end: int | None = None, skip: int = 0) -> Iterator[ev.Event]:
@@ -92,18 +92,18 @@ class _Composer:
         except yaml.MarkedYAMLError as error:
             if end is None and error.problem == _LIBYAML_TOO_DEEP and error.problem_mark:
                 yield from self._parse(error.problem_mark.index, count)
-            raise _Refused(self._syntax_problem(error)) from None
+            raise _ParseError(self._syntax_problem(error)) from None
         except yaml.YAMLError as error:
-            raise _Refused(self._problem(None, "SC003", str(error).splitlines()[0])) from None
+            raise _ParseError(self._problem(None, "SC003", str(error).splitlines()[0])) from None
 
     def _node(self, event: ev.Event, depth: int) -> tuple[Node, int]:
         """Return the node that begins with `event`, and its depth."""
         if isinstance(event, ev.AliasEvent):
             return self._alias(event, depth)
         if depth > MAX_DEPTH:
-            raise _Refused(self._problem(event, "SC006", f"nested deeper than {MAX_DEPTH}"))
+            raise _ParseError(self._problem(event, "SC006", f"nested deeper than {MAX_DEPTH}"))
         assert isinstance(event, ev.NodeEvent)
-        self._refuse_tag(event)
+        self._report_tag(event)
         self._count(event, 1)
         before = self._values
         if event.anchor is not None:
@@ -149,7 +149,7 @@ class _Composer:
                 merged.extend(value.items if isinstance(value, SequenceNode) else [value])
                 continue
             if key in entries:
-                self._duplicate(event, key, entries[key].key)
+                self._report_duplicate(event, key, entries[key].key)
             if self.last_wins or key not in entries:
                 entries[key] = Entry(self._place(event), value)
         return MappingNode(self._place(start), self._merge(start, entries, merged)), height + 1
@@ -165,29 +165,29 @@ class _Composer:
 
     def _key(self, event: ev.Event) -> str:
         if not isinstance(event, ev.ScalarEvent):
-            raise _Refused(self._problem(event, "SC003", "a key must be text; it is a list, a mapping or an alias"))
-        self._refuse_tag(event)
+            raise _ParseError(self._problem(event, "SC003", "a key must be text; it is a list, a mapping or an alias"))
+        self._report_tag(event)
         self._count(event, 1)
         return str(event.value)
 
     def _alias(self, event: ev.AliasEvent, depth: int) -> tuple[Node, int]:
         if event.anchor not in self._anchors:
-            raise _Refused(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
+            raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
         anchor = self._anchors[event.anchor]
         if anchor is None:
-            raise _Refused(self._problem(event, "SC006", f"alias `*{event.anchor}` contains itself"))
+            raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` contains itself"))
         if depth + anchor.depth > MAX_DEPTH:
-            raise _Refused(self._problem(event, "SC006", f"nested deeper than {MAX_DEPTH}"))
+            raise _ParseError(self._problem(event, "SC006", f"nested deeper than {MAX_DEPTH}"))
         self._count(event, anchor.values)
         return anchor.node, anchor.depth
 
     def _count(self, event: ev.Event, values: int) -> None:
         self._values += values
         if self._values > MAX_VALUES:
-            what = "aliases expand to" if isinstance(event, ev.AliasEvent) else "the file has"
-            raise _Refused(self._problem(event, "SC006", f"{what} more than {MAX_VALUES} values"))
+            subject = "aliases expand to" if isinstance(event, ev.AliasEvent) else "the file has"
+            raise _ParseError(self._problem(event, "SC006", f"{subject} more than {MAX_VALUES} values"))
 
-    def _refuse_tag(self, event: ev.Event) -> None:
+    def _report_tag(self, event: ev.Event) -> None:
         tag = getattr(event, "tag", None)
         if tag is not None:
             short = tag.replace("tag:yaml.org,2002:", "!!", 1)
@@ -195,11 +195,11 @@ class _Composer:
                 self._problem(event, "SC005", f"tag `{short}` is not allowed", "remove it; a scenario is plain data")
             )
 
-    def _duplicate(self, event: ev.Event, key: str, first: Position) -> None:
+    def _report_duplicate(self, event: ev.Event, key: str, first: Position) -> None:
         message = f"duplicate key `{key}` (first at {first.line}:{first.col})"
         if self.last_wins:
-            twice = self._problem(event, "SC007", message, "this one counts, as in ROS 2")
-            self.problems.append(replace(twice, severity="warning"))
+            problem = self._problem(event, "SC007", message, "this one counts, as in ROS 2")
+            self.problems.append(replace(problem, severity="warning"))
         else:
             self.problems.append(self._problem(event, "SC007", message, "remove one of them"))
 
@@ -225,8 +225,8 @@ class _Composer:
         if (lookalike := self._lookalike(lines, start.line if start else mark.line, mark.line)) is not None:
             return lookalike
         if start is not None and mark.index >= len(self.text.rstrip()) and start.index < mark.index:
-            what = (error.context or "this").removeprefix("while parsing a ").removeprefix("while scanning a ")
-            return Problem(self.path, start.line + 1, start.column + 1, "SC003", f"this {what} is not closed")
+            subject = (error.context or "this").removeprefix("while parsing a ").removeprefix("while scanning a ")
+            return Problem(self.path, start.line + 1, start.column + 1, "SC003", f"this {subject} is not closed")
         message = error.problem or "cannot be read as YAML"
         if start is not None and error.context and start.index != mark.index:
             message += f" ({error.context} that starts at {start.line + 1}:{start.column + 1})"

@@ -58,11 +58,11 @@ def _decode(raw: bytes, shown: str) -> str | Problem:
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        before = _plain_breaks(raw[: error.start].decode("utf-8-sig", errors="replace"))
+        before = _normalize_line_breaks(raw[: error.start].decode("utf-8-sig", errors="replace"))
         line, column = _position(before, len(before))
         hint = "save the file as UTF-8" + (" (it looks like UTF-16)" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "")
         return Problem(shown, line, column, "SC002", f"not valid UTF-8 at byte {error.start}", hint)
-    text = _plain_breaks(text)
+    text = _normalize_line_breaks(text)
     if control := _CONTROL.search(text):
         line, column = _position(text, control.start())
         message = f"control character U+{ord(control[0]):04X}"
@@ -70,7 +70,7 @@ def _decode(raw: bytes, shown: str) -> str | Problem:
     return text
 
 
-def _plain_breaks(text: str) -> str:
+def _normalize_line_breaks(text: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 

@@ -1,4 +1,4 @@
-"""Tree of a YAML file whose keys and values know their position."""
+"""Tree of a YAML file with the positions of its keys and values."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class SequenceNode:
 
     @property
     def plain(self) -> list[Any]:
-        """As lists, mappings and scalars."""
+        """The sequence as a list of plain Python values."""
         return [item.plain for item in self.items]
 
 
@@ -58,7 +58,7 @@ class MappingNode:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """As lists, mappings and scalars."""
+        """The mapping as a dict of plain Python values."""
         return {key: entry.value.plain for key, entry in self.entries.items()}
 
 

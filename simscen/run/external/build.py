@@ -27,7 +27,7 @@ def build_external_stack(
 
     Raises InvalidInput if the name of the stack is not defined.
     """
-    command = prepared.loaded.runs
+    command = prepared.loaded.external_command
     if command is None:
         raise InvalidInput([problem] if (problem := undefined_stack(prepared.loaded)) else [])
     parameters = RunParameters(

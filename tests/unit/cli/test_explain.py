@@ -39,7 +39,7 @@ def test_ambiguous_name_explains_all_topics(simscen) -> None:
 
 
 def test_codes_are_explained(simscen) -> None:
-    assert simscen("explain", "sc012").out == "SC012\n  A key is not known there.\n"
+    assert simscen("explain", "sc012").out == "SC012\n  A key is unknown in this mapping.\n"
 
 
 def test_codes_of_other_stacks_are_marked(simscen) -> None:

@@ -89,8 +89,8 @@ def test_unusable_program_is_reported_before_any_run(simscen, project, command, 
 
 def test_command_line_overrides_the_configuration(project: Path) -> None:
     configure(project, "stacks: {mine: {command: sh -c true}, other: {command: ./nav --other}}\n")
-    assert loaded("mine")[0].runs.argv == ("sh", "-c", "true")
-    assert loaded("mine", "mine=./nav 'a b'")[0].runs.argv == ("./nav", "a b")
+    assert loaded("mine")[0].external_command.argv == ("sh", "-c", "true")
+    assert loaded("mine", "mine=./nav 'a b'")[0].external_command.argv == ("./nav", "a b")
     both = loaded("mine", "mine", "x=other", "ref=reference")
     assert [(one.stack_name, one.runs and one.runs.argv) for one in both] == [
         ("mine", ("sh", "-c", "true")),
@@ -133,7 +133,7 @@ def test_configuration_sets_limits_folder_and_variables(project: Path, monkeypat
     configure(project, f"stacks: {{mine: {text}}}\n")
     (project / "deep").mkdir()
     monkeypatch.chdir(project / "deep")
-    runs = load_all([project / "mine.scenario.yaml"], None, [], False, Selection(), ())[0][0].runs
+    runs = load_all([project / "mine.scenario.yaml"], None, [], False, Selection(), ())[0][0].external_command
     assert runs is not None
     assert (runs.cwd, runs.start_limit, runs.answer_limit) == (f"{project}", 120.0, 0.5)
     assert (runs.env["ROS_DOMAIN_ID"], runs.env["PYTHONPATH"]) == ("7", "/opt/mine")
@@ -234,7 +234,10 @@ def test_digest_includes_modules_next_to_a_python_script(project: Path, command:
 def test_simscen_is_found_without_an_activated_environment(project: Path, monkeypatch) -> None:
     """Its adapter for ROS 2 is a command: `--stack mine='simscen ros2 …'`."""
     monkeypatch.setenv("PATH", "/nowhere")
-    assert loaded("mine", "mine=simscen ros2")[0].runs.argv == (str(Path(sys.executable).parent / "simscen"), "ros2")
+    assert loaded("mine", "mine=simscen ros2")[0].external_command.argv == (
+        str(Path(sys.executable).parent / "simscen"),
+        "ros2",
+    )
     with pytest.raises(UsageError, match="no program `sh` in the PATH"):
         loaded("mine", "mine=sh -c true")
 
@@ -244,7 +247,7 @@ def test_program_is_searched_in_the_path_of_its_environment(project: Path) -> No
     (project / "bin/only-here").write_text("#!/bin/sh\n")
     (project / "bin/only-here").chmod(0o755)
     configure(project, f"stacks: {{mine: {{command: only-here, env: {{PATH: {project}/bin}}}}}}\n")
-    assert loaded("mine")[0].runs.argv == ("only-here",)
+    assert loaded("mine")[0].external_command.argv == ("only-here",)
 
 
 def test_schema_of_the_configuration_is_written(simscen, project: Path) -> None:

@@ -56,7 +56,7 @@ def loaded(name: str, *stacks: str):
 def runs(scenario) -> dict[str, str]:
     """What drives each robot: the words of a command, or the type of stack in the engine."""
     return {
-        name: " ".join(view.runs.argv) if view.runs else type(view.spec.stack).__name__
+        name: " ".join(view.external_command.argv) if view.external_command else type(view.spec.stack).__name__
         for name, view in scenario.robots.items()
     }
 

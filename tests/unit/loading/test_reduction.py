@@ -13,7 +13,7 @@ from simscen.loading.reduction import (
     roundings,
     with_seed,
     with_values,
-    without,
+    without_parts,
 )
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.tree import MappingNode, Position, ScalarNode
@@ -54,7 +54,7 @@ def test_parts_of_each_depth_can_be_left_out_but_not_what_fails() -> None:
 
 def test_parts_are_left_out_with_what_becomes_empty() -> None:
     tree = parsed(TEXT)
-    left = without(tree, [("goals", 0), ("events", 0), ("robot", "motor_torque")])
+    left = without_parts(tree, [("goals", 0), ("events", 0), ("robot", "motor_torque")])
     assert left.plain["goals"] == [{"pose": "kitchen", "timeout": "100 s"}]
     assert "events" not in left.plain
     assert left.plain["robot"] == {"pose": "dock"}

@@ -186,7 +186,7 @@ def test_every_scenario_in_a_world_knows_all_files_of_it(project: Path, of: Dige
     """Also the second one, whose world another has had built already."""
     (project / "p/b.scenario.yaml").write_text(FILES["p/a.scenario.yaml"])
     loaded, _ = load_all([project / "p"], project / "p", [project / "models"], False, Selection())
-    first, second = (scenario.read for scenario in loaded)
+    first, second = (scenario.read_files for scenario in loaded)
     assert first == second
     assert {"model.sdf", "crate.stl", "hill.png", "cart.xacro", "size.xacro", "mast.stl"} <= {f.name for f in first}
 

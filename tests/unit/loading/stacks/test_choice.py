@@ -75,8 +75,8 @@ def test_a_stack_file_may_extend_another_and_lie_outside_the_root(write, scenari
     choice = load_stack_file("m", "m", write("stacks/m.stack.yaml", text), home)
     assert choice.section is not None
     assert choice.section.plain == {"controller": {"type": "mppi"}, "costmap": {"inflation_radius": 0.4}}
-    assert choice.seen_from(home) == f"m={tmp_path}/stacks/m.stack.yaml"
-    assert choice.seen_from(tmp_path) == "m=stacks/m.stack.yaml"
+    assert choice.relative_to_folder(home) == f"m={tmp_path}/stacks/m.stack.yaml"
+    assert choice.relative_to_folder(tmp_path) == "m=stacks/m.stack.yaml"
     assert load_scenario(file, tmp_path, (), choice).spec.stack.costmap.inflation_radius == 0.4
 
 

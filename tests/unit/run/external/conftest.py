@@ -58,7 +58,7 @@ def load(tmp_path: Path, program: Program) -> Load:
         file = tmp_path / f"{name}.scenario.yaml"
         file.write_text("\n".join(written.values()) + "\n")
         loaded = load_scenario(file, tmp_path)
-        return replace(loaded, runs=program(text, start_limit, answer_limit))
+        return replace(loaded, external_command=program(text, start_limit, answer_limit))
 
     return write
 

@@ -178,9 +178,9 @@ def test_a_program_that_cannot_be_started_is_told(load, argv: tuple[str, ...]) -
     from simscen.run.simulate import simulate
 
     loaded = load("")
-    assert loaded.runs is not None
+    assert loaded.external_command is not None
     with pytest.raises(RunError, match=r"its process cannot be started: (No such file|Permission denied)") as told:
-        simulate(prepare(replace(loaded, runs=replace(loaded.runs, argv=argv))))
+        simulate(prepare(replace(loaded, external_command=replace(loaded.external_command, argv=argv))))
     assert told.value.kind == "stack-crashed"
 
 

@@ -39,7 +39,10 @@ def load_fleet(program, tmp_path: Path):
         file = tmp_path / "fleet.scenario.yaml"
         file.write_text(FLEET)
         loaded, runs = load_scenario(file, tmp_path), program(text, **limits)
-        robots = {name: replace(view, runs=runs if name != "third" else None) for name, view in loaded.robots.items()}
+        robots = {
+            name: replace(view, external_command=runs if name != "third" else None)
+            for name, view in loaded.robots.items()
+        }
         return replace(loaded, robots=robots)
 
     return load
