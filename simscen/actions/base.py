@@ -64,7 +64,7 @@ class AnyAction(Choice):
 
     def may(self, *kinds: str) -> bool:
         """Return whether it is one of these actions, or one of a plugin, which can do anything."""
-        return self.kind in kinds or self.narrow is not None
+        return self.kind in kinds or self.original_class is not None
 
     def perform(self, stage: Stage) -> Effect:
         """Perform the action and return its effect, which starts with the name of the robot if one is given."""
@@ -76,7 +76,7 @@ class AnyAction(Choice):
     def _perform_chosen(self, stage: Stage) -> Effect:
         action = self.chosen
         assert isinstance(action, Action)
-        return action.perform(stage) if self.narrow is None else perform_checked(action, stage, self.added_by)
+        return action.perform(stage) if self.original_class is None else perform_checked(action, stage, self.added_by)
 
 
 _QUERIES = frozenset({*dir(Situation), "room", "rng", "door", "motion", "mass"})

@@ -16,7 +16,7 @@ from simscen.criteria.findings import at_least, at_most, missed, undecided
 from simscen.criteria.timeline import Span, end_reason, has_ended, never_started, spans
 from simscen.criteria.trace_signals.ground_truth import DIMENSIONS, first_sustained, nees_samples, pose_error
 from simscen.spec.base import Spec
-from simscen.spec.places import HappeningName
+from simscen.spec.places import DisturbanceName
 from simscen.spec.quantities import Duration, PositiveAngle, PositiveDuration, PositiveLength, Quantity
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ class RelocalizedWithin(Spec, Criterion):
 
     time: PositiveDuration
     """Maximum time in seconds."""
-    after: HappeningName | None = None
+    after: DisturbanceName | None = None
     """Event or fault after which the robot is lost; default: the start of the run."""
     tolerance: PositiveLength = 0.25
     """Maximum position error."""

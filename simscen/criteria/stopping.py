@@ -14,7 +14,7 @@ from simscen.criteria.goal_outcomes import goal_outcomes
 from simscen.criteria.timeline import Span, end_reason, never_started, spans
 from simscen.criteria.trace_signals.ground_truth import Flags, drive, first_sustained, speed, truth, turn_rate
 from simscen.spec.base import Spec
-from simscen.spec.places import HappeningName
+from simscen.spec.places import DisturbanceName
 from simscen.spec.quantities import PositiveAngularSpeed, PositiveDuration, PositiveLength, PositiveSpeed
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class StoppedWithin(Spec, Criterion):
 
     time: PositiveDuration
     """Maximum time in s after its start."""
-    after: HappeningName
+    after: DisturbanceName
     """Name of the fault, e.g. `lidar.off`, or of the event."""
     speed: PositiveSpeed = 0.02
     """Maximum speed over ground of a standing robot in m/s."""

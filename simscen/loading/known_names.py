@@ -25,7 +25,7 @@ NOUNS = {
     "mover": "movable object of the world or of an event",
     "goal": "goal",
     "event": "event or mark",
-    "happening": "event, fault or mark",
+    "disturbance": "event, fault or mark",
     "verdict": "criterion, event or fault",
 }
 
@@ -43,7 +43,7 @@ def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
         "mover": None if movable is None else [*movable, *loaded.other_robots],
         "goal": goal_names(loaded),
         "event": _distinct(event_names(loaded), mark_names(loaded)),
-        "happening": _distinct(happening, mark_names(loaded)),
+        "disturbance": _distinct(happening, mark_names(loaded)),
         "verdict": None if loaded.other_robots else _distinct(verdict_names(loaded.spec.pass_), happening),
     }
 
@@ -195,7 +195,10 @@ def _poses_of_references(spec: BaseModel, places: Places) -> Iterator[tuple[Refe
     """Yield each reference to a place with the value that replaces it."""
     for reference in place_references(spec):
         assert isinstance(reference.mark, PlaceAllowed)
-        yield reference, reference.mark.value_at(places.get(reference.name, PLACEHOLDER_POSE).at(reference.name))
+        yield (
+            reference,
+            reference.mark.value_at(places.get(reference.name, PLACEHOLDER_POSE).with_place(reference.name)),
+        )
 
 
 def _replace_at(holder: Any, keys: tuple[Key, ...], value: Any) -> Any:

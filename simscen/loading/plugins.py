@@ -64,7 +64,7 @@ def _sorted(entries: Iterable[Entry]) -> tuple[Entry, ...]:
 
 def _used(keys: Keys, part: Any) -> Iterator[Entry]:
     if isinstance(part, Choice):
-        entry = find(part.group, part.kind) if part.narrow is not None else None
+        entry = find(part.group, part.kind) if part.original_class is not None else None
         if entry is not None and not entry.shipped:
             yield entry
         return

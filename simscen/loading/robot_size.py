@@ -72,7 +72,7 @@ def _round(radius: float) -> Polygon:
 
 
 def _height_of_shapes(spec: RobotSpec) -> float:
-    return max(part.z + part.tall for part in spec.body or ())
+    return max(part.z + part.total_height for part in spec.body or ())
 
 
 def _hull_heights(body: RobotBody) -> tuple[float, float]:

@@ -19,9 +19,9 @@ class Reference(NamedTuple):
     name: str
 
     @property
-    def kind(self) -> str:
+    def target(self) -> str:
         """The kind of thing that the name refers to, such as "place" or "door"."""
-        return self.mark.to
+        return self.mark.target
 
 
 Concerns = Callable[[str | None], bool]

@@ -1,1 +1,1 @@
-"""One frozen, validated description of a run: what the YAML files say, as types."""
+"""Specifications of scenarios, worlds, robots, and stacks: the content of YAML files as frozen, validated types."""

@@ -25,10 +25,10 @@ class PassRate(Spec):
     min: Rate
     """Lowest acceptable pass rate."""
     confidence: Confidence = 0.95
-    """Probability, at least, that a robot with a lower pass rate does not get accepted."""
+    """Minimum probability that a robot with a lower pass rate is not accepted."""
     method: Literal["fixed", "sprt", "anytime"] = "fixed"
     """`fixed`: all `runs`, then the exact Clopper-Pearson limits. `sprt`: the sequential probability ratio test between
-    `min` and `target`, which stops as soon as it is decided. `anytime`: a confidence sequence, which may be looked at
+    `min` and `target`, which stops as soon as it is decided. `anytime`: a confidence sequence, which may be evaluated
     after each run and stops as soon as it is decided."""
     runs: Annotated[int, Field(ge=1, le=MAX_RUNS)] | None = None
     """Number of runs of `fixed`; for the others, the number after which they end undecided. Default: the fewest runs
@@ -36,7 +36,7 @@ class PassRate(Spec):
     target: Rate | None = None
     """Pass rate of a robot that should be accepted; only for `sprt`."""
     power: Confidence = 0.9
-    """Probability, at least, that `sprt` does not reject a robot with the pass rate `target`."""
+    """Minimum probability that `sprt` does not reject a robot with the pass rate `target`."""
 
     @property
     def max_runs(self) -> int:

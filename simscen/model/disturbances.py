@@ -114,8 +114,8 @@ def steps_of(events: Sequence[EventEntry]) -> list[SequenceStep]:
         steps.append(SequenceStep(name, ("events", index), event, event.required))
         for number, entry in enumerate(event.then):
             required = steps[-1].required if entry.required is None else entry.required
-            called = entry.name or f"{name} then {number + 1}"
-            steps.append(SequenceStep(called, ("events", index, "then", number), entry, required, len(steps) - 1))
+            step_name = entry.name or f"{name} then {number + 1}"
+            steps.append(SequenceStep(step_name, ("events", index, "then", number), entry, required, len(steps) - 1))
     return steps
 
 

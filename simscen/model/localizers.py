@@ -26,9 +26,9 @@ class LocalizerSpec(Typed):
     """Base class of localizer specifications."""
 
     fuses_odometry: ClassVar[bool] = False
-    """The pose never jumps, so that it also defines the odom frame, as that of robot_localization's odom→base does."""
+    """Whether the pose never jumps, so that it also defines the odom frame, as odom→base of robot_localization does."""
     needs_map: ClassVar[bool] = False
-    """Without a map the localizer is no more than dead reckoning."""
+    """Whether the localizer is only dead reckoning without a map."""
     precomputation: ClassVar[str] = ""
     """`package.module:function`, called as `function(spec, grid)` once per map before the runs start; optional."""
 
@@ -118,7 +118,7 @@ class Amcl(AmclParameters):
 
     @model_validator(mode="before")
     @classmethod
-    def _with_values_of_nav2(cls, values: Any) -> Any:
+    def _apply_nav2_values(cls, values: Any) -> Any:
         """Apply the deprecated `parameters: nav2`; values that are given win."""
         if isinstance(values, Mapping) and values.get("parameters") == "nav2":
             return {"laser_model_type": "likelihood_field", **values}
@@ -163,7 +163,7 @@ class OdometryOnly(LocalizerSpec):
 
 
 DEFAULT_TYPE = "amcl"
-"""The type of a localizer that is written without one."""
+"""Type of a localizer without a `type`."""
 _Localizers = Annotated[
     Annotated[Amcl, Tag(DEFAULT_TYPE)]
     | Annotated[Ekf, Tag("ekf")]

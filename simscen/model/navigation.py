@@ -48,7 +48,7 @@ def expected_failure_name(expected: "Expectation") -> str:
 
 
 class OnReached(Spec):
-    """What the robot does at a goal before it continues.
+    """Action of the robot at a goal before it continues.
 
     Example: `on_reached: {wait: 5 s}`
     """

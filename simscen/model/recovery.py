@@ -165,10 +165,10 @@ class Recovery(Spec):
         return [entry if isinstance(entry, str) else entry.type for entry in self.behaviors]
 
     def chosen(self) -> list[BehaviorSpec]:
-        """Return the behaviors in order, with parameters that they do not set from those of the same name here."""
-        return [self._completed(entry) for entry in self.behaviors]
+        """Return the behaviors in order; parameters that they do not set have the values given here."""
+        return [self._with_shared_parameters(entry) for entry in self.behaviors]
 
-    def _completed(self, entry: str | BehaviorSpec) -> BehaviorSpec:
+    def _with_shared_parameters(self, entry: str | BehaviorSpec) -> BehaviorSpec:
         model = _SHIPPED[entry] if isinstance(entry, str) else type(entry)
         shared = type(self).model_fields.keys() & model.model_fields.keys()
         own = {} if isinstance(entry, str) else {name: getattr(entry, name) for name in entry.model_fields_set}

@@ -326,7 +326,7 @@ class Sensor(Choice):
     @property
     def may_render(self) -> bool:
         """Whether the sensor may use the renderer; sensors of installed packages may do so whatever they report."""
-        return self.narrow is not None or self.reading_type == "Image"
+        return self.original_class is not None or self.reading_type == "Image"
 
 
 class Part(Shaped):
@@ -374,9 +374,9 @@ class RobotSpec(Spec):
     @property
     def top_speed(self) -> float:
         """Maximum ground speed in m/s in the fastest direction."""
-        ahead = max(self.limits.linear, self.limits.reverse or self.limits.linear)
+        forward = max(self.limits.linear, self.limits.reverse or self.limits.linear)
         sideways = (self.limits.lateral or self.limits.linear) if isinstance(self.drive, Holonomic) else 0.0
-        return float((ahead**2 + sideways**2) ** 0.5)
+        return float((forward**2 + sideways**2) ** 0.5)
 
     @property
     def has_imu(self) -> bool:
@@ -385,8 +385,8 @@ class RobotSpec(Spec):
 
     @model_validator(mode="after")
     def _check_consistency(self) -> "RobotSpec":
-        if strange := sorted(self.latency.sensors.keys() - self.sensors.keys()):
-            raise ValueError(f"`latency` names `{strange[0]}`, which is not a sensor of the robot")
+        if unknown := sorted(self.latency.sensors.keys() - self.sensors.keys()):
+            raise ValueError(f"`latency` names `{unknown[0]}`, which is not a sensor of the robot")
         if (self.urdf is None) == (self.body is None):
             raise ValueError("expected exactly one of: body, urdf")
         if self.urdf is None and (self.packages or self.arguments):

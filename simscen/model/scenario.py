@@ -132,7 +132,7 @@ class GoalEntry(Spec):
     """Expected outcome: `succeeded`, `failed`, or the code of a failure, e.g. `{error_code: GOAL_OCCUPIED}`. The goal
     passes if and only if this is its outcome."""
     on_reached: OnReached = by_default()
-    """What the robot does at the goal before it continues."""
+    """Action of the robot at the goal before it continues."""
 
 
 MAX_GOALS = 1000
@@ -213,9 +213,9 @@ class Physics(Spec):
 
 def _check_unique(measures: list[AnyMeasure]) -> list[AnyMeasure]:
     kinds = [measure.kind for measure in measures]
-    twice = [kind for index, kind in enumerate(kinds) if kind in kinds[:index]]
-    if twice:
-        raise ValueError(f"`{twice[0]}` is given twice")
+    repeated = [kind for index, kind in enumerate(kinds) if kind in kinds[:index]]
+    if repeated:
+        raise ValueError(f"`{repeated[0]}` is given twice")
     return measures
 
 
@@ -227,10 +227,10 @@ class ScenarioSpec(Spec):
     name: Name | None = None
     """Name in reports; default: the name of the file."""
     description: Annotated[str, Field(max_length=10_000)] = ""
-    """What the scenario tests, and why."""
+    """Description for people: the tested behavior, and the reason for the test."""
     tags: Annotated[list[PlaceName], Field(max_length=50)] = []
-    """Tags that `--tag` selects scenarios by."""
-    seed: Annotated[int, Field(ge=1, le=MAX_SEED)] = 1
+    """Tags; `--tag` selects scenarios by them."""
+    seed: Annotated[int, Field(ge=1, le=LARGEST_SEED)] = 1
     """Seed of all random numbers of a run."""
     world: WorldOrFile
     """World: a `*.world.yaml` file, a ROS map `.yaml`, a Gazebo `.sdf` or `.world` file, or an inline world."""
@@ -287,8 +287,8 @@ class ScenarioSpec(Spec):
     @property
     def triggers(self) -> "list[Trigger]":
         """Triggers of all events and faults in order."""
-        waiting = [*(step.when for step in self.steps), *(fault.when for fault in self.faults)]
-        return [trigger for trigger in waiting if trigger is not None]
+        triggers = [*(step.when for step in self.steps), *(fault.when for fault in self.faults)]
+        return [trigger for trigger in triggers if trigger is not None]
 
     @property
     def goal_names(self) -> list[str]:
@@ -299,7 +299,7 @@ class ScenarioSpec(Spec):
         taken, names = {goal.name for goal in self.goals}, list[str]()
         for number, goal in enumerate(self.goals, start=1):
             default = goal.pose.place or f"goal-{number}"
-            others = (name for again in count(2) if (name := f"{default}-{again}") not in taken)
+            others = (name for suffix in count(2) if (name := f"{default}-{suffix}") not in taken)
             names.append(goal.name or (default if default not in taken else next(others)))
             taken.add(names[-1])
         return names

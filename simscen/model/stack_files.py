@@ -13,7 +13,7 @@ from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
 
 _TAG = "an external stack"
-"""Tag of external stacks in validation errors; not a valid key, so that it can be told from the keys of a stack."""
+"""Tag of external stacks in validation errors; not a valid key, so that it differs from all keys of a stack."""
 StackName = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]
 
 

@@ -136,7 +136,7 @@ class WorldSpec(Spec):
     @model_validator(mode="after")
     def _check_names(self) -> "WorldSpec":
         names = [*(thing.name for thing in self.objects), *(door.name for door in self.doors)]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise ValueError(f"several objects have the name `{twice[0]}`")
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            raise ValueError(f"several objects have the name `{repeated[0]}`")
         return self

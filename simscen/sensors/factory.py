@@ -32,7 +32,7 @@ def build_sensors(
     """
     return tuple(
         _build_sensor(name, spec, clock, streams, view, rays)
-        for name in sorted(spec.sensors, key=lambda name: (spec.sensors[name].narrow is not None, name))
+        for name in sorted(spec.sensors, key=lambda name: (spec.sensors[name].original_class is not None, name))
     )
 
 
@@ -44,7 +44,7 @@ def _build_sensor(
     assert isinstance(spec, SensorSpec)
     period, rng = clock.period(spec.rate), streams.generator(f"sensor.{name}")
     setting = SensorSetting(name, period, clock.seconds(period), rng, view, rays, robot.drive)
-    if entry.narrow is not None:
+    if entry.original_class is not None:
         return PluginSensor(entry.kind, spec, setting)
     sensor: Sensor = spec.implementation()(spec, setting)
     return sensor

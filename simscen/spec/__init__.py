@@ -1,1 +1,1 @@
-"""How specifications are written: strict pydantic models, quantities with units, single-key choices."""
+"""Building blocks of specifications: strict pydantic models, quantities with units, single-key choices."""

@@ -58,7 +58,7 @@ T = TypeVar("T")
 
 
 class Value(RootModel[T], Generic[T]):
-    """Specification that is a bare value instead of a mapping, e.g. `time: 10 s`."""
+    """Specification that is a single value instead of a mapping, e.g. `time: 10 s`."""
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 

@@ -27,7 +27,7 @@ class Choice(Spec):
 
     modifiers: ClassVar[frozenset[str]] = frozenset()
     group: ClassVar[str] = ""
-    narrow: ClassVar[type["Choice"] | None] = None
+    original_class: ClassVar[type["Choice"] | None] = None
     """Original class of an extended class."""
 
     @classmethod
@@ -50,7 +50,12 @@ class Choice(Spec):
     @model_validator(mode="wrap")
     @classmethod
     def _use_installed(cls, value: Any, handler: ModelWrapValidatorHandler["Choice"]) -> "Choice":
-        if cls.group and cls.narrow is None and isinstance(value, dict) and not cls.known_keys().issuperset(value):
+        if (
+            cls.group
+            and cls.original_class is None
+            and isinstance(value, dict)
+            and not cls.known_keys().issuperset(value)
+        ):
             extended = with_installed_choices(cls)
             if not extended.known_keys().isdisjoint(value.keys() - cls.known_keys()):
                 return extended.model_validate(value, by_alias=True, by_name=False)
@@ -93,7 +98,7 @@ class Choice(Spec):
     @property
     def added_by(self) -> str:
         """Suffix for messages with the package of the choice: " (criterion `dwell` of yardwork 1.2)"; "" if shipped."""
-        if self.narrow is None:
+        if self.original_class is None:
             return ""
         from simscen.spec.registry import find
 
@@ -101,9 +106,9 @@ class Choice(Spec):
         return f" ({self.group} `{self.kind}` of {found.origin})" if found is not None and not found.shipped else ""
 
     def __reduce_ex__(self, protocol: Any) -> Any:
-        if self.narrow is None:
+        if self.original_class is None:
             return super().__reduce_ex__(protocol)
-        return blank, (self.narrow,), self.__getstate__()
+        return empty_instance, (self.original_class,), self.__getstate__()
 
 
 @cache
@@ -114,7 +119,7 @@ def with_installed_choices(choice: type[Choice]) -> type[Choice]:
     from simscen.spec.extensible_union import PluginSpec
     from simscen.spec.registry import installed
 
-    if choice.narrow is not None or not choice.group:
+    if choice.original_class is not None or not choice.group:
         return choice
     fields: dict[str, Any] = {
         f"plugin_{entry.name}": (
@@ -129,7 +134,7 @@ def with_installed_choices(choice: type[Choice]) -> type[Choice]:
     extended = create_model(
         choice.__name__, __base__=choice, __module__=choice.__module__, __doc__=choice.__doc__, **fields
     )
-    extended.narrow = choice
+    extended.original_class = choice
     return extended
 
 
@@ -145,9 +150,9 @@ def installed_choices(choice: type[Choice]) -> dict[str, type[BaseModel]]:
     return found
 
 
-def blank(narrow: type[Choice]) -> Choice:
+def empty_instance(original_class: type[Choice]) -> Choice:
     """Return an empty instance of an extended class for unpickling; each process creates the class again."""
-    extended = with_installed_choices(narrow)
+    extended = with_installed_choices(original_class)
     return extended.__new__(extended)
 
 

@@ -77,7 +77,7 @@ def specification(entry: Entry, value: dict[str, Any]) -> BaseModel:
 def installed_specs(group: str) -> Iterator[tuple[str, type[BaseModel]]]:
     """Yield names and specifications that installed packages add to a group, without broken ones."""
     for entry in installed(group):
-        if entry.flaw or entry.name in _names(group):
+        if entry.problem or entry.name in _names(group):
             continue
         try:
             yield entry.name, entry.load()

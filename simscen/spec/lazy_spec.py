@@ -34,8 +34,8 @@ class LazySpec:
         model = self.load()
         model.model_rebuild()
         # For a nullable schema the handler makes a reference to the model, for a model itself a copy.
-        made = handler(core_schema.nullable_schema(model.__pydantic_core_schema__))
-        return made if schema["type"] == "nullable" else made["anyOf"][0]
+        generated = handler(core_schema.nullable_schema(model.__pydantic_core_schema__))
+        return generated if schema["type"] == "nullable" else generated["anyOf"][0]
 
     def _validate(self, value: Any) -> BaseModel:
         """Validate a value; pydantic reports errors of the model as errors of the field, with their positions."""

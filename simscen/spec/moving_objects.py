@@ -46,7 +46,7 @@ class Motion(Spec):
     keyframe at time 0 places the object there; otherwise it moves from its current pose to the first keyframe. Turns
     take the shorter direction."""
     repeat: Literal["once", "loop", "back_and_forth"] = "once"
-    """What happens at the end: stop, start over, or reverse. A loop through waypoints returns to its start; a loop of
+    """Behavior at the end: stop, start over, or reverse. A loop through waypoints returns to its start; a loop of
     keyframes must end at its first keyframe."""
     ease: Literal["linear", "smooth", "spline"] = "linear"
     """Velocity profile. `linear`: constant speed between waypoints or keyframes. `smooth`: a stop at each of them, with
@@ -128,11 +128,11 @@ class _Leg(NamedTuple):
 
     begin: Pose2
     length: float
-    to: tuple[float, float]
+    end_point: tuple[float, float]
 
     @property
     def end(self) -> Pose2:
-        return Pose2(*self.to, self.begin.yaw)
+        return Pose2(*self.end_point, self.begin.yaw)
 
     def at(self, distance: float) -> Pose2:
         return self.begin.compose(Pose2(distance, 0.0))
@@ -196,7 +196,7 @@ class Shaped(Spec):
         return self
 
     @property
-    def tall(self) -> float:
+    def total_height(self) -> float:
         """Height of the object in meters."""
         return self.box[2] if self.box is not None else self.cylinder[1] if self.cylinder is not None else self.height
 

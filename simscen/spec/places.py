@@ -63,11 +63,11 @@ class PoseSpec(Spec):
         """Name of the place that this pose was written as; "" if the file contains the pose itself."""
         return self._place
 
-    def at(self, place: str) -> "PoseSpec":
+    def with_place(self, place: str) -> "PoseSpec":
         """Return a copy of the pose with the name of the place that it comes from."""
-        named = self.model_copy()
-        named._place = place
-        return named
+        copy = self.model_copy()
+        copy._place = place
+        return copy
 
     @property
     def pose(self) -> Pose2:
@@ -75,19 +75,19 @@ class PoseSpec(Spec):
         return Pose2(self.x, self.y, self.yaw)
 
 
-Target = Literal["place", "region", "object", "movable", "mover", "door", "goal", "event", "happening", "mask"]
+Target = Literal["place", "region", "object", "movable", "mover", "door", "goal", "event", "disturbance", "mask"]
 
 
 @dataclass(frozen=True)
 class ReferenceTo:
-    """Annotation of a string that must be the name of an existing thing; the loader checks that it exists.
+    """Annotation of a string that must be the name of an existing `target`; the loader checks that it exists.
 
     `object`: anything that can be touched. `movable`: an object with its own pose. `mover`: a movable or another robot.
-    `happening`: an event or a fault of the scenario. `mask`: the file of a filter mask; those of criteria are in the
-    masks of their Case.
+    `disturbance`: an event, a fault, or a mark of the scenario. `mask`: the file of a filter mask;
+    masks of criteria are in the `masks` of their Case.
     """
 
-    to: Target
+    target: Target
 
 
 RegionName = Annotated[Name, ReferenceTo("region")]
@@ -97,7 +97,7 @@ MoverName = Annotated[Name, ReferenceTo("mover")]
 DoorName = Annotated[Name, ReferenceTo("door")]
 GoalName = Annotated[Name, ReferenceTo("goal")]
 EventName = Annotated[Name, ReferenceTo("event")]
-HappeningName = Annotated[Name, ReferenceTo("happening")]
+DisturbanceName = Annotated[Name, ReferenceTo("disturbance")]
 MaskFile = Annotated[str, Field(min_length=1, max_length=4096), ReferenceTo("mask")]
 
 
@@ -115,7 +115,7 @@ class PlaceAllowed(ReferenceTo):
     `keywords` are texts with another meaning in this field.
     """
 
-    to: Target = "place"
+    target: Target = "place"
     keywords: tuple[str, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:

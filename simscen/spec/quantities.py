@@ -50,7 +50,7 @@ class Quantity:
         pattern = rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$"
         # Bounds apply only to numbers and the pattern only to text, so both fit into one schema.
         message = f"expected {self._with_article}, e.g. {self.example}; units: {', '.join(UNITS[self.dimension])}"
-        schema = {**number, "type": [number["type"], "string"], "pattern": pattern, "description": self.described}
+        schema = {**number, "type": [number["type"], "string"], "pattern": pattern, "description": self.description}
         return {**schema, "patternErrorMessage": message}
 
     @property
@@ -59,7 +59,7 @@ class Quantity:
         return f"1.5 {next(iter(UNITS[self.dimension]))}"
 
     @property
-    def described(self) -> str:
+    def description(self) -> str:
         """Description for editors."""
         return f"{self.dimension}, e.g. {self.example}"
 

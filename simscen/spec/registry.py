@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 PREFIX = "simscen."
-_SPECIFICATIONS = ("simscen.spec.base:Spec", "simscen.spec.base:Value")
+_BASE_CLASSES = ("simscen.spec.base:Spec", "simscen.spec.base:Value")
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
-_VALUE = re.compile(r"(?P<module>[\w.]+):(?P<name>\w+)")
+_ADDRESS = re.compile(r"(?P<module>[\w.]+):(?P<name>\w+)")
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,8 @@ GROUPS: dict[str, Group] = {
 class Entry:
     """Type of a group: its name and the address of its specification, `value` = "package.module:Class".
 
-    `distribution` and `version` are those of the package that adds it, or "" for a shipped type. `flaw` is the reason
-    why it cannot be used, as far as known without importing it.
+    `distribution` and `version` belong to the package that adds it; they are "" for a shipped type. `problem` is
+    the reason why it cannot be used, as far as known without importing it.
     """
 
     group: str
@@ -85,7 +85,7 @@ class Entry:
     value: str
     distribution: str = ""
     version: str = ""
-    flaw: str = ""
+    problem: str = ""
     folder: str = ""
     """Folder of the search path in which its package is installed."""
 
@@ -101,8 +101,8 @@ class Entry:
 
     def load(self) -> type[BaseModel]:
         """Import the module and return the specification. Raises BrokenPlugin."""
-        if self.flaw:
-            raise BrokenPlugin(self, self.flaw)
+        if self.problem:
+            raise BrokenPlugin(self, self.problem)
         return _load(self)
 
 
@@ -144,7 +144,7 @@ def find(group: str, name: str) -> Entry | None:
 
 
 def unknown_groups() -> tuple[Entry, ...]:
-    """Return the entry points of packages in groups `simscen.…` that do not exist, probably by a typing mistake."""
+    """Return the entry points of packages in groups `simscen.…` that do not exist, probably because of a typo."""
     return tuple(entry for entry in _installed_entries() if entry.group not in GROUPS)
 
 
@@ -156,12 +156,12 @@ def origin_of(spec: type) -> tuple[Entry, ...]:
     same_package = [
         entry
         for entry in _installed_entries()
-        if not entry.flaw and entry.value.partition(".")[0].partition(":")[0] == package
+        if not entry.problem and entry.value.partition(".")[0].partition(":")[0] == package
     ]
-    return tuple(entry for entry in same_package if _is(entry, spec))
+    return tuple(entry for entry in same_package if _has_spec(entry, spec))
 
 
-def _is(entry: Entry, spec: type) -> bool:
+def _has_spec(entry: Entry, spec: type) -> bool:
     try:
         return entry.load() is spec
     except BrokenPlugin:
@@ -172,7 +172,7 @@ def _is(entry: Entry, spec: type) -> bool:
 def _installed_entries() -> tuple[Entry, ...]:
     """Return all entry points in groups of simscen, sorted by group, name, and package."""
     found = sorted(set(_read_entries()), key=lambda e: (e.group, e.name, e.distribution, e.version, e.value))
-    return tuple(replace(entry, flaw=entry.flaw or _flaw(entry, found)) for entry in found)
+    return tuple(replace(entry, problem=entry.problem or _entry_problem(entry, found)) for entry in found)
 
 
 def _read_entries() -> Iterator[Entry]:
@@ -211,7 +211,7 @@ def _mentions_simscen(package: Distribution) -> bool:
 def search_path() -> list[str]:
     """Return the search path of modules without the folders that Python adds by itself.
 
-    These are the working directory and the folder of the program. A dist-info folder beside scenarios must not be able
+    These are the working directory and the folder of the program. A dist-info folder next to scenarios must not be able
     to run code.
     """
     program = getattr(sys.modules.get("__main__"), "__file__", None)
@@ -221,8 +221,8 @@ def search_path() -> list[str]:
     return [folder for folder in sys.path if folder not in implicit - explicit]
 
 
-def _flaw(entry: Entry, all_entries: list[Entry]) -> str:
-    """Return what is wrong with an entry as far as known without importing it, or ""."""
+def _entry_problem(entry: Entry, all_entries: list[Entry]) -> str:
+    """Return why an entry cannot be used, as far as known without importing it, or ""."""
     group = GROUPS.get(entry.group)
     if group is None:
         return f"there is no group `{PREFIX}{entry.group}`"
@@ -235,7 +235,7 @@ def _flaw(entry: Entry, all_entries: list[Entry]) -> str:
     others = [other for other in all_entries if (other.group, other.name) == (entry.group, entry.name)]
     if len(others) > 1:
         return "added by " + " and by ".join(f"{other.origin} ({other.value})" for other in others)
-    if not _VALUE.fullmatch(entry.value):
+    if not _ADDRESS.fullmatch(entry.value):
         return f"`{entry.value}` is not of the form package.module:Class"
     return ""
 
@@ -247,7 +247,7 @@ def _load(entry: Entry) -> type[BaseModel]:
         # Output of a module during import must not get into output that programs read.
         with contextlib.redirect_stdout(sys.stderr):
             model = getattr(import_module(module), name, None)
-        if (why := _defect(entry, model)) is None:
+        if (why := _specification_problem(entry, model)) is None:
             model.model_rebuild()  # type: ignore[union-attr]
     except (Exception, SystemExit) as error:  # code of other packages can raise anything
         cause = f"{type(error).__name__}: {error}".splitlines()[0]
@@ -258,11 +258,11 @@ def _load(entry: Entry) -> type[BaseModel]:
     return model  # type: ignore[return-value]
 
 
-def _defect(entry: Entry, model: Any) -> str | None:
+def _specification_problem(entry: Entry, model: Any) -> str | None:
     """Return why an imported object is not a valid specification of its group, or None."""
     if model is None:
         return f"`{entry.value}` does not exist"
-    if not isinstance(model, type) or not issubclass(model, tuple(map(_resolve, _SPECIFICATIONS))):
+    if not isinstance(model, type) or not issubclass(model, tuple(map(_resolve, _BASE_CLASSES))):
         return f"`{entry.value}` is not a subclass of simscen.plugin.Spec or simscen.plugin.Value"
     base = _resolve(GROUPS[entry.group].base)
     if not issubclass(model, base):

@@ -9,7 +9,7 @@ from simscen.core.records.events import EventKind
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.extensible_union import BehaviorName
-from simscen.spec.places import GoalName, HappeningName, MovableName, ObjectName
+from simscen.spec.places import DisturbanceName, GoalName, MovableName, ObjectName
 from simscen.triggers.base import Condition
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
@@ -29,7 +29,7 @@ class EventStatus(Spec, Condition):
 
     is_robot_specific: ClassVar[bool] = False
 
-    name: HappeningName
+    name: DisturbanceName
     """The `name` of the event, fault, or mark; an unnamed fault is called `<sensor>.<fault>`, e.g. `lidar.off`."""
     status: Literal["started", "ended"] = "started"
     """The required status."""

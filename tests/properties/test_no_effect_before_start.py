@@ -13,7 +13,7 @@ from simscen.actions.base import AnyAction
 from simscen.core.records.events import KIND_BY_INSTANCE, MAP, EventKind
 from simscen.core.records.trace import Moment
 from simscen.faults.base import AnyFault
-from simscen.loading.checks.faults import instances, unfit_faults, unknown_sensors
+from simscen.loading.checks.faults import instances, unknown_sensors, unsuitable_faults
 from simscen.loading.checks.registry import NameScope
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
@@ -123,7 +123,7 @@ def play(tmp_path_factory):
         file.write_text(SCENARIO % (str(shut).lower(), f"{seconds:.3f} s", *lists))
         loaded = load_scenario(file, Path(folder))
         scope = NameScope(loaded)
-        assert [*unknown_sensors(scope), *unfit_faults(scope)] == []
+        assert [*unknown_sensors(scope), *unsuitable_faults(scope)] == []
         heard = Heard()
         simulate(prepare(loaded), 3, attach=lambda rig, logs: [heard])
         return heard.moments

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from simscen.criteria.trace_signals.catalog import SIGNALS, Signal, SignalName
 from simscen.spec.base import Spec
 from simscen.spec.extensible_union import BehaviorName
-from simscen.spec.places import EventName, GoalName, HappeningName, MoverName, ObjectName, PlaceOrPoint, RegionName
+from simscen.spec.places import DisturbanceName, EventName, GoalName, MoverName, ObjectName, PlaceOrPoint, RegionName
 from simscen.spec.quantities import UNITS, AnyQuantity, Duration, PositiveDuration, Quantity
 
 Op = Literal[">=", ">", "<=", "<"]
@@ -40,7 +40,7 @@ class Condition(Spec):
     """Goal of `distance_to` or `goal_active`."""
     region: RegionName | None = None
     """Region of `in_region`."""
-    fault: HappeningName | None = None
+    fault: DisturbanceName | None = None
     """Fault of `fault_active` or `started`, e.g. `lidar.off`."""
     event: EventName | None = None
     """Event of `event_active` or `started`."""

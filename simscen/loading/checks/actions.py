@@ -1,4 +1,4 @@
-"""Checks of actions that are impossible or change nothing."""
+"""Checks of actions that are impossible or have no effect."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -10,8 +10,8 @@ from simscen.model.stack_files import ExternalStackSpec
 
 
 @MEANING.check("SC050")
-def stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[Finding]:
-    """Find pedestrians that are stopped for a while: they have no script that could continue."""
+def timed_stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find stops of pedestrians with a duration: pedestrians have no script that could continue."""
     pedestrians = pedestrian_names(loaded)
     for step in loaded.spec.steps:
         for keys, action in step.located_actions():
@@ -65,7 +65,7 @@ def _limits_speed(keys: Keys, action: Any) -> bool:
 
 @MEANING.check("SC055", severity="warning")
 def pushes_without_effect(loaded: LoadedScenario) -> Iterator[Finding]:
-    """Find pushes of zero, and pushes of what has no mass."""
+    """Find pushes of zero, and pushes of objects without mass."""
     world = loaded.world.spec
     spawned = [action.chosen for step in loaded.spec.steps for action in step.actions if action.kind == "spawn"]
     things = [*(world.objects if world else []), *spawned]
@@ -88,17 +88,17 @@ def pushes_without_effect(loaded: LoadedScenario) -> Iterator[Finding]:
 
 
 @MEANING.check("SC055", severity="warning")
-def doors_already_there(loaded: LoadedScenario) -> Iterator[Finding]:
-    """Find doors that are opened or closed although they already are."""
-    done = [placed for step in loaded.spec.steps for placed in step.located_actions()]
-    if loaded.world.spec is None or any(action.may() for _, action in done):
+def doors_already_in_state(loaded: LoadedScenario) -> Iterator[Finding]:
+    """Find doors that are opened although they are open, or closed although they are closed."""
+    located_actions = [placed for step in loaded.spec.steps for placed in step.located_actions()]
+    if loaded.world.spec is None or any(action.may() for _, action in located_actions):
         return
-    kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, action in done}
+    kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, action in located_actions}
     closed = {door.name: door.closed for door in loaded.world.spec.doors}
-    for keys, action in done:
-        name, fully = getattr(action.chosen, "name", ""), getattr(action.chosen, "to", 1) == 1
+    for keys, action in located_actions:
+        name, is_full = getattr(action.chosen, "name", ""), getattr(action.chosen, "to", 1) == 1
         for kind, opposite, state in (("open", "close", False), ("close", "open", True)):
-            if action.kind == kind and fully and closed.get(name) is state and (opposite, name) not in kinds:
+            if action.kind == kind and is_full and closed.get(name) is state and (opposite, name) not in kinds:
                 initial = "closed" if state else "open"
                 message = f"door `{name}` is {initial} from the start, and no event {opposite}s it"
                 yield Finding((*keys, kind, "name"), message)

@@ -14,10 +14,10 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import MappingNode
 from simscen.worlds.geometry.overlaps import blocking_solid
 
-HEIGHTS_M = 0.02, 0.4
+BLOCKING_HEIGHTS_M = 0.02, 0.4
 """Heights between which an obstacle blocks most robots."""
 RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M = 0.1, 0.35, 0.03
-"""What a robot that climbs typical ramps can climb."""
+"""Wheel radius, maximum slope and maximum step of a robot that climbs typical ramps."""
 
 
 class BuiltWorld(NamedTuple):
@@ -46,7 +46,7 @@ def places_in_obstacles(built: BuiltWorld) -> Iterator[Finding]:
     assert built.source.spec is not None
     world = _without_platforms(built.world) if built.source.spec.ramps else built.world
     for name, place in built.source.spec.places.items():
-        solid = blocking_solid(world, (place.x, place.y), TOUCH_M, HEIGHTS_M)
+        solid = blocking_solid(world, (place.x, place.y), TOUCH_M, BLOCKING_HEIGHTS_M)
         if solid is not None:
             message = f'place {quoted(name)} is inside obstacle "{solid}"'
             yield Finding(("places", name), message, at_key=True)
@@ -58,7 +58,7 @@ def motions_into_obstacles(built: BuiltWorld) -> Iterator[Finding]:
     assert built.source.spec is not None
     for index, thing in enumerate(built.source.spec.objects):
         for keys, what, (x, y) in motion_stops(thing.move) if thing.move is not None else ():
-            if solid := blocking_solid(built.world, (x, y), TOUCH_M, HEIGHTS_M):
+            if solid := blocking_solid(built.world, (x, y), TOUCH_M, BLOCKING_HEIGHTS_M):
                 message = f'{what} of {quoted(thing.name)} ({x:g}, {y:g}) is inside obstacle "{solid}"'
                 yield Finding(("objects", index, "move", *keys), message)
 
@@ -67,16 +67,16 @@ def motions_into_obstacles(built: BuiltWorld) -> Iterator[Finding]:
 def regions_outside_the_world(built: BuiltWorld) -> Iterator[Finding]:
     """Find regions outside the bounds of the world."""
     assert built.source.spec is not None
-    left, low, right, high = built.world.bounds
+    left, bottom, right, top = built.world.bounds
     for name, corners in built.source.spec.regions.items():
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
-        if max(xs) < left or min(xs) > right or max(ys) < low or min(ys) > high:
-            message = f"region {quoted(name)} is outside the world ({left:g} … {right:g}, {low:g} … {high:g})"
+        if max(xs) < left or min(xs) > right or max(ys) < bottom or min(ys) > top:
+            message = f"region {quoted(name)} is outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
             yield Finding(("regions", name), message, at_key=True)
 
 
 def _without_platforms(world: World) -> World:
-    """Return the world as it blocks a robot that climbs ramps: places may be on top of platforms."""
+    """Return the world with only the solids that block a robot that climbs ramps: places may be on platforms."""
     from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 
     solids = drive_obstacles(world.solids, RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M)

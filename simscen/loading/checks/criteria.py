@@ -1,9 +1,9 @@
-"""Checks of criteria: those that no run can pass, and bounds that hardly any run can exceed."""
+"""Checks of criteria: criteria that no run can pass, and bounds that hardly any run can exceed."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from simscen.loading.checks.events import no_recovery
+from simscen.loading.checks.events import why_no_recovery
 from simscen.loading.checks.registry import MEANING, Finding, Keys
 from simscen.loading.known_names import goal_names
 from simscen.loading.loaded import LoadedScenario
@@ -37,12 +37,12 @@ def impossible_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
     """Find criteria that no run can pass."""
     for index, entry in enumerate(loaded.spec.pass_):
         check = _IMPOSSIBLE.get(entry.kind)
-        reason = _without_goals(loaded, entry.kind, entry.chosen) or (check(loaded, entry.chosen) if check else None)
+        reason = _why_no_goals(loaded, entry.kind, entry.chosen) or (check(loaded, entry.chosen) if check else None)
         if reason:
             yield Finding(("pass", index, entry.kind), f"{entry.kind} can never hold: {reason}", at_key=True)
 
 
-def _without_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
+def _why_no_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
     needs_goal = kind in GOAL_CRITERIA or (kind == "path_length" and criterion.max_ratio is not None)
     return "the robot gets no goal" if needs_goal and not goal_names(loaded) else None
 
@@ -59,7 +59,7 @@ def _result(loaded: LoadedScenario, result: Any) -> str | None:
 
 
 def _recoveries(loaded: LoadedScenario, recoveries: Any) -> str | None:
-    return no_recovery(loaded, recoveries.name) if recoveries.min else None
+    return why_no_recovery(loaded, recoveries.name) if recoveries.min else None
 
 
 _IMPOSSIBLE = {"result": _result, "recoveries": _recoveries}
@@ -67,9 +67,9 @@ _IMPOSSIBLE = {"result": _result, "recoveries": _recoveries}
 
 @MEANING.check("SC051")
 def contradicting_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
-    """Find pairs of criteria that ask for different results."""
+    """Find pairs of criteria that require different results."""
     failing = any(expected_failure_name(goal.expect) for goal in loaded.spec.goals)
-    wanted: dict[str, tuple[str, Keys]] = {}
+    required_results: dict[str, tuple[str, Keys]] = {}
     for index, entry in enumerate(loaded.spec.pass_):
         if entry.severity != "fail":
             continue
@@ -78,12 +78,12 @@ def contradicting_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
         if not status:
             continue
         keys: Keys = ("pass", index, entry.kind)
-        before = next((other for key, other in wanted.items() if key != status), None)
+        before = next((other for key, other in required_results.items() if key != status), None)
         if before:
             first = loaded.key_place_of(*before[1])
             message = f"{entry.kind} contradicts {before[0]} at {first.line}:{first.col}: no run can pass both"
             yield Finding(keys, message, at_key=True)
-        wanted.setdefault(status, (entry.kind, keys))
+        required_results.setdefault(status, (entry.kind, keys))
 
 
 @MEANING.check("SC051")

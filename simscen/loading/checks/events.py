@@ -15,10 +15,12 @@ from simscen.model.stack import StackSpec
 from simscen.triggers.base import AnyCondition, Trigger
 
 Reason = tuple[Keys, str]
-"""Keys of what keeps a trigger from firing, and the reason as words after "can never happen: "."""
+"""Keys of the part that prevents a trigger from firing, and the reason as words after "can never happen: "."""
 
-LATCHED = frozenset({"time", "travelled", "goal", "waypoint", "replan", "recovery", "collision", "pedestrian", "event"})
-"""Conditions that stay true once they are."""
+LATCHING_CONDITIONS = frozenset(
+    {"time", "travelled", "goal", "waypoint", "replan", "recovery", "collision", "pedestrian", "event"}
+)
+"""Conditions that stay true once they have become true."""
 MAX_OVERSHOOT = 1.1
 """Factor by which a robot may exceed its top speed."""
 MAX_TRUTH_ERROR_M = 0.5
@@ -30,7 +32,7 @@ def impossible_triggers(loaded: LoadedScenario) -> Iterator[Finding]:
     """Find events and faults that can never happen, whatever the robot does."""
     run = possible_run(loaded)
     for keys, trigger, name, required in run.triggers:
-        if trigger is not None and (reason := run.never(trigger, keys)):
+        if trigger is not None and (reason := run.why_never(trigger, keys)):
             yield Finding(reason[0], f"`{name}` can never happen: {reason[1]}", warning=not required)
 
 
@@ -39,9 +41,9 @@ def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[Finding]:
     """Find events and faults with `times` that can happen only once."""
     run = possible_run(loaded)
     for keys, trigger, name, _ in run.triggers:
-        if trigger is None or trigger.times == 1 or trigger.edge != "rising" or not _latched(trigger):
+        if trigger is None or trigger.times == 1 or trigger.edge != "rising" or not _stays_true(trigger):
             continue
-        if run.never(trigger, keys) is None:
+        if run.why_never(trigger, keys) is None:
             message = f"`{name}` happens once, not {trigger.times} times: its condition stays true"
             yield Finding((*keys, "times"), message)
     for index, fault in enumerate(loaded.spec.faults):
@@ -56,7 +58,7 @@ def impossible_steps(loaded: LoadedScenario) -> Iterator[Finding]:
     run = possible_run(loaded)
     limit, needed = loaded.spec.time_limit, dict[int, float]()
     for number, step in enumerate(run.steps):
-        own = 0.0 if step.when is None or step.when.edge == "falling" else step.when.delay + _earliest(step.when)
+        own = 0.0 if step.when is None or step.when.edge == "falling" else step.when.delay + _earliest_true_s(step.when)
         needed[number] = own + (0.0 if step.after is None else needed[step.after])
         if step.after is None or not run.is_reached(step) or step.when is None:
             continue
@@ -66,12 +68,12 @@ def impossible_steps(loaded: LoadedScenario) -> Iterator[Finding]:
             yield Finding(keys, f"`{step.name}` can never happen: {reason}", warning=not step.required)
         for part in step.when.parts():
             name = getattr(part.event, "name", None)
-            if name in run.before(step):
+            if name in run.earlier_steps(step):
                 message = f"`{step.name}` waits for `{name}`, which has already happened; a step waits for new events"
                 yield Finding(keys, message)
 
 
-def no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
+def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
     """Return why a recovery behavior (None: any) never runs; None if it can run."""
     if not isinstance(loaded.spec.stack, StackSpec):
         return None
@@ -84,19 +86,19 @@ def no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
 
 
 def possible_run(loaded: LoadedScenario) -> "PossibleRun":
-    """Return what can happen in a run: the fixed point of the events that make other events possible."""
+    """Return everything that can happen in a run: the fixed point of events that make other events possible."""
     run = PossibleRun(loaded, frozenset())
-    while (alive := run.possible) != run.alive:
-        run = replace(run, alive=alive)
+    while (possible := run.next_possible) != run.possible:
+        run = replace(run, possible=possible)
     return run
 
 
 @dataclass(frozen=True)
 class PossibleRun:
-    """What can happen in a run if the events, faults and marks with the names `alive` can happen."""
+    """Everything that can happen in a run if the events, faults and marks with the names `possible` can happen."""
 
     loaded: LoadedScenario
-    alive: frozenset[str]
+    possible: frozenset[str]
 
     @cached_property
     def steps(self) -> list[SequenceStep]:
@@ -114,34 +116,34 @@ class PossibleRun:
 
     def is_reached(self, step: SequenceStep) -> bool:
         """Return whether the step before it in its story can happen."""
-        return step.after is None or self.steps[step.after].name in self.alive
+        return step.after is None or self.steps[step.after].name in self.possible
 
-    def before(self, step: SequenceStep) -> frozenset[str]:
+    def earlier_steps(self, step: SequenceStep) -> frozenset[str]:
         """Return the names of the steps before it in its story."""
         if step.after is None:
             return frozenset()
-        return self.before(self.steps[step.after]) | {self.steps[step.after].name}
+        return self.earlier_steps(self.steps[step.after]) | {self.steps[step.after].name}
 
     @property
-    def possible(self) -> frozenset[str]:
-        """Return the names of what can happen next, given what is alive."""
+    def next_possible(self) -> frozenset[str]:
+        """Return the names of the events, faults and marks that can happen if those in `possible` can."""
         triggers = [
             *((step.when, step.name) for step in self.steps if self.is_reached(step)),
             *((fault.when, fault.label) for fault in self.loaded.spec.faults),
         ]
-        happening = {name for when, name in triggers if when is None or self.never(when, ()) is None}
-        actions = [action for step in self.steps if step.name in happening for action in step.actions]
+        reachable = {name for when, name in triggers if when is None or self.why_never(when, ()) is None}
+        actions = [action for step in self.steps if step.name in reachable for action in step.actions]
         marks = {getattr(action.chosen, "name", "") for action in actions if action.kind == "mark"}
-        return frozenset(happening | marks)
+        return frozenset(reachable | marks)
 
-    def never(self, trigger: Trigger, keys: Keys) -> Reason | None:
+    def why_never(self, trigger: Trigger, keys: Keys) -> Reason | None:
         """Return why a trigger never fires; None if it can."""
         limit = self.loaded.spec.time_limit
         if trigger.probability == 0:
             return (*keys, "probability"), "its probability is 0"
-        if trigger.edge == "falling" and _latched(trigger):
+        if trigger.edge == "falling" and _stays_true(trigger):
             return (*keys, "edge"), "its condition stays true, so it has no falling edge"
-        earliest = trigger.delay + _earliest(trigger)
+        earliest = trigger.delay + _earliest_true_s(trigger)
         if trigger.edge == "rising" and earliest >= limit:
             key = "delay" if trigger.delay else "for" if trigger.for_ else trigger.kind
             return (*keys, key), f"{earliest:g} s is not before the time limit of {limit:g} s"
@@ -160,7 +162,7 @@ class PossibleRun:
             reasons = self._reasons(test.any, (*keys, "any"))
             return reasons[0] if all(reasons) else None
         if test.not_ is not None:
-            always = test.not_.time is not None and _earliest(test.not_) == 0
+            always = test.not_.time is not None and _earliest_true_s(test.not_) == 0
             return ((*keys, "not"), "the condition under `not` is always true") if always else None
         check = _CONDITIONS.get(test.kind)
         reason = check(self, test.chosen) if check else None
@@ -169,9 +171,9 @@ class PossibleRun:
     def _reasons(self, tests: Sequence[AnyCondition], keys: Keys) -> list[Reason | None]:
         return [self._reason(test, (*keys, k)) for k, test in enumerate(tests)]
 
-    def does(self, *kinds: str) -> bool:
-        """Return whether an event that can happen does, or may do, one of these actions."""
-        return any(action.may(*kinds) for step in self.steps if step.name in self.alive for action in step.actions)
+    def may_do(self, *kinds: str) -> bool:
+        """Return whether a possible event has, or may have, one of these actions."""
+        return any(action.may(*kinds) for step in self.steps if step.name in self.possible for action in step.actions)
 
     def goal_count(self, goal: str | None) -> int:
         """Return how many goals of this name (None: any name) the robot can get."""
@@ -180,7 +182,7 @@ class PossibleRun:
             1 if step.when is None else step.when.times
             for step in self.steps
             for action in step.actions
-            if step.name in self.alive
+            if step.name in self.possible
             and action.kind == "new_goal"
             and self.loaded.concerns(action.robot)
             and goal in (None, getattr(action.chosen, "name", ""))
@@ -199,13 +201,13 @@ class PossibleRun:
 
     def _speed_above(self, speed: Any) -> str | None:
         top = self._top_speed
-        if top is None or speed.root <= MAX_OVERSHOOT * top or self._may_be_rammed:
+        if top is None or speed.root <= MAX_OVERSHOOT * top or self._may_be_pushed:
             return None
         return f"the robot's top speed is {top:g} m/s"
 
     def _turning_above(self, rate: Any) -> str | None:
         spec = self.loaded.robot.spec
-        if spec is None or self._may_be_rammed or self.does("push"):
+        if spec is None or self._may_be_pushed or self.may_do("push"):
             return None
         if rate.root <= MAX_OVERSHOOT * spec.limits.angular:
             return None
@@ -224,14 +226,14 @@ class PossibleRun:
         return self._localization_error(lost.tolerance) if lost.std is None else None
 
     def _goal(self, goal: Any) -> str | None:
-        count, whose = self.goal_count(goal.name), "" if goal.name is None else f" called `{goal.name}`"
+        count, suffix = self.goal_count(goal.name), "" if goal.name is None else f" called `{goal.name}`"
         if goal.count > count:
-            return f"the robot gets {f'only {count}' if count else 'no'} goal{'' if count == 1 else 's'}{whose}"
-        if goal.status == "canceled" and not self.does("cancel_goal", "new_goal"):
+            return f"the robot gets {f'only {count}' if count else 'no'} goal{'' if count == 1 else 's'}{suffix}"
+        if goal.status == "canceled" and not self.may_do("cancel_goal", "new_goal"):
             return "no event cancels a goal or sends another one"
         if goal.status == "passed" and self.loaded.spec.navigation.mode != "navigate_through_poses":
             return "goals are only passed in the mode navigate_through_poses"
-        stops = self.loaded.spec.on_goal_failure == "stop" and not self.does("new_goal")
+        stops = self.loaded.spec.on_goal_failure == "stop" and not self.may_do("new_goal")
         if goal.status == "failed" and goal.count > 1 and stops:
             return "the run ends after the first failed goal (`on_goal_failure: stop`)"
         return None
@@ -245,13 +247,13 @@ class PossibleRun:
     def _recovery(self, recovery: Any) -> str | None:
         if not self.goal_count(None):
             return "the robot has no goal to recover for"
-        return no_recovery(self.loaded, recovery.name)
+        return why_no_recovery(self.loaded, recovery.name)
 
     def _pedestrian(self, _: Any) -> str | None:
-        return None if self.does("pedestrian", "crowd") else "no event adds a pedestrian"
+        return None if self.may_do("pedestrian", "crowd") else "no event adds a pedestrian"
 
     def _event(self, event: Any) -> str | None:
-        if event.name not in self.alive:
+        if event.name not in self.possible:
             return f"it waits for `{event.name}`, which can never happen"
         lasting = [fault for fault in self.loaded.spec.faults if fault.label == event.name and fault.for_ is None]
         if event.status == "ended" and lasting and event.name not in [step.name for step in self.steps]:
@@ -262,15 +264,15 @@ class PossibleRun:
     def _top_speed(self) -> float | None:
         """Return the top speed in m/s; None if it is not known or something can make the robot faster."""
         spec = self.loaded.robot.spec
-        return None if spec is None or self.does("push", "kidnap") else spec.top_speed
+        return None if spec is None or self.may_do("push", "kidnap") else spec.top_speed
 
     @property
-    def _may_be_rammed(self) -> bool:
+    def _may_be_pushed(self) -> bool:
         """Return whether something that moves could push the robot."""
         world = self.loaded.world
         if world.spec is None or world.sdf is not None or self.loaded.other_robots:
             return True
-        moving = self.does("move", "close", "open", "pedestrian", "crowd")
+        moving = self.may_do("move", "close", "open", "pedestrian", "crowd")
         return moving or any(thing.move for thing in world.spec.objects)
 
 
@@ -292,20 +294,20 @@ _CONDITIONS = {
 }
 
 
-def _latched(test: AnyCondition) -> bool:
-    """Return whether a condition stays true once it is."""
+def _stays_true(test: AnyCondition) -> bool:
+    """Return whether a condition stays true once it has become true."""
     parts = test.all or test.any
-    return all(map(_latched, parts)) if parts else test.kind in LATCHED
+    return all(map(_stays_true, parts)) if parts else test.kind in LATCHING_CONDITIONS
 
 
-def _earliest(test: AnyCondition) -> float:
+def _earliest_true_s(test: AnyCondition) -> float:
     """Return a lower bound on the time in s at which a condition counts as true."""
-    return (test.for_ or 0.0) + _first_true(test)
+    return (test.for_ or 0.0) + _earliest_condition_s(test)
 
 
-def _first_true(test: AnyCondition) -> float:
+def _earliest_condition_s(test: AnyCondition) -> float:
     if test.all is not None:
-        return max(map(_earliest, test.all))
+        return max(map(_earliest_true_s, test.all))
     if test.any is not None:
-        return min(map(_earliest, test.any))
+        return min(map(_earliest_true_s, test.any))
     return float(test.chosen.root) if test.time is not None else 0.0  # type: ignore[attr-defined]

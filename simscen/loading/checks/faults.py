@@ -1,4 +1,4 @@
-"""Checks of faults: do they fit what they affect, can they happen, do they change anything?"""
+"""Checks of faults: can they affect their sensor, can they happen, do they have an effect?"""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -28,7 +28,7 @@ class ListedFault(NamedTuple):
 
 
 def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance]:
-    """Return everything that faults can affect, by name: the robot's sensors, then commands, wheels and so on."""
+    """Return all targets of faults by name: the robot's sensors, then commands, wheels, localizer and map."""
     frequency = loaded.spec.stack.controller_frequency
     others = {
         name: Instance(kind, frequency if kind == COMMAND else 0.0, robot.drive if kind == WHEELS else None)
@@ -41,8 +41,8 @@ def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance
     return {**sensors, **{name: other for name, other in others.items() if name not in sensors}}
 
 
-def _listed(loaded: LoadedScenario) -> Iterator[ListedFault]:
-    """Return the faults; none if the sensors of the robot are not known yet."""
+def _listed_faults(loaded: LoadedScenario) -> Iterator[ListedFault]:
+    """Yield the faults; none if the sensors of the robot are not known yet."""
     if loaded.robot.spec is not None:
         known = instances(loaded, loaded.robot.spec)
         for index, entry in enumerate(loaded.spec.faults):
@@ -53,7 +53,7 @@ def _listed(loaded: LoadedScenario) -> Iterator[ListedFault]:
 def unknown_sensors(scope: NameScope) -> Iterator[Finding]:
     """Find faults on a sensor that the robot does not have."""
     loaded = scope.loaded
-    for index, entry, instance in _listed(loaded):
+    for index, entry, instance in _listed_faults(loaded):
         if instance is None:
             assert loaded.robot.spec is not None
             hint = suggestion(entry.sensor, instances(loaded, loaded.robot.spec))
@@ -62,32 +62,32 @@ def unknown_sensors(scope: NameScope) -> Iterator[Finding]:
 
 
 @NAMES.check("SC032")
-def unfit_faults(scope: NameScope) -> Iterator[Finding]:
-    """Find faults that cannot happen to what they are written for, or whose values do not fit it."""
+def unsuitable_faults(scope: NameScope) -> Iterator[Finding]:
+    """Find faults that cannot affect their sensor, or whose values do not suit it."""
     loaded = scope.loaded
-    for index, entry, instance in _listed(loaded):
+    for index, entry, instance in _listed_faults(loaded):
         if instance is None:
             continue
         assert loaded.robot.spec is not None
         keys = ("faults", index, entry.kind)
         if instance.kind not in entry.fault.affects:
             known = instances(loaded, loaded.robot.spec)
-            fitting = [name for name, one in known.items() if one.kind in entry.fault.affects]
-            hint = f"it can affect: {', '.join(fitting)}" if fitting else "it can affect nothing on this robot"
+            suitable = [name for name, one in known.items() if one.kind in entry.fault.affects]
+            hint = f"it can affect: {', '.join(suitable)}" if suitable else "it can affect nothing on this robot"
             what = NOUNS.get(instance.kind) or _with_article(loaded.robot.spec.sensors[entry.sensor].kind)
             message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
             yield Finding(keys, message, hint, at_key=True)
-        elif why := entry.fault.unsuitable_key(instance):
-            below = (why[0],) if why[0] else ()
-            message = f"fault `{entry.kind}` does not fit `{entry.sensor}`: {why[1]}"
+        elif unsuitable := entry.fault.unsuitable_key(instance):
+            below = (unsuitable[0],) if unsuitable[0] else ()
+            message = f"fault `{entry.kind}` does not fit `{entry.sensor}`: {unsuitable[1]}"
             yield Finding((*keys, *below), message, at_key=True)
 
 
 @NAMES.check("SC032")
-def faults_out_of_reach(scope: NameScope) -> Iterator[Finding]:
+def unsupported_faults(scope: NameScope) -> Iterator[Finding]:
     """Find faults on the localizer of an external stack, on a map that is not used, or during part of a run."""
     loaded = scope.loaded
-    for index, entry, instance in _listed(loaded):
+    for index, entry, instance in _listed_faults(loaded):
         if instance is None or instance.kind not in entry.fault.affects or entry.fault.unsuitable_key(instance):
             continue
         if instance.kind == BELIEF and not isinstance(loaded.spec.stack, StackSpec):
@@ -107,10 +107,10 @@ def faults_out_of_reach(scope: NameScope) -> Iterator[Finding]:
 
 @NAMES.check("SC032")
 def resampling_after_delay(scope: NameScope) -> Iterator[Finding]:
-    """Find faults that measure again but are listed behind a fault that holds the scans back."""
+    """Find faults that measure again but are listed after a fault that delays the scans."""
     loaded = scope.loaded
     faults = loaded.spec.faults
-    for index, entry, instance in _listed(loaded):
+    for index, entry, instance in _listed_faults(loaded):
         before = [one.label for one in faults[:index] if one.sensor == entry.sensor and one.kind in ("delay", "stuck")]
         resamples = entry.kind in RESAMPLING_FAULTS and instance is not None and instance.kind in ("Scan", "Image")
         if resamples and before:
@@ -130,7 +130,7 @@ def faults_between_messages(loaded: LoadedScenario) -> Iterator[Finding]:
         rate = rates.get(entry.sensor)
         if entry.for_ is None or rate is None or entry.for_ * rate >= 1 - 1e-9:
             continue
-        begin = _begin(entry.when)
+        begin = _start_time(entry.when)
         between = begin is not None and math.ceil(begin * rate - 1e-6) > (begin + entry.for_) * rate + 1e-6
         if begin is None or between:
             when = "begins and ends" if between else "may begin and end"
@@ -139,7 +139,7 @@ def faults_between_messages(loaded: LoadedScenario) -> Iterator[Finding]:
             yield Finding(("faults", index, "for"), message, hint, warning=not (between and entry.required))
 
 
-def _begin(when: Trigger | None) -> float | None:
+def _start_time(when: Trigger | None) -> float | None:
     """Return when a fault begins, in s, if that depends on the time alone."""
     if when is None:
         return 0.0
@@ -148,7 +148,7 @@ def _begin(when: Trigger | None) -> float | None:
 
 @MEANING.check("SC055", severity="warning")
 def faults_without_effect(loaded: LoadedScenario) -> Iterator[Finding]:
-    """Find faults whose values change nothing."""
+    """Find faults whose values have no effect."""
     for index, entry in enumerate(loaded.spec.faults):
         idle = entry.fault.idle
         if idle and all(getattr(entry.chosen, key) == value for key, value in idle.items()):

@@ -17,13 +17,13 @@ from simscen.loading.checks.scene import WORLD, Scene, expects_start_failure
 from simscen.loading.schema.messages import quoted
 
 Forbids = Callable[[Pose2, float], bool]
-"""Whether a zone contains a pose and everything around it within a distance in m."""
+"""Predicate: does a zone contain a pose and all positions around it within a distance in m?"""
 
 CELL_M = 0.1
-"""Depth inside a zone at which a goal is forbidden however the zone is rounded to cells."""
+"""Depth inside a zone at which a goal is forbidden for any rounding of the zone to cells."""
 ESTIMATE_ERROR_M = 0.5
 """Possible error of the initial estimate."""
-NO_LIMIT = "no cell of the mask limits the speed with this `base` and `multiplier`"
+NO_LIMIT_REASON = "no cell of the mask limits the speed with this `base` and `multiplier`"
 
 
 def stack_masks(scene: Scene) -> FilterMasks:
@@ -44,7 +44,7 @@ def check_stack_zones(scene: Scene) -> Iterator[Finding]:
         (("stack", "keepout", index), f"in `{region}`", _inside_region(regions[region]))
         for index, region in enumerate(scene.loaded.spec.stack.keepout)
     ]
-    keepout = scene.once(stack_masks).keepout
+    keepout = scene.cached(stack_masks).keepout
     if keepout is not None:
         zones.append((KEEPOUT_KEYS, "in a cell that the keepout mask forbids", forbidden_test(keepout)))
     for keys, where, forbids in zones:
@@ -62,7 +62,7 @@ def _inside_region(corners: Polygon) -> Forbids:
 
 
 def forbidden_test(mask: OccupancyGrid) -> Forbids:
-    """Return the test whether a keepout mask forbids a position."""
+    """Return the predicate whether a keepout mask forbids a pose and its surroundings."""
 
     def forbids(pose: Pose2, within: float) -> bool:
         steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, CELL_M))) + 1)
@@ -75,17 +75,17 @@ def forbidden_test(mask: OccupancyGrid) -> Forbids:
 @WORLD.check("SC055", severity="warning")
 def masks_without_effect(scene: Scene) -> Iterator[Finding]:
     """Find masks of the stack that forbid or limit nothing."""
-    masks = scene.once(stack_masks)
+    masks = scene.cached(stack_masks)
     if masks.keepout is not None and not (masks.keepout.cells == OCCUPIED).any():
         yield Finding(KEEPOUT_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
-    if masks.speed is not None and not masks.speed.has_limits:
-        yield Finding(SPEED_KEYS, f"the speed mask has no effect: {NO_LIMIT}")
+    if masks.speed is not None and not masks.speed.limiting:
+        yield Finding(SPEED_KEYS, f"the speed mask has no effect: {NO_LIMIT_REASON}")
 
 
 @WORLD.check("SC311", severity="warning")
 def shades_in_keepout_mask(scene: Scene) -> Iterator[Finding]:
     """Find keepout masks with cells that are neither free nor occupied."""
-    keepout = scene.once(stack_masks).keepout
+    keepout = scene.cached(stack_masks).keepout
     if keepout is not None and (keepout.cells == OCCUPIED).any():
         count = np.count_nonzero((keepout.cells > FREE) & (keepout.cells < OCCUPIED))
         if count:
@@ -96,14 +96,16 @@ def shades_in_keepout_mask(scene: Scene) -> Iterator[Finding]:
 @WORLD.check("SC055", severity="warning")
 def criterion_masks_without_effect(scene: Scene) -> Iterator[Finding]:
     """Find masks of criteria that forbid or limit nothing."""
-    masks = scene.once(criterion_masks)
+    masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         match entry.chosen:
             case Keepout(mask=str(name)) if not len(masks[name].forbidden):
                 message = "the criterion judges nothing: no cell of the mask is occupied"
                 yield Finding(("pass", index, "keepout", "mask"), message)
-            case Speed(mask=spec) if spec is not None and not spec.over(masks[spec.file].grid).has_limits:
-                yield Finding(("pass", index, "speed", "mask", "file"), f"the criterion judges nothing: {NO_LIMIT}")
+            case Speed(mask=spec) if spec is not None and not spec.over(masks[spec.file].grid).limiting:
+                yield Finding(
+                    ("pass", index, "speed", "mask", "file"), f"the criterion judges nothing: {NO_LIMIT_REASON}"
+                )
             case _:
                 pass
 
@@ -111,7 +113,7 @@ def criterion_masks_without_effect(scene: Scene) -> Iterator[Finding]:
 @WORLD.check("SC051")
 def keepout_masks_on_goals(scene: Scene) -> Iterator[Finding]:
     """Find keepout criteria whose mask forbids the start or a goal."""
-    masks = scene.once(criterion_masks)
+    masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         if not isinstance(entry.chosen, Keepout) or entry.chosen.mask is None:
             continue

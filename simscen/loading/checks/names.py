@@ -1,4 +1,4 @@
-"""Checks of names, also of robots: do they exist, are they unique, do they fit?"""
+"""Checks of names, also of robots: do they exist, are they unique, are they allowed in their place?"""
 
 from collections.abc import Container, Iterator
 from dataclasses import replace
@@ -22,10 +22,10 @@ def unknown_names(scope: NameScope) -> Iterator[Finding]:
     loaded = scope.loaded
     known = known_names(loaded, scope.world)
     for reference in references(loaded.spec, concerns=loaded.concerns):
-        names = known.get(reference.kind)
+        names = known.get(reference.target)
         if names is not None and reference.name not in names and not _is_immovable(scope, reference):
             hint = suggestion(reference.name, dict.fromkeys(names)) or "there is none"
-            message = f"no {NOUNS[reference.kind]} is called {quoted(reference.name)}"
+            message = f"no {NOUNS[reference.target]} is called {quoted(reference.name)}"
             yield Finding(reference.keys, message, hint)
 
 
@@ -35,24 +35,28 @@ def immovable_names(scope: NameScope) -> Iterator[Finding]:
     loaded = scope.loaded
     known = known_names(loaded, scope.world)
     for reference in references(loaded.spec, concerns=loaded.concerns):
-        names = known.get(reference.kind)
+        names = known.get(reference.target)
         if names is None or reference.name in names or not _is_immovable(scope, reference):
             continue
-        what = "one of the robots" if reference.name in _robots(scope, reference) else "a fixed part of the world"
+        what = (
+            "one of the robots"
+            if reference.name in _robots_not_allowed(scope, reference)
+            else "a fixed part of the world"
+        )
         message = f"{quoted(reference.name)} is {what}, which cannot be moved or followed"
         yield Finding(reference.keys, message, "name an object, a door or something that an event spawns")
 
 
 def _is_immovable(scope: NameScope, reference: Reference) -> bool:
-    if reference.kind not in ("movable", "mover"):
+    if reference.target not in ("movable", "mover"):
         return False
     objects = known_names(scope.loaded, scope.world)["object"] or ()
-    return reference.name in (*_robots(scope, reference), *objects)
+    return reference.name in (*_robots_not_allowed(scope, reference), *objects)
 
 
-def _robots(scope: NameScope, reference: Reference) -> tuple[str, ...]:
-    """Return the robots that cannot be meant by a reference."""
-    own = (scope.loaded.robot_name,) if reference.kind == "movable" else ()
+def _robots_not_allowed(scope: NameScope, reference: Reference) -> tuple[str, ...]:
+    """Return the robots to which a reference must not refer."""
+    own = (scope.loaded.robot_name,) if reference.target == "movable" else ()
     return (*own, *scope.loaded.other_robots)
 
 
@@ -72,7 +76,7 @@ def unknown_lidars(scope: NameScope) -> Iterator[Finding]:
 
 @NAMES.check("SC033")
 def duplicate_names(scope: NameScope) -> Iterator[Finding]:
-    """Find two goals, events or faults of one name, and an event and a fault of one name."""
+    """Find goals, events or faults that share a name, and events and faults with the same name."""
     loaded = scope.loaded
     lists: dict[str, list[tuple[Keys, str | None]]] = {
         "goal": [(("goals", k), goal.name) for k, goal in enumerate(loaded.spec.goals)],
@@ -95,13 +99,13 @@ def duplicate_names(scope: NameScope) -> Iterator[Finding]:
 
 @NAMES.check("SC033")
 def duplicate_names_of_actions(scope: NameScope) -> Iterator[Finding]:
-    """Find marks and new goals that are called like an event, a fault or a goal."""
+    """Find marks and new goals with the name of an event, a fault or a goal."""
     loaded = scope.loaded
-    happenings = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
+    disturbances = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
     goals = own_goal_names(loaded)
     for keys, action in (placed for step in loaded.spec.steps for placed in step.located_actions()):
         name = getattr(action.chosen, "name", "")
-        if action.kind == "mark" and name in happenings:
+        if action.kind == "mark" and name in disturbances:
             message = f"an event or a fault is also called {quoted(name)}; criteria could not tell them apart"
             yield Finding((*keys, "mark", "name"), message, RENAME_HINT)
         if action.kind != "new_goal" or not name or not loaded.concerns(action.robot):
@@ -123,24 +127,24 @@ def reserved_goal_names(scope: NameScope) -> Iterator[Finding]:
 
 @NAMES.check("SC033")
 def duplicate_pedestrians(scope: NameScope) -> Iterator[Finding]:
-    """Find pedestrians that are called like an object of the world or like another pedestrian."""
+    """Find pedestrians with the name of an object of the world or of another pedestrian."""
     loaded = scope.loaded
-    taken = dict.fromkeys(world_object_names(loaded, scope.world), "an object of the world")
+    used_names = dict.fromkeys(world_object_names(loaded, scope.world), "an object of the world")
     for step in loaded.spec.steps:
         for keys, action in step.located_actions():
             if action.kind not in ("spawn", "pedestrian", "crowd"):
                 continue
             names = getattr(action.chosen, "names", None) or [getattr(action.chosen, "name", "")]
-            twice = [name for name in names if name in taken]
-            if twice and (action.kind != "spawn" or taken[twice[0]] == "a pedestrian"):
-                message = f"{taken[twice[0]]} is also called {quoted(twice[0])}"
+            repeated = [name for name in names if name in used_names]
+            if repeated and (action.kind != "spawn" or used_names[repeated[0]] == "a pedestrian"):
+                message = f"{used_names[repeated[0]]} is also called {quoted(repeated[0])}"
                 yield Finding((*keys, action.kind, "name"), message, RENAME_HINT)
-            taken.update(dict.fromkeys(names, "a spawned object" if action.kind == "spawn" else "a pedestrian"))
+            used_names.update(dict.fromkeys(names, "a spawned object" if action.kind == "spawn" else "a pedestrian"))
 
 
 @NAMES.check("SC033")
 def robots_named_like_objects(scope: NameScope) -> Iterator[Finding]:
-    """Find robots that are called like an object of the world."""
+    """Find robots with the name of an object of the world."""
     loaded = scope.loaded
     objects = known_names(replace(loaded, other_robots=()), scope.world)["object"] or ()
     if loaded.robot_name in objects:
@@ -164,7 +168,7 @@ def unknown_robots(scenario: WrittenScenario) -> Iterator[Finding]:
 
 @ROBOT_NAMES.check("SC043")
 def missing_robots(scenario: WrittenScenario) -> Iterator[Finding]:
-    """Find triggers and actions on a robot that do not name one of several."""
+    """Find triggers and actions that apply to one robot, but do not name one of several robots."""
     spec = scenario.spec
     if not spec.robots:
         return
@@ -182,7 +186,7 @@ def missing_robots(scenario: WrittenScenario) -> Iterator[Finding]:
 
 
 def _tests_without_robot(test: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, str]]:
-    """Yield keys and kind of each condition on a robot, or on a fault of a robot, that names no robot."""
+    """Yield keys and kind of each condition that applies to one robot, or to its fault, but names no robot."""
     if test.robot is not None:
         return
     for key, inner in (("all", test.all), ("any", test.any)):
@@ -209,7 +213,7 @@ def unknown_expected_verdicts(scenario: WrittenScenario) -> Iterator[Finding]:
         known += [f"{name}/{one}" for one in own]
     for number, expected in enumerate(spec.expected.criteria if spec.expected else ()):
         if expected not in known:
-            meant = [one for one in known if one.partition("/")[2] == expected]
-            hint = f"write {' or '.join(f'`{one}`' for one in meant)}" if meant else suggestion(expected, known)
+            matches = [one for one in known if one.partition("/")[2] == expected]
+            hint = f"write {' or '.join(f'`{one}`' for one in matches)}" if matches else suggestion(expected, known)
             message = f"no criterion, event or fault is called {quoted(expected)}"
             yield Finding(("expected", "criteria", number), message, hint)

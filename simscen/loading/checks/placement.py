@@ -1,4 +1,4 @@
-"""Checks of poses: is the robot, a goal, or what an event adds inside an obstacle or outside the map?"""
+"""Checks of poses: is the robot, a goal, or an object of an event inside an obstacle or outside the map?"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -28,14 +28,14 @@ START_HINT = "move it to free space"
 GOAL_HINT = "move it, or expect the failure with `result: {status: FAILED, error_code: GOAL_OCCUPIED}`"
 OUTSIDE_HINT = GOAL_HINT.replace("GOAL_OCCUPIED", "GOAL_OUTSIDE_MAP")
 TOLERANCE_SHARES = (-0.9, 0.0, 0.9)
-"""Shares of a goal's tolerances at which the robot may stop instead of at the exact pose."""
+"""Fractions of a goal's tolerances: offsets from the exact pose at which the robot may stop instead."""
 
 MotionStop = tuple[Keys, str, tuple[float, float]]
 """Keys below the motion, name and position of a keyframe or waypoint."""
 
 
 def blocked_poses(scene: Scene) -> dict[Keys, Finding]:
-    """Return the findings for the start, goals and kidnap poses that the robot cannot have, by their keys."""
+    """Return the findings for the start, goals and kidnap poses at which the robot cannot be, by their keys."""
     found = [*_start(scene), *_goals(scene), *_kidnaps(scene)]
     return {finding.keys: finding for finding in found}
 
@@ -43,19 +43,19 @@ def blocked_poses(scene: Scene) -> dict[Keys, Finding]:
 @WORLD.check("SC301")
 def check_robot_poses(scene: Scene) -> Iterator[Finding]:
     """Find start, goal and kidnap poses inside an obstacle or outside the map."""
-    yield from scene.once(blocked_poses).values()
+    yield from scene.cached(blocked_poses).values()
 
 
 def _start(scene: Scene) -> Iterator[Finding]:
     if not expects_start_failure(scene.loaded.spec):
         solids = (*scene.world.solids, *scene.bodies)
-        yield from _blocked(scene, START, "the robot's start", scene.start, solids, START_HINT)
+        yield from _pose_problem(scene, START, "the robot's start", scene.start, solids, START_HINT)
 
 
 def _goals(scene: Scene) -> Iterator[Finding]:
     for keys, goal in scene.targets:
         hint = OUTSIDE_HINT if scene.area.outside(goal.pose) else GOAL_HINT
-        found = list(_blocked(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
+        found = list(_pose_problem(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
         if found and not _fits_nearby(scene, goal):
             yield from found
         position = goal.pose.x, goal.pose.y
@@ -82,10 +82,10 @@ def _kidnaps(scene: Scene) -> Iterator[Finding]:
     for keys, _, action in scene.actions:
         if isinstance(action, Kidnap):
             what = "the pose to which the robot is kidnapped"
-            yield from _blocked(scene, (*keys, "pose"), what, action.pose.pose, scene.world.solids, START_HINT)
+            yield from _pose_problem(scene, (*keys, "pose"), what, action.pose.pose, scene.world.solids, START_HINT)
 
 
-def _blocked(
+def _pose_problem(
     scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
 ) -> Iterator[Finding]:
     conflict = scene.area.outside(pose) or scene.footprint_conflict(pose, solids)
@@ -95,7 +95,7 @@ def _blocked(
 
 @WORLD.check("SC304")
 def check_spawns(scene: Scene) -> Iterator[Finding]:
-    """Find things that are spawned inside an obstacle or on the robot."""
+    """Find objects that are spawned inside an obstacle or on the robot."""
     for keys, _, action in scene.actions:
         if isinstance(action, Spawn):
             is_event = keys[2] == "do"  # the time of a later step counts from the step before it
@@ -106,13 +106,13 @@ def check_spawns(scene: Scene) -> Iterator[Finding]:
 
 
 def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
-    """Return the obstacle that contains the whole outline of a spawned thing, which nothing could ever meet."""
+    """Return the obstacle that contains the whole outline of a spawned object, so that nothing can touch the object."""
     if spawn.pose is None:
         return None
     corners = place_polygon(_outline(spawn), spawn.pose.pose)
     for solid in scene.world.solids:
         prism = upright_prism(solid)
-        if prism is None or prism.bottom > spawn.z or prism.top < spawn.z + spawn.tall:
+        if prism is None or prism.bottom > spawn.z or prism.top < spawn.z + spawn.total_height:
             continue
         if all(prism.distance(corner, (prism.bottom, prism.top)) == 0 for corner in corners):
             return f'inside obstacle "{solid.name}"'
@@ -120,7 +120,7 @@ def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
 
 
 def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
-    """Return "on the robot" if a thing overlaps the robot when it appears: relative to the robot, or at t = 0."""
+    """Return "on the robot" if an object overlaps the robot when it appears: relative to the robot, or at t = 0."""
     if spawn.z >= scene.size.height:
         return None
     if spawn.ahead is not None:
@@ -133,7 +133,7 @@ def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
 
 
 def _outline(spawn: Spawn) -> Polygon:
-    """Return the outline of a thing in its own frame."""
+    """Return the outline of an object in its own frame."""
     solid = spawn.solid(spawn.name)
     prism = upright_prism(Solid(solid.shape, Pose3(z=solid.pose.z), spawn.name))
     return prism.base if prism is not None else tuple((x, y) for x, y in spawn.polygon or ())
@@ -141,7 +141,7 @@ def _outline(spawn: Spawn) -> Polygon:
 
 @WORLD.check("SC304")
 def check_pedestrians(scene: Scene) -> Iterator[Finding]:
-    """Find pedestrians that appear, or want to go, where they have no room."""
+    """Find pedestrians whose start or goals are too close to obstacles."""
     solids = (*scene.world.solids, *scene.immovable_bodies)
     for keys, _, action in scene.actions:
         if not isinstance(action, Pedestrian):

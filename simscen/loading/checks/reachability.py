@@ -12,7 +12,7 @@ from simscen.loading.checks.registry import Finding
 from simscen.loading.checks.scene import START, WORLD, Scene
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
-HINT = "widen the gap, or expect the failure with `result: {status: FAILED, error_code: NO_VALID_PATH}`"
+NO_ROUTE_HINT = "widen the gap, or expect the failure with `result: {status: FAILED, error_code: NO_VALID_PATH}`"
 GAP_EDGE_M = 0.03
 """Distance from the edge of a gap within which the solid is searched that forms it."""
 
@@ -29,10 +29,10 @@ def closed_gaps(scene: Scene) -> list[tuple[Finding, Gap]]:
 
     It is an error if fixed walls block the goal, and a warning if the robot might pass or push what blocks it.
     """
-    blocked = scene.once(blocked_poses)
+    blocked = scene.cached(blocked_poses)
     if START in blocked:
         return []
-    routes, starts, world = scene.once(robot_routes), scene.start_poses, scene.world.solids
+    routes, starts, world = scene.cached(robot_routes), scene.start_poses, scene.world.solids
     solids = (*world, *scene.immovable_bodies) if scene.immovable_bodies else world
     found = []
     for keys, goal in scene.targets:
@@ -42,12 +42,12 @@ def closed_gaps(scene: Scene) -> list[tuple[Finding, Gap]]:
         message = f"goal `{goal.name}` cannot be reached from the start: {gap.description}"
         if solids is not world and routes.is_reachable(starts, goal.pose, world):
             finding = Finding(keys, message, "no event opens, moves or removes it", warning=True)
-        elif scene.does():
+        elif scene.may_do():
             finding = Finding(keys, message, "unless an action of an installed package opens a route", warning=True)
         elif len(scene.certain_walls) < len(world) and routes.is_reachable(starts, goal.pose, scene.certain_walls):
             finding = Finding(keys, message, _ramp_hint(scene), warning=True)
         else:
-            finding = Finding(keys, message, HINT)
+            finding = Finding(keys, message, NO_ROUTE_HINT)
         found.append((finding, gap))
     return found
 
@@ -55,7 +55,7 @@ def closed_gaps(scene: Scene) -> list[tuple[Finding, Gap]]:
 @WORLD.check("SC302")
 def check_reachability(scene: Scene) -> Iterator[Finding]:
     """Find goals that no route leads to."""
-    return (finding for finding, _ in scene.once(closed_gaps))
+    return (finding for finding, _ in scene.cached(closed_gaps))
 
 
 def _ramp_hint(scene: Scene) -> str:
@@ -72,7 +72,7 @@ def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
     from simscen.worlds.geometry.triangulation import merge_solids
     from simscen.worlds.routes.narrow_gaps import narrowest_gap
 
-    routes = scene.once(robot_routes)
+    routes = scene.cached(robot_routes)
     gap = narrowest_gap(merge_solids(solids), routes.bounds, (scene.start, goal), scene.size.inscribed, routes.z_range)
     position = f"({gap.x:.2f}, {gap.y:.2f})"
     sides = gap.sides or ((gap.x, gap.y), (gap.x, gap.y))

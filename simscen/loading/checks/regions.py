@@ -1,4 +1,4 @@
-"""Checks of triggers, criteria and goals by position: positions that the robot cannot reach, or has from the start."""
+"""Checks of triggers, criteria and goals by position: positions that cannot be reached, or are reached at the start."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -40,31 +40,33 @@ class RobotRoutes:
 
     def is_reachable(self, starts: Sequence[Pose2], goal: Pose2, solids: tuple[Solid, ...]) -> bool:
         """Return whether a route may lead from a start to the goal; False proves that there is none."""
-        plain = self._plain(solids)
-        if plain is not None and any(plain.length(start[:2], goal[:2]) < float("inf") for start in starts):
+        approximate = self._approximate_paths(solids)
+        if approximate is not None and any(approximate.length(start[:2], goal[:2]) < float("inf") for start in starts):
             return True
-        exact = self._exact(solids)
-        return any(exact.may_reach(start, goal) for start in starts)
+        exact_paths = self._exact_paths(solids)
+        return any(exact_paths.may_reach(start, goal) for start in starts)
 
-    def can_come_to(self, starts: Sequence[Pose2], towards: Pose2, distance: Callable[[Pose2], float]) -> bool:
-        """Return whether the center of the robot can get from a start to where `distance` is at most 0."""
-        plain = self._plain(self.scene.world.solids)
+    def can_enter(self, starts: Sequence[Pose2], towards: Pose2, distance: Callable[[Pose2], float]) -> bool:
+        """Return whether the center of the robot can get from a start to a position where `distance` is at most 0."""
+        approximate = self._approximate_paths(self.scene.world.solids)
 
-        def arrived(point: tuple[float, float]) -> bool:
+        def is_inside(point: tuple[float, float]) -> bool:
             return distance(Pose2(*point)) <= 0
 
-        if plain is not None and any(plain.comes_to(start[:2], towards[:2], arrived) for start in starts):
+        if approximate is not None and any(
+            approximate.can_enter(start[:2], towards[:2], is_inside) for start in starts
+        ):
             return True
-        return self._exact(self.scene.world.solids).may_come_to(starts, distance)
+        return self._exact_paths(self.scene.world.solids).may_enter(starts, distance)
 
     def length_upper_bound(self, start: Pose2, goal: Pose2) -> float:
         """Return an upper bound of the shortest route in m; inf if the approximation finds none."""
-        plain = self._fixed
-        return float("inf") if plain is None else plain.length(start[:2], goal[:2])
+        approximate = self._paths_around_fixed
+        return float("inf") if approximate is None else approximate.length(start[:2], goal[:2])
 
     def length(self, start: Pose2, goal: Pose2) -> float:
         """Return the length of the shortest route around the fixed solids in m; inf if there is none."""
-        return self._exact(self.scene.world.solids).length(start, goal)
+        return self._exact_paths(self.scene.world.solids).length(start, goal)
 
     @property
     def z_range(self) -> tuple[float, float]:
@@ -77,15 +79,15 @@ class RobotRoutes:
         return extend_bounds(self.scene.world.bounds, list(self.stops))
 
     @cached_property
-    def _fixed(self) -> SimplePaths | None:
+    def _paths_around_fixed(self) -> SimplePaths | None:
         return self.scene.cache.simple_paths(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
 
-    def _plain(self, solids: tuple[Solid, ...]) -> SimplePaths | None:
+    def _approximate_paths(self, solids: tuple[Solid, ...]) -> SimplePaths | None:
         if solids is self.scene.world.solids:
-            return self._fixed
+            return self._paths_around_fixed
         return simple_paths_between(solids, self.scene.size.inscribed, self.z_range)
 
-    def _exact(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
+    def _exact_paths(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
         return self.scene.cache.shortest_paths(solids, self.bounds, self.scene.size.inscribed, self.z_range)
 
 
@@ -122,40 +124,40 @@ def _areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[
         case RobotIn(region=region):
             corners = scene.world.regions[region]
             yield TriggerArea(keys, name, f"region `{region}`", corners, _distance_to_region(corners, 0.0))
-        case RobotWithin(region=str(region), distance=reach):
+        case RobotWithin(region=str(region), distance=max_distance):
             corners = scene.world.regions[region]
-            what = f"a position within {reach:g} m of region `{region}`"
-            yield TriggerArea(keys, name, what, corners, _distance_to_region(corners, reach))
-        case RobotWithin(of=[x, y], distance=reach):
-            what = f"a position within {reach:g} m of ({x:g}, {y:g})"
-            yield TriggerArea(keys, name, what, ((x, y),), lambda pose: pose.distance(Pose2(x, y)) - reach)
+            what = f"a position within {max_distance:g} m of region `{region}`"
+            yield TriggerArea(keys, name, what, corners, _distance_to_region(corners, max_distance))
+        case RobotWithin(of=[x, y], distance=max_distance):
+            what = f"a position within {max_distance:g} m of ({x:g}, {y:g})"
+            yield TriggerArea(keys, name, what, ((x, y),), lambda pose: pose.distance(Pose2(x, y)) - max_distance)
         case _:
             pass
 
 
-def _distance_to_region(corners: Polygon, reach: float) -> Callable[[Pose2], float]:
-    return lambda pose: distance_to_polygon(pose, corners) - reach
+def _distance_to_region(corners: Polygon, max_distance: float) -> Callable[[Pose2], float]:
+    return lambda pose: distance_to_polygon(pose, corners) - max_distance
 
 
 def robot_routes(scene: Scene) -> RobotRoutes:
     """Return the routes between the start, all goals and all trigger areas."""
-    corners = [Pose2(x, y) for area in scene.once(trigger_areas) for x, y in area.corners]
+    corners = [Pose2(x, y) for area in scene.cached(trigger_areas) for x, y in area.corners]
     return RobotRoutes(scene, (*scene.start_poses, *(goal.pose for _, goal in scene.targets), *corners))
 
 
 def _start_is_blocked(scene: Scene) -> bool:
-    return START in scene.once(blocked_poses)
+    return START in scene.cached(blocked_poses)
 
 
 @WORLD.check("SC050")
 def unreachable_triggers(scene: Scene) -> Iterator[Finding]:
-    """Find events and faults that wait for the robot to be where it cannot get."""
-    if _start_is_blocked(scene) or scene.does():  # an action of an installed package may take the robot anywhere
+    """Find events and faults that wait for the robot at a position that it cannot reach."""
+    if _start_is_blocked(scene) or scene.may_do():  # an action of an installed package may take the robot anywhere
         return
     starts, robot, limit = scene.start_poses, scene.loaded.robot.spec, scene.loaded.spec.time_limit
-    for keys, name, what, corners, distance in scene.once(trigger_areas):
+    for keys, name, what, corners, distance in scene.cached(trigger_areas):
         center = Pose2(*(sum(values) / len(corners) for values in zip(*corners, strict=True)))
-        if not scene.once(robot_routes).can_come_to(starts, center, distance):
+        if not scene.cached(robot_routes).can_enter(starts, center, distance):
             yield Finding(keys, f"`{name}` can never happen: no route leads the robot to {what}")
         elif robot is not None and min(map(distance, starts)) > MAX_OVERSHOOT * robot.top_speed * limit:
             reason = f"at {robot.top_speed:g} m/s, its top speed, the robot does not reach {what} within the time limit"
@@ -201,8 +203,8 @@ def loose_localization_bounds(scene: Scene) -> Iterator[Finding]:
     """Find bounds on the localization error that are larger than the world."""
     if _start_is_blocked(scene):
         return
-    left, low, right, high = scene.world.bounds
-    diagonal = math.hypot(right - left, high - low)
+    left, bottom, right, top = scene.world.bounds
+    diagonal = math.hypot(right - left, top - bottom)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         for key in ("max", "rmse", "final") if isinstance(entry.chosen, LocalizationError) else ():
             bound = getattr(entry.chosen, key)

@@ -1,4 +1,4 @@
-"""Semantic checks: what a check receives and returns, and the stages in which checks run.
+"""Interface of semantic checks, and the stages in which checks run.
 
 A check is a generator function that yields one Finding per problem. It is registered for a stage together with the
 error code that it reports:
@@ -53,7 +53,7 @@ class Finding(NamedTuple):
 
 
 class Subject(Protocol):
-    """What checks look at: anything with the tree of the file in which problems are reported."""
+    """Object that checks examine: anything with the tree of the file in which problems are reported."""
 
     @property
     def tree(self) -> MappingNode | None:
@@ -84,7 +84,7 @@ class Stage(Generic[S]):
         return register
 
     def problems(self, subject: S) -> list[Problem]:
-        """Return what all checks of this stage find, without the text of lines."""
+        """Return the problems that all checks of this stage find, without the text of lines."""
         tree = subject.tree
         if tree is None:
             return []

@@ -34,18 +34,18 @@ def dimension_warnings(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]
     """Yield warnings about dimensions of the drive that differ from the URDF."""
     if robot.tree is None or robot.urdf is None:
         return
-    drawn = _drawn(body.wheels)
+    urdf_dimensions = _urdf_dimensions(body.wheels)
     for name in ("wheel_radius", "wheel_separation", "wheel_base"):
-        said = getattr(body.drive, name, None)
-        if said is None or name not in body.drive.model_fields_set or name not in drawn:
+        written = getattr(body.drive, name, None)
+        if written is None or name not in body.drive.model_fields_set or name not in urdf_dimensions:
             continue
-        if abs(said - drawn[name]) > DIMENSION_TOLERANCE * drawn[name]:
-            message = f"{name} is {said:g} m here, but {drawn[name]:.4g} m in {robot.urdf.name}"
-            hint = "the wheels stand where the URDF has them; commands and odometry reckon with what is written here"
+        if abs(written - urdf_dimensions[name]) > DIMENSION_TOLERANCE * urdf_dimensions[name]:
+            message = f"{name} is {written:g} m here, but {urdf_dimensions[name]:.4g} m in {robot.urdf.name}"
+            hint = "the wheels are placed as in the URDF, but commands and odometry use the value written here"
             yield Problem(*value_position(robot.tree, ("drive", name)), "SC404", message, hint, "warning")
 
 
-def _drawn(wheels: tuple[Wheel, ...]) -> dict[str, float]:
+def _urdf_dimensions(wheels: tuple[Wheel, ...]) -> dict[str, float]:
     """Return the dimensions of the drive according to the wheels of the body."""
     driven = [wheel for wheel in wheels if wheel.driven]
     if not driven:

@@ -30,12 +30,12 @@ from simscen.worlds.geometry.prisms import upright_prism
 SILL_M = 0.02
 """Height below which an obstacle does not block a robot."""
 TOUCHING_M = 0.002
-"""Height that an obstacle must reach above the underside of a hull to surely touch it."""
+"""Height above the underside of a hull that an obstacle must have to touch the hull for certain."""
 TOUCH_M = 1e-6
 """Distance below which a point counts as inside a solid."""
 START = ("robot", "pose")
 MOVING_ACTIONS = frozenset({"open", "close", "move", "remove", "teleport", "push"})
-"""Actions after which a body is no longer where it was."""
+"""Actions that can move or remove a body."""
 
 T = TypeVar("T")
 
@@ -48,7 +48,7 @@ class DrivableArea:
     grid: OccupancyGrid | None = None
 
     def outside(self, pose: Pose2) -> str | None:
-        """Return what a pose is outside of, as words after "is"; None for a pose inside."""
+        """Return why a pose is not in the area, as words after "is"; None for a pose in the area."""
         if self.grid is not None and not self.grid.inside(self.grid.cell_of(np.array([[pose.x, pose.y]])))[0]:
             rows, columns = self.grid.shape
             size = f"{columns * self.grid.resolution:g} m x {rows * self.grid.resolution:g} m"
@@ -82,7 +82,7 @@ class Scene:
     cache: WorldCache = field(default_factory=WorldCache, repr=False)
     _results: dict[Callable[..., Any], Any] = field(default_factory=dict, repr=False, compare=False)
 
-    def once(self, compute: "Callable[[Scene], T]") -> T:
+    def cached(self, compute: "Callable[[Scene], T]") -> T:
         """Return `compute(self)`, computed once: checks share results this way."""
         if compute not in self._results:
             self._results[compute] = compute(self)
@@ -141,13 +141,13 @@ class Scene:
 
     @cached_property
     def _moved(self) -> set[str]:
-        if self.does():
+        if self.may_do():
             return {body.name for body in self.world.bodies}
         return {getattr(action, "name", "") for _, kind, action in self.actions if kind in MOVING_ACTIONS}
 
     @cached_property
     def certain_walls(self) -> tuple[Solid, ...]:
-        """The fixed solids that surely block a robot: upright ones, and the walls made from a map.
+        """The fixed solids that certainly block a robot: upright ones, and the walls made from a map.
 
         A mesh or a tilted box may be a ramp.
         """
@@ -160,18 +160,18 @@ class Scene:
         spec = self.loaded.spec
         first = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses
         own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
-        every = {**own, **event_goals(spec, self.loaded.concerns)}
-        return [((*keys, "pose"), goal) for keys, goal in every.items() if not expects_failure(spec, goal.name)]
+        goals = {**own, **event_goals(spec, self.loaded.concerns)}
+        return [((*keys, "pose"), goal) for keys, goal in goals.items() if not expects_failure(spec, goal.name)]
 
     @cached_property
     def actions(self) -> list[tuple[Keys, str, BaseModel]]:
         """Keys, kind and specification of every action of every event."""
-        placed = [found for step in self.loaded.spec.steps for found in step.located_actions()]
-        mine = [(keys, action) for keys, action in placed if self.loaded.concerns(action.robot)]
-        return [((*keys, action.kind), action.kind, action.chosen) for keys, action in mine]
+        located = [found for step in self.loaded.spec.steps for found in step.located_actions()]
+        relevant = [(keys, action) for keys, action in located if self.loaded.concerns(action.robot)]
+        return [((*keys, action.kind), action.kind, action.chosen) for keys, action in relevant]
 
-    def does(self, *kinds: str) -> bool:
-        """Return whether an event does, or may do, one of these actions; without kinds: may do anything."""
+    def may_do(self, *kinds: str) -> bool:
+        """Return whether an event has, or may have, one of these actions; without kinds: may do anything."""
         return any(action.may(*kinds) for step in self.loaded.spec.steps for action in step.actions)
 
     def footprint_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
@@ -212,8 +212,8 @@ START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
 def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
     """Return whether the scenario passes if the robot fails at this goal.
 
-    The scenario says so with `expect` at the goal, with the result or the error code of the whole navigation, or with
-    the error code of this goal.
+    The scenario states this with `expect` at the goal, with the result or the error code of the whole navigation, or
+    with the error code of this goal.
     """
     through = spec.navigation.mode == "navigate_through_poses"
     entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
@@ -221,16 +221,16 @@ def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
         return True
     results = [entry.chosen for entry in spec.pass_ if entry.severity == "fail"]
     failing = any(isinstance(result, Result) and result.status == "FAILED" for result in results)
-    return failing or any(code != ErrorCode.NONE and of in (None, goal) for code, of in _codes(spec))
+    return failing or any(code != ErrorCode.NONE and name in (None, goal) for code, name in _required_codes(spec))
 
 
 def expects_start_failure(spec: ScenarioSpec) -> bool:
     """Return whether the scenario passes if the robot cannot start."""
-    return any(code in START_FAILURES for code, _ in _codes(spec))
+    return any(code in START_FAILURES for code, _ in _required_codes(spec))
 
 
-def _codes(spec: ScenarioSpec) -> Iterator[tuple[ErrorCode, str | None]]:
-    """Return each error code that a criterion asks for, and its goal; None: the whole navigation."""
+def _required_codes(spec: ScenarioSpec) -> Iterator[tuple[ErrorCode, str | None]]:
+    """Yield each error code that a criterion requires, and its goal; None: the whole navigation."""
     for entry in spec.pass_:
         if entry.severity != "fail":
             continue

@@ -49,7 +49,7 @@ def _check_robot(loaded: LoadedScenario, cache: WorldCache, pictures: Path | Non
     world = cache.world(loaded)
     loaded = _with_robot_spec(loaded)
     blocking = blocking_world(loaded, world)
-    problems = [*_check_names_again(loaded, world), *_too_large(loaded, world)]
+    problems = [*_check_names_again(loaded, world), *_oversized_map(loaded, world)]
     problems += [loaded.with_source_line(problem) for problem in check_built_world(blocking, loaded.world)]
     problems += _robot_file_mismatches(loaded)
     if not _has_errors(problems):
@@ -63,7 +63,7 @@ def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
         problems += TIMING.problems(scene)
     problems = [scene.loaded.with_source_line(problem) for problem in sorted(problems)]
     if problems and pictures is not None:
-        gaps = [gap.position for _, gap in scene.once(reachability.closed_gaps)]
+        gaps = [gap.position for _, gap in scene.cached(reachability.closed_gaps)]
         file = draw_picture(scene, gaps, pictures)
         problems = [replace(problem, hint=f"{problem.hint}; picture: {file}".lstrip("; ")) for problem in problems]
     return problems
@@ -100,21 +100,21 @@ def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Pr
 
 
 def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
-    """Check names that are only known now: those of an imported world, and the sensors of a bare URDF."""
+    """Check names that are only known now: those of an imported world, and sensors of a robot that is only a URDF."""
     is_urdf = loaded.robot.path == loaded.robot.urdf
     if is_urdf or loaded.world.map is not None or loaded.world.sdf is not None:
         return sorted(check_scenario(loaded, world))
     return []
 
 
-def _too_large(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
+def _oversized_map(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
     message = map_size_error(world.bounds) if world.grid is None else None
     if message:
         yield loaded.problem(("world",), "SC330", message, "is something far away from everything else?")
 
 
 def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:
-    """Find contradictions between a robot file and its URDF."""
+    """Yield contradictions between a robot file and its URDF."""
     if loaded.robot.urdf is None:
         return
     from simscen.loading.checks.robot_geometry import dimension_warnings
@@ -123,7 +123,7 @@ def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:
 
 
 def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:
-    """Return the scenario with the specification that follows from a bare URDF."""
+    """Return the scenario with the specification inferred from the URDF if the robot has no robot file."""
     if loaded.robot.spec is not None:
         return loaded
     return replace(loaded, robot=replace(loaded.robot, spec=load_robot(loaded)[0]))

@@ -37,10 +37,10 @@ def uneven_rates(scope: NameScope) -> Iterator[Finding]:
         try:
             clock.period(rate)
         except ValueError as error:
-            yield _uneven(loaded, tree, keys, str(error))
+            yield _uneven_rate(loaded, tree, keys, str(error))
 
 
-def _uneven(loaded: LoadedScenario, tree: MappingNode, keys: Keys, error: str) -> Finding:
+def _uneven_rate(loaded: LoadedScenario, tree: MappingNode, keys: Keys, error: str) -> Finding:
     """Return the finding at the tick rate if that is written, else at the rate or where the rate would be."""
     owner = "" if tree is loaded.tree else f" of robot `{loaded.robot.name}`"
     message = f"{'.'.join(str(key) for key in keys)}{owner}: {error}"
@@ -169,7 +169,7 @@ def speeds_above_the_top_speed(loaded: LoadedScenario) -> Iterator[Finding]:
             message = f"the limit has no effect: the robot's top speed is {robot.top_speed:g} m/s"
             yield Finding(("stack", "speed_zones", index, "speed_limit"), message)
     for key in SPEED_PARAMETERS:
-        wanted = getattr(getattr(stack, "controller", None), key, None)
-        if isinstance(wanted, int | float) and wanted > robot.limits.linear:
-            message = f"the robot never drives {wanted:g} m/s: its top speed is {robot.limits.linear:g} m/s"
+        speed = getattr(getattr(stack, "controller", None), key, None)
+        if isinstance(speed, int | float) and speed > robot.limits.linear:
+            message = f"the robot never drives {speed:g} m/s: its top speed is {robot.limits.linear:g} m/s"
             yield Finding(("stack", "controller", key), message)

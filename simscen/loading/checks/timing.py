@@ -59,19 +59,19 @@ def impossible_time_bounds(scene: Scene) -> Iterator[Finding]:
     """Find timeouts, time limits and bounds of criteria that no drive can meet."""
     goals, robot = scenario_goals(scene.loaded.spec), scene.loaded.robot.spec
     failing = any(expects_failure(scene.loaded.spec, goal.name) for goal in goals)
-    if not goals or robot is None or failing or scene.does(*SHORTCUT_ACTIONS):
+    if not goals or robot is None or failing or scene.may_do(*SHORTCUT_ACTIONS):
         return
-    routes, stops = scene.once(robot_routes), (scene.start, *(goal.pose for goal in goals))
+    routes, stops = scene.cached(robot_routes), (scene.start, *(goal.pose for goal in goals))
     # The upper bounds are cheap: if the drive meets all bounds with them, it does with the exact lengths.
     upper = [routes.length_upper_bound(a, b) for a, b in pairwise(stops)]
-    if all(map(math.isfinite, upper)) and not list(_broken_bounds(scene, Drive(goals, robot, upper))):
+    if all(map(math.isfinite, upper)) and not list(_violated_bounds(scene, Drive(goals, robot, upper))):
         return
     exact = [routes.length(a, b) for a, b in pairwise(stops)]
     if all(map(math.isfinite, exact)):
-        yield from _broken_bounds(scene, Drive(goals, robot, exact))
+        yield from _violated_bounds(scene, Drive(goals, robot, exact))
 
 
-def _broken_bounds(scene: Scene, drive: Drive) -> Iterator[Finding]:
+def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[Finding]:
     spec = scene.loaded.spec
     for index, goal in enumerate(drive.goals[: len(spec.goals)]):
         is_sent = index == 0 or spec.on_goal_failure == "stop"
@@ -87,11 +87,11 @@ def _broken_bounds(scene: Scene, drive: Drive) -> Iterator[Finding]:
         message = f"the goals cannot be reached within {spec.time_limit:g} s: {drive.description}{waiting}"
         yield Finding(keys, message)
     for index, entry in enumerate(spec.pass_):
-        for key, reason in _broken_criterion(entry, drive):
+        for key, reason in _violated_criterion_bounds(entry, drive):
             yield Finding(("pass", index, entry.kind, key), f"{entry.kind} can never hold: {reason}")
 
 
-def _broken_criterion(entry: AnyCriterion, drive: Drive) -> Iterator[tuple[str, str]]:
+def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tuple[str, str]]:
     """Yield the key of each bound that cannot be met, and the reason."""
     criterion, names = entry.chosen, [goal.name for goal in drive.goals]
     times, lengths = drive.least_times, drive.least_lengths
@@ -100,8 +100,8 @@ def _broken_criterion(entry: AnyCriterion, drive: Drive) -> Iterator[tuple[str, 
         goal = getattr(criterion, "goal", None)
         least = sum(times) if goal is None else min(t for t, n in zip(times, names, strict=True) if is_named(n, goal))
         if least > bound:
-            alone = f"the path to `{goal}` alone takes at least {least:.1f} s"
-            yield "max", drive.description if goal is None else alone
+            reason = f"the path to `{goal}` alone takes at least {least:.1f} s"
+            yield "max", drive.description if goal is None else reason
     if entry.kind == "path_length":
         ratio = getattr(criterion, "max_ratio", None)
         if isinstance(bound, float) and sum(lengths) > bound:
@@ -111,17 +111,17 @@ def _broken_criterion(entry: AnyCriterion, drive: Drive) -> Iterator[tuple[str, 
     within = getattr(criterion, "within", None)
     if entry.kind == "goals_reached" and within is not None:
         chosen = getattr(criterion, "goals", None) or names
-        far = [k for k, name in enumerate(names) if times[k] > within and any(is_named(name, c) for c in chosen)]
-        if far:
-            k = far[0]
+        too_late = [k for k, name in enumerate(names) if times[k] > within and any(is_named(name, c) for c in chosen)]
+        if too_late:
+            k = too_late[0]
             yield "within", f"the path of {drive.lengths[k]:.2f} m to `{names[k]}` takes {times[k]:.1f} s"
 
 
 def _requires_success(entry: AnyCriterion) -> bool:
     """Return whether the run fails unless every goal is reached."""
     if entry.kind == "result":
-        wants = getattr(entry.chosen, "status", "") == "SUCCEEDED"
+        requires = getattr(entry.chosen, "status", "") == "SUCCEEDED"
     else:
-        some = getattr(entry.chosen, "goals", None) or getattr(entry.chosen, "goal", None)
-        wants = entry.kind in ("goals_reached", "time_to_goal") and not some
-    return wants and entry.severity == "fail"
+        selected_goals = getattr(entry.chosen, "goals", None) or getattr(entry.chosen, "goal", None)
+        requires = entry.kind in ("goals_reached", "time_to_goal") and not selected_goals
+    return requires and entry.severity == "fail"

@@ -1,4 +1,4 @@
-"""Checks of world files: unique names, things without extent, duplicates, unknown regions."""
+"""Checks of world files: unique names, objects without extent, duplicates, unknown regions."""
 
 from collections.abc import Iterator
 
@@ -15,7 +15,7 @@ def _spec(world: LoadedWorld) -> WorldSpec:
 
 @WORLD_FILE.check("SC033")
 def shared_names(world: LoadedWorld) -> Iterator[Finding]:
-    """Find obstacles and walls that are called like an object or a door, or obstacles of one name (a warning)."""
+    """Find obstacles and walls with the name of an object or a door, or obstacles that share a name (a warning)."""
     spec = _spec(world)
     moving = {thing.name for thing in spec.objects} | {door.name for door in spec.doors}
     seen: set[str] = set()

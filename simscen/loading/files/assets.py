@@ -216,7 +216,7 @@ def find_criterion_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> 
     found: dict[str, CriterionMask] = {}
     for reference in references(spec):
         node = node_at(tree, reference.keys)
-        if reference.kind == "mask" and reference.keys[0] == "pass" and isinstance(node, ScalarNode):
+        if reference.target == "mask" and reference.keys[0] == "pass" and isinstance(node, ScalarNode):
             loaded = assets.map(node)
             if loaded is not None:
                 found.setdefault(reference.name, CriterionMask(reference.keys, loaded))

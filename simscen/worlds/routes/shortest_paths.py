@@ -100,7 +100,7 @@ class ShortestPaths:
         first, last = (self._free_cell(self._optimistic_graph, np.array(end[:2])) for end in (start, goal))
         return not first or not last or self._optimistic_graph.shortest_path(first, last) is not None
 
-    def may_come_to(self, starts: Sequence[Pose2], arrived: Callable[[Pose2], float]) -> bool:
+    def may_enter(self, starts: Sequence[Pose2], arrived: Callable[[Pose2], float]) -> bool:
         """Return whether the disc may get from one of the starts to a pose for which `arrived` returns 0.
 
         `arrived` returns the distance in m from a pose to the destination. False proves that there is no path.

@@ -57,7 +57,7 @@ class SimplePaths:
 
         return self._search(start, goal, last_leg)
 
-    def comes_to(self, start: Point, towards: Point, arrived: Callable[[Point], bool]) -> bool:
+    def can_enter(self, start: Point, towards: Point, arrived: Callable[[Point], bool]) -> bool:
         """Return whether a path was found to a point for which `arrived` is true, searching `towards` a point first."""
         return (
             arrived(start) or self._search(start, towards, lambda here: 0.0 if arrived(here) else math.inf) < math.inf

@@ -122,5 +122,5 @@ def test_a_file_of_criteria_takes_places_of_the_world_that_it_names(write: Write
 
 def test_a_pose_of_a_place_is_equal_to_one_written_out_but_for_its_name() -> None:
     here = PoseSpec(x=1, y=2)
-    assert here.at("desk").pose == here.pose
-    assert (here.at("desk").place, here.place) == ("desk", "")
+    assert here.with_place("desk").pose == here.pose
+    assert (here.with_place("desk").place, here.place) == ("desk", "")

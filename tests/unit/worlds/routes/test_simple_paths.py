@@ -58,7 +58,7 @@ def test_a_sealed_room_is_proven_and_the_wall_between_is_where() -> None:
     solids = [*ROOM, wall(2.5, 0.0, 4.0, "partition")]
     exact = ShortestPaths(merge_solids(solids), BOUNDS, 0.2, Z)
     assert not exact.may_reach(START, GOAL)
-    assert not exact.may_come_to([START], lambda pose: pose.distance(GOAL) - 0.5)
+    assert not exact.may_enter([START], lambda pose: pose.distance(GOAL) - 0.5)
     gap = narrowest_gap(merge_solids(solids), BOUNDS, (START, GOAL), 0.2, Z)
     assert (gap.width, round(gap.x, 1)) == (0.0, 2.5)
 
