@@ -10,7 +10,7 @@ from simscen.loading.builders import load_robot
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.robot import RobotSpec
 from simscen.sim.body.robot_body import RobotBody, check_ground_clearance
-from simscen.worlds.geometry.prisms import is_surely_flat
+from simscen.worlds.geometry.prisms import has_no_drivable_solids
 
 CIRCLE_CORNERS = 24
 """Corners of the polygon that approximates a round footprint."""
@@ -86,7 +86,7 @@ def _hull_heights(body: RobotBody) -> tuple[float, float]:
 def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:
     """Return the solids that block a robot: all except the ramps that it can climb."""
     reach = max((wheel.radius for wheel in body.wheels), default=0.0)
-    if is_surely_flat(solids, reach):
+    if has_no_drivable_solids(solids, reach):
         return solids
     from simscen.sim.body.climb import compute_climb_limits
     from simscen.worlds.geometry.drive_obstacles import drive_obstacles
@@ -101,7 +101,7 @@ def blocking_world(loaded: LoadedScenario, world: World) -> World:
     """
     spec = loaded.robot.spec
     radius = None if spec is None else getattr(spec.drive, "wheel_radius", 0.0)
-    if radius is not None and is_surely_flat(world.solids, 2 * radius):
+    if radius is not None and has_no_drivable_solids(world.solids, 2 * radius):
         return world
     solids = blocking_solids(world.solids, load_robot(loaded)[1])
     return world if solids is world.solids else replace(world, solids=solids)

@@ -1,1 +1,1 @@
-"""Worlds: from files to solids, and from solids to what physics, rays and maps need."""
+"""Worlds: read from files as solids, and converted to meshes, ray scenes, and maps."""

@@ -1,4 +1,4 @@
-"""A world made ready: once for each world and lidar height, shared by all its runs."""
+"""Prepare the mesh and the map of a world, once for all its runs, and summarize worlds."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from simscen.worlds.maps.occupancy_map import draw_map
 
 
 def build_world_and_map(world: World, lidar_height: float, resolution: float = MAP_RESOLUTION_M) -> BuiltWorld:
-    """Fuse the static solids and draw the map a robot with a lidar at `lidar_height` meters would have.
+    """Merge the static solids, and draw the map that SLAM with a lidar at `lidar_height` meters would build.
 
-    Numpy arrays only, so that the result can be made before forking and shared by every run. Takes some 10 ms for
+    The result has only NumPy arrays, so that forked runs can share it. Takes some 10 ms for
     a house of 20 x 20 m, 0.1 s for thousands of solids. Raises InvalidInput for a map beyond 16 million cells.
     """
     mesh = merge_solids(world.solids)
@@ -51,7 +51,7 @@ class WorldSummary:
     """Rows and columns."""
     map_resolution: float
     map_shares: tuple[float, float, float]
-    """Shares of occupied, free and unknown cells."""
+    """Fractions of occupied, free and unknown cells."""
     places: tuple[str, ...]
     regions: tuple[str, ...]
     notes: tuple[str, ...]
@@ -75,9 +75,9 @@ def inspect_world(built: BuiltWorld) -> WorldSummary:
     unknown = float(np.mean(cells == UNKNOWN)) if cells.size else 0.0
     bodies = []
     for body in world.bodies:
-        placed = tuple(Solid(s.shape, body.pose.compose(s.pose), s.name) for s in body.solids)
-        kinds = "+".join(dict.fromkeys(_kind(solid) for solid in placed))
-        bodies.append(_item(body.name, kinds, placed, body.mass))
+        solids = tuple(Solid(s.shape, body.pose.compose(s.pose), s.name) for s in body.solids)
+        kinds = "+".join(dict.fromkeys(_kind(solid) for solid in solids))
+        bodies.append(_item(body.name, kinds, solids, body.mass))
     return WorldSummary(
         name=world.name,
         bounds=world.bounds,

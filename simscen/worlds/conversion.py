@@ -70,16 +70,16 @@ def prism_shapes(solid: Solid, height: float, changes: list[str]) -> list[PrismS
     A solid without exact equivalent is replaced by its cross section at `height` m, or at half its height if it does
     not reach that height.
     """
-    exact = _exact(solid)
+    exact = _exact_shape(solid)
     shapes = [exact] if exact else list(_prisms(solid, height, changes))
     above = [_above_ground(shape) for shape in shapes if shape.bottom + shape.height > 10**-DIGITS]
     if shapes and not above:
-        changes.append(f"{solid.name}: it lies below the ground; it is left out")
+        changes.append(f"{solid.name}: it is below the ground; it is left out")
     return [shape for shape in above if _is_valid(shape, solid.name, changes)]
 
 
 def _is_valid(shape: PrismShape, name: str, changes: list[str]) -> bool:
-    """Return whether a world file can hold a shape. If not, e.g. if it is too thin, add the reason to `changes`."""
+    """Return whether a shape is valid in a world file. If not, e.g. if it is too thin, add the reason to `changes`."""
     try:
         Obstacle.model_validate({"name": "shape", **shape.fields})
     except ValidationError as error:
@@ -95,21 +95,21 @@ def _reason(error: ValidationError) -> str:
     return f"its `{problem['loc'][0]}` is not valid: {message[:1].lower()}{message[1:]}"
 
 
-def _exact(solid: Solid) -> PrismShape | None:
-    """Return the same solid as a shape; None if it is not upright or has another shape."""
-    turn, pose = solid.pose.rotation(), solid.pose
-    up = int(np.argmax(np.abs(turn[2])))
-    if abs(turn[2, up]) < MIN_UPRIGHT_COSINE:
+def _exact_shape(solid: Solid) -> PrismShape | None:
+    """Return the shape that equals a solid; None if it is not upright or world files have no such shape."""
+    rotation, pose = solid.pose.rotation(), solid.pose
+    up = int(np.argmax(np.abs(rotation[2])))
+    if abs(rotation[2, up]) < MIN_UPRIGHT_COSINE:
         return None
     along, across = ((1, 2), (0, 2), (0, 1))[up]
-    place = Pose2(pose.x, pose.y, math.atan2(turn[1, along], turn[0, along]))
+    place = Pose2(pose.x, pose.y, math.atan2(rotation[1, along], rotation[0, along]))
     match solid.shape:
         case Box(size):
             return PrismShape(place, pose.z - size[up] / 2, size[up], box=(size[along], size[across]))
         case Cylinder(radius, length) if up == 2:
             return PrismShape(Pose2(pose.x, pose.y), pose.z - length / 2, length, radius=radius)
-        case Extrusion(polygon, tall) if up == 2 and turn[2, 2] > 0 and len(polygon) <= MAX_CORNERS:
-            return PrismShape(place, pose.z, tall, polygon=polygon)
+        case Extrusion(polygon, extrusion_height) if up == 2 and rotation[2, 2] > 0 and len(polygon) <= MAX_CORNERS:
+            return PrismShape(place, pose.z, extrusion_height, polygon=polygon)
         case _:
             return None
 
@@ -124,14 +124,16 @@ def _prisms(solid: Solid, height: float, changes: list[str]) -> Iterator[PrismSh
     try:
         pieces = simple_polygons(rings_from_segments(section_segments(mesh, section_height)))
     except OpenCrossSection:
-        changes.append(f"{solid.name}: {kind} whose cut at {section_height:g} m is not closed; it is left out")
+        changes.append(
+            f"{solid.name}: {kind} whose cross section at {section_height:g} m is not closed; it is left out"
+        )
         return
     if not pieces:
         changes.append(f"{solid.name}: {kind} that is flat; it is left out")
         return
     if not _is_prism(solid, sum(map(signed_area, pieces)) * (high - low)):
         prisms = "an upright prism" if len(pieces) == 1 else f"{len(pieces)} upright prisms"
-        changes.append(f"{solid.name}: {kind}; it became {prisms} over its cut at {section_height:.3g} m")
+        changes.append(f"{solid.name}: {kind}; replaced by {prisms} over its cross section at {section_height:.3g} m")
     for piece in pieces:
         x, y = _rounded(np.mean(piece, axis=0).tolist())
         yield PrismShape(Pose2(x, y), low, high - low, polygon=tuple((px - x, py - y) for px, py in piece))
@@ -144,8 +146,8 @@ def _is_prism(solid: Solid, volume: float) -> bool:
     normals = np.cross(b - a, c - a)
     level, upright = np.linalg.norm(normals[:, :2], axis=1), np.abs(normals[:, 2])
     tilted = np.minimum(level, upright) > 1e-6 * np.linalg.norm(normals, axis=1) + 1e-12
-    own = float(np.sum(a * np.cross(b, c)) / 6)
-    return not tilted.any() and math.isclose(own, volume, rel_tol=1e-6)
+    solid_volume = float(np.sum(a * np.cross(b, c)) / 6)
+    return not tilted.any() and math.isclose(solid_volume, volume, rel_tol=1e-6)
 
 
 def _above_ground(shape: PrismShape) -> PrismShape:
@@ -166,7 +168,7 @@ class Conversion:
     changes: list[str] = field(default_factory=list)
 
     def merged_into(self, spec: WorldSpec) -> WorldSpec:
-        """Return a specification with these before its own obstacles and objects.
+        """Return a specification in which these come before the obstacles and objects of `spec`.
 
         Raises pydantic.ValidationError if there are too many.
         """
@@ -185,45 +187,47 @@ def convert_world(world: World, height: float) -> Conversion:
 
     Solids without exact equivalent are replaced by their cross section at `height` m, or left out, with a sentence.
     """
-    done = Conversion()
+    conversion = Conversion()
     for solid in world.solids:
         friction = {"friction": solid.friction} if solid.friction != 1.0 else {}
-        for shape in prism_shapes(solid, height, done.changes):
-            _add_obstacle({"name": _name(solid.name), **shape.fields, **friction}, done)
+        for shape in prism_shapes(solid, height, conversion.changes):
+            _add_obstacle({"name": _name(solid.name), **shape.fields, **friction}, conversion)
     for body in world.bodies:
-        _add_body(body, height, done)
-    return done
+        _add_body(body, height, conversion)
+    return conversion
 
 
-def _add_obstacle(fields: dict[str, object], done: Conversion) -> None:
+def _add_obstacle(fields: dict[str, object], conversion: Conversion) -> None:
     try:
-        done.obstacles.append(Obstacle.model_validate(fields))
+        conversion.obstacles.append(Obstacle.model_validate(fields))
     except ValidationError as error:
-        done.changes.append(f"{fields['name']}: {_reason(error)}; it is left out")
+        conversion.changes.append(f"{fields['name']}: {_reason(error)}; it is left out")
 
 
-def _add_body(body: Body, height: float, done: Conversion) -> None:
-    """Add an object, or obstacles if the body has several shapes, which no object can have."""
+def _add_body(body: Body, height: float, conversion: Conversion) -> None:
+    """Add the body as an object, or as obstacles if it has several shapes, because an object can have only one."""
     placed = [Solid(solid.shape, body.pose.compose(solid.pose), body.name) for solid in body.solids]
-    shapes = [shape for solid in placed for shape in prism_shapes(solid, height, done.changes)]
+    shapes = [shape for solid in placed for shape in prism_shapes(solid, height, conversion.changes)]
     if not shapes:
         return
     if len(shapes) > 1:
         moves = "moved" if body.path else "could be pushed" if body.mass else "could be moved"
-        done.changes.append(f"{body.name}: it {moves} and has {len(shapes)} shapes, an object has one; it stands still")
+        conversion.changes.append(
+            f"{body.name}: it {moves} and has {len(shapes)} shapes, but an object can have only one; it is made static"
+        )
         for shape in shapes:
-            _add_obstacle({"name": _name(body.name), **shape.fields}, done)
+            _add_obstacle({"name": _name(body.name), **shape.fields}, conversion)
         return
-    travel = _travel(body, shapes[0], done.changes) if body.path else None
+    travel = _travel(body, shapes[0], conversion.changes) if body.path else None
     fields = {"name": _name(body.name), "mass": body.mass, "move": travel, **shapes[0].fields}
     try:
-        done.objects.append(Movable.model_validate(fields))
+        conversion.objects.append(Movable.model_validate(fields))
     except ValidationError as error:
-        done.changes.append(f"{body.name}: {_reason(error)}; it is left out")
+        conversion.changes.append(f"{body.name}: {_reason(error)}; it is left out")
 
 
 def _travel(body: Body, shape: PrismShape, changes: list[str]) -> Travel | None:
-    """Return the scripted motion: through waypoints if it is straight and has one speed, else along keyframes."""
+    """Return the scripted motion: waypoints if it is straight with a constant speed, else keyframes."""
     assert body.path is not None
     path, start, is_round = body.path, shape.pose, shape.radius is not None
     if waypoints := _waypoints(path):
@@ -231,23 +235,25 @@ def _travel(body: Body, shape: PrismShape, changes: list[str]) -> Travel | None:
         by_waypoints = {"through": waypoints, "speed": speed, "repeat": path.mode, "start": path.start}
         with suppress(ValidationError):  # keyframes may still describe the motion
             travel = Travel.model_validate(by_waypoints)
-            if _are_equal(travel.path(start, path.start), path, is_round):
+            if _are_same_motion(travel.path(start, path.start), path, is_round):
                 return travel
     first = pose_at(path, 0.0)
     if start.distance(first) > 10**-DIGITS or not (is_round or abs(wrap(start.yaw - first.yaw)) < 10**-DIGITS):
-        changes.append(f"{body.name}: it moves, and its shape is beside its own origin; it stands still")
+        changes.append(f"{body.name}: it moves, but its shape is not at its origin; it is made static")
         return None
     frames = [[time, *np.round(pose, DIGITS).tolist()] for time, pose in zip(path.times, path.poses, strict=True)]
     timed = {"keyframes": frames, "repeat": path.mode, "ease": path.ease, "phase": path.phase, "start": path.start}
     try:
         return Travel.model_validate(timed)
     except ValidationError as error:
-        changes.append(f"{body.name}: it moves as no keyframes say ({error.errors()[0]['msg']}); it stands still")
+        changes.append(
+            f"{body.name}: its motion cannot be written as keyframes ({error.errors()[0]['msg']}); it is made static"
+        )
         return None
 
 
 def _waypoints(path: MotionPath) -> list[list[float]]:
-    """Return the corners of a path after its start, without the return of a loop; empty if its speed is not even."""
+    """Return the corners of a path after its start, without the return of a loop; empty if it is eased."""
     points = [(round(pose.x, DIGITS), round(pose.y, DIGITS)) for pose in path.poses]
     turns = [b for a, b, c in zip(points, points[1:], points[2:], strict=False) if not _in_line(a, b, c)]
     corners = [*turns, *(points[-1:] if path.mode != "loop" else [])]
@@ -261,11 +267,11 @@ def _in_line(a: tuple[float, float], b: tuple[float, float], c: tuple[float, flo
     ) * math.hypot(vx, vy)
 
 
-def _are_equal(written: MotionPath, path: MotionPath, is_round: bool) -> bool:
-    """Return whether two paths have the same poses at all stops; the headings of a round object do not count."""
-    times = sorted({*written.times, *path.times})
-    pairs = [(pose_at(written, t + path.start), pose_at(path, t + path.start)) for t in times]
-    return math.isclose(written.times[-1], path.times[-1], rel_tol=1e-6) and all(
+def _are_same_motion(converted: MotionPath, path: MotionPath, is_round: bool) -> bool:
+    """Return whether two paths have the same poses at all their times; headings of round objects are ignored."""
+    times = sorted({*converted.times, *path.times})
+    pairs = [(pose_at(converted, t + path.start), pose_at(path, t + path.start)) for t in times]
+    return math.isclose(converted.times[-1], path.times[-1], rel_tol=1e-6) and all(
         a.distance(b) < 10**-DIGITS and (is_round or abs(wrap(a.yaw - b.yaw)) < 10**-DIGITS) for a, b in pairs
     )
 

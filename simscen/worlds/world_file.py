@@ -27,7 +27,7 @@ def world_from_spec(
 
     name:   used if the specification has none
     grid:   loaded `map`; it becomes walls with the height `map_height`, and is the robot's map
-    base:   imported `sdf`; own solids and bodies come after its own, and own places and regions override its own
+    base:   imported `sdf`; its solids and bodies come first, and `spec` overrides its places and regions
     notes:  messages of the map's loader
     """
     base = base or World(name, ())
@@ -109,18 +109,18 @@ def _bounds(
 ) -> tuple[float, float, float, float]:
     """Return (min x, min y, max x, max y) of everything in m; zeros for an empty world."""
     corners = [(place.x, place.y) for place in places]
-    covered = [bounding_rectangle(solid) for solid in solids]
-    covered += [bounding_rectangle(solid, body.pose) for body in bodies for solid in body.solids]
-    corners += [corner for left, low, right, high in covered for corner in ((left, low), (right, high))]
+    rectangles = [bounding_rectangle(solid) for solid in solids]
+    rectangles += [bounding_rectangle(solid, body.pose) for body in bodies for solid in body.solids]
+    corners += [corner for left, bottom, right, top in rectangles for corner in ((left, bottom), (right, top))]
     if grid is not None:
-        corners += _corners_of(grid)
+        corners += _grid_corners(grid)
     if not corners:
         return (0.0, 0.0, 0.0, 0.0)
     xs, ys = zip(*corners, strict=True)
     return min(xs), min(ys), max(xs), max(ys)
 
 
-def _corners_of(grid: OccupancyGrid) -> list[tuple[float, float]]:
+def _grid_corners(grid: OccupancyGrid) -> list[tuple[float, float]]:
     height, width = (cells * grid.resolution for cells in grid.shape)
     local = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
     return [grid.origin.compose(Pose2(x, y))[:2] for x, y in local]
@@ -142,16 +142,16 @@ def wall_solids(points: list[Point], thickness: float, height: float, name: str)
     corners = [p for k, p in enumerate(points) if k == 0 or p != points[k - 1]]
     if len(corners) < 2:
         return []
-    ways = [_direction(a, b) for a, b in pairwise(corners)]
-    closed = len(ways) > 1 and corners[0] == corners[-1]
-    before = [ways[-1] if closed else None, *ways[:-1]]
-    after = [*ways[1:], ways[0] if closed else None]
+    directions = [_direction(a, b) for a, b in pairwise(corners)]
+    is_closed = len(directions) > 1 and corners[0] == corners[-1]
+    before = [directions[-1] if is_closed else None, *directions[:-1]]
+    after = [*directions[1:], directions[0] if is_closed else None]
     solids = []
-    for (a, b), way, previous, following in zip(pairwise(corners), ways, before, after, strict=True):
-        start = _end(a, way, previous, thickness / 2, -1.0)
-        end = _end(b, way, following, thickness / 2, 1.0)
-        if any(_behind(start[side], end[side], way) for side in (0, 1)):
-            start, end = _square_end(a, way, thickness / 2, -1.0), _square_end(b, way, thickness / 2, 1.0)
+    for (a, b), direction, previous, following in zip(pairwise(corners), directions, before, after, strict=True):
+        start = _miter_end(a, direction, previous, thickness / 2, -1.0)
+        end = _miter_end(b, direction, following, thickness / 2, 1.0)
+        if any(_runs_backward(start[side], end[side], direction) for side in (0, 1)):
+            start, end = _square_end(a, direction, thickness / 2, -1.0), _square_end(b, direction, thickness / 2, 1.0)
         solids.append(Solid(Extrusion((start[1], end[1], end[0], start[0]), height), name=name))
     return solids
 
@@ -161,25 +161,25 @@ def _direction(a: Point, b: Point) -> Point:
     return (b[0] - a[0]) / length, (b[1] - a[1]) / length
 
 
-def _behind(start: Point, end: Point, way: Point) -> bool:
+def _runs_backward(start: Point, end: Point, direction: Point) -> bool:
     """Return whether a side of a part would run backwards, because its miters cross."""
-    return (end[0] - start[0]) * way[0] + (end[1] - start[1]) * way[1] <= 0
+    return (end[0] - start[0]) * direction[0] + (end[1] - start[1]) * direction[1] <= 0
 
 
-def _end(corner: Point, way: Point, other: Point | None, half: float, side: float) -> tuple[Point, Point]:
+def _miter_end(corner: Point, direction: Point, other: Point | None, half: float, side: float) -> tuple[Point, Point]:
     """Return the left and right corner of a part at one end; `side` is -1 at its start, 1 at its end."""
-    (x, y), (ux, uy) = corner, way
+    (x, y), (ux, uy) = corner, direction
     if other is None:
         return (x - uy * half, y + ux * half), (x + uy * half, y - ux * half)
     cosine = ux * other[0] + uy * other[1]
     if cosine < MIN_MITER_COSINE:
-        return _square_end(corner, way, half, side)
+        return _square_end(corner, direction, half, side)
     left = (-uy - other[1]) * half / (1 + cosine), (ux + other[0]) * half / (1 + cosine)
     return (x + left[0], y + left[1]), (x - left[0], y - left[1])
 
 
-def _square_end(corner: Point, way: Point, half: float, side: float) -> tuple[Point, Point]:
-    (x, y), (ux, uy) = corner, way
+def _square_end(corner: Point, direction: Point, half: float, side: float) -> tuple[Point, Point]:
+    (x, y), (ux, uy) = corner, direction
     x, y = x + ux * half * side, y + uy * half * side
     return (x - uy * half, y + ux * half), (x + uy * half, y - ux * half)
 

@@ -39,7 +39,7 @@ def drive_between_rooms(
         extruded_mesh(floor.walls, floor.glass, furniture),
         (0.0, 0.0, *floor.size),
         CLEARANCE_M,
-        finest=SEARCH_CELL_M,
+        min_resolution=SEARCH_CELL_M,
     )
     waypoints = _waypoints(floor, paths, rng, alternate)
     start, goal = next(waypoints), next(waypoints)
@@ -68,7 +68,7 @@ def _waypoints(floor: Building, paths: ShortestPaths, rng: np.random.Generator, 
         rooms = floor.rooms[side] if alternate else floor.rooms
         target = rooms[rng.integers(len(rooms))] + rng.normal(0, 0.8, 2)
         start = target if here is None else here
-        path = paths.way(Pose2(*start), Pose2(*target))
+        path = paths.path(Pose2(*start), Pose2(*target))
         failed = failed + 1 if path is None else 0
         if failed > MAX_FAILED_GOALS:  # furniture blocks the door of this room
             raise EnclosedStart(tuple(start))
@@ -80,11 +80,11 @@ def _waypoints(floor: Building, paths: ShortestPaths, rng: np.random.Generator, 
 def mapping_tour(floor: Building) -> Array:
     """Return poses (k, 3), 0.5 m apart, on paths through all reachable rooms of an unfurnished floor."""
     mesh = extruded_mesh(floor.walls, floor.glass)
-    paths = ShortestPaths(mesh, (0.0, 0.0, *floor.size), CLEARANCE_M, finest=SEARCH_CELL_M)
+    paths = ShortestPaths(mesh, (0.0, 0.0, *floor.size), CLEARANCE_M, min_resolution=SEARCH_CELL_M)
     order = floor.rooms[np.argsort(floor.rooms[:, 0], kind="stable")]
     points, here = [order[:1]], order[0]
     for room in order[1:]:
-        path = paths.way(Pose2(*here), Pose2(*room))
+        path = paths.path(Pose2(*here), Pose2(*room))
         if path is None:
             continue
         length = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))))

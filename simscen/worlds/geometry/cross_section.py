@@ -16,7 +16,7 @@ from simscen.core.geometry.shapes import TriangleMesh
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """Directed segments (n, 2, 2) in meters with the solid on their left, and the number (n,) of each one's solid."""
+    """Directed segments (n, 2, 2) in meters with the solid on their left, and the index (n,) of the solid of each."""
 
     segments: Array
     owners: npt.NDArray[np.int32]
@@ -50,8 +50,8 @@ def cross_section(mesh: TriangleMesh, height: float) -> CrossSection:
 def _edge_crossing(tip: Array, base: Array, height: float, is_tip_above: npt.NDArray[np.bool_]) -> Array:
     """Return the points (n, 2) where the edges between `tip` (n, 3) and `base` (n, 3) pass the height."""
     low, high = np.where(is_tip_above[:, None], base, tip), np.where(is_tip_above[:, None], tip, base)
-    share = (height - low[:, 2]) / (high[:, 2] - low[:, 2])
-    point: Array = low[:, :2] + share[:, None] * (high - low)[:, :2]
+    fraction = (height - low[:, 2]) / (high[:, 2] - low[:, 2])
+    point: Array = low[:, :2] + fraction[:, None] * (high - low)[:, :2]
     return point
 
 
@@ -109,8 +109,8 @@ def _clip_to_heights(triangles: Array, low: float, high: float) -> tuple[Array, 
     ends, end_z = np.roll(triangles, -1, axis=1)[:, :, :2], np.roll(z, -1, axis=1)
     for height in (low, high):
         crosses = (z > height) != (end_z > height)
-        share = (height - z) / np.where(crosses, end_z - z, 1.0)
-        corners.append(triangles[:, :, :2] + share[:, :, None] * (ends - triangles[:, :, :2]))
+        fraction = (height - z) / np.where(crosses, end_z - z, 1.0)
+        corners.append(triangles[:, :, :2] + fraction[:, :, None] * (ends - triangles[:, :, :2]))
         valid.append(crosses)
     return np.concatenate(corners, axis=1), np.concatenate(valid, axis=1)
 
@@ -132,8 +132,8 @@ def _distance_from_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> float
     a, b = corners[:, first][both_valid], corners[:, second][both_valid]
     edge = b - a
     squared_length = np.einsum("ij,ij->i", edge, edge)
-    share = np.clip(-np.einsum("ij,ij->i", a, edge) / np.where(squared_length > 0, squared_length, 1.0), 0.0, 1.0)
-    return float(np.sqrt(np.min(np.sum((a + share[:, None] * edge) ** 2, axis=1))))
+    fraction = np.clip(-np.einsum("ij,ij->i", a, edge) / np.where(squared_length > 0, squared_length, 1.0), 0.0, 1.0)
+    return float(np.sqrt(np.min(np.sum((a + fraction[:, None] * edge) ** 2, axis=1))))
 
 
 Point = tuple[float, float]
@@ -146,7 +146,7 @@ MAX_CORNERS = 200
 
 
 class OpenCrossSection(ValueError):
-    """The cross section of a mesh that is not closed."""
+    """The cross section of a mesh is not closed."""
 
 
 def rings_from_segments(segments: Array) -> list[Ring]:
@@ -219,12 +219,12 @@ def _without_straight_corners(ring: Ring) -> Ring:
     """
     kept: Ring = [ring[0]]
     for point, following in zip(ring[1:], [*ring[2:], ring[0]], strict=True):
-        if _sticks_out(kept[-1], point, following):
+        if _is_corner(kept[-1], point, following):
             kept.append(point)
-    return kept if len(kept) < 3 or _sticks_out(kept[-1], kept[0], kept[1]) else kept[1:]
+    return kept if len(kept) < 3 or _is_corner(kept[-1], kept[0], kept[1]) else kept[1:]
 
 
-def _sticks_out(before: Point, point: Point, after: Point) -> bool:
+def _is_corner(before: Point, point: Point, after: Point) -> bool:
     """Return whether removing the point would move the ring by more than STRAIGHTNESS_M."""
     (ax, ay), (px, py), (bx, by) = before, point, after
     length = math.hypot(bx - ax, by - ay)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.meshes import Owners, drivable_solids, face_normals, is_convex, submesh
 from simscen.core.geometry.shapes import Box, Mesh, Solid, TriangleMesh
-from simscen.worlds.geometry.prisms import is_surely_flat
+from simscen.worlds.geometry.prisms import has_no_drivable_solids
 from simscen.worlds.geometry.triangulation import merge_solids
 
 EDGE_PIECE_M = 0.1
@@ -34,11 +34,11 @@ _PRISM_FACES = np.array(
 def drive_obstacles(
     solids: tuple[Solid, ...], wheel_radius: float, max_slope: float, max_step: float
 ) -> tuple[Solid, ...]:
-    """Return the solids in the way of a robot; the same tuple if none of them is ground.
+    """Return the solids that block a robot; the same tuple if no solid is drivable ground.
 
     The robot has wheels of `wheel_radius` m and climbs slopes up to `max_slope` rad and steps up to `max_step` m.
     """
-    if max_slope <= 0 or is_surely_flat(solids, wheel_radius):
+    if max_slope <= 0 or has_no_drivable_solids(solids, wheel_radius):
         return solids
     mesh = merge_solids(solids)
     ground = frozenset(owner for owner in drivable_solids(mesh, wheel_radius) if _is_simple(mesh, owner))
@@ -60,9 +60,9 @@ def _steep_faces(mesh: TriangleMesh, ground: Owners, max_slope: float) -> Iterat
     is_steep = (normal_z > MAX_WALL_NORMAL_Z) & (normal_z < math.cos(max_slope) - 1e-9)
     for face in np.flatnonzero(_is_ground_face(mesh, ground) & is_steep).tolist():
         corners = mesh.vertices[mesh.faces[face]]
-        foot = corners.copy()
-        foot[:, 2] = corners[:, 2].min() - WALL_THICKNESS_M
-        yield Solid(Mesh(np.concatenate((foot, corners)), _PRISM_FACES), name=mesh.names[int(mesh.owners[face])])
+        base = corners.copy()
+        base[:, 2] = corners[:, 2].min() - WALL_THICKNESS_M
+        yield Solid(Mesh(np.concatenate((base, corners)), _PRISM_FACES), name=mesh.names[int(mesh.owners[face])])
 
 
 def _is_ground_face(mesh: TriangleMesh, ground: Owners) -> npt.NDArray[np.bool_]:
@@ -70,7 +70,7 @@ def _is_ground_face(mesh: TriangleMesh, ground: Owners) -> npt.NDArray[np.bool_]
 
 
 def _walls_at_edges(mesh: TriangleMesh, ground: Owners, max_step: float) -> Iterator[Solid]:
-    """Yield upright ground faces as thin walls, where the ground beside them is lower by more than a step."""
+    """Yield upright ground faces as thin walls, where the ground next to them is lower by more than a step."""
     is_wall = np.abs(face_normals(mesh)[:, 2]) <= MAX_WALL_NORMAL_Z
     pieces = list(_edge_pieces(mesh, np.flatnonzero(_is_ground_face(mesh, ground) & is_wall)))
     if not pieces:
@@ -91,7 +91,7 @@ def _walls_at_edges(mesh: TriangleMesh, ground: Owners, max_step: float) -> Iter
 
 
 class _Edge(NamedTuple):
-    """A piece of an upright face seen from above: its ends (2,), the outward unit vector, and the face's owner.
+    """A piece of an upright face seen from above: ends (2,), outward unit vector, and index of the face's solid.
 
     A leaning face covers `depth` meters inwards of the line between the ends.
     """

@@ -16,8 +16,8 @@ from simscen.worlds.geometry.prisms import upright_prism
 
 ZRange = tuple[float, float]
 """Lower and upper height in meters."""
-TOUCHING_SHARE = 1e-3
-"""Share by which an outline is shrunk before the test, because touching is not overlapping."""
+SHRINK_FRACTION = 1e-3
+"""Fraction by which an outline is shrunk before the test, because touching is not overlapping."""
 
 
 def blocking_solid(world: World, point: tuple[float, float], radius: float, z_range: ZRange) -> str | None:
@@ -34,12 +34,12 @@ def first_solid_in_disc(
 ) -> str | None:
     """Return the name of the first of the solids that a disc at `point` overlaps, or None; see `blocking_solid`."""
     for solid in solids:
-        if is_near(solid, point, radius) and _distance(solid, point, z_range, radius) < radius:
+        if is_near(solid, point, radius) and _horizontal_distance(solid, point, z_range, radius) < radius:
             return solid.name
     return None
 
 
-def _distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within: float) -> float:
+def _horizontal_distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within: float) -> float:
     """Return the horizontal distance in meters to a solid between two heights; inf if it is not `within` that."""
     prism = upright_prism(solid)
     if prism is not None:
@@ -83,7 +83,7 @@ def place_polygon(outline: Polygon, pose: Pose2) -> Polygon:
 def first_solid_in_footprint(solids: Iterable[Solid], outline: Polygon, pose: Pose2, z_range: ZRange) -> str | None:
     """Return the name of the first solid that `outline` at `pose` overlaps between two heights, or None."""
     radius = max(math.hypot(x, y) for x, y in outline)
-    corners = place_polygon(tuple((x * (1 - TOUCHING_SHARE), y * (1 - TOUCHING_SHARE)) for x, y in outline), pose)
+    corners = place_polygon(tuple((x * (1 - SHRINK_FRACTION), y * (1 - SHRINK_FRACTION)) for x, y in outline), pose)
     for solid in solids:
         if is_near(solid, (pose.x, pose.y), radius) and _overlaps(solid, corners, z_range):
             return solid.name

@@ -1,6 +1,6 @@
 """Upright prisms over convex bases, computed in plain Python without triangulation; and bounds of any solid.
 
-Commands that must answer at once use prisms. Their bases equal those of `triangulation.triangulate`, corner for corner.
+Fast commands use prisms. Their bases equal those of `triangulation.triangulate`, corner for corner.
 """
 
 from __future__ import annotations
@@ -88,10 +88,10 @@ def _is_convex_and_anticlockwise(base: Polygon) -> bool:
     return all(0 < turn < math.pi for turn in turns) and sum(turns) < 3 * math.pi
 
 
-def is_surely_flat(solids: Iterable[Solid], max_height: float) -> bool:
+def has_no_drivable_solids(solids: Iterable[Solid], max_height: float) -> bool:
     """Return True if wheels cannot drive onto any solid: all are prisms, and higher than `max_height` or flat.
 
-    False means that the triangles must be examined.
+    False means that only the triangles of the solids can tell.
     """
     prisms = [upright_prism(solid) for solid in solids]
     return all(prism is not None and (prism.top > max_height or prism.top <= FLOOR_HEIGHT_M) for prism in prisms)

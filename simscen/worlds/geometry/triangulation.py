@@ -52,7 +52,7 @@ def merge_solids(solids: Iterable[Solid]) -> TriangleMesh:
     for owner, solid in enumerate(solids):
         if solid.shape not in meshes:
             mesh = triangulate(solid.shape)
-            meshes[solid.shape] = mesh, len(mesh.faces) <= MAX_CONVEX_FACES and _is_surely_convex(solid.shape)
+            meshes[solid.shape] = mesh, len(mesh.faces) <= MAX_CONVEX_FACES and _is_convex_by_kind(solid.shape)
         mesh, is_convex = meshes[solid.shape]
         vertices.append(solid.pose.apply(mesh.vertices))
         faces.append(mesh.faces + np.int32(vertex_count))
@@ -72,7 +72,7 @@ def merge_solids(solids: Iterable[Solid]) -> TriangleMesh:
     )
 
 
-def _is_surely_convex(shape: Shape) -> bool:
+def _is_convex_by_kind(shape: Shape) -> bool:
     """Return whether a shape is convex by its kind; always False for meshes, which are not examined."""
     match shape:
         case Mesh():

@@ -1,4 +1,4 @@
-"""Images of maps, read with suspicion: every size is checked before a pixel is decoded."""
+"""Read images of maps from untrusted sources: the size is checked before any pixel is decoded."""
 
 import io
 import re
@@ -38,21 +38,21 @@ class MapImage:
 
 
 class UnreadableImage(Exception):
-    """What is wrong with an image, as a sentence."""
+    """An image cannot be read; the message is the reason."""
 
 
 def read_image(path: Path) -> MapImage:
     """Read a pgm (P2 or P5, 8 or 16 bit), png or bmp; raises InvalidInput for anything else or too large."""
     try:
-        data = _bytes_of(path)
+        data = _read_bytes(path)
         if data[:2] in (b"P2", b"P5"):
-            return MapImage(_eight_bits(_portable(data)))
-        return _compressed(data)
-    except UnreadableImage as bad:
-        raise InvalidInput([Problem(str(path), 0, 0, CODE, str(bad))]) from None
+            return MapImage(_eight_bits(_decode_pgm(data)))
+        return _decode_png_or_bmp(data)
+    except UnreadableImage as error:
+        raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from None
 
 
-def _bytes_of(path: Path) -> bytes:
+def _read_bytes(path: Path) -> bytes:
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
@@ -73,7 +73,7 @@ def _check_size(width: int, height: int) -> None:
         raise UnreadableImage(f"map too large: {width} x {height} pixels, more than {MAX_PIXELS}")
 
 
-def _portable(data: bytes) -> Quanta:
+def _decode_pgm(data: bytes) -> Quanta:
     """Return a PGM as 16-bit grays (h, w). Source: netpbm's pgm(5); samples of two bytes are big-endian."""
     match = _PNM_HEADER.match(data)
     if match is None:
@@ -83,7 +83,7 @@ def _portable(data: bytes) -> Quanta:
     if not 1 <= maximum <= 65535:
         raise UnreadableImage(f"maxval must be between 1 and 65535, not {maximum}")
     raster = data[match.end() :]
-    values = _ascii(raster) if match[1] == b"P2" else _binary(raster, width * height, maximum)
+    values = _ascii_samples(raster) if match[1] == b"P2" else _binary_samples(raster, width * height, maximum)
     if len(values) < width * height:
         raise UnreadableImage(f"the PGM is truncated: {len(values)} of {width * height} pixels")
     values = values[: width * height].reshape(height, width)
@@ -94,21 +94,21 @@ def _portable(data: bytes) -> Quanta:
     return quanta
 
 
-def _binary(raster: bytes, count: int, maximum: int) -> npt.NDArray[np.generic]:
+def _binary_samples(raster: bytes, count: int, maximum: int) -> npt.NDArray[np.generic]:
     sample = np.dtype(">u2" if maximum > 255 else "u1")
     return np.frombuffer(raster, dtype=sample, count=min(count, len(raster) // sample.itemsize))
 
 
-def _ascii(raster: bytes) -> npt.NDArray[np.generic]:
+def _ascii_samples(raster: bytes) -> npt.NDArray[np.generic]:
     text = re.sub(rb"#[^\r\n]*", b"", raster)
     if re.search(rb"[^\d\s]", text):
-        raise UnreadableImage("the PGM holds something that is not a number")
+        raise UnreadableImage("the PGM contains something that is not a number")
     if len(text) > 0 and text.isspace():
         return np.empty(0, dtype=np.int64)
     return np.fromstring(text, dtype=np.int64, sep=" ")
 
 
-def _compressed(data: bytes) -> MapImage:
+def _decode_png_or_bmp(data: bytes) -> MapImage:
     from PIL import Image, UnidentifiedImageError
 
     if data[:8] == b"\x89PNG\r\n\x1a\n" and len(data) >= 24:
@@ -124,7 +124,7 @@ def _compressed(data: bytes) -> MapImage:
             image = Image.open(io.BytesIO(data), formats=[kind])
             _check_size(*image.size)
             image.load()
-    except UnidentifiedImageError:  # its message holds the address of an object
+    except UnidentifiedImageError:  # its message contains the address of an object
         raise UnreadableImage(f"the {kind} cannot be decoded") from None
     except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError) as error:
         raise UnreadableImage(f"the {kind} cannot be decoded: {error}") from None
@@ -138,7 +138,7 @@ def _bmp_size(data: bytes) -> tuple[int, int]:
 
 
 def _gray_and_alpha(image: "Image.Image") -> MapImage:
-    """8-bit grays as GraphicsMagick makes them of colors: 0.299 R + 0.587 G + 0.114 B (Rec. 601), in integers."""
+    """Return 8-bit grays, computed as by GraphicsMagick: 0.299 R + 0.587 G + 0.114 B (Rec. 601), in integers."""
     if image.mode.startswith("I"):
         return MapImage(_eight_bits(np.clip(np.asarray(image), 0, 65535).astype(np.uint16)))
     transparent = image.mode in ("LA", "PA", "RGBA") or "transparency" in image.info

@@ -166,7 +166,7 @@ def _runs(lines: Cells, name: str) -> Runs:
     steps = np.diff(np.pad(lines.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     count = int(np.count_nonzero(steps == 1))
     if count > MAX_EDGES:
-        message = f"map too ragged to make walls of: more than {MAX_EDGES} separate edges"
+        message = f"map too ragged for walls: more than {MAX_EDGES} separate edges"
         raise InvalidInput([Problem(name, 0, 0, "SC331", message, "remove the speckles from the map")])
     begin, end = np.argwhere(steps == 1), np.argwhere(steps == -1)
     return np.column_stack((begin, end[:, 1]))

@@ -15,13 +15,13 @@ INWARD_OFFSET_CELLS = 1e-6
 def touched_cells(cut: CrossSection, shape: tuple[int, int]) -> Cells:
     """Return which cells of a grid of `shape` (rows, columns) overlap solids, with outlines in cells."""
     cells = filled_cells(cut, shape)
-    rows, columns = _on_outline(cut.segments)
+    rows, columns = _outline_cells(cut.segments)
     inside = (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
     cells[rows[inside], columns[inside]] = True
     return cells
 
 
-def _on_outline(segments: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _outline_cells(segments: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Return rows and columns of the cells on the segments, which are split at the grid lines."""
     start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
     owner = [np.arange(len(segments)), np.arange(len(segments))]
@@ -54,7 +54,7 @@ def filled_cells(cut: CrossSection, shape: tuple[int, int]) -> Cells:
     faces, e.g. a room that is modeled as a box seen from inside.
     """
     rows, columns, signs, owners = _crossings(cut, shape)
-    keep = _balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_inside_out(cut)[owners]
+    keep = _is_balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_is_inside_out(cut)[owners]
     flat = rows[keep] * (shape[1] + 1) + np.clip(columns[keep], 0, shape[1])
     steps = np.bincount(flat, weights=signs[keep], minlength=shape[0] * (shape[1] + 1))
     winding = np.cumsum(steps.reshape(shape[0], shape[1] + 1), axis=1)[:, :-1]
@@ -77,14 +77,14 @@ def _crossings(
     return rows, np.ceil(x - 0.5).astype(np.int64), signs, cut.owners[which]
 
 
-def _balanced(keys: npt.NDArray[np.int64], signs: Array) -> Cells:
+def _is_balanced(keys: npt.NDArray[np.int64], signs: Array) -> Cells:
     """Return which crossings belong to a (row, owner) whose signs have the sum 0."""
     _, group = np.unique(keys, return_inverse=True)
     balanced: Cells = (np.bincount(group, weights=signs) == 0)[group]
     return balanced
 
 
-def _inside_out(cut: CrossSection) -> Cells:
+def _is_inside_out(cut: CrossSection) -> Cells:
     """Return for each owner whether its outline is clockwise."""
     if not len(cut.owners):
         return np.zeros(0, dtype=np.bool_)

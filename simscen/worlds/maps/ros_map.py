@@ -27,7 +27,7 @@ def load_map(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[s
     scale, pixels that are not opaque are unknown.
     """
     image = read_image(image_path)
-    _refuse_distance(spec, image.gray.shape[::-1], image_path)
+    _check_distance(spec, image.gray.shape[::-1], image_path)
     table = cell_values(spec)
     cells = table[image.gray]
     if image.alpha is not None and spec.mode != "raw":
@@ -36,12 +36,12 @@ def load_map(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[s
     return grid, _warnings(spec, table, int(np.count_nonzero(image.gray == UNKNOWN_GRAY)))
 
 
-def _refuse_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path) -> None:
+def _check_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path) -> None:
     """Raise InvalidInput for a too large map, e.g. with a resolution in the wrong unit."""
-    reach = max(pixels) * spec.resolution + max(abs(spec.origin[0]), abs(spec.origin[1]))
-    if reach > MAX_DISTANCE_M:
+    distance = max(pixels) * spec.resolution + max(abs(spec.origin[0]), abs(spec.origin[1]))
+    if distance > MAX_DISTANCE_M:
         size = " x ".join(str(count) for count in pixels)
-        message = f"map too large: {size} pixels of {spec.resolution:g} m reach {reach:g} m"
+        message = f"map too large: {size} pixels of {spec.resolution:g} m extend to {distance:g} m"
         message += f", farther than {MAX_DISTANCE_M:g} m"
         raise InvalidInput([Problem(str(image_path), 0, 0, CODE, message, "check the map's `resolution`")])
 

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 Color = tuple[int, int, int, int]
 
-PAPER, FREE_GROUND, UNKNOWN_GROUND = (226, 230, 236, 255), (255, 255, 255, 255), (226, 230, 236, 255)
+BACKGROUND, FREE_GROUND, UNKNOWN_GROUND = (226, 230, 236, 255), (255, 255, 255, 255), (226, 230, 236, 255)
 MAPPED_WALL, WALL = (147, 178, 214, 255), (16, 42, 82, 255)
-BODY, PLACE, REGION, RULER = (214, 102, 20, 255), (20, 128, 74, 255), (122, 82, 178, 255), (120, 128, 140, 255)
-MARK = (200, 24, 40, 255)
+BODY, PLACE, REGION, SCALE_BAR = (214, 102, 20, 255), (20, 128, 74, 255), (122, 82, 178, 255), (120, 128, 140, 255)
+MARKER = (200, 24, 40, 255)
 
 MAX_SIDE_PIXELS = 1200
 """Length of the longer side of the picture."""
@@ -60,32 +60,32 @@ def draw_world(
     """
     from PIL import Image, ImageDraw
 
-    view = _view(built.map)
-    canvas = Image.new("RGBA", view.size, PAPER)
+    view = _viewport(built.map)
+    canvas = Image.new("RGBA", view.size, BACKGROUND)
     canvas.alpha_composite(_map_layer(built.map, view))
     overlay = Image.new("RGBA", view.size, (0, 0, 0, 0))
     pen = ImageDraw.Draw(overlay)
     for polygon in built.world.regions.values():
         pen.polygon(view.pixels(np.array(polygon)), fill=(*REGION[:3], 40), outline=REGION, width=SUPERSAMPLING)
-    _lines(pen, view, section_segments(built.mesh, height), WALL)
+    _draw_segments(pen, view, section_segments(built.mesh, height), WALL)
     for body in built.world.bodies:
-        _lines(pen, view, _body_outline(body, height), BODY)
+        _draw_segments(pen, view, _body_outline(body, height), BODY)
     for outline in footprints:
-        pen.polygon(view.pixels(np.array(outline)), fill=(*MARK[:3], 60), outline=MARK, width=SUPERSAMPLING + 1)
-    _names(pen, view, built)
+        pen.polygon(view.pixels(np.array(outline)), fill=(*MARKER[:3], 60), outline=MARKER, width=SUPERSAMPLING + 1)
+    _draw_names(pen, view, built)
     for x, y in view.pixels(np.array(gaps).reshape(-1, 2)):
         pen.ellipse(
             (x - GAP_RING_RADIUS, y - GAP_RING_RADIUS, x + GAP_RING_RADIUS, y + GAP_RING_RADIUS),
-            outline=MARK,
+            outline=MARKER,
             width=2 * SUPERSAMPLING,
         )
-    _ruler(pen, view)
+    _draw_scale_bar(pen, view)
     canvas.alpha_composite(overlay)
     width, rows = view.size
     return canvas.convert("RGB").resize((width // SUPERSAMPLING, rows // SUPERSAMPLING), Image.Resampling.LANCZOS)
 
 
-def _view(grid: OccupancyGrid) -> Viewport:
+def _viewport(grid: OccupancyGrid) -> Viewport:
     corners = grid.origin.apply(_corners(grid))
     (left, low), (right, top) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     scale = SUPERSAMPLING * MAX_SIDE_PIXELS / max(right - left, top - low)
@@ -110,7 +110,7 @@ def _map_layer(grid: OccupancyGrid, view: Viewport) -> "Image.Image":
     zero, right, down = grid.origin.inverse().apply(ends) / grid.resolution
     across, along = right - zero, down - zero
     matrix = (across[0], along[0], zero[0], across[1], along[1], zero[1])
-    return cells.transform(view.size, Image.Transform.AFFINE, matrix, Image.Resampling.NEAREST, fillcolor=PAPER)
+    return cells.transform(view.size, Image.Transform.AFFINE, matrix, Image.Resampling.NEAREST, fillcolor=BACKGROUND)
 
 
 def _body_outline(body: Body, height: float) -> Array:
@@ -124,27 +124,27 @@ def _body_outline(body: Body, height: float) -> Array:
     return section_segments(placed, float(low + high) / 2)
 
 
-def _lines(pen: "ImageDraw.ImageDraw", view: Viewport, segments: Array, color: Color) -> None:
+def _draw_segments(pen: "ImageDraw.ImageDraw", view: Viewport, segments: Array, color: Color) -> None:
     for a, b in zip(view.pixels(segments[:, 0]), view.pixels(segments[:, 1]), strict=True):
         pen.line((a, b), fill=color, width=SUPERSAMPLING + 1)
 
 
-def _names(pen: "ImageDraw.ImageDraw", view: Viewport, built: BuiltWorld) -> None:
+def _draw_names(pen: "ImageDraw.ImageDraw", view: Viewport, built: BuiltWorld) -> None:
     for name, polygon in built.world.regions.items():
         upper_left = np.array([[min(x for x, _ in polygon), max(y for _, y in polygon)]])
-        _text(pen, view.pixels(upper_left)[0], name, REGION)
+        _draw_text(pen, view.pixels(upper_left)[0], name, REGION)
     for body in built.world.bodies:
-        _text(pen, view.pixels(np.array([body.pose.position[:2]]))[0], body.name, BODY)
+        _draw_text(pen, view.pixels(np.array([body.pose.position[:2]]))[0], body.name, BODY)
     for name, place in built.world.places.items():
         tip = place.apply(np.array([[0.0, 0.0], [0.3, 0.0]]))
         (x, y), end = view.pixels(tip)
         radius = 4 * SUPERSAMPLING
         pen.line(((x, y), end), fill=PLACE, width=2 * SUPERSAMPLING)
         pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=PLACE)
-        _text(pen, (x, y), name, PLACE)
+        _draw_text(pen, (x, y), name, PLACE)
 
 
-def _text(pen: "ImageDraw.ImageDraw", place: tuple[float, float], text: str, color: Color) -> None:
+def _draw_text(pen: "ImageDraw.ImageDraw", place: tuple[float, float], text: str, color: Color) -> None:
     from PIL import ImageFont
 
     font = ImageFont.load_default(13 * SUPERSAMPLING)
@@ -152,11 +152,11 @@ def _text(pen: "ImageDraw.ImageDraw", place: tuple[float, float], text: str, col
     pen.text((x, y), text, fill=color, font=font, stroke_width=SUPERSAMPLING, stroke_fill=(255, 255, 255, 220))
 
 
-def _ruler(pen: "ImageDraw.ImageDraw", view: Viewport) -> None:
+def _draw_scale_bar(pen: "ImageDraw.ImageDraw", view: Viewport) -> None:
     """Draw a scale bar in the lower left corner, up to a fifth of the width: 1, 2 or 5 times a power of ten."""
-    wanted = view.size[0] / view.scale / 5
-    power = 10.0 ** math.floor(math.log10(wanted))
-    meters = max(step * power for step in (1, 2, 5) if step * power <= wanted)
+    max_length = view.size[0] / view.scale / 5
+    power = 10.0 ** math.floor(math.log10(max_length))
+    meters = max(step * power for step in (1, 2, 5) if step * power <= max_length)
     x, y = 14 * SUPERSAMPLING, view.size[1] - 14 * SUPERSAMPLING
-    pen.line((x, y, x + meters * view.scale, y), fill=RULER, width=3 * SUPERSAMPLING)
-    _text(pen, (x - 6 * SUPERSAMPLING, y - 24 * SUPERSAMPLING), f"{meters:g} m", RULER)
+    pen.line((x, y, x + meters * view.scale, y), fill=SCALE_BAR, width=3 * SUPERSAMPLING)
+    _draw_text(pen, (x - 6 * SUPERSAMPLING, y - 24 * SUPERSAMPLING), f"{meters:g} m", SCALE_BAR)

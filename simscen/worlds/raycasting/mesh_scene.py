@@ -22,7 +22,7 @@ _LIBRARY = ctypes.PyDLL(rtcore_scene.__file__)  # also finds the functions of th
 _TRIANGLES, _ROBUST, _COHERENT, _ALL = 0, 1 << 2, 1 << 16, 0xFFFFFFFF
 _INDICES, _VERTICES, _THREE_WORDS, _THREE_FLOATS = 0, 1, 0x5003, 0x9003
 _NO_ERROR, _OUT_OF_MEMORY = 0, 4
-_ALIGNED = 64
+_ALIGNMENT_BYTES = 64
 
 for _name, _result, _arguments in (
     ("rtcNewDevice", c_void_p, (ctypes.c_char_p,)),
@@ -54,8 +54,8 @@ class _Query(ctypes.Structure):
 
 _QUERY = _Query(_COHERENT, _ALL)
 _QUERY_ADDRESS = c_void_p(ctypes.addressof(_QUERY))
-_ALL_VALID = np.full(PACKET_SIZE + _ALIGNED // 4, -1, dtype=np.int32)
-_ALL_VALID_ADDRESS = c_void_p(_ALL_VALID.ctypes.data + -_ALL_VALID.ctypes.data % _ALIGNED)
+_ALL_VALID = np.full(PACKET_SIZE + _ALIGNMENT_BYTES // 4, -1, dtype=np.int32)
+_ALL_VALID_ADDRESS = c_void_p(_ALL_VALID.ctypes.data + -_ALL_VALID.ctypes.data % _ALIGNMENT_BYTES)
 """Address of the mask of a packet in which all rays are valid."""
 
 
@@ -66,7 +66,7 @@ def _device() -> c_void_p:
 
 
 class EmbreeScene:
-    """Triangles that rays can hit."""
+    """Embree scene of triangles."""
 
     def __init__(self, vertices: Array, mesh: TriangleMesh | Mesh) -> None:
         """Build a scene of the faces of a mesh with other vertices (n, 3)."""
@@ -81,9 +81,9 @@ class EmbreeScene:
         self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
         if count:
             geometry = c_void_p(_LIBRARY.rtcNewGeometry(device, _TRIANGLES))
-            share, corners, faces = _LIBRARY.rtcSetSharedGeometryBuffer, self._vertices, self._faces
-            share(geometry, _VERTICES, 0, _THREE_FLOATS, corners.ctypes.data, 0, corners.strides[0], len(vertices))
-            share(geometry, _INDICES, 0, _THREE_WORDS, faces.ctypes.data, 0, faces.strides[0], count)
+            set_buffer, corners, faces = _LIBRARY.rtcSetSharedGeometryBuffer, self._vertices, self._faces
+            set_buffer(geometry, _VERTICES, 0, _THREE_FLOATS, corners.ctypes.data, 0, corners.strides[0], len(vertices))
+            set_buffer(geometry, _INDICES, 0, _THREE_WORDS, faces.ctypes.data, 0, faces.strides[0], count)
             _LIBRARY.rtcCommitGeometry(geometry)
             _LIBRARY.rtcAttachGeometry(self._scene, geometry)
             _LIBRARY.rtcReleaseGeometry(geometry)
@@ -109,7 +109,8 @@ Numbers = npt.NDArray[np.int64]
 class MeshScene:
     """Embree scene of a mesh, relative to its center, because Embree works in single precision.
 
-    `radius` is that of the bounding sphere, `extent` the greatest distance of the mesh from the origin of its frame.
+    `radius` is the radius of the bounding sphere, `extent` the greatest distance of the mesh from the origin of its
+    frame.
     """
 
     def __init__(self, mesh: TriangleMesh | Mesh, middle: Array | None = None) -> None:
@@ -130,10 +131,10 @@ class MeshScene:
         self._scene.shorten(rays)
         return rays.distances()
 
-    def sweep(self, fan: RayFan, place: Vector, packets: slice = ALL_PACKETS) -> None:
-        """Shorten some `packets` of a fan's rays, which start at `place` with their present directions."""
-        (x, y, z), (mx, my, mz) = place, self.center
-        fan.set_origin(x - mx, y - my, z - mz, packets)
+    def sweep(self, fan: RayFan, position: Vector, packets: slice = ALL_PACKETS) -> None:
+        """Shorten some `packets` of a fan's rays, which start at `position` with their current directions."""
+        (x, y, z), (mx, my, mz) = position, self.center
+        fan.begin(x - mx, y - my, z - mz, packets)
         self._scene.shorten(fan.rays, packets)
 
 
@@ -162,19 +163,19 @@ class MovingMesh:
         return self._middle
 
     @property
-    def _turn(self) -> Array:
+    def _world_rotation(self) -> Array:
         if self._rotation is None:
             self._rotation = self.pose.rotation()
         return self._rotation
 
-    def min_distance(self, place: Vector) -> float:
-        """Return a lower bound of the distance in m from a place in the world."""
-        return math.dist(self.pose[:3], place) - self.part.extent
+    def min_distance(self, position: Vector) -> float:
+        """Return a lower bound of the distance in m from a position in the world."""
+        return math.dist(self.pose[:3], position) - self.part.extent
 
     def distances(self, origins: Array, directions: Array, ends: Singles) -> Singles:
         """Return the distances (n,) to the first hits of rays in the world frame, as `MeshScene.distances`."""
-        turn = self._turn
-        return self.part.distances((origins - self.pose[:3]) @ turn, directions @ turn, ends)
+        rotation = self._world_rotation
+        return self.part.distances((origins - self.pose[:3]) @ rotation, directions @ rotation, ends)
 
     def sweep(self, fan: RayFan, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
         """Shorten the rays of a fan at `pose`, whose x and y axes are `axes`.
@@ -186,31 +187,33 @@ class MovingMesh:
 
     def _sweep_packets(self, fan: RayFan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
         (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
-        back = -i, -j, -k, w
-        fan.set_directions(rotated(back, ahead), rotated(back, left), packets)
-        self.part.sweep(fan, rotated(back, (px - x, py - y, pz - z)), packets)
+        inverse = -i, -j, -k, w
+        fan.turn(rotated(inverse, ahead), rotated(inverse, left), packets)
+        self.part.sweep(fan, rotated(inverse, (px - x, py - y, pz - z)), packets)
 
 
 def packets_towards_sphere(fan: RayFan, pose: Pose3, middle: Vector, radius: float) -> list[slice]:
     """Return the packets of a fan at `pose` with rays that may hit a sphere."""
     (x, y, z), (px, py, pz, i, j, k, w) = middle, pose
-    way = x - px, y - py, z - pz
-    far = math.hypot(*way)
-    ahead, left, _ = rotated((-i, -j, -k, w), way)
-    cone = fan.towards(ahead, left, math.sqrt(far * far - radius * radius) if far > radius else -math.inf)
+    offset = x - px, y - py, z - pz
+    distance = math.hypot(*offset)
+    ahead, left, _ = rotated((-i, -j, -k, w), offset)
+    cone = fan.towards(
+        ahead, left, math.sqrt(distance * distance - radius * radius) if distance > radius else -math.inf
+    )
     ends = fan.rays.ends
     found = [slice(rays.start // PACKET_SIZE, -(-rays.stop // PACKET_SIZE)) for rays in cone]
     # `max` would take ten times as long as `item(argmax())`.
-    return [packets for packets in found if (some := ends[packets]).item(some.argmax()) >= far - radius]
+    return [packets for packets in found if (some := ends[packets]).item(some.argmax()) >= distance - radius]
 
 
-def rays_meeting_sphere(middle: Vector, radius: float, origins: Array, directions: Array, ends: Singles) -> Numbers:
+def rays_hitting_sphere(middle: Vector, radius: float, origins: Array, directions: Array, ends: Singles) -> Numbers:
     """Return the indices of rays with different origins that hit a sphere before they end."""
-    ways = middle - origins
-    ahead = (ways * directions).sum(axis=1)
-    beside = (ways * ways).sum(axis=1) - ahead**2
-    met: Numbers = ((ahead >= -radius) & (ahead - radius <= ends) & (beside <= radius * radius)).nonzero()[0]
-    return met
+    offsets = middle - origins
+    ahead = (offsets * directions).sum(axis=1)
+    lateral_squared = (offsets * offsets).sum(axis=1) - ahead**2
+    hit: Numbers = ((ahead >= -radius) & (ahead - radius <= ends) & (lateral_squared <= radius * radius)).nonzero()[0]
+    return hit
 
 
 def bounding_box_center(vertices: Array) -> Array:

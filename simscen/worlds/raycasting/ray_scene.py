@@ -16,7 +16,7 @@ from simscen.worlds.raycasting.mesh_scene import (
     MovingMesh,
     cached_mesh_scene,
     packets_towards_sphere,
-    rays_meeting_sphere,
+    rays_hitting_sphere,
 )
 
 PlacedMesh = tuple[TriangleMesh, Pose3]
@@ -25,7 +25,7 @@ PlacedMesh = tuple[TriangleMesh, Pose3]
 MAX_GROUP_TRIANGLES = 20_000
 """Maximum number of triangles of a group, whose scene takes 10 ms to build."""
 MAX_GROUPS = 16
-"""Number of groups from which on all are rebuilt when another body comes to rest."""
+"""Number of groups at which all groups are rebuilt when another body comes to rest."""
 
 
 class RestingBodies:
@@ -40,17 +40,17 @@ class RestingBodies:
     def __bool__(self) -> bool:
         return bool(self._groups)
 
-    def keep(self, bodies: Mapping[str, PlacedMesh]) -> None:
-        """Set the bodies that rest now."""
-        before, self._bodies = self._bodies, bodies
-        stay = {name for name, body in before.items() if name in bodies and _same(body, bodies[name])}
-        if len(stay) < len(before):
-            gone = before.keys() - stay
-            self._groups = [rest for group in self._groups for rest in group.without(gone)]
-        if len(stay) < len(bodies):
+    def set_bodies(self, bodies: Mapping[str, PlacedMesh]) -> None:
+        """Set the bodies that are at rest now."""
+        previous, self._bodies = self._bodies, bodies
+        unchanged = {name for name, body in previous.items() if name in bodies and _is_same(body, bodies[name])}
+        if len(unchanged) < len(previous):
+            removed = previous.keys() - unchanged
+            self._groups = [part for group in self._groups for part in group.split_without(removed)]
+        if len(unchanged) < len(bodies):
             if len(self._groups) >= MAX_GROUPS:
-                self._groups, stay = [], set()
-            new = {name: body for name, body in bodies.items() if name not in stay}
+                self._groups, unchanged = [], set()
+            new = {name: body for name, body in bodies.items() if name not in unchanged}
             meshes = {name: Mesh(pose.apply(mesh.vertices), mesh.faces) for name, (mesh, pose) in new.items()}
             self._groups += RestingGroup(self._middle, meshes).split_to_limit()
 
@@ -66,7 +66,7 @@ class RestingBodies:
             group.cast(origins, directions, heights, ends)
 
 
-def _same(one: PlacedMesh, other: PlacedMesh) -> bool:
+def _is_same(one: PlacedMesh, other: PlacedMesh) -> bool:
     return one[0] is other[0] and one[1] == other[1]
 
 
@@ -95,23 +95,23 @@ class RestingGroup:
             for half in self._halves():
                 yield from half.split_to_limit()
 
-    def without(self, gone: Set[str]) -> Iterator["RestingGroup"]:
-        """Yield this group, or its parts without the bodies in `gone`.
+    def split_without(self, removed: Set[str]) -> Iterator["RestingGroup"]:
+        """Yield this group, or its parts without the bodies in `removed`.
 
         The group is halved repeatedly, so that each body that leaves causes less to be rebuilt.
         """
-        if gone.isdisjoint(self._meshes):
+        if removed.isdisjoint(self._meshes):
             yield self
-        elif not gone >= self._meshes.keys():
+        elif not removed >= self._meshes.keys():
             for half in self._halves():
-                yield from half.without(gone)
+                yield from half.split_without(removed)
 
     def _halves(self) -> Iterator["RestingGroup"]:
         """Yield two groups, divided along the longest side of the bounding box."""
         along = int((self._high - self._low).argmax())
         names = sorted(self._meshes, key=lambda name: (self._meshes[name].vertices[:, along].mean(), name))
-        for some in (names[: len(names) // 2], names[len(names) // 2 :]):
-            yield RestingGroup(self._middle, {name: self._meshes[name] for name in some})
+        for half_names in (names[: len(names) // 2], names[len(names) // 2 :]):
+            yield RestingGroup(self._middle, {name: self._meshes[name] for name in half_names})
 
     def _scene(self, heights: HeightRange) -> MeshScene:
         if self._part is None or heights != self._heights:
@@ -120,9 +120,9 @@ class RestingGroup:
             self._heights = heights
         return self._part
 
-    def min_distance(self, place: Vector) -> float:
-        """Return a lower bound of the distance in m from a place."""
-        return math.dist(self._center, place) - self._radius
+    def min_distance(self, position: Vector) -> float:
+        """Return a lower bound of the distance in m from a position."""
+        return math.dist(self._center, position) - self._radius
 
     def sweep(self, fan: RayFan, pose: Pose3, heights: HeightRange) -> None:
         """Shorten the rays of a fan, which is already turned to `pose`."""
@@ -131,7 +131,7 @@ class RestingGroup:
 
     def cast(self, origins: Array, directions: Array, heights: HeightRange, ends: Singles) -> None:
         """Shorten the `ends` (n,) of rays with different origins, in place."""
-        rays = rays_meeting_sphere(self._center, self._radius, origins, directions, ends)
+        rays = rays_hitting_sphere(self._center, self._radius, origins, directions, ends)
         if len(rays):
             ends[rays] = self._scene(heights).distances(origins[rays], directions[rays], ends[rays])
 
@@ -158,7 +158,7 @@ class RayScene(RayCaster):
 
     The scene of a moving body is built once in its own frame, and the few rays that come near it are transformed to
     that frame. The triangles of bodies that rest at their home pose are transformed to the world frame, once, so that
-    many bodies are one scene. The frame affects the last bits of distances, so it depends only on the present poses,
+    many bodies are one scene. The frame affects the last bits of distances, so it depends only on the current poses,
     not on earlier calls.
 
     Distances agree with PyBullet's rays within 1 mm. Embree works in single precision. Each scene is therefore relative
@@ -173,50 +173,50 @@ class RayScene(RayCaster):
         self._heights = math.inf, -math.inf
 
     def set_moving(self, bodies: Mapping[str, PlacedMesh], homes: Mapping[str, Pose3] = NO_HOMES) -> None:
-        """Set the present bodies: by name, the mesh in the body's frame and the pose of that frame.
+        """Set the current bodies: by name, the mesh in the body's frame and the pose of that frame.
 
         A body at the pose in `homes` is treated as resting.
         """
-        before, self._movers = self._movers, {}
-        at_home = dict[str, PlacedMesh]()
+        previous, self._movers = self._movers, {}
+        resting = dict[str, PlacedMesh]()
         for name, (mesh, pose) in bodies.items():
             if homes and homes.get(name) == pose:
-                at_home[name] = mesh, pose
+                resting[name] = mesh, pose
                 continue
-            mover = before.get(name)
+            mover = previous.get(name)
             if mover is None or mover.mesh is not mesh:
                 mover = MovingMesh(mesh, cached_mesh_scene(mesh), pose)
             elif mover.pose != pose:
                 mover = MovingMesh(mesh, mover.part, pose)
             self._movers[name] = mover
-        if at_home or self._resting:
-            self._resting.keep(at_home)
+        if resting or self._resting:
+            self._resting.set_bodies(resting)
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.geometry.ray_fans.RayCaster."""
         limit = min(reach, _MAX_RANGE_M)
         if not len(origins):
             return np.empty(0)
-        distances = self._from_each(origins, directions, reach, limit * _END_FACTOR)
-        answer = distances.astype(np.float64)
-        answer[distances > limit] = np.inf
-        return answer
+        distances = self._first_hits(origins, directions, reach, limit * _END_FACTOR)
+        result = distances.astype(np.float64)
+        result[distances > limit] = np.inf
+        return result
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
         """See core.geometry.ray_fans.RayCaster. Runs once per scan, so that each numpy call (1 µs) counts."""
-        place, (ahead, left) = pose[:3], forward_and_left(pose[3:])
-        fan.set_directions(ahead, left)
-        fan.set_length(min(reach, _MAX_RANGE_M) * _END_FACTOR)
-        self._static.sweep(fan, place)
+        position, (ahead, left) = pose[:3], forward_and_left(pose[3:])
+        fan.turn(ahead, left)
+        fan.end(min(reach, _MAX_RANGE_M) * _END_FACTOR)
+        self._static.sweep(fan, position)
         if self._resting:
             rise = _max_rise(math.hypot(ahead[2], left[2]), reach)
-            self._resting.sweep(fan, pose, reach, self._between(place[2] - rise, place[2] + rise))
+            self._resting.sweep(fan, pose, reach, self._height_range(position[2] - rise, position[2] + rise))
         for mover in self._movers.values():
-            if mover.min_distance(place) <= reach:
+            if mover.min_distance(position) <= reach:
                 mover.sweep(fan, pose, (ahead, left))
         return fan.rays.distances()
 
-    def _from_each(self, origins: Array, directions: Array, reach: float, end: float) -> Singles:
+    def _first_hits(self, origins: Array, directions: Array, reach: float, end: float) -> Singles:
         """Return the distances (n,) to the first hits of rays with different origins."""
         x, y, z = origins[0].tolist()
         reach += float(np.linalg.norm(origins - (x, y, z), axis=1).max())
@@ -224,22 +224,22 @@ class RayScene(RayCaster):
         if self._resting:
             low, high = origins[:, 2].min(), origins[:, 2].max()
             down, up = directions[:, 2].min(), directions[:, 2].max()
-            heights = self._between(low - _max_rise(-down, reach), high + _max_rise(up, reach))
+            heights = self._height_range(low - _max_rise(-down, reach), high + _max_rise(up, reach))
             self._resting.cast(origins, directions, heights, ends)
         for mover in self._movers.values():
             if mover.min_distance((x, y, z)) <= reach:
-                rays = rays_meeting_sphere(mover.middle, mover.part.radius, origins, directions, ends)
+                rays = rays_hitting_sphere(mover.middle, mover.part.radius, origins, directions, ends)
                 if len(rays):
                     ends[rays] = mover.distances(origins[rays], directions[rays], ends[rays])
         return ends
 
-    def _between(self, low: float, high: float) -> HeightRange:
+    def _height_range(self, low: float, high: float) -> HeightRange:
         """Return the height range of triangles for rays between two heights; the last range is kept if it suffices."""
         below, above = self._heights
         if not (below <= low - _ROUNDING_MARGIN_M and high + _ROUNDING_MARGIN_M <= above):
             low, high = min(low, below), max(high, above)
-            room = max(_HEIGHT_MARGIN_M, high - low)  # a lidar that tilts more and more needs only a few new ranges
-            self._heights = low - room, high + room
+            margin = max(_HEIGHT_MARGIN_M, high - low)  # a lidar that tilts more and more needs only a few new ranges
+            self._heights = low - margin, high + margin
         return self._heights
 
 

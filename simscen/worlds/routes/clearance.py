@@ -1,4 +1,4 @@
-"""Clearance from static solids, exact where needed, and overlap tests for footprints."""
+"""Clearance from static solids, exact where necessary, and overlap tests for footprints."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -49,29 +49,29 @@ class ClearanceField:
         """Return the clearance (n,) in m at points (n, 2)."""
         return self._nearest(points)[0]
 
-    def keeps(self, points: Array, distance: float) -> npt.NDArray[np.bool_]:
+    def has_clearance(self, points: Array, distance: float) -> npt.NDArray[np.bool_]:
         """Return which of the points (n, 2) are at least `distance` m away from all solids."""
         rough = self.rough[self._cells(points)]
         # Twice, because both the point and the outline may be that far from the centers of their cells.
-        answer: npt.NDArray[np.bool_] = rough >= distance + 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
-        unsure = ~answer
-        answer[unsure] = self.exact(points[unsure]) >= distance
-        return answer
+        has_clearance: npt.NDArray[np.bool_] = rough >= distance + 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
+        undecided = ~has_clearance
+        has_clearance[undecided] = self.exact(points[undecided]) >= distance
+        return has_clearance
 
     def free_cells(self, distance: float) -> Cells:
         """Return the cells whose center is at least `distance` m away from all solids."""
         slack = HALF_DIAGONAL_CELLS * self.grid.resolution
         free: Cells = (self.rough >= distance + slack) & ~self.inside
-        unsure = (np.abs(self.rough - distance) < slack) & ~self.inside
-        free[unsure] = self.exact(self.grid.center_of(np.argwhere(unsure))) >= distance
+        undecided = (np.abs(self.rough - distance) < slack) & ~self.inside
+        free[undecided] = self.exact(self.grid.center_of(np.argwhere(undecided))) >= distance
         return free
 
-    def push(self, points: Array, distance: float) -> Array:
+    def push_away(self, points: Array, distance: float) -> Array:
         """Return the translations (n, 2) that move points (n, 2) to `distance` m from their nearest solid."""
         moves = np.zeros_like(points)
-        near = self.rough[self._cells(points)] < distance + 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
-        clearance, away = self._nearest(points[near])
-        moves[near] = np.maximum(distance - clearance, 0.0)[:, None] * away
+        is_near = self.rough[self._cells(points)] < distance + 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
+        clearance, gradients = self._nearest(points[is_near])
+        moves[is_near] = np.maximum(distance - clearance, 0.0)[:, None] * gradients
         return moves
 
     def _nearest(self, points: Array) -> tuple[Array, Array]:
@@ -80,8 +80,8 @@ class ClearanceField:
             return np.full(len(points), CLEARANCE_WITHOUT_SOLIDS_M), np.zeros_like(points)
         distances, numbers = self.outline.query(points)
         sign = np.where(self.inside[self._cells(points)], -1.0, 1.0)
-        apart = points - self.outline.data[numbers]
-        return sign * distances, apart * (sign / np.where(distances > 0, distances, 1.0))[:, None]
+        offsets = points - self.outline.data[numbers]
+        return sign * distances, offsets * (sign / np.where(distances > 0, distances, 1.0))[:, None]
 
     def _cells(self, points: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
         rows, columns = self.grid.cell_of(points).T
@@ -98,7 +98,9 @@ def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[floa
         local = CrossSection((cut.segments - (grid.origin.x, grid.origin.y)) / grid.resolution, cut.owners)
         blocked |= touched_cells(local, grid.shape)
         inside |= filled_cells(local, grid.shape)
-    samples, owners = _along(*(np.concatenate([getattr(cut, part) for cut in cuts]) for part in ("segments", "owners")))
+    samples, owners = _sample_segments(
+        *(np.concatenate([getattr(cut, part) for cut in cuts]) for part in ("segments", "owners"))
+    )
     if not blocked.any():
         return ClearanceField(grid, np.full(grid.shape, CLEARANCE_WITHOUT_SOLIDS_M), inside, None, owners)
     rough = ndimage.distance_transform_edt(~blocked) * grid.resolution
@@ -116,15 +118,15 @@ def sections_between(mesh: TriangleMesh, z_range: tuple[float, float]) -> list[C
     return [cross_section(mesh, height) for height in middles.tolist()]
 
 
-def _along(segments: Array, owners: npt.NDArray[np.int32]) -> tuple[Array, npt.NDArray[np.int32]]:
+def _sample_segments(segments: Array, owners: npt.NDArray[np.int32]) -> tuple[Array, npt.NDArray[np.int32]]:
     """Return points (n, 2) along segments (m, 2, 2), at most SPACING_M apart, without duplicates.
 
-    Also returns the owner (n,) of each point, from those (m,) of the segments.
+    Also returns the owner (n,) of each point, from the owners (m,) of the segments.
     """
     step = segments[:, 1] - segments[:, 0]
-    pieces = np.maximum(np.ceil(np.linalg.norm(step, axis=1) / SPACING_M), 1).astype(np.int64)
-    which, number = expand_ranges(np.zeros_like(pieces), pieces + 1)
-    points = segments[which, 0] + (number / pieces[which])[:, None] * step[which]
+    piece_counts = np.maximum(np.ceil(np.linalg.norm(step, axis=1) / SPACING_M), 1).astype(np.int64)
+    which, number = expand_ranges(np.zeros_like(piece_counts), piece_counts + 1)
+    points = segments[which, 0] + (number / piece_counts[which])[:, None] * step[which]
     keys: npt.NDArray[np.int64] = np.round(points / (SPACING_M / 20)).astype(np.int64)
     order = np.lexsort(keys.T)
     new = np.ones(len(order), dtype=np.bool_)
@@ -135,32 +137,32 @@ def _along(segments: Array, owners: npt.NDArray[np.int32]) -> tuple[Array, npt.N
 
 def footprint_overlaps_solid(solid: Solid, corners: Polygon, z_range: tuple[float, float]) -> bool:
     """Return whether an outline overlaps a solid between two heights."""
-    return any(_shares(cut.segments, corners) for cut in sections_between(merge_solids([solid]), z_range))
+    return any(_overlaps_outline(cut.segments, corners) for cut in sections_between(merge_solids([solid]), z_range))
 
 
-def _shares(segments: Array, corners: Polygon) -> bool:
+def _overlaps_outline(segments: Array, corners: Polygon) -> bool:
     if not len(segments):
         return False
     if winds_around(segments, corners[0]):
         return True
     ends = (*corners[1:], corners[0])
-    if any(_cross(segments, np.array(a), np.array(b)) for a, b in zip(corners, ends, strict=True)):
+    if any(_crosses_segment(segments, np.array(a), np.array(b)) for a, b in zip(corners, ends, strict=True)):
         return True
-    return _some_inside(segments, corners)
+    return _starts_inside(segments, corners)
 
 
-def _some_inside(segments: Array, corners: Polygon) -> bool:
-    """Whether a segment begins inside; the outline of a small thing may lie within the footprint as a whole."""
+def _starts_inside(segments: Array, corners: Polygon) -> bool:
+    """Return whether a segment starts inside; a small object may be completely inside the footprint."""
     (left, low), (right, high) = np.min(corners, axis=0), np.max(corners, axis=0)
     x, y = segments[:, 0].T
-    near = segments[(x >= left) & (x <= right) & (y >= low) & (y <= high), 0]
-    return any(polygon_contains(corners, (px, py)) for px, py in near.tolist())
+    starts = segments[(x >= left) & (x <= right) & (y >= low) & (y <= high), 0]
+    return any(polygon_contains(corners, (px, py)) for px, py in starts.tolist())
 
 
-def _cross(segments: Array, a: Array, b: Array) -> bool:
-    """Whether any of the segments (n, 2, 2) properly crosses the one from a to b."""
-    way, along = b - a, segments[:, 1] - segments[:, 0]
-    side = way[0] * (segments[:, :, 1] - a[1]) - way[1] * (segments[:, :, 0] - a[0])
+def _crosses_segment(segments: Array, a: Array, b: Array) -> bool:
+    """Return whether any of the segments (n, 2, 2) properly crosses the segment from a to b."""
+    edge, along = b - a, segments[:, 1] - segments[:, 0]
+    side = edge[0] * (segments[:, :, 1] - a[1]) - edge[1] * (segments[:, :, 0] - a[0])
     from_start, from_end = a - segments[:, 0], b - segments[:, 0]
     first = along[:, 0] * from_start[:, 1] - along[:, 1] * from_start[:, 0]
     last = along[:, 0] * from_end[:, 1] - along[:, 1] * from_end[:, 0]

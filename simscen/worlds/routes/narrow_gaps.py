@@ -1,4 +1,4 @@
-"""Search of the gap that is too narrow for a robot: the narrowest point of the widest path between two places."""
+"""Search of the gap that is too narrow for a robot: the narrowest point of the widest path between two positions."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ MAX_CELLS = 1_000_000
 MIN_CLEARANCE_CELLS = 0.71
 """Clearance below which a gap cannot be distinguished from a thin wall."""
 SAME_THICKNESS_CELLS = 0.3
-"""Difference up to which walls are equally thin; then the one nearest to the center between start and goal counts."""
+"""Difference up to which walls count as equally thin; the wall nearest to the midpoint of start and goal is used."""
 OPPOSITE_COSINE = -0.5
 """Cosine of the angle beyond which two solids are on different sides of a gap."""
 
@@ -41,11 +41,13 @@ def narrowest_gap(
     radius: float,
     z_range: tuple[float, float],
 ) -> Gap:
-    """Return the gap that stops a disc of `radius` m between two `ends`. Its width is exact to about 2 cm."""
+    """Return the gap between two `ends` that blocks a disc of `radius` m. Its width is exact to about 2 cm."""
     x0, y0, x1, y1 = bounds
-    room = 2 * radius
-    area = (x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2)
-    grid = empty_grid((x0 - room, y0 - room, x1 + room, y1 + room), max(0.05, math.sqrt(area / MAX_CELLS)), "gap")
+    margin = 2 * radius
+    area = (x1 - x0 + 2 * margin + 2) * (y1 - y0 + 2 * margin + 2)
+    grid = empty_grid(
+        (x0 - margin, y0 - margin, x1 + margin, y1 + margin), max(0.05, math.sqrt(area / MAX_CELLS)), "gap"
+    )
     return narrowest_gap_in(clearance_field(mesh, grid, z_range), ends, radius)
 
 
@@ -54,18 +56,18 @@ def narrowest_gap_in(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: f
     grid = field.grid
     clearance = _clearances(field, 2 * radius)
     cell = _bottleneck(clearance, grid.cell_of(np.array([ends[0][:2], ends[1][:2]])))
-    place: Array = grid.center_of(cell[None])[0]
-    least = clearance[tuple(cell)]
-    if least < MIN_CLEARANCE_CELLS * grid.resolution:
+    position: Array = grid.center_of(cell[None])[0]
+    min_clearance = clearance[tuple(cell)]
+    if min_clearance < MIN_CLEARANCE_CELLS * grid.resolution:
         return Gap(*_thinnest_wall(clearance, grid, ends), 0.0)
-    return _measure_gap(field, place, 4 * radius)
+    return _measure_gap(field, position, 4 * radius)
 
 
-def _clearances(field: ClearanceField, most: float) -> Array:
-    """Return the clearance of each cell's center in m, negative in solids and at most `most`."""
-    clearance: Array = np.minimum(field.rough, most)
-    near = field.rough < most
-    clearance[near] = np.minimum(field.exact(_centers(field.grid, near)), most)
+def _clearances(field: ClearanceField, max_clearance: float) -> Array:
+    """Return the clearance of each cell's center in m, negative in solids and at most `max_clearance`."""
+    clearance: Array = np.minimum(field.rough, max_clearance)
+    near = field.rough < max_clearance
+    clearance[near] = np.minimum(field.exact(_centers(field.grid, near)), max_clearance)
     return clearance
 
 
@@ -83,8 +85,8 @@ def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np
     while high - low > 1:
         middle = (low + high) // 2
         labels, _ = ndimage.label(clearance >= levels[middle], structure=np.ones((3, 3)))
-        joined = labels[first] == labels[last] > 0
-        low, high = (middle, high) if joined else (low, middle)
+        connected = labels[first] == labels[last] > 0
+        low, high = (middle, high) if connected else (low, middle)
     return _connecting_cell(clearance, levels[low], first, last)
 
 
@@ -99,11 +101,11 @@ def _connecting_cell(
     found: list[tuple[bool, npt.NDArray[np.int64]]] = []
     for number, box in enumerate(ndimage.find_objects(joints), start=1):
         around = tuple(slice(max(0, side.start - 1), side.stop + 1) for side in box)
-        beside = ndimage.binary_dilation(joints[around] == number, structure=np.ones((3, 3), np.bool_))
-        joined = set(np.unique(parts[around][beside]).tolist()) - {0}
+        neighbors = ndimage.binary_dilation(joints[around] == number, structure=np.ones((3, 3), np.bool_))
+        connected = set(np.unique(parts[around][neighbors]).tolist()) - {0}
         cells = np.argwhere(joints == number)
-        if len(joined) > 1 and (parts[first] in joined or parts[first] == 0):
-            found.append((parts[last] not in joined, cells[len(cells) // 2]))
+        if len(connected) > 1 and (parts[first] in connected or parts[first] == 0):
+            found.append((parts[last] not in connected, cells[len(cells) // 2]))
     cell: npt.NDArray[np.int64] = min(found, key=lambda joint: joint[0])[1] if found else np.argwhere(joints)[0]
     return cell
 
@@ -118,28 +120,28 @@ def _thinnest_wall(clearance: Array, grid: OccupancyGrid, ends: tuple[Pose2, Pos
     places = np.array([end[:2] for end in ends])
     walls = clearance < MIN_CLEARANCE_CELLS * grid.resolution
     parts, _ = ndimage.label(~walls, structure=np.ones((3, 3)))
-    away: list[Array] = []
+    distances: list[Array] = []
     for row, column in grid.cell_of(places).tolist():
         part = parts == parts[row, column] if parts[row, column] else np.zeros_like(walls)
         part[row, column] = True
-        away.append(ndimage.distance_transform_edt(~part))
-    depth = np.where(walls, np.maximum(*away), np.inf)
+        distances.append(ndimage.distance_transform_edt(~part))
+    depth = np.where(walls, np.maximum(*distances), np.inf)
     middles = grid.center_of(np.argwhere(depth < depth.min() + SAME_THICKNESS_CELLS))
     x, y = middles[np.argmin(np.linalg.norm(middles - places.mean(axis=0), axis=1))].tolist()
     return x, y
 
 
-def _measure_gap(field: ClearanceField, place: Array, reach: float) -> Gap:
-    """Return the gap at a place, between the two points of solids on opposite sides that are nearest to each other."""
+def _measure_gap(field: ClearanceField, position: Array, search_radius: float) -> Gap:
+    """Return the gap at a position, between the two nearest points of solids on opposite sides."""
     assert field.outline is not None
-    points = field.outline.data[field.outline.query_ball_point(place, reach)]
-    apart = points - place
-    distances = np.linalg.norm(apart, axis=1)
-    towards = apart[int(np.argmin(distances))] / distances.min()
-    cosines = (apart @ towards) / distances
+    points = field.outline.data[field.outline.query_ball_point(position, search_radius)]
+    offsets = points - position
+    distances = np.linalg.norm(offsets, axis=1)
+    direction = offsets[int(np.argmin(distances))] / distances.min()
+    cosines = (offsets @ direction) / distances
     near, far = points[cosines > -OPPOSITE_COSINE], points[cosines < OPPOSITE_COSINE]
     if not len(far):
-        return Gap(float(place[0]), float(place[1]), 2 * float(distances.min()))
+        return Gap(float(position[0]), float(position[1]), 2 * float(distances.min()))
     between = np.linalg.norm(near[:, None] - far[None], axis=2)
     j, k = np.unravel_index(int(np.argmin(between)), between.shape)
     (ax, ay), (bx, by) = near[j].tolist(), far[k].tolist()

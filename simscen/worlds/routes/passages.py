@@ -25,14 +25,14 @@ MAX_POINTS = 400
 """Maximum number of points of the outline on each side of a passage."""
 
 
-def find_passages(way: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...]:
+def find_passages(path: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...]:
     """Return the passages of a path (n, 2) to `goal`, in its direction. Widths are exact to about 2 cm."""
     if field.outline is None:
         return ()
-    points = resample_polyline(way, max(SPACING_M, polyline_length(way) / MAX_LINES))
+    points = resample_polyline(path, max(SPACING_M, polyline_length(path) / MAX_LINES))
     found: dict[tuple[int, int], float] = {}
     for point in points:
-        places = ((pair, _crossed(field.outline.data[list(pair)], points)) for pair in _pairs(point, field))
+        places = ((pair, _crossing_index(field.outline.data[list(pair)], points)) for pair in _pairs(point, field))
         pair, place = next(((pair, place) for pair, place in places if place is not None), (None, None))
         if pair is not None and place is not None:
             found.setdefault((min(pair), max(pair)), place)
@@ -48,7 +48,9 @@ def passage_between(sides: tuple[Point, ...], goal: str, field: ClearanceField) 
 
 def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage:
     one, other = pair
-    return Passage(goal, (_end(one, field), _end(other, field)), (_name(one, field), _name(other, field)))
+    return Passage(
+        goal, (_outline_point(one, field), _outline_point(other, field)), (_name(one, field), _name(other, field))
+    )
 
 
 def _pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
@@ -82,12 +84,12 @@ def _hits(point: Array, side: Array, distance: float, field: ClearanceField) -> 
     return hits
 
 
-def _crossed(ends: Array, way: Array) -> float | None:
+def _crossing_index(ends: Array, path: Array) -> float | None:
     """Return the index along the path where the line between two points first crosses it; None without a crossing."""
     (ax, ay), (bx, by) = ends.tolist()
-    across = (bx - ax) * (way[:, 1] - ay) - (by - ay) * (way[:, 0] - ax)
-    step = np.diff(way, axis=0)
-    one, other = (step[:, 0] * (y - way[:-1, 1]) - step[:, 1] * (x - way[:-1, 0]) for x, y in ((ax, ay), (bx, by)))
+    across = (bx - ax) * (path[:, 1] - ay) - (by - ay) * (path[:, 0] - ax)
+    step = np.diff(path, axis=0)
+    one, other = (step[:, 0] * (y - path[:-1, 1]) - step[:, 1] * (x - path[:-1, 0]) for x, y in ((ax, ay), (bx, by)))
     pieces = np.flatnonzero((across[:-1] * across[1:] <= 0) & (one * other <= 0))
     if not len(pieces):
         return None
@@ -107,15 +109,15 @@ def _narrowest(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
     around: npt.NDArray[np.int64] = np.array(field.outline.query_ball_point(middle, 0.75 * width, return_sorted=True))
     apart = data[around] - middle
     cosines = apart @ (data[one] - middle) / np.maximum(np.linalg.norm(apart, axis=1) * width / 2, 1e-9)
-    near, far = _thin(around[cosines > 0.5], one), _thin(around[cosines < -0.5], other)
+    near, far = _subsample(around[cosines > 0.5], one), _subsample(around[cosines < -0.5], other)
     between = np.linalg.norm(data[near][:, None] - data[far][None], axis=2)
     j, k = np.unravel_index(int(np.argmin(between)), between.shape)
     return int(near[j]), int(far[k])
 
 
-def _thin(numbers: npt.NDArray[np.int64], also: int) -> npt.NDArray[np.int64]:
-    """Return at most MAX_POINTS of the indices, evenly spaced, and `also`."""
-    return np.append(numbers[:: 1 + len(numbers) // MAX_POINTS], also)
+def _subsample(numbers: npt.NDArray[np.int64], required: int) -> npt.NDArray[np.int64]:
+    """Return at most MAX_POINTS of the indices, evenly spaced, and `required`."""
+    return np.append(numbers[:: 1 + len(numbers) // MAX_POINTS], required)
 
 
 def _name(number: int, field: ClearanceField) -> str:
@@ -123,7 +125,7 @@ def _name(number: int, field: ClearanceField) -> str:
     return field.names[owner] if owner < len(field.names) else ""
 
 
-def _end(number: int, field: ClearanceField) -> Point:
+def _outline_point(number: int, field: ClearanceField) -> Point:
     """Return a point of the outline, rounded to 1 mm to keep logs small."""
     assert field.outline is not None
     x, y = field.outline.data[number].tolist()

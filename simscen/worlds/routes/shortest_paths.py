@@ -1,4 +1,4 @@
-"""Shortest paths of a disc through the static world, with which driven paths are compared."""
+"""Shortest paths of a disc through the static world, as a reference for driven paths."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -49,44 +49,44 @@ class ShortestPaths:
         bounds: tuple[float, float, float, float],
         radius: float,
         z_range: tuple[float, float] = Z_RANGE,
-        finest: float = MIN_RESOLUTION_M,
+        min_resolution: float = MIN_RESOLUTION_M,
     ) -> None:
-        """Prepare the search with cells of `finest` m, or larger ones in a large world."""
+        """Prepare the search with cells of `min_resolution` m, or larger ones in a large world."""
         x0, y0, x1, y1 = bounds
-        room = 2 * radius  # around the world, so that a path can lead around it
-        bounds = (x0 - room, y0 - room, x1 + room, y1 + room)
-        resolution = max(finest, math.sqrt((x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2) / MAX_CELLS))
+        margin = 2 * radius  # around the world, so that a path can lead around it
+        bounds = (x0 - margin, y0 - margin, x1 + margin, y1 + margin)
+        resolution = max(min_resolution, math.sqrt((x1 - x0 + 2 * margin + 2) * (y1 - y0 + 2 * margin + 2) / MAX_CELLS))
         grid = empty_grid(bounds, resolution, "shortest path")
         self._radius = max(radius, 0.71 * resolution)
-        self._too_small = radius < self._radius
+        self._is_radius_enlarged = radius < self._radius
         self._field = clearance_field(mesh, grid, z_range)
-        self._allowed = self._radius - 0.1 * resolution
+        self._min_clearance = self._radius - 0.1 * resolution
 
     def length(self, start: Pose2, goal: Pose2) -> float:
         """Return the length in m of the shortest path between two positions; inf if there is none."""
-        way = self.way(start, goal)
-        return math.inf if way is None else polyline_length(way)
+        path = self.path(start, goal)
+        return math.inf if path is None else polyline_length(path)
 
     def leg(self, start: Pose2, goal: Pose2, name: str) -> Leg:
-        """Return the shortest path to the goal `name`; if there is none, with the gap that is too narrow."""
-        way = self.way(start, goal)
-        if way is not None:
-            return Leg(polyline_length(way), find_passages(way, name, self._field))
-        return Leg(math.inf, self._too_narrow(start, goal, name))
+        """Return the shortest path to the goal `name`; if there is none, length inf and the gap that is too narrow."""
+        path = self.path(start, goal)
+        if path is not None:
+            return Leg(polyline_length(path), find_passages(path, name, self._field))
+        return Leg(math.inf, self._too_narrow_gap(start, goal, name))
 
-    def _too_narrow(self, start: Pose2, goal: Pose2, name: str) -> tuple[Passage, ...]:
+    def _too_narrow_gap(self, start: Pose2, goal: Pose2, name: str) -> tuple[Passage, ...]:
         """Return the gap that is too narrow; empty if start or goal is occupied, or if there is no gap."""
-        if not self._field.keeps(np.array([start[:2], goal[:2]]), self._allowed).all():
+        if not self._field.has_clearance(np.array([start[:2], goal[:2]]), self._min_clearance).all():
             return ()
         gap = narrowest_gap_in(self._field, (start, goal), self._radius)
         return (passage_between(gap.sides, name, self._field),) if len(gap.sides) == 2 else ()
 
-    def way(self, start: Pose2, goal: Pose2) -> Array | None:
+    def path(self, start: Pose2, goal: Pose2) -> Array | None:
         """Return the corners (n, 2) of the shortest path, with arcs as short chords; None if there is none."""
         ends = np.array([start[:2], goal[:2]])
-        if not self._field.keeps(ends, self._allowed).all():
+        if not self._field.has_clearance(ends, self._min_clearance).all():
             return None
-        if is_line_clear(ends[0], ends[1], self._field, self._allowed):
+        if is_line_clear(ends[0], ends[1], self._field, self._min_clearance):
             return ends
         optimistic = self._search(self._optimistic_graph, ends)
         if optimistic is None or self._is_clear(optimistic):
@@ -95,24 +95,24 @@ class ShortestPaths:
 
     def may_reach(self, start: Pose2, goal: Pose2) -> bool:
         """Return whether there may be a path between two positions; False proves that there is none."""
-        if self._too_small:
+        if self._is_radius_enlarged:
             return True
         first, last = (self._free_cell(self._optimistic_graph, np.array(end[:2])) for end in (start, goal))
         return not first or not last or self._optimistic_graph.shortest_path(first, last) is not None
 
-    def may_enter(self, starts: Sequence[Pose2], arrived: Callable[[Pose2], float]) -> bool:
-        """Return whether the disc may get from one of the starts to a pose for which `arrived` returns 0.
+    def may_enter(self, starts: Sequence[Pose2], distance: Callable[[Pose2], float]) -> bool:
+        """Return whether the disc may get from one of the starts to a pose at which `distance` is at most 0.
 
-        `arrived` returns the distance in m from a pose to the destination. False proves that there is no path.
+        `distance` returns the distance in m from a pose to the destination. False proves that there is no path.
         """
-        if self._too_small:
+        if self._is_radius_enlarged:
             return True
         grid = self._field.grid
         cells = self._optimistic_graph.connected_cells(
             [self._free_cell(self._optimistic_graph, np.array(start[:2])) for start in starts]
         )
         slack = HALF_DIAGONAL_CELLS * grid.resolution
-        return any(arrived(Pose2(x, y)) <= slack for x, y in grid.center_of(cells).tolist())
+        return any(distance(Pose2(x, y)) <= slack for x, y in grid.center_of(cells).tolist())
 
     @cached_property
     def _optimistic_graph(self) -> GridGraph:
@@ -124,25 +124,25 @@ class ShortestPaths:
         """The cells whose center the disc may occupy: gaps less than a cell wider than the disc may be missed."""
         return GridGraph(self._field.free_cells(self._radius))
 
-    def _search(self, lattice: GridGraph, ends: Array) -> Array | None:
+    def _search(self, graph: GridGraph, ends: Array) -> Array | None:
         """Return the tightened path (n, 2) over a graph; None if there is none."""
-        first, last = (self._free_cell(lattice, end) for end in ends)
-        cells = lattice.shortest_path(first, last) if first and last else None
+        first, last = (self._free_cell(graph, end) for end in ends)
+        cells = graph.way(first, last) if first and last else None
         if cells is None:
             return None
         inner = self._field.grid.center_of(cells)
         return tighten_path(np.concatenate((ends[:1], inner, ends[1:])), self._field, self._radius)
 
-    def _is_clear(self, way: Array) -> bool:
-        return all(is_line_clear(a, b, self._field, self._allowed) for a, b in pairwise(way))
+    def _is_clear(self, path: Array) -> bool:
+        return all(is_line_clear(a, b, self._field, self._min_clearance) for a, b in pairwise(path))
 
-    def _free_cell(self, lattice: GridGraph, point: Array) -> tuple[int, int] | None:
+    def _free_cell(self, graph: GridGraph, point: Array) -> tuple[int, int] | None:
         """Return the free cell nearest to a point, whose own cell may be too near a wall; None without one nearby."""
         grid = self._field.grid
         around = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3), indexing="ij"), axis=-1).reshape(-1, 2)
         cells: CellIndices = grid.cell_of(point[None]) + around
         cells = cells[grid.inside(cells)]
-        cells = cells[lattice.is_free(cells)]
+        cells = cells[graph.is_free(cells)]
         if not len(cells):
             return None
         row, column = cells[np.argmin(np.linalg.norm(grid.center_of(cells) - point, axis=1))].tolist()
@@ -154,10 +154,10 @@ def shortest_paths_in(
     stops: Sequence[Pose2],
     radius: float,
     z_range: tuple[float, float] = Z_RANGE,
-    finest: float = MIN_RESOLUTION_M,
+    min_resolution: float = MIN_RESOLUTION_M,
 ) -> ShortestPaths:
-    """Return the shortest paths of a disc in a built world, extended to hold all `stops`."""
-    return ShortestPaths(built.mesh, _bounds_with(built, stops), radius, z_range, finest)
+    """Return the shortest paths of a disc in a built world, extended to contain all `stops`."""
+    return ShortestPaths(built.mesh, _bounds_containing(built, stops), radius, z_range, min_resolution)
 
 
 def legs_between(
@@ -165,19 +165,19 @@ def legs_between(
 ) -> list[Leg]:
     """Return the shortest path of a disc from each pose to its goal. Repeated pairs are searched once."""
     stops = [pose for start, goal in ends for pose in (start, goal.pose)]
-    ways = shortest_paths_in(built, stops, radius, z_range) if stops else None
+    paths = shortest_paths_in(built, stops, radius, z_range) if stops else None
     found: dict[tuple[Pose2, Pose2], Leg] = {}
     legs = []
     for start, goal in ends:
-        assert ways is not None
+        assert paths is not None
         leg = found.get((start, goal.pose))
-        found[start, goal.pose] = leg = leg or ways.leg(start, goal.pose, goal.name)
+        found[start, goal.pose] = leg = leg or paths.leg(start, goal.pose, goal.name)
         legs.append(replace(leg, passages=tuple(replace(each, goal=goal.name) for each in leg.passages)))
     return legs
 
 
-def _bounds_with(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, float, float, float]:
-    """Return the bounds of the world, or of its map if the world has none, extended to hold the stops."""
+def _bounds_containing(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, float, float, float]:
+    """Return the bounds of the world, or of its map if the world has none, extended to contain the stops."""
     x0, y0, x1, y1 = built.world.bounds
     corners = [(x0, y0), (x1, y1)]
     if not any(built.world.bounds):
@@ -189,54 +189,56 @@ def _bounds_with(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, floa
 
 
 MIN_SHORTENING = 0.001
-"""Share of the length below which a round of tightening is the last. Paths over a lattice need two to five rounds."""
+"""Fraction of the length; a round that shortens the path by less is the last. Most paths need two to five rounds."""
 MAX_ROUNDS = 12
 SMOOTHING_STEPS = 24
 """Smoothing steps in each round; they affect about five points on either side of a corner."""
 
 
-def tighten_path(way: Array, field: ClearanceField, radius: float) -> Array:
+def tighten_path(path: Array, field: ClearanceField, radius: float) -> Array:
     """Return a path (n, 2) shortened as far as the clearance `radius` in m allows, with a tolerance of 0.1 cells.
 
-    String pulling makes the straight parts. Between them, an elastic band (Quinlan and Khatib 1993) moves the path onto
-    arcs with `radius` around obstacles.
+    String pulling creates the straight parts. Between them, an elastic band (Quinlan and Khatib 1993) moves the path
+    onto arcs with `radius` around obstacles.
     """
-    allowed = radius - 0.1 * field.grid.resolution
+    min_clearance = radius - 0.1 * field.grid.resolution
     for _ in range(MAX_ROUNDS):
-        before = polyline_length(way)
-        way = _smooth(resample_polyline(_straighten(way, field, allowed), field.grid.resolution), field, radius)
-        if polyline_length(way) > (1 - MIN_SHORTENING) * before:
+        before = polyline_length(path)
+        path = _smooth(resample_polyline(_straighten(path, field, min_clearance), field.grid.resolution), field, radius)
+        if polyline_length(path) > (1 - MIN_SHORTENING) * before:
             break
-    return _straighten(way, field, allowed)
+    return _straighten(path, field, min_clearance)
 
 
-def is_line_clear(a: Array, b: Array, field: ClearanceField, allowed: float) -> bool:
-    """Return whether a straight line keeps the clearance `allowed` in m, sampled twice per cell."""
+def is_line_clear(a: Array, b: Array, field: ClearanceField, min_clearance: float) -> bool:
+    """Return whether a straight line keeps the clearance `min_clearance` in m, sampled twice per cell."""
     count = 2 + math.ceil(2 * math.dist(a, b) / field.grid.resolution)
     line = a + np.linspace(0.0, 1.0, count)[:, None] * (b - a)
-    return bool(field.keeps(line, allowed).all())
+    return bool(field.has_clearance(line, min_clearance).all())
 
 
-def _straighten(way: Array, field: ClearanceField, allowed: float) -> Array:
+def _straighten(path: Array, field: ClearanceField, min_clearance: float) -> Array:
     """Return the path with straight lines to the farthest visible point, found by doubling and bisection."""
-    kept, last = [0], len(way) - 1
+    kept, last = [0], len(path) - 1
     while kept[-1] < last:
         here = kept[-1]
         near, reach = here + 1, 2
-        while near < last and is_line_clear(way[here], way[min(here + reach, last)], field, allowed):
+        while near < last and is_line_clear(path[here], path[min(here + reach, last)], field, min_clearance):
             near, reach = min(here + reach, last), 2 * reach
         far = min(here + reach, last)
         while far - near > 1:
             middle = (near + far) // 2
-            near, far = (middle, far) if is_line_clear(way[here], way[middle], field, allowed) else (near, middle)
+            near, far = (
+                (middle, far) if is_line_clear(path[here], path[middle], field, min_clearance) else (near, middle)
+            )
         kept.append(near)
-    return way[kept]
+    return path[kept]
 
 
-def _smooth(way: Array, field: ClearanceField, radius: float) -> Array:
+def _smooth(path: Array, field: ClearanceField, radius: float) -> Array:
     """Return a path after the smoothing steps of an elastic band."""
-    way = way.copy()
+    path = path.copy()
     for _ in range(SMOOTHING_STEPS):
-        way[1:-1] = (way[:-2] + way[2:]) / 2
-        way[1:-1] += field.push(way[1:-1], radius)
-    return way
+        path[1:-1] = (path[:-2] + path[2:]) / 2
+        path[1:-1] += field.push_away(path[1:-1], radius)
+    return path

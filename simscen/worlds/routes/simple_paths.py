@@ -33,11 +33,11 @@ class SimplePaths:
         self._radius = radius
         self._lengths: dict[tuple[Point, Point], float] = {}
         self._near: dict[Cell, list[UprightPrism]] = {}
-        reach = radius + HALF_STEP_M + SAMPLING_MARGIN_M
+        search_radius = radius + HALF_STEP_M + SAMPLING_MARGIN_M
         for prism in prisms:
-            left, low, right, high = prism.rectangle
-            columns = range(math.floor(left - reach), math.floor(right + reach) + 1)
-            rows = range(math.floor(low - reach), math.floor(high + reach) + 1)
+            left, bottom, right, top = prism.rectangle
+            columns = range(math.floor(left - search_radius), math.floor(right + search_radius) + 1)
+            rows = range(math.floor(bottom - search_radius), math.floor(top + search_radius) + 1)
             for bucket in product(columns, rows):
                 self._near.setdefault(bucket, []).append(prism)
 
@@ -57,10 +57,11 @@ class SimplePaths:
 
         return self._search(start, goal, last_leg)
 
-    def can_enter(self, start: Point, towards: Point, arrived: Callable[[Point], bool]) -> bool:
-        """Return whether a path was found to a point for which `arrived` is true, searching `towards` a point first."""
+    def can_enter(self, start: Point, towards: Point, is_inside: Callable[[Point], bool]) -> bool:
+        """Return whether a path was found to a point for which `is_inside` is true, searching towards `towards`."""
         return (
-            arrived(start) or self._search(start, towards, lambda here: 0.0 if arrived(here) else math.inf) < math.inf
+            is_inside(start)
+            or self._search(start, towards, lambda here: 0.0 if is_inside(here) else math.inf) < math.inf
         )
 
     def _search(self, start: Point, goal: Point, last_leg: Callable[[Point], float]) -> float:
@@ -68,38 +69,40 @@ class SimplePaths:
 
         `last_leg` returns the distance from a point to the goal, inf if it is not reachable in a straight line.
         """
-        driven: dict[Cell, float] = {(0, 0): 0.0}
+        lengths: dict[Cell, float] = {(0, 0): 0.0}
         queue = [(math.dist(start, goal), (0, 0))]
         done: set[Cell] = set()
-        while queue and len(driven) < MAX_POINTS:
+        while queue and len(lengths) < MAX_POINTS:
             _, cell = heapq.heappop(queue)
             if cell in done:
                 continue
             done.add(cell)
             here = _point(start, cell)
             if (rest := last_leg(here)) < math.inf:
-                return driven[cell] + rest
+                return lengths[cell] + rest
             for move in MOVES:
-                to = cell[0] + move[0], cell[1] + move[1]
-                there, length = _point(start, to), driven[cell] + STEP_M * math.hypot(*move)
-                if length < driven.get(to, math.inf) and self._passes(here, there, cell == (0, 0)):
-                    driven[to] = length
-                    heapq.heappush(queue, (length + math.dist(there, goal), to))
+                neighbor = cell[0] + move[0], cell[1] + move[1]
+                there, length = _point(start, neighbor), lengths[cell] + STEP_M * math.hypot(*move)
+                if length < lengths.get(neighbor, math.inf) and self._can_move(here, there, cell == (0, 0)):
+                    lengths[neighbor] = length
+                    heapq.heappush(queue, (length + math.dist(there, goal), neighbor))
         return math.inf
 
-    def _passes(self, here: Point, there: Point, first: bool) -> bool:
+    def _can_move(self, here: Point, there: Point, first: bool) -> bool:
         """Return whether the disc can move to a neighbor. Only the start may have less clearance than required."""
-        return self._keeps(there, HALF_STEP_M) and (not first or self._is_clear(here, there))
+        return self._has_clearance(there, HALF_STEP_M) and (not first or self._is_clear(here, there))
 
     def _is_clear(self, a: Point, b: Point) -> bool:
         pieces = max(1, math.ceil(math.dist(a, b) / (2 * SAMPLING_MARGIN_M)))
         parts = (k / pieces for k in range(pieces + 1))
-        return all(self._keeps((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])), SAMPLING_MARGIN_M) for t in parts)
+        return all(
+            self._has_clearance((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])), SAMPLING_MARGIN_M) for t in parts
+        )
 
-    def _keeps(self, point: Point, more: float) -> bool:
-        """Return whether all solids are farther away than the radius plus `more` m."""
+    def _has_clearance(self, point: Point, margin: float) -> bool:
+        """Return whether all solids are farther away than the radius plus `margin` m."""
         near = self._near.get((math.floor(point[0]), math.floor(point[1])), ())
-        return all(prism.distance(point, (prism.bottom, prism.top)) >= self._radius + more for prism in near)
+        return all(prism.distance(point, (prism.bottom, prism.top)) >= self._radius + margin for prism in near)
 
 
 MOVES = [move for move in product((-1, 0, 1), repeat=2) if move != (0, 0)]

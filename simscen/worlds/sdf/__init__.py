@@ -1,4 +1,4 @@
-"""Import of Gazebo worlds: SDF 1.3 to 1.12 becomes the shapes that physics, ray casting and maps share."""
+"""Import of Gazebo worlds: SDF 1.3 to 1.12 is converted to the shapes that physics, ray casting and maps share."""
 
 from simscen.worlds.sdf.load import load_sdf
 

@@ -1,4 +1,4 @@
-"""Groups links into static solids and movable bodies.
+"""Group links into static solids and movable bodies.
 
 Links that are connected by a joint of any type form one rigid body: simscen has no jointed obstacles, and links that
 overlap at a joint would be pushed apart without it. A joint to the world or to a static model makes the whole group
@@ -86,7 +86,7 @@ def _join_links(
         ends.append(_WORLD if link is None else numbers.get(id(link), _WORLD))
     joint_type = joint.attributes.get("type", "")
     if joint_type != "fixed" and any(end != _WORLD and groups.root(end) != _WORLD for end in ends):
-        report.note(joint.place, f"a joint of type {joint_type[:20] or 'unknown'} is held rigid as it stands")
+        report.note(joint.place, f"a joint of type {joint_type[:20] or 'unknown'} is treated as fixed")
     groups.join(*ends)
 
 
@@ -104,7 +104,7 @@ def _movable_mass(group: list[LinkContent], report: ImportReport) -> float:
         return mass
     heaviest = max(group, key=lambda content: content.mass).link.frame.element
     message = f"has a mass of {mass:g} kg; at most {MAX_MOVABLE_MASS_KG:g} kg can move"
-    report.add_error(heaviest.unusable(message, "if nothing moves it, make its model <static>"))
+    report.add_error(heaviest.unusable(message, "if it never moves, make its model <static>"))
     return 0.0
 
 
@@ -131,7 +131,7 @@ def with_unique_names(bodies: list[Body], report: ImportReport, world: Element) 
             number += 1
             name = f"{body.name}_{number}"
         if number:
-            report.note(world.place, f"the name {body.name!r} is taken, the next one is called {name!r}")
+            report.note(world.place, f"the name {body.name!r} is already used; the next body is called {name!r}")
         taken.add(name.casefold())
         unique.append(replace(body, name=name))
     return tuple(unique)

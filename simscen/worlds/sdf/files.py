@@ -118,7 +118,7 @@ class IncludedFiles:
         except UnusableElement as error:
             if not os.path.lexists(model):
                 raise
-            self._report.note(error.place, f"{error.message}; model.sdf beside it is used")
+            self._report.note(error.place, f"{error.message}; model.sdf in the same folder is used")
             return model
 
 

@@ -43,7 +43,7 @@ def read_link(link: PlacedLink, reader: ShapeReader, report: ImportReport) -> Li
             else:
                 report_unknown(child, "link", report)
     if element.child("collision") is None and element.child("visual"):
-        report.note(element.place, "has visuals only: nothing to collide with or to see for a lidar")
+        report.note(element.place, "has only visuals: robots cannot collide with it, and lidars do not see it")
     mass = DEFAULT_MASS_KG
     with report.skip_unusable():
         mass = _link_mass(element.child("inertial"), collisions)
@@ -95,7 +95,7 @@ def _note_disabled_contacts(collision: Element, report: ImportReport) -> None:
         text = element.text.lower()
         has_no_bits = element.tag == "collide_bitmask" and text.removeprefix("0x").strip("0") == ""
         if has_no_bits or (element.tag == "collide_without_contact" and text in ("1", "true")):
-            report.note(element.place, "not supported: the robot collides with it all the same")
+            report.note(element.place, "not supported: the robot still collides with it")
 
 
 def _scaled(shape: Shape, scale: Scale) -> Shape:

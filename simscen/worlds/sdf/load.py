@@ -1,4 +1,4 @@
-"""Loads an SDF file as a world: static solids, bodies, bounds and notes."""
+"""Load an SDF file as a world: static solids, bodies, bounds and notes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -24,13 +24,13 @@ from simscen.worlds.sdf.report import ImportReport, UnusableElement
 from simscen.worlds.sdf.shapes import MIN_LEVEL_NORMAL_Z, ShapeReader
 
 MAX_OUTLIER_SHARE = 0.05
-"""Share of the models that may be outliers; with more, the world is regarded as large."""
+"""Fraction of the models that may be outliers; with more, the world is regarded as large."""
 MAX_FLOOR_HEIGHT_M = 0.3
 """Height up to which a level face can be the floor instead of a platform."""
 MIN_FLOOR_HEIGHT_M = 0.001
 """Height up to which a floor is treated as lying at z = 0."""
 MIN_FLOOR_SHARE = 0.8
-"""Share of the world's extent that a floor must cover."""
+"""Fraction of the world's extent that a floor must cover."""
 
 Placed = TypeVar("Placed", Solid, Body)
 
@@ -40,7 +40,7 @@ def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bo
 
     Only collision geometry is used. Static models become solids, other models bodies with their mass, and actors
     bodies of mass 0 with a path. Poses are in the world frame, and the order is that of the document. A floor above
-    z = 0 is lowered to z = 0, where robots drive. Files that the world refers to are searched beside it and in
+    z = 0 is lowered to z = 0, where robots drive. Files that the world refers to are searched in its folder and in
     `search`, and must lie inside `root` or `search`.
 
     Raises InvalidInput with all elements that would change the geometry and cannot be used. With `lenient`, such
@@ -68,14 +68,14 @@ def _load(path: Path, files: WorldFiles, report: ImportReport) -> World:
 
 
 def _world_element(document: Element, report: ImportReport) -> Element:
-    """Return the first `<world>`, as Gazebo does, or the root of a file that holds only models."""
+    """Return the first `<world>`, as Gazebo does, or the root of a file that contains only models."""
     worlds = list(document.all("world"))
     for other in worlds[1:]:
         report.note(other.place, f"only the first world of a file is loaded, which is {worlds[0].name!r}")
     if worlds:
         return worlds[0]
     if not any(document.all("model", "actor", "include")):
-        raise document.unusable("holds neither a world nor a model")
+        raise document.unusable("contains neither a world nor a model")
     return document
 
 
@@ -121,8 +121,10 @@ class _WorldImporter:
         solids, bodies, bounds = self._without_outliers(with_unique_names(self._bodies, self._report, element))
         height = floor_height(solids, bounds)
         if height:
-            self._report.note(element.place, f"its floor lies {height:.3f} m high; the world is lowered by as much")
-        solids, bodies = _lowered(solids, height), _lowered(bodies, height)
+            self._report.note(
+                element.place, f"its floor is {height:.3f} m above z = 0; the world is lowered by that height"
+            )
+        solids, bodies = _lowered_by(solids, height), _lowered_by(bodies, height)
         return World(name, solids, bodies, bounds=bounds, notes=self._report.notes)
 
     def _without_outliers(self, bodies: tuple[Body, ...]) -> tuple[tuple[Solid, ...], tuple[Body, ...], Bounds]:
@@ -132,31 +134,31 @@ class _WorldImporter:
             extents.setdefault(_model_name(solid), []).append(mesh_bounds_2d(solid))
         for body in bodies:
             extents.setdefault(body.name, []).extend(mesh_bounds_2d(solid, body.pose) for solid in body.solids)
-        far = outliers({name: np.array(_union(boxes)).reshape(2, 2) for name, boxes in extents.items()})
-        for name, distance in far.items():
-            message = f"left out: {name!r} lies {distance:.0f} m away from the middle of all, too far for a map of them"
+        far_models = outliers({name: np.array(_union(boxes)).reshape(2, 2) for name, boxes in extents.items()})
+        for name, distance in far_models.items():
+            message = f"left out: {name!r} is {distance:.0f} m away from the median of all models, too far for a map"
             self._report.note(self._root.element.place, message)
         return (
-            tuple(solid for solid in self._solids if _model_name(solid) not in far),
-            tuple(body for body in bodies if body.name not in far),
-            _union([box for name, boxes in extents.items() if name not in far for box in boxes]),
+            tuple(solid for solid in self._solids if _model_name(solid) not in far_models),
+            tuple(body for body in bodies if body.name not in far_models),
+            _union([box for name, boxes in extents.items() if name not in far_models for box in boxes]),
         )
 
     def _report_empty_world(self, element: Element) -> None:
         """Report a world without obstacles as an error, unless it is a ground plane on purpose."""
         if self._report.skipped_count:
-            message = f"nothing is left of this world: {self._report.skipped_count} things in it were skipped"
+            message = f"nothing is left of this world: {self._report.skipped_count} of its elements were skipped"
             raise element.unusable(message, "load it without --lenient to see what is missing")
         if self._shapes.has_ground:
-            self._report.note(element.place, "holds nothing but a ground plane")
+            self._report.note(element.place, "contains only a ground plane")
             return
         models = [m for part in self._root.parts if isinstance(part, ModelNode) for m in part.models()]
         has_links = any(not isinstance(part, ModelNode) for model in models for part in model.parts)
         reason = "it has no models"
         if models:
-            reason = "its links have visuals at most" if has_links else "its models have no links"
+            reason = "its links have no collisions" if has_links else "its models have no links"
         message = f"no collision geometry in this world: {reason}"
-        self._report.add_error(element.unusable(message, "load it leniently if an empty floor is meant"))
+        self._report.add_error(element.unusable(message, "load it with --lenient if the world should be empty"))
 
 
 def _model_name(solid: Solid) -> str:
@@ -164,7 +166,7 @@ def _model_name(solid: Solid) -> str:
     return solid.name.partition("::")[0]
 
 
-def _lowered(placed: Sequence[Placed], height: float) -> tuple[Placed, ...]:
+def _lowered_by(placed: Sequence[Placed], height: float) -> tuple[Placed, ...]:
     return tuple(replace(each, pose=each.pose._replace(z=each.pose.z - height)) for each in placed)
 
 

@@ -1,7 +1,7 @@
 """Readers of COLLADA (DAE), STL and OBJ mesh files; vertices are in meters.
 
 COLLADA is read with pycollada, because trimesh drops the unit and the node names. STL and OBJ are parsed by trimesh's
-exchange functions without making `Trimesh` objects, which would compute normals of degenerate triangles.
+exchange functions without creating `Trimesh` objects, which would compute normals of degenerate triangles.
 """
 
 import io
@@ -62,7 +62,7 @@ def _check_parts(parts: tuple[MeshPart, ...]) -> None:
         if part.vertices.ndim != 2 or part.vertices.shape[1] != 3:
             raise UnusableMesh("a vertex does not have three coordinates")
         if part.faces.min() < 0 or part.faces.max() >= len(part.vertices):
-            raise UnusableMesh("a triangle names a vertex that is not there")
+            raise UnusableMesh("a triangle refers to a vertex that does not exist")
         if not np.isfinite(part.vertices).all():
             raise UnusableMesh("a vertex is not a finite number")
 

@@ -86,11 +86,11 @@ class MeshReader:
         request = _mesh_request(element, self._files.locate(uri))
         if request not in self._meshes:
             parts = _select_submesh(self._read_file(request.path, uri), request, element)
-            if _reach(parts, request) > MAX_COORDINATE_M:
+            if _largest_coordinate(parts, request) > MAX_COORDINATE_M:
                 raise element.unusable(f"the mesh reaches farther than {MAX_COORDINATE_M:g} m")
-            self._meshes[request] = _joined(parts, request)
+            self._meshes[request] = _merge_parts(parts, request)
         if element.attributes.get("optimization") or element.child("convex_decomposition"):
-            self._report.note(element.place, "convex hulls are not made, the mesh is used as it is")
+            self._report.note(element.place, "convex hulls are not computed; the mesh is used unchanged")
         return self._meshes[request]
 
     def _read_file(self, path: Path, uri: Element) -> tuple[MeshPart, ...]:
@@ -112,7 +112,7 @@ def read_mesh(path: Path) -> Mesh:
         parts = MESH_CACHE.read(data, path.suffix.lower())
     except (UnusableFile, UnusableMesh) as error:
         raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from error
-    return _joined(parts, MeshRequest(path))
+    return _merge_parts(parts, MeshRequest(path))
 
 
 def _mesh_request(element: Element, path: Path) -> MeshRequest:
@@ -137,7 +137,7 @@ def _select_submesh(parts: tuple[MeshPart, ...], request: MeshRequest, element: 
     return selected
 
 
-def _reach(parts: tuple[MeshPart, ...], request: MeshRequest) -> float:
+def _largest_coordinate(parts: tuple[MeshPart, ...], request: MeshRequest) -> float:
     """Return the largest absolute coordinate of the requested mesh.
 
     Computed in Python floats: huge coordinates and scales overflow to infinity without a warning of NumPy.
@@ -151,7 +151,7 @@ def _reach(parts: tuple[MeshPart, ...], request: MeshRequest) -> float:
     return reach
 
 
-def _joined(parts: tuple[MeshPart, ...], request: MeshRequest) -> Mesh:
+def _merge_parts(parts: tuple[MeshPart, ...], request: MeshRequest) -> Mesh:
     vertices = np.vstack([part.vertices for part in parts])
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     faces = np.vstack([part.faces + start for part, start in zip(parts, starts, strict=True)]).astype(np.int32)
@@ -193,7 +193,7 @@ def _read_relative_heights(uri: Element, files: WorldFiles) -> Array:
         with image:
             if max(image.size) > MAX_HEIGHTMAP_PIXELS or min(image.size) < 2:
                 size = f"{image.size[0]} x {image.size[1]} pixels"
-                raise uri.unusable(f"{files.shown(path)}: {size}; 2 to {MAX_HEIGHTMAP_PIXELS} an edge are read")
+                raise uri.unusable(f"{files.shown(path)}: {size}; an edge must have 2 to {MAX_HEIGHTMAP_PIXELS} pixels")
             gray = image if image.mode in GRAY_MODES else image.convert("L")
             pixels = np.asarray(gray, dtype=np.float64)
     except Image.DecompressionBombError as error:

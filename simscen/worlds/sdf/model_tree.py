@@ -1,4 +1,4 @@
-"""The tree of models in a world, with every `<include>` replaced by the model that it names."""
+"""Tree of models in a world, with every `<include>` replaced by the model that it refers to."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from simscen.worlds.sdf.known_elements import report_unknown, report_unknown_chi
 from simscen.worlds.sdf.report import ImportReport
 
 MAX_MODELS = 20_000
-"""Limit for files that include each other tenfold at every level."""
+"""Limit against exponential growth, e.g. files that include ten others at every level."""
 
 
 @dataclass(eq=False)
@@ -127,10 +127,10 @@ class TreeReader:
         try:
             entities = list(root.all("model", "actor", "light", "world"))
             if not entities or entities[0].tag == "world":
-                hint = "it holds a world" if entities else ""
-                raise include.unusable(f"{root.source.name} holds no model", hint)
+                hint = "it contains a world" if entities else ""
+                raise include.unusable(f"{root.source.name} contains no model", hint)
             if len(entities) > 1:
-                self._report.note(root.place, "holds more than one model; an include brings the first")
+                self._report.note(root.place, "contains more than one model; only the first is included")
             first = entities[0]
             if first.tag == "model":
                 self.add_model(owner, self.read_model(first, owner.static, include), _is_merged(include))

@@ -22,7 +22,7 @@ class SourcePlace:
 
 
 class UnusableElement(Exception):
-    """A part of a file that cannot be used and without which the geometry changes."""
+    """A part of a file that cannot be used; leaving it out would change the geometry."""
 
     is_harmless = False
     """If True, the part is left out with a note, as leaving it out cannot affect a robot."""

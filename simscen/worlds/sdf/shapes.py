@@ -36,10 +36,12 @@ class ShapeReader:
         """
         shapes = [child for child in geometry.children if not child.tag.startswith("xacro:")]
         if not shapes:
-            raise geometry.unusable("holds no shape")
+            raise geometry.unusable("contains no shape")
         first = shapes[0]
         if any(shape.tag != first.tag for shape in shapes):
-            raise geometry.unusable("holds more than one shape: " + ", ".join(shape.tag[:60] for shape in shapes[:5]))
+            raise geometry.unusable(
+                "contains more than one shape: " + ", ".join(shape.tag[:60] for shape in shapes[:5])
+            )
         for shape in shapes:
             if shape.tag in SHAPES:
                 report_unknown_children(shape, shape.tag, self._report)

@@ -85,7 +85,7 @@ def test_changes_of_a_converted_world_are_printed(simscen, room: Path) -> None:
     ended = simscen("world", "convert", "shop.sdf", "shop.world.yaml")
     assert (ended.code, ended.out) == (
         0,
-        "changed: m::l::c: a sphere; it became an upright prism over its cut at 0.2 m\n"
+        "changed: m::l::c: a sphere; replaced by an upright prism over its cross section at 0.2 m\n"
         "shop.world.yaml: 1 walls, obstacles, objects, and doors; 1 changed\n",
     )
     assert simscen("validate", "shop.world.yaml").code == 0

@@ -74,7 +74,7 @@ def test_what_is_below_the_ground_is_cut_off():
     world, changes = converted(
         Solid(Box((1, 1, 1)), Pose3(z=0.25), "sunk"), Solid(Box((9, 9, 1)), Pose3(z=-0.5), "floor")
     )
-    assert changes == ["floor: it lies below the ground; it is left out"]
+    assert changes == ["floor: it is below the ground; it is left out"]
     vertices = merge_solids(world.solids).vertices
     assert (vertices[:, 2].min(), vertices[:, 2].max()) == (0.0, 0.75)
 
@@ -92,7 +92,7 @@ def test_what_is_below_the_ground_is_cut_off():
 def test_what_leans_or_bulges_keeps_its_cut_and_is_told(shape, pose, kind):
     solid = Solid(shape, pose, "thing")
     world, changes = converted(solid, height=0.25)
-    assert changes == [f"thing: {kind}; it became an upright prism over its cut at 0.25 m"]
+    assert changes == [f"thing: {kind}; replaced by an upright prism over its cross section at 0.25 m"]
     before, after = covered([solid], 0.25), covered(world.solids, 0.25)
     assert before.symmetric_difference(after).area < 1e-4
 
@@ -110,7 +110,7 @@ def test_a_mesh_that_is_open_is_left_out_and_told():
     solid = Solid(Mesh(box.vertices, box.faces[2:][:-1]), Pose3(z=0.5), "torn")
     world, changes = converted(solid)
     assert world.solids == ()
-    assert changes == ["torn: a mesh whose cut at 0.2 m is not closed; it is left out"]
+    assert changes == ["torn: a mesh whose cross section at 0.2 m is not closed; it is left out"]
 
 
 def test_bodies_keep_mass_and_motion():
@@ -136,8 +136,8 @@ def test_motion_and_shape_that_cannot_be_said_are_told():
     table = Body("table", (*disc, Solid(Box((1, 1, 0.1)), Pose3(z=1.0))), Pose3(x=5.0), 3.0)
     world, changes = converted(bodies=(hasty, table))
     assert changes == [
-        "beside: it moves, and its shape is beside its own origin; it stands still",
-        "table: it could be pushed and has 2 shapes, an object has one; it stands still",
+        "beside: it moves, but its shape is not at its origin; it is made static",
+        "table: it could be pushed and has 2 shapes, but an object can have only one; it is made static",
     ]
     assert world.bodies[0].path is None
     assert [solid.name for solid in world.solids] == ["table", "table"]

@@ -122,7 +122,7 @@ def _corners(name: str, rng: np.random.Generator) -> Iterator[Array]:
     here: Array | None = None
     while True:
         ends = rng.uniform((left, low), (right, high), (2, 2))
-        way = ways(name).way(Pose2(*(ends[0] if here is None else here)), Pose2(*ends[1]))
+        way = ways(name).path(Pose2(*(ends[0] if here is None else here)), Pose2(*ends[1]))
         if way is not None:
             yield from way if here is None else way[1:]
             here = way[-1]

@@ -9,11 +9,11 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, Box, Solid
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.maps.occupancy_map import walls_from_map
-from simscen.worlds.maps.world_picture import BODY, FREE_GROUND, MAPPED_WALL, SUPERSAMPLING, _view, draw_world
+from simscen.worlds.maps.world_picture import BODY, FREE_GROUND, MAPPED_WALL, SUPERSAMPLING, _viewport, draw_world
 
 
 def color_at(image, built, x, y):
-    view = _view(built.map)
+    view = _viewport(built.map)
     ((column, row),) = view.pixels(np.array([[x, y]]))
     return image.getpixel((int(column / SUPERSAMPLING), int(row / SUPERSAMPLING)))
 

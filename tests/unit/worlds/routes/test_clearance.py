@@ -33,7 +33,7 @@ def test_clearance_agrees_with_shapely_outside_and_is_negative_inside(seed):
     assert np.abs(field.exact(points) - exact)[outside].max() < 0.0015
     assert (field.exact(points)[deep] < 0).all()
     for distance in (0.1, 0.25, 0.6):
-        assert np.array_equal(field.keeps(points, distance), field.exact(points) >= distance)
+        assert np.array_equal(field.has_clearance(points, distance), field.exact(points) >= distance)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -51,12 +51,12 @@ def test_points_are_pushed_off_the_nearest_solid():
     field = clearance_field(wall, empty_grid(BOUNDS, 0.05, "w"), BODY)
     points = np.array([[0.3, 0.0], [-0.2, 1.0], [0.05, 0.0], [0.5, 0.0], [2.0, 0.0]])
     expected = np.array([[0.1, 0], [-0.2, 0], [0.35, 0], [0, 0], [0, 0]])
-    assert field.push(points, 0.3) == pytest.approx(expected, abs=0.001)
+    assert field.push_away(points, 0.3) == pytest.approx(expected, abs=0.001)
 
 
 def test_where_nothing_stands_everything_is_far_away():
     field = clearance_field(merge_solids([]), empty_grid(BOUNDS, 0.05, "w"), BODY)
-    assert field.keeps(np.zeros((3, 2)), 100.0).all()
+    assert field.has_clearance(np.zeros((3, 2)), 100.0).all()
     assert field.free_cells(100.0).all()
 
 

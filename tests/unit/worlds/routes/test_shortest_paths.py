@@ -96,7 +96,7 @@ def test_the_way_keeps_its_distance():
     rng = np.random.default_rng(3)
     posts = [(x, y) for x, y in rng.uniform(-4, 4, (30, 2)).tolist() if abs(x) + abs(y) < 7]
     search = ways(*(Solid(Cylinder(0.2, 1.0), Pose3(x, y, 0.5)) for x, y in posts))
-    way = shapely.LineString(search.way(Pose2(-4.8, -4.8), Pose2(4.8, 4.8)))
+    way = shapely.LineString(search.path(Pose2(-4.8, -4.8), Pose2(4.8, 4.8)))
     assert min(way.distance(shapely.Point(post)) for post in posts) > 0.2 + R - 0.01
 
 

@@ -35,9 +35,7 @@ def test_links_on_a_fixed_joint_are_one_body_with_both_masses(load):
 def test_movable_joints_are_held_rigid_with_a_note(load):
     world = load(model(link("a") + link("b", 4) + joint("a", "b")))
     assert len(world.bodies) == 1
-    assert world.notes == (
-        "shop.world: world[w]/model[cart]/joint[j]: a joint of type revolute is held rigid as it stands",
-    )
+    assert world.notes == ("shop.world: world[w]/model[cart]/joint[j]: a joint of type revolute is treated as fixed",)
 
 
 def test_links_without_a_joint_are_bodies_of_their_own(load):
@@ -50,7 +48,7 @@ def test_what_hangs_on_the_world_does_not_move(load):
     world = load(model(door))
     assert [solid.name for solid in world.solids] == ["cart::frame::c", "cart::panel::c"]
     assert not world.bodies
-    assert "held rigid" in world.notes[0]
+    assert "treated as fixed" in world.notes[0]
 
 
 def test_what_hangs_on_something_static_does_not_move(load):
@@ -114,7 +112,7 @@ def test_joints_to_nowhere_are_refused(refuse):
 def test_bodies_with_the_same_name_get_numbers(load):
     world = load(model(link("a")) + model(link("a"), "Cart"))
     assert [body.name for body in world.bodies] == ["cart", "Cart_1"]
-    assert "is taken" in world.notes[0]
+    assert "is already used" in world.notes[0]
 
 
 def test_more_than_2000_bodies_are_refused(refuse):

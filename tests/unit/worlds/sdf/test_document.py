@@ -29,7 +29,7 @@ def test_a_doctype_is_refused(refuse):
         ("<?xml version='1.0'?>\n", 2, "not well-formed XML: no element found"),
         ("<?xml version='1.0' encoding='klingon'?><sdf/>", 1, "cannot be read as XML"),
         ("<?xml version='1.0'?>\n" + "<a>" * 200_000, 2, "nested deeper than 100"),
-        ("<sdf version='1.9'>\n</sdf>", 1, "holds neither a world nor a model"),
+        ("<sdf version='1.9'>\n</sdf>", 1, "contains neither a world nor a model"),
         ("<sdf version='1.99'><world name='w'/></sdf>", 1, "SDF version 1.99 is not read"),
     ],
 )

@@ -20,7 +20,7 @@ def test_everything_is_lowered_by_the_height_of_the_floor_and_a_note_says_so(loa
     assert [solid.pose.z for solid in world.solids] == pytest.approx([-0.05, 1.0])
     assert world.bodies[0].pose.z == pytest.approx(0.5)
     assert [note.partition("]: ")[2] for note in world.notes] == [
-        "its floor lies 0.050 m high; the world is lowered by as much"
+        "its floor is 0.050 m above z = 0; the world is lowered by that height"
     ]
 
 

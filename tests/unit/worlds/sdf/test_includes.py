@@ -210,7 +210,7 @@ def test_a_broken_included_file_is_told_with_its_line(tmp_path, refuse):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("<sdf version='1.6'><world name='x'/></sdf>", "holds no model"),
+        ("<sdf version='1.6'><world name='x'/></sdf>", "contains no model"),
         ("<robot name='r'/>", "this is a URDF, not an SDF"),
         ("<sdf version='1.13'><model name='x'/></sdf>", "SDF version 1.13 is not read"),
         ("<sdf><model name='x'/></sdf>", "SDF version none is not read"),

@@ -240,7 +240,7 @@ def test_equal_wishes_share_one_mesh_and_nobody_can_change_it(load, tmp_path):
 def test_convex_hulls_are_not_made_and_that_is_said(load, tmp_path):
     (tmp_path / "x.dae").write_text(dae())
     (note,) = load(world("x.dae").replace("<mesh>", "<mesh optimization='convex_hull'>")).notes
-    assert "the mesh is used as it is" in note
+    assert "the mesh is used unchanged" in note
 
 
 def test_a_mesh_may_be_read_by_itself(tmp_path):

@@ -52,7 +52,7 @@ REFUSED = {
     "nolink": (20, "world[w]: no collision geometry in this world: its models have no links"),
     "population": (36, "world[w]/population[p]: <population> is not supported"),
     "pose_rel": (70, "world[w]/model[m]/pose: unknown frame 'q'"),
-    "visual_only": (20, "world[w]: no collision geometry in this world: its links have visuals at most"),
+    "visual_only": (20, "world[w]: no collision geometry in this world: its links have no collisions"),
 }
 
 

@@ -118,7 +118,7 @@ def test_a_broken_model_config_does_not_matter_where_there_is_a_model_sdf(load, 
     (tmp_path / "models" / "crate" / "model.config").write_text(config)
     world = load(include("model://crate"), search=[tmp_path / "models"])
     assert len(world.solids) == 1
-    assert world.notes[0].endswith("; model.sdf beside it is used")
+    assert world.notes[0].endswith("; model.sdf in the same folder is used")
 
 
 def test_a_broken_model_config_alone_is_an_error(refuse, tmp_path):
@@ -130,7 +130,7 @@ def test_a_broken_model_config_alone_is_an_error(refuse, tmp_path):
 
 @pytest.mark.parametrize("static", [0, 1])
 @pytest.mark.parametrize(
-    ("x", "told"), [(9_000, "'far' lies 8998 m away from the middle"), (20_000, "farther than 10000 m")]
+    ("x", "told"), [(9_000, "'far' is 8998 m away from the median"), (20_000, "farther than 10000 m")]
 )
 def test_a_thing_that_was_parked_far_away_is_left_out_with_a_note(load, x, told, static):
     world = load("".join(box(f"m{k}", k, k) for k in range(5)) + box("far", x, static=static))
@@ -146,14 +146,14 @@ def test_a_world_that_is_large_throughout_is_left_as_it_is(load):
 
 
 def test_a_world_of_which_nothing_is_left_is_an_error_even_leniently(load):
-    with pytest.raises(InvalidInput, match="nothing is left of this world: 2 things in it were skipped"):
+    with pytest.raises(InvalidInput, match="nothing is left of this world: 2 of its elements were skipped"):
         load(include("model://gone") + include("model://lost"), lenient=True)
 
 
 def test_a_world_of_only_a_ground_plane_is_empty_and_says_so(load):
     world = load(include("model://ground_plane"))
     assert world.solids == ()
-    assert any("nothing but a ground plane" in note for note in world.notes)
+    assert any("only a ground plane" in note for note in world.notes)
 
 
 def test_planes_larger_than_a_world_are_cut(load):

@@ -58,7 +58,7 @@ def test_every_include_of_the_warehouse_brings_its_mesh(data: Path, name: str) -
     assert all(isinstance(solid.shape, Mesh) for solid in world.solids)
     assert not world.bodies
     assert [note.partition("]: ")[2] for note in world.notes] == [
-        "its floor lies 0.034 m high; the world is lowered by as much"
+        "its floor is 0.034 m above z = 0; the world is lowered by that height"
     ]
     np.testing.assert_allclose(world.bounds, (-6.99, -10.45, 6.99, 10.45), atol=0.01)
 
@@ -150,4 +150,4 @@ def test_an_empty_world_with_only_a_floor_says_so(data: Path) -> None:
     folder = data / "nav2_tb3_sandbox"
     world = load_sdf(folder / "worlds/tb3_empty_world.sdf.xacro", root=folder, lenient=True)
     assert not world.solids
-    assert any("nothing but a ground plane" in note for note in world.notes)
+    assert any("only a ground plane" in note for note in world.notes)
