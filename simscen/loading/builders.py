@@ -166,8 +166,10 @@ def _mask_grid(
     try:
         return load_map(source)
     except InvalidInput as error:
-        place, image = value_position(tree, keys), source.image.name
-        moved = [replace(problem, path=place.path, line=place.line, col=place.col) for problem in error.problems]
+        position, image = value_position(tree, keys), source.image.name
+        moved = [
+            replace(problem, path=position.path, line=position.line, col=position.col) for problem in error.problems
+        ]
         raise InvalidInput(
             [with_source_line(replace(problem, message=f"mask image {image}: {problem.message}")) for problem in moved]
         ) from error

@@ -152,28 +152,30 @@ class LoadedScenario:
         expected = self.spec.expected
         if expected is None:
             return None
-        place = self.key_place_of("expected")
-        return ExpectedFailure(expected.fail, tuple(expected.criteria), place.line if place.path == self.path else 0)
+        position = self.key_position_of("expected")
+        return ExpectedFailure(
+            expected.fail, tuple(expected.criteria), position.line if position.path == self.path else 0
+        )
 
     def key(self, seed: int) -> RunKey:
         """Return the key of the run with this seed."""
         return RunKey(self.id, seed, self.variation, self.stack_name)
 
-    def place_of(self, *keys: Key) -> Position:
-        """Return the position of the value at `keys`, e.g. `place_of("goals", 0, "pose")`."""
+    def position_of(self, *keys: Key) -> Position:
+        """Return the position of the value at `keys`, e.g. `position_of("goals", 0, "pose")`."""
         return value_position(self.tree, keys)
 
-    def key_place_of(self, *keys: Key) -> Position:
+    def key_position_of(self, *keys: Key) -> Position:
         """Return the position of the last of `keys`."""
         return key_position(self.tree, keys)
 
     def problem(self, keys: tuple[Key, ...], code: str, message: str, hint: str = "") -> Problem:
         """Return a problem at the value of `keys`, with the text of its line."""
-        return self.problem_at(self.place_of(*keys), code, message, hint)
+        return self.problem_at(self.position_of(*keys), code, message, hint)
 
-    def problem_at(self, place: Position, code: str, message: str, hint: str = "") -> Problem:
+    def problem_at(self, position: Position, code: str, message: str, hint: str = "") -> Problem:
         """Return a problem at a position in any of the files, with the text of its line."""
-        return self.with_source_line(Problem(*place, code=code, message=message, hint=hint))
+        return self.with_source_line(Problem(*position, code=code, message=message, hint=hint))
 
     def with_source_line(self, problem: Problem) -> Problem:
         """Return the problem, which may be in any of the files, with the text of its line."""

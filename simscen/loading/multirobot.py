@@ -32,15 +32,15 @@ def has_multiple_robots(tree: MappingNode) -> bool:
 
 
 def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
-    own_tree, place = entry.value, entry.value.place
+    own_tree, position = entry.value, entry.value.position
     assert isinstance(own_tree, MappingNode)
     robot = {key: value for key, value in own_tree.entries.items() if key in RobotEntry.model_fields}
     own = {key: value for key, value in own_tree.entries.items() if key not in robot and key != PASS}
-    whole = merge_mappings(MappingNode(tree.place, own), _without(tree, ROBOTS, EXPECTED))
-    criteria = SequenceNode(tree.place, (*_items(child(tree, PASS)), *_items(child(own_tree, PASS))))
+    whole = merge_mappings(MappingNode(tree.position, own), _without(tree, ROBOTS, EXPECTED))
+    criteria = SequenceNode(tree.position, (*_items(child(tree, PASS)), *_items(child(own_tree, PASS))))
     return MappingNode(
-        tree.place,
-        {**whole.entries, ROBOT: Entry(entry.key, MappingNode(place, robot)), PASS: Entry(entry.key, criteria)},
+        tree.position,
+        {**whole.entries, ROBOT: Entry(entry.key, MappingNode(position, robot)), PASS: Entry(entry.key, criteria)},
     )
 
 
@@ -63,14 +63,16 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
     own = {name: Entry(entry.key, _with_stack_of(entry.value, chosen[name])) for name, entry in robots.entries.items()}
     rest = _without(tree, STACK)
     return MappingNode(
-        tree.place, {**rest.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.place, own))}
+        tree.position, {**rest.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.position, own))}
     )
 
 
 def _with_stack_of(robot: Node, part: MappingNode) -> MappingNode:
     """Return the tree of a robot with the complete stack of `part`, since the common `stack` is removed."""
     assert isinstance(robot, MappingNode)
-    return MappingNode(robot.place, robot.entries | {key: entry for key, entry in part.entries.items() if key == STACK})
+    return MappingNode(
+        robot.position, robot.entries | {key: entry for key, entry in part.entries.items() if key == STACK}
+    )
 
 
 def external_stack_name(tree: MappingNode) -> str | None:
@@ -85,7 +87,7 @@ def _items(node: Node | None) -> tuple[Node, ...]:
 
 
 def _without(tree: MappingNode, *keys: str) -> MappingNode:
-    return MappingNode(tree.place, {key: entry for key, entry in tree.entries.items() if key not in keys})
+    return MappingNode(tree.position, {key: entry for key, entry in tree.entries.items() if key not in keys})
 
 
 def missing_in_scenario(tree: MappingNode) -> list[Problem]:
@@ -100,16 +102,16 @@ def missing_in_criteria(tree: MappingNode) -> list[Problem]:
 
 def _single_robot_problems(tree: MappingNode) -> Iterator[Problem]:
     if ROBOT not in tree.entries:
-        yield Problem(*tree.place, "SC010", f"missing key `{ROBOT}`")
+        yield Problem(*tree.position, "SC010", f"missing key `{ROBOT}`")
     yield from _missing_criteria(tree)
 
 
 def _missing_criteria(tree: MappingNode) -> Iterator[Problem]:
     criteria = child(tree, PASS)
     if criteria is None and ROBOTS not in tree.entries:
-        yield Problem(*tree.place, "SC010", f"missing key `{PASS}`")
+        yield Problem(*tree.position, "SC010", f"missing key `{PASS}`")
     if isinstance(criteria, SequenceNode) and not criteria.items:
-        yield Problem(*criteria.place, "SC017", "expected 1 or more values, got 0")
+        yield Problem(*criteria.position, "SC017", "expected 1 or more values, got 0")
 
 
 def _multi_robot_problems(tree: MappingNode) -> Iterator[Problem]:

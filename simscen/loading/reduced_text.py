@@ -60,7 +60,7 @@ def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequenc
     start = original.entries[key].key.line - 1
     if not isinstance(node, SequenceNode) or not value or not node.items:
         return _dumped({key: value})
-    first_lines = [item.place.line - 1 for item in node.items]
+    first_lines = [item.position.line - 1 for item in node.items]
     on_own_lines = all(lines[line].lstrip().startswith("- ") for line in first_lines) and len(set(first_lines)) == len(
         first_lines
     )

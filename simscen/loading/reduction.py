@@ -85,35 +85,37 @@ def roundings(tree: MappingNode, digits: int) -> list[Rounding]:
 
 def rounded_tree(tree: MappingNode, changes: Sequence[Rounding]) -> MappingNode:
     """Return the scenario with these rounded numbers."""
-    return with_values(tree, {one.keys: ScalarNode(node_at(tree, one.keys).place, one.value) for one in changes})
+    return with_values(tree, {one.keys: ScalarNode(node_at(tree, one.keys).position, one.value) for one in changes})
 
 
 def with_seed(tree: MappingNode, seed: int) -> MappingNode:
     """Return the scenario with this seed, without keys that `simscen run` does not need for a single run."""
     entries = {key: entry for key, entry in tree.entries.items() if key not in ("acceptance", "expected", "variations")}
-    place = entries["seed"].key if "seed" in entries else tree.place
-    entries["seed"] = Entry(place, ScalarNode(place, seed))
+    position = entries["seed"].key if "seed" in entries else tree.position
+    entries["seed"] = Entry(position, ScalarNode(position, seed))
     return replace(tree, entries=entries)
 
 
 def removed_parts(before: MappingNode, after: MappingNode) -> list[str]:
     """Return the parts of a scenario that a reduced version lacks; a removed part is listed without its own parts."""
-    remaining = {node.place for _, node in _parts(after)}
+    remaining = {node.position for _, node in _parts(after)}
     found: list[Keys] = []
     for keys, node in _parts(before):
         is_part_of_found = bool(found) and keys[: len(found[-1])] == found[-1]
-        if not is_part_of_found and not any(each.place in remaining for each in (node, *(n for _, n in _parts(node)))):
+        if not is_part_of_found and not any(
+            each.position in remaining for each in (node, *(n for _, n in _parts(node)))
+        ):
             found.append(keys)
     return [part_text(before, keys) for keys in found]
 
 
 def changed_values(before: MappingNode, after: MappingNode) -> list[str]:
     """Return the values that differ in a reduced version of a scenario: `time_limit: 61.7 s -> 60 s`."""
-    values = {node.place: (keys, node.value) for keys, node in _parts(before) if isinstance(node, ScalarNode)}
+    values = {node.position: (keys, node.value) for keys, node in _parts(before) if isinstance(node, ScalarNode)}
     return [
-        f"{dotted_path(values[node.place][0])}: {values[node.place][1]} -> {node.value}"
+        f"{dotted_path(values[node.position][0])}: {values[node.position][1]} -> {node.value}"
         for _, node in _parts(after)
-        if isinstance(node, ScalarNode) and node.place in values and node.value != values[node.place][1]
+        if isinstance(node, ScalarNode) and node.position in values and node.value != values[node.position][1]
     ]
 
 
@@ -183,10 +185,10 @@ def _with_value(node: Node | None, keys: Keys, value: Node) -> Node:
         items = list(node.items)
         items[key] = _with_value(items[key], rest, value)
         return replace(node, items=tuple(items))
-    owner = node if isinstance(node, MappingNode) else MappingNode(value.place, {})
+    owner = node if isinstance(node, MappingNode) else MappingNode(value.position, {})
     below = owner.entries.get(str(key))
-    place: Position = below.key if below is not None else value.place
-    entry = Entry(place, _with_value(below.value if below is not None else None, rest, value))
+    position: Position = below.key if below is not None else value.position
+    entry = Entry(position, _with_value(below.value if below is not None else None, rest, value))
     return replace(owner, entries={**owner.entries, str(key): entry})
 
 

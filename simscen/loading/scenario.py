@@ -146,7 +146,7 @@ class ChangedScenario:
         if problems or not isinstance(merged, MappingNode):
             return problems
         entries = {key: entry for key, entry in merged.entries.items() if key != VARIATIONS}
-        merged = MappingNode(merged.place, entries)
+        merged = MappingNode(merged.position, entries)
         return _with_choice(Variation("", merged), self._library, self.file, self._choice)
 
 
@@ -161,9 +161,9 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
         return [Problem(sandbox.display_name(file), 0, 0, "SC041", message, hint)]
     tree, problems = library.read(file, defaults=True)
     if kind := recognize_stack_file(
-        tree, library.texts.get(name_in_problems := sandbox.display_name(file), ""), name_in_problems
+        tree, library.texts.get(display_name := sandbox.display_name(file), ""), display_name
     ):
-        return [not_a_scenario(kind, name_in_problems)]
+        return [not_a_scenario(kind, display_name)]
     if choice is not None:
         library.add(choice.texts, choice.files)
     if problems or not isinstance(tree, MappingNode):
@@ -206,7 +206,7 @@ def _without_effect(one: Variation, tree: MappingNode, choice: StackChoice) -> I
         if all(node_at(part, change.target.keys) is not change.value for part in each):
             message = f"{quoted(change.target.path)} changes nothing with --stack {choice.written}"
             hint = "select variations that do not set it with -k or --variation, or choose another stack"
-            yield Problem(*change.target.place, "SC055", message, hint)
+            yield Problem(*change.target.position, "SC055", message, hint)
 
 
 def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
@@ -259,15 +259,15 @@ def _load_single_robot(
     robot = assets.robot(spec.only_robot.model, value_position(tree, ("robot", "model")))
     if world is None or robot is None or assets.problems:
         return library.with_source(sorted(assets.problems))
-    sandbox, name_in_problems, places = library.sandbox, library.sandbox.display_name(file), places_of(world)
+    sandbox, display_name, places = library.sandbox, library.sandbox.display_name(file), places_of(world)
     unknown = library.with_source(list(unknown_places(spec, tree, places)))
     loaded = LoadedScenario(
         id=scenario_id(file, sandbox.root),
-        path=name_in_problems,
+        path=display_name,
         file=file,
         root=sandbox.root,
         world_path=sandbox.world_path,
-        text=library.texts[name_in_problems],
+        text=library.texts[display_name],
         spec=resolve_places(spec, places),
         world=world,
         map=robot_map,
@@ -326,8 +326,8 @@ def is_unusable_name(name: str) -> bool:
 
 def scenario_id(file: Path, root: Path) -> str:
     """Return the id of a scenario: its path relative to the root, without suffix."""
-    name_in_problems = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
+    display_name = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
     return next(
-        (name_in_problems.removesuffix(suffix) for suffix in SUFFIXES if name_in_problems.endswith(suffix)),
-        name_in_problems,
+        (display_name.removesuffix(suffix) for suffix in SUFFIXES if display_name.endswith(suffix)),
+        display_name,
     )

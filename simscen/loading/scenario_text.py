@@ -122,5 +122,5 @@ def _one_line_yaml(loaded: LoadedScenario, *keys: Key) -> str:
 
 def _line(loaded: LoadedScenario, *keys: Key) -> int:
     """Return the line in the scenario file; 0 if the keys are in a file that it extends."""
-    place = loaded.place_of(*keys)
-    return place.line if place.path == loaded.path else 0
+    position = loaded.position_of(*keys)
+    return position.line if position.path == loaded.path else 0

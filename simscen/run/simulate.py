@@ -140,7 +140,7 @@ def judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Tra
 def _judge_robot(prepared: PreparedScenario, seed: int, trace: Trace, log: Path | None) -> Run:
     """Judge the trace of one robot."""
     loaded = prepared.loaded
-    places = [loaded.place_of("pass", index) for index in range(len(prepared.spec.pass_))]
+    places = [loaded.position_of("pass", index) for index in range(len(prepared.spec.pass_))]
     # Entries from `extends` or defaults.yaml have no line in the file that reports name.
     lines = tuple(place.line if place.path == loaded.path else 0 for place in places)
     result = judge_run(

@@ -142,7 +142,7 @@ def _check_parameters(what: What, parameters: Nav2Parameters | None, bases: list
         raise InvalidInput(problems)
     if problems:
         print_text(as_text(problems), sys.stderr)
-    print_text(f"{parameters.shown}: Nav2 can work with simscen's /scan, /odom, and {' or '.join(bases)}")
+    print_text(f"{parameters.display_name}: Nav2 can work with simscen's /scan, /odom, and {' or '.join(bases)}")
 
 
 def _find_python() -> str:

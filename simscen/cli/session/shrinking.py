@@ -154,7 +154,7 @@ def only_failing(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
         kept = named or items
         if kept:
             entries["pass"] = Entry(criteria.key, replace(criteria.value, items=tuple(kept)))
-    return with_seed(MappingNode(tree.place, entries), seed)
+    return with_seed(MappingNode(tree.position, entries), seed)
 
 
 def with_inline_world(tree: MappingNode, world: MappingNode | None) -> MappingNode | None:
@@ -162,4 +162,4 @@ def with_inline_world(tree: MappingNode, world: MappingNode | None) -> MappingNo
     entry = tree.entries.get("world")
     if world is None or entry is None or not isinstance(entry.value, ScalarNode):
         return None
-    return MappingNode(tree.place, {**tree.entries, "world": Entry(entry.key, world)})
+    return MappingNode(tree.position, {**tree.entries, "world": Entry(entry.key, world)})

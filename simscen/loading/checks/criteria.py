@@ -80,7 +80,7 @@ def contradicting_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
         keys: Keys = ("pass", index, entry.kind)
         before = next((other for key, other in required_results.items() if key != status), None)
         if before:
-            first = loaded.key_place_of(*before[1])
+            first = loaded.key_position_of(*before[1])
             message = f"{entry.kind} contradicts {before[0]} at {first.line}:{first.col}: no run can pass both"
             yield Finding(keys, message, at_key=True)
         required_results.setdefault(status, (entry.kind, keys))

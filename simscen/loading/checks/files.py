@@ -117,7 +117,7 @@ def _with_lists(tree: Node) -> Node:
         key.removesuffix(APPEND_SUFFIX): entry for key, entry in tree.entries.items() if key.endswith(APPEND_SUFFIX)
     }
     return MappingNode(
-        tree.place, {**entries, **{key: entry for key, entry in tree.entries.items() if key[-1:] != APPEND_SUFFIX}}
+        tree.position, {**entries, **{key: entry for key, entry in tree.entries.items() if key[-1:] != APPEND_SUFFIX}}
     )
 
 

@@ -87,7 +87,7 @@ def duplicate_names(scope: NameScope) -> Iterator[Finding]:
         seen: dict[str, Keys] = {}
         for keys, name in named:
             if name is not None and name in seen:
-                first = loaded.place_of(*seen[name], "name")
+                first = loaded.position_of(*seen[name], "name")
                 message = f"{what} {quoted(name)} is already defined at {first.line}:{first.col}"
                 yield Finding((*keys, "name"), message, "choose another name")
             seen.setdefault(name or "", keys)

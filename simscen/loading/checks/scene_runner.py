@@ -95,8 +95,11 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
 
 def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Problem]:
     """Return the notes of the reader of a world, as warnings about its file."""
-    shown = source.path.relative_to(root).as_posix() if source.path.is_relative_to(root) else str(source.path)
-    return [Problem(shown, 0, 0, "SC311", note.removeprefix(f"{shown}: "), severity="warning") for note in world.notes]
+    display_name = source.path.relative_to(root).as_posix() if source.path.is_relative_to(root) else str(source.path)
+    return [
+        Problem(display_name, 0, 0, "SC311", note.removeprefix(f"{display_name}: "), severity="warning")
+        for note in world.notes
+    ]
 
 
 def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:

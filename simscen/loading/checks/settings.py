@@ -117,7 +117,7 @@ def duplicate_entries(loaded: LoadedScenario) -> Iterator[Finding]:
     for keys, entries in lists:
         for index, entry in enumerate(entries):
             if entry in entries[:index]:
-                first = loaded.place_of(*keys, entries.index(entry))
+                first = loaded.position_of(*keys, entries.index(entry))
                 message = f"the same entry is already in `{keys[-1]}` at {first.line}:{first.col}"
                 yield Finding((*keys, index), message)
 

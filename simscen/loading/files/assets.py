@@ -40,7 +40,7 @@ class Assets:
 
     def world(self, written: ScalarNode) -> LoadedWorld | None:
         """Load the world in the file that a scenario names."""
-        path = self._find(str(written.value), written.place)
+        path = self._find(str(written.value), written.position)
         return None if path is None else self._load_cached(self.world_file, path)
 
     def world_file(self, path: Path) -> LoadedWorld | None:
@@ -59,8 +59,8 @@ class Assets:
         before = len(self.problems)
         loaded_map = sdf = None
         if spec.map is not None:
-            place = value_position(tree, ("map",))
-            found = self._find(spec.map, place)
+            position = value_position(tree, ("map",))
+            found = self._find(spec.map, position)
             loaded_map = self.map_file(found) if found else None
         if spec.sdf is not None:
             sdf = self._find(spec.sdf, value_position(tree, ("sdf",)))
@@ -72,23 +72,23 @@ class Assets:
 
     def map(self, written: ScalarNode) -> LoadedMap | None:
         """Load the ROS map in the file that a scenario names."""
-        path = self._find(str(written.value), written.place)
+        path = self._find(str(written.value), written.position)
         return None if path is None else self._load_cached(self.map_file, path)
 
     def map_file(self, path: Path) -> LoadedMap | None:
         """Load the ROS map in a file."""
         return self._ros_map(self._tree(path), path)
 
-    def robot(self, written: str, place: Position) -> LoadedRobot | None:
+    def robot(self, written: str, position: Position) -> LoadedRobot | None:
         """Load a robot by the path of its file, or by the name of a robot that ships with simscen."""
         if "/" in written or written.endswith((*URDF_SUFFIXES, ".yaml", ".yml")):
-            path = self._find(written, place)
+            path = self._find(written, position)
             return None if path is None else self._load_cached(self.robot_file, path)
         bundled_files = shipped_robots()
         if written in bundled_files:
             return self._load_cached(partial(self.robot_file, bundled=True), bundled_files[written])
         hint = f"{suggestion(written, bundled_files)} (or the path of a *.robot.yaml or .urdf file)"
-        self._add(place, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
+        self._add(position, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
         return None
 
     def robot_file(self, path: Path, bundled: bool = False) -> LoadedRobot | None:
@@ -106,7 +106,7 @@ class Assets:
             return None
         urdf = self._find(spec.urdf, value_position(tree, ("urdf",))) if spec.urdf else None
         places = {package: value_position(tree, ("packages", package)) for package in spec.packages}
-        packages = {package: self._folder(spec.packages[package], place) for package, place in places.items()}
+        packages = {package: self._folder(spec.packages[package], position) for package, position in places.items()}
         if (spec.urdf and urdf is None) or None in packages.values():
             return None
         body = tree if isinstance(tree, MappingNode) else None
@@ -150,29 +150,29 @@ class Assets:
             return None
         return spec
 
-    def _find(self, written: str, place: Position) -> Path | None:
-        found = self._existing(written, place)
+    def _find(self, written: str, position: Position) -> Path | None:
+        found = self._existing(written, position)
         if found is not None and not found.is_file():
-            self._add(place, "SC001", f"not a regular file: {quoted(written)}")
+            self._add(position, "SC001", f"not a regular file: {quoted(written)}")
             return None
         return found
 
-    def _folder(self, written: str, place: Position) -> Path | None:
-        found = self._existing(written, place)
+    def _folder(self, written: str, position: Position) -> Path | None:
+        found = self._existing(written, position)
         if found is not None and not found.is_dir():
-            self._add(place, "SC001", f"not a folder: {quoted(written)}")
+            self._add(position, "SC001", f"not a folder: {quoted(written)}")
             return None
         return found
 
-    def _existing(self, written: str, place: Position) -> Path | None:
-        found = self.library.sandbox.find(written, self.library.folder_of(place))
+    def _existing(self, written: str, position: Position) -> Path | None:
+        found = self.library.sandbox.find(written, self.library.folder_of(position))
         if isinstance(found, PathProblem):
-            self._add(place, found.code, found.message, found.hint)
+            self._add(position, found.code, found.message, found.hint)
             return None
         return found
 
-    def _add(self, place: Position, code: str, message: str, hint: str = "") -> None:
-        self.problems.append(Problem(*place, code=code, message=message, hint=hint))
+    def _add(self, position: Position, code: str, message: str, hint: str = "") -> None:
+        self.problems.append(Problem(*position, code=code, message=message, hint=hint))
 
 
 def is_ros_map(tree: Node | None) -> bool:

@@ -37,7 +37,7 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
     for file, copy in copies.items():
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, copy)
-    for leaf, file in sorted(files.items(), key=lambda item: item[0].place, reverse=True):
+    for leaf, file in sorted(files.items(), key=lambda item: item[0].position, reverse=True):
         text = _with_path(text, leaf, relpath(copies.get(file, file), target.parent))
     target.write_text(text, encoding="utf-8")
     return [target, *copies.values()]
@@ -92,8 +92,8 @@ def _with_dependencies(file: Path, known: frozenset[Path] = frozenset()) -> Iter
 def _with_path(text: str, leaf: ScalarNode, path: str) -> str:
     """Return the text with another path at the position of the leaf."""
     lines = text.split("\n")
-    line, start = lines[leaf.place.line - 1], leaf.place.col - 1
+    line, start = lines[leaf.position.line - 1], leaf.position.col - 1
     quote = line[start] if line[start] in "'\"" else ""
     end = start + len(quote) + len(str(leaf.value)) + len(quote)
-    lines[leaf.place.line - 1] = f"{line[:start]}{quote}{path}{quote}{line[end:]}"
+    lines[leaf.position.line - 1] = f"{line[:start]}{quote}{path}{quote}{line[end:]}"
     return "\n".join(lines)

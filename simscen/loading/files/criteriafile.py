@@ -90,9 +90,11 @@ def _loaded(file: Path, tree: MappingNode, library: Library) -> LoadedCriteria:
         spec = resolve_places(spec, known)
     if assets.problems:
         raise InvalidInput(library.with_source(sorted(assets.problems)))
-    shown = library.sandbox.display_name(file)
+    display_name = library.sandbox.display_name(file)
     places = [value_position(tree, ("pass", index)) for index in range(len(spec.pass_))]
-    return LoadedCriteria(file, spec, tuple(p.line if p.path == shown else 0 for p in places), tree, library, masks)
+    return LoadedCriteria(
+        file, spec, tuple(p.line if p.path == display_name else 0 for p in places), tree, library, masks
+    )
 
 
 def _world(spec: CriteriaSpec, tree: MappingNode, file: Path, assets: Assets) -> LoadedWorld | None:

@@ -17,14 +17,14 @@ EVERY_NODE = "**"
 
 @dataclass(frozen=True)
 class Nav2Parameters:
-    """Parameters by node and dotted name, and their positions; `shown` is the name of the file in messages.
+    """Parameters by node and dotted name, and their positions; `display_name` is the name of the file in messages.
 
     Parameters of `/**` apply to every node of the file. `notes` are warnings about duplicate keys.
     """
 
-    shown: str
+    display_name: str
     nodes: Mapping[str, Mapping[str, Any]]
-    places: Mapping[tuple[str, str], Position]
+    positions: Mapping[tuple[str, str], Position]
     text: str
     notes: tuple[Problem, ...] = ()
 
@@ -32,7 +32,7 @@ class Nav2Parameters:
         """Return the parameters that do not fit what simscen publishes, in the order of the file."""
         found = [
             Problem(
-                *self.places[finding.node, finding.parameter],
+                *self.positions[finding.node, finding.parameter],
                 code="SC340",
                 message=f"{finding.node}: {finding.message}",
                 severity="error" if finding.severe else "warning",
@@ -43,36 +43,36 @@ class Nav2Parameters:
         return [replace(problem, source=lines[problem.line - 1]) for problem in sorted(found)]
 
 
-def read_nav2_parameters(path: Path, shown: str = "") -> Nav2Parameters | list[Problem]:
-    """Return the parameters in a file, or its problems; `shown` is its name in problems (default: its path)."""
-    shown = shown or str(path)
-    text = read_text(path, shown)
+def read_nav2_parameters(path: Path, display_name: str = "") -> Nav2Parameters | list[Problem]:
+    """Return the parameters in a file, or its problems; `display_name` is its name in problems (default: its path)."""
+    display_name = display_name or str(path)
+    text = read_text(path, display_name)
     if isinstance(text, Problem):
         return [text]
-    tree, problems = parse_yaml(text, shown, last_wins=True)
+    tree, problems = parse_yaml(text, display_name, last_wins=True)
     notes = tuple(problem for problem in problems if problem.severity == "warning")
     if len(notes) < len(problems) or tree is None:
         return [problem for problem in problems if problem not in notes]
     found = dict(_nodes(tree, ""))
     if not found:
-        return [Problem(shown, 0, 0, "SC340", f"not a Nav2 parameter file: it has no key {PARAMETERS}")]
+        return [Problem(display_name, 0, 0, "SC340", f"not a Nav2 parameter file: it has no key {PARAMETERS}")]
     nodes: dict[str, dict[str, Any]] = {}
-    places: dict[tuple[str, str], Position] = {}
+    positions: dict[tuple[str, str], Position] = {}
     for_all_nodes = found.pop(EVERY_NODE, None)
-    for name, parameters in found.items() if found else ((EVERY_NODE, MappingNode(Position(shown, 0, 0), {})),):
+    for name, parameters in found.items() if found else ((EVERY_NODE, MappingNode(Position(display_name, 0, 0), {})),):
         nodes[name] = {}
         for source in (for_all_nodes, parameters):
             for key, value in _flat(source, "") if source else ():
                 nodes[name][key] = value.plain
-                places[name, key] = value.place
-    return Nav2Parameters(shown, nodes, places, text, notes)
+                positions[name, key] = value.position
+    return Nav2Parameters(display_name, nodes, positions, text, notes)
 
 
-def is_nav2_parameter_file(text: str, shown: str) -> bool:
+def is_nav2_parameter_file(text: str, display_name: str) -> bool:
     """Return whether a text is a Nav2 parameter file and not a file of simscen."""
     if PARAMETERS not in text:
         return False
-    tree, _ = parse_yaml(text, shown, last_wins=True)
+    tree, _ = parse_yaml(text, display_name, last_wins=True)
     return isinstance(tree, MappingNode) and "simscen" not in tree.entries and any(_nodes(tree, ""))
 
 

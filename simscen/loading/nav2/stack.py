@@ -45,7 +45,7 @@ def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
             for name, entry in robots.entries.items()
         }
         tree = MappingNode(
-            tree.place, {**tree.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.place, own))}
+            tree.position, {**tree.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.position, own))}
         )
     result.tree = _with_expanded_stack(tree, library, result)
     return result
@@ -56,25 +56,25 @@ def _with_expanded_stack(tree: Node, library: Library, result: ExpandedTree) -> 
     if not isinstance(tree, MappingNode) or not isinstance(stack, MappingNode) or NAV2_PARAMS not in stack.entries:
         return tree
     filled = _merge_parameters(stack, library, result)
-    return MappingNode(tree.place, {**tree.entries, STACK: Entry(tree.entries[STACK].key, filled)})
+    return MappingNode(tree.position, {**tree.entries, STACK: Entry(tree.entries[STACK].key, filled)})
 
 
 def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree) -> MappingNode:
     """Return a `stack:` section merged onto its parameter file, which is merged onto Nav2's defaults."""
-    written, place = stack.entries[NAV2_PARAMS].value, value_position(stack, (NAV2_PARAMS,))
+    written, position = stack.entries[NAV2_PARAMS].value, value_position(stack, (NAV2_PARAMS,))
     if not isinstance(written, ScalarNode) or not isinstance(written.value, str):
         return stack  # validation reports the wrong type
-    file = library.sandbox.find(written.value, library.folder_of(place))
+    file = library.sandbox.find(written.value, library.folder_of(position))
     if isinstance(file, PathProblem):
-        result.problems.append(Problem(*place, file.code, file.message, file.hint))
+        result.problems.append(Problem(*position, file.code, file.message, file.hint))
         return stack
-    shown = library.sandbox.display_name(file)
-    parameters = read_nav2_parameters(file, shown)
+    display_name = library.sandbox.display_name(file)
+    parameters = read_nav2_parameters(file, display_name)
     if not isinstance(parameters, Nav2Parameters):
         result.problems += parameters
         return stack
-    library.add({shown: parameters.text}, {shown: file})
-    profile = MappingNode(place, {"profile": Entry(place, ScalarNode(place, "nav2"))})
+    library.add({display_name: parameters.text}, {display_name: file})
+    profile = MappingNode(position, {"profile": Entry(position, ScalarNode(position, "nav2"))})
     translations = list(translate(parameters.nodes, _known_parameters()))
     below = profile
     for one in translations:
@@ -85,45 +85,45 @@ def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree
 
 
 def _nested(one: Translation, parameters: Nav2Parameters) -> MappingNode:
-    place = parameters.places[one.node, one.parameter]
-    node: Node = _node(one.value, place)
+    position = parameters.positions[one.node, one.parameter]
+    node: Node = _node(one.value, position)
     for key in reversed(one.path):
-        node = MappingNode(place, {key: Entry(place, node)})
+        node = MappingNode(position, {key: Entry(position, node)})
     assert isinstance(node, MappingNode)
     return node
 
 
-def _node(value: Any, place: Position) -> Node:
+def _node(value: Any, position: Position) -> Node:
     if isinstance(value, list):
-        return SequenceNode(place, tuple(_node(item, place) for item in value))
-    return ScalarNode(place, value)
+        return SequenceNode(position, tuple(_node(item, position) for item in value))
+    return ScalarNode(position, value)
 
 
 def _notes(translations: Sequence[Translation], parameters: Nav2Parameters) -> Iterator[Problem]:
     """Yield notes on unused parameters: one for each with a reason, one per node for all others."""
     for one in translations:
         if one.note:
-            yield _note(parameters.places[one.node, one.parameter], f"{one.node}: `{one.parameter}`: {one.note}")
-    used = {parameters.places[one.node, one.parameter] for one in translations if one.path}
+            yield _note(parameters.positions[one.node, one.parameter], f"{one.node}: `{one.parameter}`: {one.note}")
+    used = {parameters.positions[one.node, one.parameter] for one in translations if one.path}
     for node in parameters.nodes:
-        places = [
-            (parameters.places[node, one.parameter], one.parameter)
+        positions = [
+            (parameters.positions[node, one.parameter], one.parameter)
             for one in translations
             if one.node == node
             and not one.path
             and not one.note
-            and parameters.places[node, one.parameter] not in used  # parameters of `/**` may be used by another node
+            and parameters.positions[node, one.parameter] not in used  # parameters of `/**` may be used by another node
         ]
-        if places:
-            names = ", ".join(f"{name} ({place.line})" for place, name in sorted(places))
-            yield _note(min(places)[0], f"{node}: simscen has no {names}")
+        if positions:
+            names = ", ".join(f"{name} ({position.line})" for position, name in sorted(positions))
+            yield _note(min(positions)[0], f"{node}: simscen has no {names}")
     for node in unknown_nodes(parameters.nodes):
-        places_of = [place for (name, _), place in parameters.places.items() if name == node]
-        yield _note(min(places_of), f"simscen has no node like {node}")
+        node_positions = [position for (name, _), position in parameters.positions.items() if name == node]
+        yield _note(min(node_positions), f"simscen has no node like {node}")
 
 
-def _note(place: Position, message: str) -> Problem:
-    return Problem(*place, code="SC341", message=message, hint="it is ignored", severity="warning")
+def _note(position: Position, message: str) -> Problem:
+    return Problem(*position, code="SC341", message=message, hint="it is ignored", severity="warning")
 
 
 def _known_parameters() -> Known:

@@ -37,7 +37,9 @@ MissingKeys = Callable[[MappingNode], list[Problem]]
 def check(model: type[Model], tree: Node, find_missing_keys: MissingKeys | None = None) -> Model | list[Problem]:
     """Return the specification in `tree`, or all its problems, including those that `find_missing_keys` finds."""
     if not isinstance(tree, MappingNode):
-        return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")]
+        return [
+            _problem(tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
+        ]
     if problem := _wrong_version(tree):
         return [problem]
     empty = [_empty_value_problem(model, tree, loc) for loc in _empty_values(tree)]
@@ -54,7 +56,9 @@ def check(model: type[Model], tree: Node, find_missing_keys: MissingKeys | None 
 def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
     """Return the problems of a file that other files extend; missing keys are allowed, except inside of lists."""
     if not isinstance(tree, MappingNode):
-        return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")]
+        return [
+            _problem(tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
+        ]
     if problem := _wrong_version(tree):
         return [problem]
     empty = [_empty_value_problem(model, tree, loc) for loc in _empty_values(tree)]
@@ -82,7 +86,7 @@ def _wrong_version(tree: MappingNode) -> Problem | None:
     if not isinstance(version.value, int):
         return None
     message = f"needs schema {version.value}; this version of simscen supports {LANGUAGE_VERSION}"
-    return _problem(version.place, "SC009", message)
+    return _problem(version.position, "SC009", message)
 
 
 def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Problem:
@@ -95,7 +99,7 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
     if kind.startswith("union_tag"):
         return _wrong_type(model, tree, loc, error)
     if loc and loc[-1] == "[key]":
-        name = ScalarNode(tree.place, str(loc[-2]))
+        name = ScalarNode(tree.position, str(loc[-2]))
         return _problem(
             key_position(tree, loc), *messages.translate_error(kind, error.get("ctx", {}), name, error["msg"])
         )
@@ -199,5 +203,5 @@ def _spelling_hint(missing: Problem) -> str:
     return f"did you mean {missing.message.split()[2]}?"
 
 
-def _problem(place: Position, code: str, message: str, hint: str = "") -> Problem:
-    return Problem(place.path, place.line, place.col, code, message, hint)
+def _problem(position: Position, code: str, message: str, hint: str = "") -> Problem:
+    return Problem(position.path, position.line, position.col, code, message, hint)

@@ -57,28 +57,28 @@ def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
     own = child(tree, "stack")
     if own is not None and not isinstance(own, MappingNode):
         return tree  # validation reports the wrong type
-    own = own or MappingNode(tree.place, {})
+    own = own or MappingNode(tree.position, {})
     if choice.section is None and stack_type(own) == choice.type:
         return tree
-    key = tree.entries["stack"].key if "stack" in tree.entries else tree.place
-    return MappingNode(tree.place, {**tree.entries, "stack": Entry(key, _section(own, choice))})
+    key = tree.entries["stack"].key if "stack" in tree.entries else tree.position
+    return MappingNode(tree.position, {**tree.entries, "stack": Entry(key, _section(own, choice))})
 
 
 def _section(own: MappingNode, choice: StackChoice) -> MappingNode:
     scenario_entries = {name: own.entries[name] for name in SCENARIO_KEYS if name in own.entries}
     if choice.section is not None:
         return _with_goal_tolerances(
-            MappingNode(choice.section.place, {**choice.section.entries, **scenario_entries}), own
+            MappingNode(choice.section.position, {**choice.section.entries, **scenario_entries}), own
         )
-    place = Position(f"--stack {choice.written}", 0, 0)
+    position = Position(f"--stack {choice.written}", 0, 0)
     if choice.external_command is not None:
-        named = {EXTERNAL: Entry(place, ScalarNode(place, choice.name))}
+        named = {EXTERNAL: Entry(position, ScalarNode(position, choice.name))}
         if child(own, EXTERNAL) is not None:
-            return MappingNode(own.place, {**own.entries, **named})
+            return MappingNode(own.position, {**own.entries, **named})
     else:
-        named = {"type": Entry(place, ScalarNode(place, choice.type))}
+        named = {"type": Entry(position, ScalarNode(position, choice.type))}
     rate = {name: own.entries[name] for name in COMMON_STACK_KEYS if name in own.entries}
-    return _with_goal_tolerances(MappingNode(place, {**named, **rate, **scenario_entries}), own)
+    return _with_goal_tolerances(MappingNode(position, {**named, **rate, **scenario_entries}), own)
 
 
 def _with_goal_tolerances(section: MappingNode, own: MappingNode) -> MappingNode:
@@ -89,8 +89,8 @@ def _with_goal_tolerances(section: MappingNode, own: MappingNode) -> MappingNode
     tolerances = {name: checker.entries[name] for name in TOLERANCES if name in checker.entries}
     if not tolerances:
         return section
-    whole = MappingNode(checker.place, {**(below.entries if below else {}), **tolerances})
-    return MappingNode(section.place, {**section.entries, GOAL_CHECKER: Entry(own.entries[GOAL_CHECKER].key, whole)})
+    whole = MappingNode(checker.position, {**(below.entries if below else {}), **tolerances})
+    return MappingNode(section.position, {**section.entries, GOAL_CHECKER: Entry(own.entries[GOAL_CHECKER].key, whole)})
 
 
 def stack_type(section: Node) -> str | None:

@@ -55,17 +55,17 @@ def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Pro
     if isinstance(spec, list) or misplaced or not isinstance(section, MappingNode):
         return library.with_source(sorted([*misplaced, *(spec if isinstance(spec, list) else [])]))
     entries = {key: entry for key, entry in section.entries.items() if key != NAV2_PARAMS}
-    return MappingNode(section.place, entries), notes
+    return MappingNode(section.position, entries), notes
 
 
 def _read(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
     """Return the tree of a stack file; for a Nav2 parameter file, of a stack file with `nav2_params`."""
-    shown = library.sandbox.display_name(file)
-    text = read_text(file, shown)
-    if isinstance(text, Problem) or not is_nav2_parameter_file(text, shown):
+    display_name = library.sandbox.display_name(file)
+    text = read_text(file, display_name)
+    if isinstance(text, Problem) or not is_nav2_parameter_file(text, display_name):
         return library.read(file)
-    library.add({shown: text}, {shown: file})
-    here = Position(shown, 1, 1)
+    library.add({display_name: text}, {display_name: file})
+    here = Position(display_name, 1, 1)
 
     def fields(key: str, value: Node) -> dict[str, Entry]:
         return {key: Entry(here, value)}
@@ -88,16 +88,16 @@ STACK_FILE_KIND, NAV2_FILE_KIND = "stack file", "parameter file of Nav2"
 _STACK_FILE_KEYS = frozenset({"simscen", "name", "description", "stack"})
 
 
-def recognize_stack_file(tree: Node | None, text: str, shown: str) -> str:
+def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str:
     """Return STACK_FILE_KIND or NAV2_FILE_KIND if the file is one of them, else ""."""
-    if is_nav2_parameter_file(text, shown):
+    if is_nav2_parameter_file(text, display_name):
         return NAV2_FILE_KIND
     keys = set(tree.entries) if isinstance(tree, MappingNode) else set()
     return STACK_FILE_KIND if "stack" in keys <= _STACK_FILE_KEYS else ""
 
 
-def not_a_scenario(kind: str, shown: str) -> Problem:
+def not_a_scenario(kind: str, display_name: str) -> Problem:
     """Return the problem that a file of this kind is not a scenario, with a hint how to use it."""
-    alternative = f", or name it in a scenario: `stack: {{nav2_params: {shown.rpartition('/')[2]}}}`"
-    hint = f"run scenarios with `--stack NAME={shown}`{alternative if kind == NAV2_FILE_KIND else ''}"
-    return Problem(shown, 0, 0, "SC025", f"this is a {kind}, not a scenario", hint)
+    alternative = f", or name it in a scenario: `stack: {{nav2_params: {display_name.rpartition('/')[2]}}}`"
+    hint = f"run scenarios with `--stack NAME={display_name}`{alternative if kind == NAV2_FILE_KIND else ''}"
+    return Problem(display_name, 0, 0, "SC025", f"this is a {kind}, not a scenario", hint)

@@ -55,8 +55,8 @@ class UserConfig:
 
     def _invalid(self, keys: tuple[str, str], message: str, hint: str) -> InvalidInput:
         assert self.tree is not None and self.library is not None, "only stacks from a file can be invalid"
-        place = value_position(self.tree, ("stacks", *keys))
-        problem = Problem(*place, code="SC061", message=message, hint=hint)
+        position = value_position(self.tree, ("stacks", *keys))
+        problem = Problem(*position, code="SC061", message=message, hint=hint)
         return InvalidInput(self.library.with_source([problem]))
 
 

@@ -86,7 +86,7 @@ class AxisBuilder:
             if lengths[path] != lengths[first]:
                 message = f"{quoted(path)} has {lengths[path]} values, {quoted(first)} has {lengths[first]}"
                 hint = "the lists of `pairs` must have the same length"
-                self.add(node.entries[path].value.place, "SC016", message, hint)
+                self.add(node.entries[path].value.position, "SC016", message, hint)
                 return []
         return [Option(changes) for changes in zip(*self._columns(node, False), strict=True)]
 
@@ -98,7 +98,7 @@ class AxisBuilder:
             name = self._given_name(item)
             entries = [(path, entry) for path, entry in item.entries.items() if path != "name"]
             if not entries:
-                self.add(item.place, "SC010", "this variation changes nothing", "add a path and its value")
+                self.add(item.position, "SC010", "this variation changes nothing", "add a path and its value")
             targets = [(self._target(path, entry), entry) for path, entry in entries]
             changes = [Change(target, entry.value, number) for target, entry in targets if target is not None]
             self._report_overlaps([[Option((change,))] for change in changes])
@@ -109,13 +109,13 @@ class AxisBuilder:
         entry = item.entries.get("name")
         if entry is None:
             return ""
-        place, value = entry.value.place, entry.value.plain
+        position, value = entry.value.position, entry.value.plain
         name = value if isinstance(value, str) else str(value) if isinstance(value, int | float) else ""
         if (error := name_error(name)) is not None:
-            self.add(place, "SC017", error, NAME_HINT)
-        first = self._names.setdefault(name.casefold(), place)
-        if first != place:
-            self.add(place, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
+            self.add(position, "SC017", error, NAME_HINT)
+        first = self._names.setdefault(name.casefold(), position)
+        if first != position:
+            self.add(position, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
         return name
 
     def _sampled(self, sampled: "Sampled", node: Node | None) -> Sequence[Option]:
@@ -128,7 +128,7 @@ class AxisBuilder:
             try:
                 draw_value(sampled, path, 0)
             except ValueError as error:
-                self.add(entry.value.place, "SC016", str(error))
+                self.add(entry.value.position, "SC016", str(error))
                 continue
             if target is not None:
                 targets.append(target)
@@ -156,7 +156,7 @@ class AxisBuilder:
         seen: list[object] = []
         for item in items.items:
             if item.plain in seen:
-                self.add(item.place, "SC054", "this value is listed twice", "remove one of them")
+                self.add(item.position, "SC054", "this value is listed twice", "remove one of them")
             seen.append(item.plain)
 
     def _report_overlaps(self, axes: Sequence[Sequence[Option]]) -> None:
@@ -171,7 +171,7 @@ class AxisBuilder:
                 if one.keys[:shorter] == other.keys[:shorter]:
                     same = len(one.keys) == len(other.keys)
                     what = "change the same value" if same else "overlap: one is part of the other"
-                    self.add(other.place, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
+                    self.add(other.position, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
 
     def conditions(self, block: Node) -> list[Condition]:
         """Return the conditions in the `require` of a block; reports those that cannot be read."""
@@ -181,7 +181,7 @@ class AxisBuilder:
             try:
                 found.append(parse_condition(str(item.value)))
             except ConditionError as error:
-                self.add(item.place, "SC017", str(error), GRAMMAR)
+                self.add(item.position, "SC017", str(error), GRAMMAR)
         return found
 
     def check_paths(self, conditions: Sequence[Condition], block: Node) -> None:
@@ -193,10 +193,10 @@ class AxisBuilder:
             for path in condition.paths:
                 if path not in self.targets and written_value(self.tree, path) is None:
                     message = f"`{path}` is neither varied nor written in the scenario"
-                    self.add(item.place, "SC030", message, "write its value, or vary it")
+                    self.add(item.position, "SC030", message, "write its value, or vary it")
 
-    def add(self, place: Position, code: str, message: str, hint: str = "") -> None:
+    def add(self, position: Position, code: str, message: str, hint: str = "") -> None:
         """Add a problem once."""
-        problem = Problem(*place, code=code, message=message, hint=hint)
+        problem = Problem(*position, code=code, message=message, hint=hint)
         if problem not in self.problems:
             self.problems.append(problem)

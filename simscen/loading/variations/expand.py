@@ -36,9 +36,9 @@ class Variation:
     def set_by(self) -> Mapping[Position, str]:
         """The path of each changed value, by the position of the value and of each of its parts."""
         return {
-            place: change.target.path
+            position: change.target.path
             for change in self.changes
-            for place in (*_places(change.value), change.target.place)
+            for position in (*_positions(change.value), change.target.position)
         }
 
     @property
@@ -159,17 +159,17 @@ def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -
     space = variation_space(tree)
     if not isinstance(space, VariationSpace):
         return space if space is not None else [Variation("", tree)]
-    place = tree.entries[VARIATIONS].value.place
+    position = tree.entries[VARIATIONS].value.position
     try:
         if numbers is not None:
             return [one for number in numbers if (one := _numbered(space, number)) is not None]
-        if problem := _too_many(space, place):
+        if problem := _too_many(space, position):
             return [problem]
         found = space.all_named()
     except ConditionError as error:
-        return [Problem(*_require_place(tree), "SC016", str(error), "")]
+        return [Problem(*_require_position(tree), "SC016", str(error), "")]
     if not found and space.count:
-        return [Problem(*_require_place(tree), "SC016", "no variation meets the conditions", "")]
+        return [Problem(*_require_position(tree), "SC016", "no variation meets the conditions", "")]
     return found or [Variation("", space.tree)]
 
 
@@ -180,8 +180,8 @@ def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
         return None
     from simscen.model.variations import VariationsSection  # most scenarios have no variations
 
-    own = MappingNode(tree.place, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
-    section = check(VariationsSection, MappingNode(tree.place, {VARIATIONS: entry}))
+    own = MappingNode(tree.position, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
+    section = check(VariationsSection, MappingNode(tree.position, {VARIATIONS: entry}))
     if isinstance(section, list):
         return section
     builder, found = AxisBuilder(own), []
@@ -207,12 +207,14 @@ def _numbered(space: VariationSpace, number: int) -> Variation | None:
         return None
 
 
-def _too_many(space: VariationSpace, place: Position) -> Problem | None:
+def _too_many(space: VariationSpace, position: Position) -> Problem | None:
     from simscen.model.variations import MAX_VARIATIONS
 
     if space.count > MAX_VARIATIONS:
         message = f"the scenario has {space.count} variations; the limit is {MAX_VARIATIONS}"
-        return Problem(*place, "SC017", message, "run them with `simscen study`, or use `sampled` to draw some of them")
+        return Problem(
+            *position, "SC017", message, "run them with `simscen study`, or use `sampled` to draw some of them"
+        )
     weights = (sum(max(map(_weight, typical_options(axis))) for axis in block.axes) for block in space.blocks)
     largest = max(weights, default=0)
     values = _size(space.tree) + largest
@@ -220,17 +222,17 @@ def _too_many(space: VariationSpace, place: Position) -> Problem | None:
         message = (
             f"{space.count} variations of up to {values} values exceed the limit of {MAX_TOTAL_VALUES} values in total"
         )
-        return Problem(*place, "SC006", message)
+        return Problem(*position, "SC006", message)
     return None
 
 
-def _require_place(tree: MappingNode) -> Position:
+def _require_position(tree: MappingNode) -> Position:
     """Return the position of the first `require`."""
     value = tree.entries[VARIATIONS].value
     for block in value.items if isinstance(value, SequenceNode) else [value]:
         if isinstance(block, MappingNode) and "require" in block.entries:
-            return block.entries["require"].value.place
-    return value.place
+            return block.entries["require"].value.position
+    return value.position
 
 
 def _name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
@@ -250,15 +252,15 @@ def _weight(option: Option) -> int:
 
 def _size(node: Node) -> int:
     """Return the number of values below a node."""
-    return sum(1 for _ in _places(node))
+    return sum(1 for _ in _positions(node))
 
 
-def _places(node: Node) -> Iterator[Position]:
-    yield node.place
+def _positions(node: Node) -> Iterator[Position]:
+    yield node.position
     if isinstance(node, MappingNode):
         for entry in node.entries.values():
             yield entry.key
-            yield from _places(entry.value)
+            yield from _positions(entry.value)
     elif isinstance(node, SequenceNode):
         for item in node.items:
-            yield from _places(item)
+            yield from _positions(item)

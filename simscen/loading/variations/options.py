@@ -70,7 +70,7 @@ def value_node(distribution: Node, value: object) -> Node:
         assert chosen is not None
         return chosen
     assert isinstance(value, str | int | float)
-    return ScalarNode(distribution.place, value)
+    return ScalarNode(distribution.position, value)
 
 
 def typical_options(axis: Sequence[Option]) -> Sequence[Option]:

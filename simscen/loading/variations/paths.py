@@ -38,21 +38,21 @@ class Target:
     """Path to a value as written, the position of the path, and the keys of the value."""
 
     path: str
-    place: Position
+    position: Position
     keys: tuple[Key, ...]
 
 
-def resolve_path(path: str, place: Position, tree: MappingNode) -> Target:
+def resolve_path(path: str, position: Position, tree: MappingNode) -> Target:
     """Return the target of a path, whose value need not exist in the scenario. Raises PathError."""
     parts = split_path(path)
     if parts[0] in FIXED_KEYS:
         raise PathError(f"a variation cannot change `{parts[0]}`", FIXED_KEYS[parts[0]])
-    return Target(path, place, _keys(path, parts, tree))
+    return Target(path, position, _keys(path, parts, tree))
 
 
 def set_value(tree: MappingNode, target: Target, value: Node) -> MappingNode:
     """Return the scenario with the value set. New nodes have the position of the path."""
-    changed = _with_value(tree, target.keys, value, target.place)
+    changed = _with_value(tree, target.keys, value, target.position)
     assert isinstance(changed, MappingNode)
     return changed
 
@@ -163,15 +163,17 @@ def _file_hint(keys: list[Key]) -> str:
     return ""
 
 
-def _with_value(node: Node | None, keys: tuple[Key, ...], value: Node, place: Position) -> Node:
+def _with_value(node: Node | None, keys: tuple[Key, ...], value: Node, position: Position) -> Node:
     if not keys:
         return value
     first, *rest = keys
     if isinstance(node, SequenceNode) and isinstance(first, int):
         items = list(node.items)
-        items[first] = _with_value(items[first], tuple(rest), value, place)
-        return SequenceNode(node.place, tuple(items))
-    fields = node if isinstance(node, MappingNode) else MappingNode(place, {})
+        items[first] = _with_value(items[first], tuple(rest), value, position)
+        return SequenceNode(node.position, tuple(items))
+    fields = node if isinstance(node, MappingNode) else MappingNode(position, {})
     below = fields.entries.get(str(first))
-    entry = Entry(below.key if below else place, _with_value(below.value if below else None, tuple(rest), value, place))
-    return MappingNode(fields.place, {**fields.entries, str(first): entry})
+    entry = Entry(
+        below.key if below else position, _with_value(below.value if below else None, tuple(rest), value, position)
+    )
+    return MappingNode(fields.position, {**fields.entries, str(first): entry})

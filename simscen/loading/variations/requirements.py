@@ -24,7 +24,7 @@ def all_hold(conditions: Iterable[Condition], values: Mapping[str, Any]) -> bool
 def written_value(tree: MappingNode, path: str) -> Any:
     """Return the value that the scenario has at a path, or None."""
     try:
-        keys = resolve_path(path, tree.place, tree).keys
+        keys = resolve_path(path, tree.position, tree).keys
     except PathError:
         return None
     node: Node | None = tree

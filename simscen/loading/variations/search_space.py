@@ -54,16 +54,16 @@ def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
     entry = tree.entries.get(VARIATIONS)
     if entry is None:
         message, hint = "the scenario has no `variations` to search", "add `sampled` with the range of each value"
-        return [Problem(*tree.place, "SC010", message, hint)]
-    own = MappingNode(tree.place, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
-    section = check(VariationsSection, MappingNode(tree.place, {VARIATIONS: entry}))
+        return [Problem(*tree.position, "SC010", message, hint)]
+    own = MappingNode(tree.position, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
+    section = check(VariationsSection, MappingNode(tree.position, {VARIATIONS: entry}))
     if isinstance(section, list):
         return section
     blocks = section.variations.blocks
     node = entry.value.items[0] if isinstance(entry.value, SequenceNode) and entry.value.items else entry.value
     if len(blocks) != 1 or not blocks[0].is_sampled_alone:
         message, hint = "only the ranges of `sampled` can be searched", "write one block with `sampled` alone"
-        return [Problem(*entry.value.place, "SC016", message, hint)]
+        return [Problem(*entry.value.position, "SC016", message, hint)]
     builder, block = AxisBuilder(own), blocks[0]
     conditions = builder.conditions(node)
     builder.axes(block, node, conditions)

@@ -57,9 +57,9 @@ class Library:
         self.texts |= texts
         self.files |= files
 
-    def folder_of(self, place: Position) -> Path:
+    def folder_of(self, position: Position) -> Path:
         """Return the folder of the file that contains a position; paths in that file are relative to it."""
-        return self.files[place.path].parent
+        return self.files[position.path].parent
 
     def with_source(self, problems: list[Problem]) -> list[Problem]:
         """Return the problems with the text of their lines."""
@@ -78,7 +78,7 @@ class Library:
         if not isinstance(tree, MappingNode) or EXTENDS not in tree.entries:
             return tree, problems
         entry = tree.entries[EXTENDS]
-        own = MappingNode(tree.place, {key: value for key, value in tree.entries.items() if key != EXTENDS})
+        own = MappingNode(tree.position, {key: value for key, value in tree.entries.items() if key != EXTENDS})
         base = self._base_file(entry, path, (*chain, path))
         if isinstance(base, Problem):
             return own, [*problems, base]
@@ -105,17 +105,17 @@ class Library:
         return parse_yaml(text, name)
 
     def _base_file(self, entry: Entry, path: Path, chain: tuple[Path, ...]) -> Path | Problem:
-        place = entry.value.place
+        position = entry.value.position
         if not isinstance(entry.value, ScalarNode) or not isinstance(entry.value.value, str):
-            return Problem(*place, "SC011", f"`{EXTENDS}` must be the path of one file")
+            return Problem(*position, "SC011", f"`{EXTENDS}` must be the path of one file")
         base = self.sandbox.find(entry.value.value, path.parent)
         if isinstance(base, PathProblem):
-            return Problem(*place, base.code, base.message, base.hint)
+            return Problem(*position, base.code, base.message, base.hint)
         if base in chain:
             names = " → ".join(self.sandbox.display_name(file) for file in (*chain[chain.index(base) :], base))
-            return Problem(*place, "SC024", f"circular `extends`: {names}")
+            return Problem(*position, "SC024", f"circular `extends`: {names}")
         if len(self.files) >= MAX_FILES:
-            return Problem(*place, "SC024", f"a scenario can extend at most {MAX_FILES} files")
+            return Problem(*position, "SC024", f"a scenario can extend at most {MAX_FILES} files")
         return base
 
 
@@ -134,9 +134,9 @@ def extend_mapping(over: MappingNode, under: MappingNode) -> MappingNode:
             if below is not None and isinstance(below.value, SequenceNode):
                 del entries[key]
                 items = (*below.value.items, *more.value.items)
-                entries[known] = Entry(more.key, SequenceNode(more.value.place, items))
+                entries[known] = Entry(more.key, SequenceNode(more.value.position, items))
                 break
-    return merge_mappings(MappingNode(over.place, entries), under)
+    return merge_mappings(MappingNode(over.position, entries), under)
 
 
 def merge_mappings(over: MappingNode, under: MappingNode) -> MappingNode:
@@ -155,7 +155,7 @@ def merge_mappings(over: MappingNode, under: MappingNode) -> MappingNode:
             and _same_type(key, above, below)
         ):
             entries[key] = Entry(above.key, merge_mappings(above.value, below.value))
-    return MappingNode(over.place, entries)
+    return MappingNode(over.position, entries)
 
 
 def _same_type(key: str, above: Entry, below: Entry) -> bool:

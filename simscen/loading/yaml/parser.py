@@ -74,7 +74,7 @@ class _Composer:
         next(self._events)  # the end of the document
         after = next(self._events)
         if not isinstance(after, ev.StreamEndEvent):
-            message = f"more than one YAML document (line {self._place(after).line})"
+            message = f"more than one YAML document (line {self._position_of(after).line})"
             raise _ParseError(self._problem(after, "SC004", message, "put each scenario into its own file"))
         return root
 
@@ -115,7 +115,7 @@ class _Composer:
 
     def _content(self, event: ev.NodeEvent, depth: int) -> tuple[Node, int]:
         if isinstance(event, ev.ScalarEvent):
-            return ScalarNode(self._place(event), self._scalar(event)), 0
+            return ScalarNode(self._position_of(event), self._scalar(event)), 0
         if isinstance(event, ev.SequenceStartEvent):
             return self._sequence(event, depth)
         return self._mapping(event, depth)
@@ -135,7 +135,7 @@ class _Composer:
             item, below = self._node(event, depth + 1)
             items.append(item)
             height = max(height, below)
-        return SequenceNode(self._place(start), tuple(items)), height + 1
+        return SequenceNode(self._position_of(start), tuple(items)), height + 1
 
     def _mapping(self, start: ev.Event, depth: int) -> tuple[Node, int]:
         entries: dict[str, Entry] = {}
@@ -151,8 +151,8 @@ class _Composer:
             if key in entries:
                 self._report_duplicate(event, key, entries[key].key)
             if self.last_wins or key not in entries:
-                entries[key] = Entry(self._place(event), value)
-        return MappingNode(self._place(start), self._merge(start, entries, merged)), height + 1
+                entries[key] = Entry(self._position_of(event), value)
+        return MappingNode(self._position_of(start), self._merge(start, entries, merged)), height + 1
 
     def _merge(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
         """Add the merge keys (`<<`): keys of the mapping itself win, then those of earlier aliases."""
@@ -203,14 +203,14 @@ class _Composer:
         else:
             self.problems.append(self._problem(event, "SC007", message, "remove one of them"))
 
-    def _place(self, event: ev.Event) -> Position:
+    def _position_of(self, event: ev.Event) -> Position:
         mark = event.start_mark
         assert mark is not None
         return Position(self.path, mark.line + 1, mark.column + 1)
 
     def _problem(self, event: ev.Event | None, code: str, message: str, hint: str = "") -> Problem:
-        place = self._place(event) if event is not None else Position(self.path, 0, 0)
-        return Problem(*place, code=code, message=message, hint=hint)
+        position = self._position_of(event) if event is not None else Position(self.path, 0, 0)
+        return Problem(*position, code=code, message=message, hint=hint)
 
     def _syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
         mark = error.problem_mark or error.context_mark

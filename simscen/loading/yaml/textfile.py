@@ -15,18 +15,18 @@ MAX_FILE_BYTES = 1 << 20
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufffe\uffff]")
 
 
-def read_text(path: Path, shown: str) -> str | Problem:
+def read_text(path: Path, display_name: str) -> str | Problem:
     """Return the text of a regular UTF-8 file of at most 1 MiB with line breaks as \\n, or a problem.
 
-    `shown` is the name of the file in problems. A FIFO, device, socket or folder is rejected without being read.
+    `display_name` is the name of the file in problems. A FIFO, device, socket or folder is rejected without being read.
     """
     try:
         raw = _read_bytes(path)
     except OSError as error:
-        return Problem(shown, 0, 0, "SC001", os_error_reason(error))
+        return Problem(display_name, 0, 0, "SC001", os_error_reason(error))
     if isinstance(raw, str):
-        return Problem(shown, 0, 0, "SC001", raw)
-    return _decode(raw, shown)
+        return Problem(display_name, 0, 0, "SC001", raw)
+    return _decode(raw, display_name)
 
 
 def os_error_reason(error: OSError) -> str:
@@ -54,19 +54,19 @@ def _read_bytes(path: Path) -> bytes | str:
     return raw if len(raw) <= MAX_FILE_BYTES else "larger than 1 MiB"
 
 
-def _decode(raw: bytes, shown: str) -> str | Problem:
+def _decode(raw: bytes, display_name: str) -> str | Problem:
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = _normalize_line_breaks(raw[: error.start].decode("utf-8-sig", errors="replace"))
         line, column = _position(before, len(before))
         hint = "save the file as UTF-8" + (" (it looks like UTF-16)" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "")
-        return Problem(shown, line, column, "SC002", f"not valid UTF-8 at byte {error.start}", hint)
+        return Problem(display_name, line, column, "SC002", f"not valid UTF-8 at byte {error.start}", hint)
     text = _normalize_line_breaks(text)
     if control := _CONTROL.search(text):
         line, column = _position(text, control.start())
         message = f"control character U+{ord(control[0]):04X}"
-        return Problem(shown, line, column, "SC002", message, "remove it, or write an escape such as \\n")
+        return Problem(display_name, line, column, "SC002", message, "remove it, or write an escape such as \\n")
     return text
 
 

@@ -19,7 +19,7 @@ class Position(NamedTuple):
 class ScalarNode:
     """Scalar value."""
 
-    place: Position
+    position: Position
     value: Scalar
 
     @property
@@ -32,7 +32,7 @@ class ScalarNode:
 class SequenceNode:
     """Sequence of nodes."""
 
-    place: Position
+    position: Position
     items: tuple["Node", ...]
 
     @property
@@ -53,7 +53,7 @@ class Entry:
 class MappingNode:
     """Mapping, in the order of the file."""
 
-    place: Position
+    position: Position
     entries: dict[str, Entry]
 
     @property
@@ -83,7 +83,7 @@ def existing_keys(node: Node, loc: Sequence[Key]) -> tuple[Key, ...]:
 
 def key_position(node: Node, loc: Sequence[Key]) -> Position:
     """Return the position of the last key of `loc`: a key of a mapping, an item of a sequence, or the node itself."""
-    return [node.place, *(place for _, place in _walk(node, loc))][-1]
+    return [node.position, *(position for _, position in _walk(node, loc))][-1]
 
 
 def value_position(node: Node, loc: Sequence[Key]) -> Position:
@@ -91,7 +91,7 @@ def value_position(node: Node, loc: Sequence[Key]) -> Position:
     found = node_at(node, loc)
     if isinstance(found, ScalarNode) and found.value is None:
         return key_position(node, loc)
-    return found.place
+    return found.position
 
 
 def node_at(node: Node, loc: Sequence[Key]) -> Node:
@@ -106,7 +106,7 @@ def _walk(node: Node, loc: Sequence[Key]) -> Iterator[tuple[Key, Position]]:
         below = child(node, part)
         if below is None:
             continue
-        yield part, node.entries[str(part)].key if isinstance(node, MappingNode) else below.place
+        yield part, node.entries[str(part)].key if isinstance(node, MappingNode) else below.position
         node = below
 
 

@@ -58,8 +58,8 @@ def parse(data: bytes, file: str, folder: str) -> Element:
 
 def _printable(name: str) -> str:
     """Return a name with control characters escaped and at most MAX_SHOWN_NAME_LENGTH characters."""
-    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
-    return shown if len(shown) <= MAX_SHOWN_NAME_LENGTH else f"{shown[:MAX_SHOWN_NAME_LENGTH]}…"
+    printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+    return printable if len(printable) <= MAX_SHOWN_NAME_LENGTH else f"{printable[:MAX_SHOWN_NAME_LENGTH]}…"
 
 
 # Values: each function raises UnusableElement at the element that holds an invalid value.

@@ -149,7 +149,7 @@ def test_what_is_said_for_all_holds_for_each_that_says_nothing_else(load):
     assert (a.map, b.map) == (None, "none")
     assert [len(view.spec.pass_) for view in (a, b)] == [1, 2]
     assert [goal.pose.place for goal in a.spec.goals] == ["there"]
-    assert a.place_of("goals", 0).line == 8
+    assert a.position_of("goals", 0).line == 8
 
 
 def test_the_order_of_robots_in_the_file_means_nothing(load):

@@ -34,8 +34,8 @@ def test_a_scenario_comes_with_its_world_and_robot(write: Write, scenario: str, 
 
 def test_places_of_values_and_keys_are_known(write: Write, scenario: str, tmp_path: Path) -> None:
     loaded = _loaded(write("a.scenario.yaml", scenario), tmp_path)
-    assert loaded.place_of("goals", 0, "pose") == ("a.scenario.yaml", 4, 16)
-    assert loaded.key_place_of("goals", 0, "pose") == ("a.scenario.yaml", 4, 10)
+    assert loaded.position_of("goals", 0, "pose") == ("a.scenario.yaml", 4, 16)
+    assert loaded.key_position_of("goals", 0, "pose") == ("a.scenario.yaml", 4, 10)
     problem = loaded.problem(("goals", 0, "pose"), "SC301", "in a wall")
     assert (problem.place, problem.source) == ("a.scenario.yaml:4:16", "goals: [{pose: desk}]")
 
@@ -103,7 +103,7 @@ def test_paths_are_relative_to_the_file_they_are_written_in(write: Write, scenar
     write("base/base.yaml", scenario.replace(": room", ": ../room").replace(": cube", ": ../cube"))
     loaded = _loaded(write("deep/er/a.scenario.yaml", "extends: ../../base/base.yaml\nseed: 3\n"), tmp_path)
     assert loaded.spec.seed == 3
-    assert loaded.place_of("world").path == "base/base.yaml"
+    assert loaded.position_of("world").path == "base/base.yaml"
     assert set(loaded.sources) >= {"base/base.yaml", "deep/er/a.scenario.yaml"}
 
 

@@ -61,7 +61,7 @@ def test_places_stay_in_the_file_they_were_written_in(tmp_path: Path) -> None:
     library = _read(tmp_path, {"a.yaml": "extends: sub/b.yaml\n", "sub/b.yaml": "\nworld: w.yaml\n"})[2]
     tree, _ = library.read(tmp_path / "a.yaml")
     assert tree is not None
-    place = tree.entries["world"].value.place  # type: ignore[union-attr]
+    place = tree.entries["world"].value.position  # type: ignore[union-attr]
     assert place == ("sub/b.yaml", 2, 8)
     assert library.folder_of(place) == tmp_path / "sub"
 
