@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Contract", "Promise", "PromiseBroken", "contracts_of", "promises_of"]
 
-_WHERE = {
+_MODULES = {
     "Contract": "contracts.base",
     "Promise": "contracts.base",
     "PromiseBroken": "contracts.base",
@@ -28,8 +28,8 @@ _WHERE = {
 
 def __getattr__(name: str) -> Any:
     """Import a name on first use, because every start of pytest imports this package."""
-    if name not in _WHERE:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(f"{__name__}.{_WHERE[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

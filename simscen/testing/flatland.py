@@ -23,7 +23,9 @@ from simscen.stack.protocols import RobotModel, Stack, Surroundings
 from simscen.stack.setting import Setting
 
 RATE = 240
+"""Ticks per second."""
 CONTROL, SCAN, ODOMETRY = 12, 24, 6
+"""Periods of the controller, the lidar and odometry in ticks."""
 
 
 def round_robot(radius: float = 0.22, speed: float = 0.5, **limits: float) -> RobotModel:
@@ -108,7 +110,7 @@ class Flatland:
         return best
 
     def clearance(self, robot: RobotModel, pose: Pose2) -> float:
-        """Return the distance from the robot's hull to the nearest surface, which is not positive in contact."""
+        """Return the distance from the robot's footprint to the nearest surface, which is not positive in contact."""
         if robot.radius is not None:
             return float(self.distance(np.array([[pose.x, pose.y]]))[0]) - robot.radius
         corners = np.array(robot.footprint)
@@ -119,7 +121,7 @@ class Flatland:
 
 @dataclass
 class Drive:
-    """Drive of a robot under a stack. `log` are the events, `least` is the smallest clearance so far."""
+    """Drive of a robot that a stack controls. `log` has the events; `min_clearance` is in m."""
 
     world: Flatland
     robot: RobotModel
@@ -140,7 +142,7 @@ class Drive:
         self.track: list[Pose2] = [self.pose]
         self.commands: list[Twist] = []
         self.plans: list[Path] = []
-        self.least = math.inf
+        self.min_clearance = math.inf
 
     def run(self, seconds: float, until: str = "navigation.ended") -> "Drive":
         """Continue for some seconds, or until an event of the kind `until`."""
@@ -179,9 +181,9 @@ class Drive:
 
     def _move(self, command: Twist, dt: float) -> None:
         r = self.robot
-        slower = r.linear_deceleration if abs(command.vx) < abs(self.twist.vx) else r.linear_acceleration
-        vx = self.twist.vx + np.clip(command.vx - self.twist.vx, -slower * dt, slower * dt)
-        vy = self.twist.vy + np.clip(command.vy - self.twist.vy, -slower * dt, slower * dt)
+        limit = r.linear_deceleration if abs(command.vx) < abs(self.twist.vx) else r.linear_acceleration
+        vx = self.twist.vx + np.clip(command.vx - self.twist.vx, -limit * dt, limit * dt)
+        vy = self.twist.vy + np.clip(command.vy - self.twist.vy, -limit * dt, limit * dt)
         turn = r.angular_acceleration * dt
         wz = self.twist.wz + np.clip(command.wz - self.twist.wz, -turn, turn)
         self.twist = Twist(float(vx), float(vy), float(wz))
@@ -192,7 +194,7 @@ class Drive:
             math.remainder(float(self.pose.yaw + wz * dt), 2 * math.pi),
         )
         self.track.append(self.pose)
-        self.least = min(self.least, self.world.clearance(self.robot, self.pose))
+        self.min_clearance = min(self.min_clearance, self.world.clearance(self.robot, self.pose))
 
     def kinds(self, kind: str) -> list[Event]:
         """Return the events of a kind."""

@@ -30,15 +30,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="append",
         default=[],
         metavar="TARGET",
-        help="try every promise that package.module:Class, or an entry point's name, has to keep (repeatable); "
-        "TARGET={JSON} gives its specification values; without paths nothing else is run",
+        help="check all promises of a component: package.module:Class or the name of an entry point (repeatable); "
+        "TARGET={JSON} sets values of its specification; without paths, nothing else runs",
     )
     group.addoption(
         "--simscen-contract-limit",
         type=float,
         default=60.0,
         metavar="SECONDS",
-        help="wall time after which a promise counts as broken because its component does not end (default: 60)",
+        help="wall time after which a promise counts as broken because the component does not return (default: 60)",
     )
 
 
@@ -51,8 +51,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
     try:
         config.stash[_PROMISES] = [promise for target in targets for promise in promises_of_target(target)]
-    except InvalidTarget as wrong:
-        raise pytest.UsageError(f"--simscen-contract {wrong}") from wrong
+    except InvalidTarget as error:
+        raise pytest.UsageError(f"--simscen-contract {error}") from error
     if config.args_source is not pytest.Config.ArgsSource.ARGS:
         config.args[:] = []
 
@@ -97,10 +97,10 @@ class PromiseItem(pytest.Item):
 
         if not isinstance(excinfo.value, PromiseBroken):
             return super().repr_failure(excinfo)
-        told = [f"{self._promise.subject}: {excinfo.value}", f"promised: {self._promise.keep.__doc__}"]
+        lines = [f"{self._promise.subject}: {excinfo.value}", f"promised: {self._promise.verify.__doc__}"]
         if (cause := excinfo.value.__cause__) is not None:
-            told += ["", *traceback.format_exception(cause)]
-        return "\n".join(told).rstrip()
+            lines += ["", *traceback.format_exception(cause)]
+        return "\n".join(lines).rstrip()
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
         """Return the promise as a sentence."""

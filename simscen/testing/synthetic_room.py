@@ -20,7 +20,7 @@ from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 from simscen.stack.setting import Setting
 
 TICK_RATE, ODOMETRY_PERIOD, SCAN_PERIOD = 240, 6, 24
-EACH = SCAN_PERIOD // ODOMETRY_PERIOD
+READINGS_PER_SCAN = SCAN_PERIOD // ODOMETRY_PERIOD
 RANGE_MAX, BEAMS = 12.0, 360
 # Boxes as (left, bottom, right, top) in m: four walls of different depth, then furniture.
 BOXES = np.array([
@@ -28,7 +28,7 @@ BOXES = np.array([
     (-1.13, 1.62, -0.88, 4.06), (-5.07, -0.52, -3.31, -0.29), (2.21, -2.44, 3.02, -1.17), (1.37, 2.73, 2.96, 3.34),
     (-2.52, -4.03, -1.49, -3.06), (3.58, 0.71, 4.93, 1.29), (-3.52, 2.18, -3.07, 2.61),
 ])  # fmt: skip
-ROUND = ((-2.5, -1.8), (0.8, -2.9), (0.9, -0.4), (3.9, -0.2), (2.6, 1.7), (0.3, 2.4), (0.1, 0.6), (-2.2, 1.0),
+WAYPOINTS = ((-2.5, -1.8), (0.8, -2.9), (0.9, -0.4), (3.9, -0.2), (2.6, 1.7), (0.3, 2.4), (0.1, 0.6), (-2.2, 1.0),
          (-2.0, 3.2), (-4.2, 3.0), (-4.1, 0.8), (-2.4, 0.2))  # fmt: skip
 ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), 0.2, 0.5, 0.2, 0.0, 1.5, 1, 1, 3)
 
@@ -59,9 +59,10 @@ def cast(poses: Array, angles: Array, boxes: Array = BOXES) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Drive with `truth` (k, 3) at 40 Hz from tick 0, `steps` (k, 3) of the wheels to each row, and perfect scans.
+    """Drive through the room, sampled at 40 Hz from tick 0.
 
-    The scans are `ranges` (k / 4, 360) at 10 Hz.
+    `truth` (k, 3) are the true poses, `steps` (k, 3) the motion to each pose from the previous one in its base frame,
+    and `ranges` (k / 4, 360) the perfect scans at 10 Hz.
     """
 
     truth: Array
@@ -70,25 +71,25 @@ class Drive:
 
 
 def record(truth: Array) -> Drive:
-    """Return the drive along some poses."""
+    """Return the drive along poses (k, 3)."""
     poses = [Pose2(*row) for row in truth]
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(poses))])
     angles = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS, dtype=np.float64)
-    return Drive(truth, steps, cast(truth[::EACH], angles))
+    return Drive(truth, steps, cast(truth[::READINGS_PER_SCAN], angles))
 
 
 @cache
 def drive(seconds: float, first: int = 0) -> Drive:
     """Return a drive through the room at up to 0.5 m/s and 1 rad/s, from the waypoint `first`."""
-    dt, pose, goal = ODOMETRY_PERIOD / TICK_RATE, Pose2(*ROUND[first], 0.0), first + 1
+    dt, pose, goal = ODOMETRY_PERIOD / TICK_RATE, Pose2(*WAYPOINTS[first], 0.0), first + 1
     truth = [pose]
     for _ in range(round(seconds / dt)):
-        place = Pose2(*ROUND[goal % len(ROUND)])
-        goal += pose.distance(place) < 0.3
-        x, y, _ = pose.between(place)
+        waypoint = Pose2(*WAYPOINTS[goal % len(WAYPOINTS)])
+        goal += pose.distance(waypoint) < 0.3
+        x, y, _ = pose.between(waypoint)
         error = np.arctan2(y, x)
-        turn, ahead = np.clip(2 * error, -1, 1) * dt, 0.5 * max(0.0, np.cos(error)) ** 4 * dt
-        pose = pose.compose(Pose2(ahead * np.cos(turn / 2), ahead * np.sin(turn / 2), turn))
+        turn, forward = np.clip(2 * error, -1, 1) * dt, 0.5 * max(0.0, np.cos(error)) ** 4 * dt
+        pose = pose.compose(Pose2(forward * np.cos(turn / 2), forward * np.sin(turn / 2), turn))
         truth.append(pose)
     return record(np.array(truth))
 
@@ -101,13 +102,13 @@ def surroundings(room: OccupancyGrid | None = None) -> Surroundings:
 def localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
     """Return a localizer in the room."""
     setting = Setting(surroundings(), "localizer", Streams(seed), estimate=estimate)
-    made: Localizer = spec.implementation()(spec, setting)
-    return made
+    localizer: Localizer = spec.implementation()(spec, setting)
+    return localizer
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of the sensors, as in simscen.model.robot. That of odometry grows with the square root of the distance."""
+    """Sensor noise, as in simscen.model.robot. Odometry noise grows with the square root of the distance."""
 
     lidar: float = 0.01
     translation: float = 0.01
@@ -117,20 +118,22 @@ class Noise:
     gyro_bias: float = 0.0005
 
 
-USUAL = Noise()
+DEFAULT_NOISE = Noise()
 
 
-def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = USUAL, *, imu: bool = False) -> list[Belief]:
+def run(
+    subject: Localizer, drive: Drive, seed: int, noise: Noise = DEFAULT_NOISE, *, imu: bool = False
+) -> list[Belief]:
     """Return the beliefs (k) of a localizer, one for each row of the truth."""
     rng, beliefs = np.random.default_rng((seed, 2)), []
     ranges = drive.ranges + rng.normal(0, noise.lidar, drive.ranges.shape)
     ranges = np.where(ranges < RANGE_MAX, np.round(ranges, 3), np.inf)
     odometry, bias = Pose2(0, 0, 0), rng.normal(0, noise.gyro_bias)
     for row, step in enumerate(drive.steps):
-        tick, way = row * ODOMETRY_PERIOD, float(np.hypot(step[0], step[1]))
-        heading = np.sqrt(noise.rotation**2 * abs(step[2]) + noise.drift**2 * way)
-        stretched = 1 + rng.normal() * noise.translation * np.sqrt(way) / max(way, 1e-9)
-        odometry = odometry.compose(Pose2(step[0] * stretched, step[1] * stretched, step[2] + rng.normal() * heading))
+        tick, distance = row * ODOMETRY_PERIOD, float(np.hypot(step[0], step[1]))
+        heading_std = np.sqrt(noise.rotation**2 * abs(step[2]) + noise.drift**2 * distance)
+        scale = 1 + rng.normal() * noise.translation * np.sqrt(distance) / max(distance, 1e-9)
+        odometry = odometry.compose(Pose2(step[0] * scale, step[1] * scale, step[2] + rng.normal() * heading_std))
         if imu and row:
             rate = step[2] * TICK_RATE / ODOMETRY_PERIOD + bias + rng.normal() * noise.gyro
             subject.on_imu(Imu("imu", tick, (0.0, 0.0, rate), (0.0, 0.0, 9.81)))
@@ -143,13 +146,13 @@ def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = USUAL, *, im
 
 def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
     """Return a scan of 360 degrees by a lidar at the center of the robot."""
-    given = {
+    defaults = {
         "angle_min": -np.pi,
         "angle_increment": 2 * np.pi / max(len(ranges), 1),
         "range_min": 0.05,
         "range_max": RANGE_MAX,
     }
-    return Scan("lidar", tick, ranges, **(given | changes))  # type: ignore[arg-type]
+    return Scan("lidar", tick, ranges, **(defaults | changes))  # type: ignore[arg-type]
 
 
 def errors(beliefs: list[Belief], truth: Array) -> Array:

@@ -15,7 +15,7 @@ from simscen.core.records.trace import Samples, Ticks, Trace
 TICK_RATE, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
 
 
-def synthetic_trace(words: Mapping[str, Any]) -> Trace:
+def synthetic_trace(description: Mapping[str, Any]) -> Trace:
     """Return a trace with 240 Hz ticks, truth at 40 Hz, scans and belief at 10 Hz.
 
     seconds: duration · truth: waypoints [t, x, y, yaw] with straight lines at constant speed between them · belief:
@@ -23,26 +23,28 @@ def synthetic_trace(words: Mapping[str, Any]) -> Trace:
     scans: intervals [from, to] with scans · events: [t, kind, name, {data}] · plans: [t, [[x, y], …]] · objects:
     {name: waypoints} · ended: why the run ended; null for a truncated log.
     """
-    end = round(words["seconds"] * TICK_RATE)
+    end = round(description["seconds"] * TICK_RATE)
     ticks = np.arange(0, end + 1, TRUTH_PERIOD, dtype=np.int64)
-    truth = _way(words["truth"], ticks)
+    truth = _poses_at(description["truth"], ticks)
     return Trace(
         tick_rate=TICK_RATE,
         truth=truth,
         velocity=Samples(ticks, _velocity(truth)),
-        clearance=_clearance(words.get("clearance", 1.0), ticks),
-        belief=_belief(words.get("belief", {"offset": [0, 0, 0]}), words["truth"], end),
+        clearance=_clearance(description.get("clearance", 1.0), ticks),
+        belief=_belief(description.get("belief", {"offset": [0, 0, 0]}), description["truth"], end),
         odometry=truth,
         command=Samples(ticks, _velocity(truth)),
-        scans=_scans(words.get("scans", [[0, words["seconds"]]]), end),
-        plans=tuple(Path(_lifted(points), round(t * TICK_RATE)) for t, points in words.get("plans", [])),
-        events=_events(words, end),
-        objects={name: _way(way, ticks) for name, way in sorted(words.get("objects", {}).items())},
+        scans=_scans(description.get("scans", [[0, description["seconds"]]]), end),
+        plans=tuple(Path(_path_points(points), round(t * TICK_RATE)) for t, points in description.get("plans", [])),
+        events=_events(description, end),
+        objects={
+            name: _poses_at(waypoints, ticks) for name, waypoints in sorted(description.get("objects", {}).items())
+        },
         end=end,
     )
 
 
-def _way(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
+def _poses_at(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
     """Return x, y, yaw at `ticks`, interpolated between waypoints; headings turn the shorter way."""
     points = np.array([[*point, 0.0][:4] for point in waypoints], dtype=np.float64)
     times = ticks / TICK_RATE
@@ -59,85 +61,86 @@ def _velocity(truth: Samples) -> Array:
     dx, dy, turn = np.diff(truth.values, axis=0).T / step
     turn = wrap_array(turn * step) / step
     c, s = np.cos(truth.values[:-1, 2]), np.sin(truth.values[:-1, 2])
-    moving = np.column_stack((c * dx + s * dy, c * dy - s * dx, turn))
-    return np.vstack((moving, moving[-1:]))
+    velocity = np.column_stack((c * dx + s * dy, c * dy - s * dx, turn))
+    return np.vstack((velocity, velocity[-1:]))
 
 
-def _belief(words: Any, truth: Sequence[Sequence[float]], end: int) -> Samples:
-    if words is None:
+def _belief(description: Any, truth: Sequence[Sequence[float]], end: int) -> Samples:
+    if description is None:
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 9)))
     ticks = np.arange(0, end + 1, BELIEF_PERIOD, dtype=np.int64)
-    if isinstance(words, Mapping):
-        poses = _way(truth, ticks).values + np.array(words["offset"], dtype=np.float64)
+    if isinstance(description, Mapping):
+        poses = _poses_at(truth, ticks).values + np.array(description["offset"], dtype=np.float64)
     else:
-        poses = _way(words, ticks).values
+        poses = _poses_at(description, ticks).values
     covariance = np.tile([0.01, 0.0, 0.0, 0.01, 0.0, 0.01], (len(ticks), 1))
     return Samples(ticks, np.column_stack((poses, covariance)))
 
 
-def _clearance(words: Any, ticks: Ticks) -> Samples:
-    points = np.array([[0.0, words]] if isinstance(words, int | float) else words, dtype=np.float64)
+def _clearance(values: Any, ticks: Ticks) -> Samples:
+    points = np.array([[0.0, values]] if isinstance(values, int | float) else values, dtype=np.float64)
     return Samples(ticks, np.interp(ticks / TICK_RATE, points[:, 0], points[:, 1])[:, np.newaxis])
 
 
-def _scans(stretches: Sequence[Sequence[float]], end: int) -> Ticks:
+def _scans(intervals: Sequence[Sequence[float]], end: int) -> Ticks:
     ticks = np.arange(0, end + 1, SCAN_PERIOD, dtype=np.int64)
-    arrives = np.zeros(len(ticks), dtype=bool)
-    for begin, until in stretches:
-        arrives |= (ticks >= begin * TICK_RATE) & (ticks <= until * TICK_RATE)
-    return ticks[arrives]
+    has_scan = np.zeros(len(ticks), dtype=bool)
+    for begin, until in intervals:
+        has_scan |= (ticks >= begin * TICK_RATE) & (ticks <= until * TICK_RATE)
+    return ticks[has_scan]
 
 
-def _events(words: Mapping[str, Any], end: int) -> tuple[Event, ...]:
+def _events(description: Mapping[str, Any], end: int) -> tuple[Event, ...]:
     events = []
-    for at, kind, *rest in words.get("events", []):
+    for seconds, kind, *rest in description.get("events", []):
         name, data = [*rest, "", {}][:2] if len(rest) != 1 else (rest[0], {})
-        events.append(Event(round(at * TICK_RATE), kind, name, data))
-    ended = words.get("ended", "navigation ended")
+        events.append(Event(round(seconds * TICK_RATE), kind, name, data))
+    ended = description.get("ended", "navigation ended")
     return (*events, *([] if ended is None else [Event(end, EventKind.RUN_ENDED, ended)]))
 
 
-def _lifted(points: Sequence[Sequence[float]]) -> Array:
-    """Return path points with the heading of the path."""
+def _path_points(points: Sequence[Sequence[float]]) -> Array:
+    """Return the points (n, 3) of a path with the heading of each segment; the last heading is repeated."""
     xy = np.array(points, dtype=np.float64)[:, :2]
     steps = np.diff(xy, axis=0)
     yaw = np.arctan2(steps[:, 1], steps[:, 0])
     return np.column_stack((xy, np.append(yaw, yaw[-1:])))
 
 
-def synthetic_case(words: Mapping[str, Any]) -> Case:
+def synthetic_case(description: Mapping[str, Any]) -> Case:
     """Return a case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · sent ·
     expected {goal: failed or a code} · shortest {goal: meters} · passages [[goal, [x, y], [x, y], name, name]] ·
     disturbances [{name, kind, …}] ·
     masks {file: {resolution, origin: [x, y, yaw], blocks: [[column, row, width, height, value]]}} · …"""
     goals, sent = (
-        tuple(Goal(**{**goal, "pose": _pose(goal["pose"])}) for goal in words.get(key, [])) for key in ("goals", "sent")
+        tuple(Goal(**{**goal, "pose": _pose(goal["pose"])}) for goal in description.get(key, []))
+        for key in ("goals", "sent")
     )
     return Case(
-        start=_pose(words.get("start", [0, 0])),
+        start=_pose(description.get("start", [0, 0])),
         goals=goals,
         sent=sent,
-        shortest=words.get("shortest", {}),
-        regions={name: tuple((x, y) for x, y in corners) for name, corners in words.get("regions", {}).items()},
-        footprint=tuple((x, y) for x, y in words.get("footprint", [])),
-        inscribed_radius=words.get("inscribed_radius", 0.2),
-        time_limit=words.get("time_limit", 60.0),
-        clearance_range=words.get("clearance_range", CLEARANCE_RANGE),
+        shortest=description.get("shortest", {}),
+        regions={name: tuple((x, y) for x, y in corners) for name, corners in description.get("regions", {}).items()},
+        footprint=tuple((x, y) for x, y in description.get("footprint", [])),
+        inscribed_radius=description.get("inscribed_radius", 0.2),
+        time_limit=description.get("time_limit", 60.0),
+        clearance_range=description.get("clearance_range", CLEARANCE_RANGE),
         passages=tuple(
             Passage(goal, ((ax, ay), (bx, by)), (one, other))
-            for goal, (ax, ay), (bx, by), one, other in words.get("passages", [])
+            for goal, (ax, ay), (bx, by), one, other in description.get("passages", [])
         ),
-        masks={name: MaskBlocks(**_mask(mask)) for name, mask in words.get("masks", {}).items()},
-        expected=words.get("expected", {}),
-        disturbances=tuple(Disturbance(**ordered) for ordered in words.get("disturbances", [])),
+        masks={name: MaskBlocks(**_mask(mask)) for name, mask in description.get("masks", {}).items()},
+        expected=description.get("expected", {}),
+        disturbances=tuple(Disturbance(**ordered) for ordered in description.get("disturbances", [])),
     )
 
 
-def _mask(words: Mapping[str, Any]) -> dict[str, Any]:
-    blocks = tuple(tuple(block) for block in words["blocks"])
-    return {**words, "blocks": blocks, "origin": _pose(words.get("origin", [0, 0]))}
+def _mask(description: Mapping[str, Any]) -> dict[str, Any]:
+    blocks = tuple(tuple(block) for block in description["blocks"])
+    return {**description, "blocks": blocks, "origin": _pose(description.get("origin", [0, 0]))}
 
 
-def _pose(words: Sequence[float]) -> Pose2:
-    x, y, yaw = [*words, 0.0][:3]
+def _pose(values: Sequence[float]) -> Pose2:
+    x, y, yaw = [*values, 0.0][:3]
     return Pose2(float(x), float(y), float(yaw))

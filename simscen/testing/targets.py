@@ -1,4 +1,4 @@
-"""Contracts of the plug-ins that a user names."""
+"""Contracts of plug-ins, selected by a specification, a class, or the name of an entry point."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ from simscen.triggers.base import Condition
 ROBOTS = {"round robot": round_robot(), "long robot": box_robot(speed=0.8)}
 """Default robots for planners, controllers and behaviors: 0.44 m wide, and 0.42 m by 0.31 m."""
 
-_WITH_ROBOTS: dict[type, Callable[..., Contract]] = {
+_CONTRACTS_PER_ROBOT: dict[type, Callable[..., Contract]] = {
     PlannerSpec: PlannerContract,
     ControllerSpec: ControllerContract,
     BehaviorSpec: BehaviorContract,
 }
-_ALONE: dict[type, Callable[..., Contract]] = {
+_CONTRACTS: dict[type, Callable[..., Contract]] = {
     LocalizerSpec: LocalizerContract,
     StackBase: StackContract,
     Criterion: CriterionContract,
@@ -63,16 +63,16 @@ class InvalidTarget(Exception):
 
 def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Contract]:
     """Return the contracts of a specification, one for each robot if the robot matters."""
-    for kind, contract in _WITH_ROBOTS.items():
+    for kind, contract in _CONTRACTS_PER_ROBOT.items():
         if isinstance(spec, kind):
-            several = (robots or ROBOTS).items()
-            return [contract(spec, robot, f"{subject} on a {name}".strip()) for name, robot in several]
+            named_robots = (robots or ROBOTS).items()
+            return [contract(spec, robot, f"{subject} on a {name}".strip()) for name, robot in named_robots]
     if isinstance(spec, GoalCheckerSpec):
         return [GoalCheckerContract(spec, ROBOTS["round robot"], subject)]
-    for kind, contract in _ALONE.items():
+    for kind, contract in _CONTRACTS.items():
         if isinstance(spec, kind):
             return [contract(spec, subject=subject)]
-    raise InvalidTarget(f"{type(spec).__name__} is no specification of {', '.join(GROUPS)}")
+    raise InvalidTarget(f"{type(spec).__name__} is not a specification of one of: {', '.join(GROUPS)}")
 
 
 def promises_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Promise]:
@@ -90,60 +90,62 @@ def promises_of_target(target: str) -> list[Promise]:
     The class is a specification, or a component whose first argument is one. Values of the specification follow as
     JSON after `=`: `my_planner={"weight": 2}`. Raises InvalidTarget.
     """
-    what, _, written = target.partition("=")
+    component, _, values_json = target.partition("=")
     try:
-        values = json.loads(written) if written else {}
+        values = json.loads(values_json) if values_json else {}
     except ValueError as error:
-        raise InvalidTarget(f"{target}: {written} is no JSON: {error}") from error
-    return [each for model in _models(what) for each in promises_of(_instance(model, values, target), what)]
+        raise InvalidTarget(f"{target}: {values_json} is not valid JSON: {error}") from error
+    return [each for model in _models(component) for each in promises_of(_instance(model, values, target), component)]
 
 
-def _models(what: str) -> Sequence[Any]:
-    if ":" in what:
-        return [specification_of(_resolved(what), what)]
-    entries = [entry for group in GROUPS if (entry := find(group, what)) is not None]
+def _models(component: str) -> Sequence[Any]:
+    if ":" in component:
+        return [specification_of(_import_class(component), component)]
+    entries = [entry for group in GROUPS if (entry := find(group, component)) is not None]
     if not entries:
         raise InvalidTarget(
-            f"{what}: no installed package adds anything of that name, and it is no package.module:Class"
+            f"{component}: no installed package adds anything of that name, and it is not package.module:Class"
         )
-    return [_loaded(entry) for entry in entries]
+    return [_load_entry(entry) for entry in entries]
 
 
-def _loaded(entry: Entry) -> Any:
+def _load_entry(entry: Entry) -> Any:
     try:
         return entry.load()
     except BrokenPlugin as broken:
         raise InvalidTarget(str(broken)) from broken
 
 
-def _resolved(what: str) -> Any:
-    module, _, name = what.partition(":")
+def _import_class(component: str) -> Any:
+    module, _, name = component.partition(":")
     try:
         return getattr(import_module(module), name)
     except (ImportError, AttributeError) as error:
-        raise InvalidTarget(f"{what}: {error}") from error
+        raise InvalidTarget(f"{component}: {error}") from error
 
 
-def specification_of(promises_of_target: Any, what: str) -> Any:
+def specification_of(component_class: Any, component: str) -> Any:
     """Return the specification, or for a component the specification that its constructor takes."""
-    if not inspect.isclass(promises_of_target):
-        raise InvalidTarget(f"{what} is no class")
-    if hasattr(promises_of_target, "model_validate"):
-        return promises_of_target
-    parameters = list(inspect.signature(promises_of_target).parameters)
-    hint = get_type_hints(promises_of_target.__init__).get(parameters[0]) if parameters else None
+    if not inspect.isclass(component_class):
+        raise InvalidTarget(f"{component} is not a class")
+    if hasattr(component_class, "model_validate"):
+        return component_class
+    parameters = list(inspect.signature(component_class).parameters)
+    hint = get_type_hints(component_class.__init__).get(parameters[0]) if parameters else None
     if not inspect.isclass(hint) or not hasattr(hint, "model_validate"):
-        raise InvalidTarget(f"{what}: its first argument is not annotated with a specification, so name that one")
+        raise InvalidTarget(
+            f"{component}: its first argument is not annotated with a specification; give the specification instead"
+        )
     return hint
 
 
 def _instance(model: Any, values: Any, target: str) -> Any:
     if not isinstance(values, dict) and not issubclass(model, RootModel):
-        raise InvalidTarget(f"{target}: {json.dumps(values)} is no JSON object")
+        raise InvalidTarget(f"{target}: {json.dumps(values)} is not a JSON object")
     try:
         return model.model_validate(values, by_alias=True, by_name=False)
     except ValidationError as error:
-        wrong = "; ".join(f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors())
+        problems = "; ".join(f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors())
         example = "1.0" if issubclass(model, RootModel) else '{"key": 1}'
         hint = "" if values else f", e.g. {target}={example}"
-        raise InvalidTarget(f"{target}: {model.__name__} needs other values ({wrong}){hint}") from error
+        raise InvalidTarget(f"{target}: {model.__name__} has invalid values ({problems}){hint}") from error

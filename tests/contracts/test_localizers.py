@@ -10,7 +10,7 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf, GroundTruth, LocalizerSpec, OdometryOnly
 from simscen.testing import Promise, promises_of
-from simscen.testing.contracts.localizer import here, short
+from simscen.testing.contracts.localizer import short_drive, start_estimate
 from simscen.testing.synthetic_room import Drive, localizer, run
 
 SPECS: dict[str, LocalizerSpec] = {
@@ -41,9 +41,9 @@ def test_it_keeps_its_promise(promise: Promise) -> None:
 def test_after_a_reset_the_belief_is_exactly_the_estimate(spec: LocalizerSpec) -> None:
     """More than the contract asks: a localizer that draws particles may be off by what they are off."""
     used = localizer(spec, Estimate(Pose2(3, 3, 3)), 1)
-    run(used, Drive(short().truth[:80], short().steps[:80], short().ranges[:20]), 1, imu=True)
-    used.reset(here())
-    assert used.belief.pose == here().pose
-    assert np.allclose(used.belief.covariance, np.diag(np.square(here().std)))
+    run(used, Drive(short_drive().truth[:80], short_drive().steps[:80], short_drive().ranges[:20]), 1, imu=True)
+    used.reset(start_estimate())
+    assert used.belief.pose == start_estimate().pose
+    assert np.allclose(used.belief.covariance, np.diag(np.square(start_estimate().std)))
     used.on_odometry(Odometry("odom", 0, Pose2(-8, 4, 2), Twist()))
-    assert used.belief.pose == pytest.approx(here().pose)
+    assert used.belief.pose == pytest.approx(start_estimate().pose)

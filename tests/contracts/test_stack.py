@@ -35,7 +35,7 @@ def test_it_reaches_a_goal_around_an_unmapped_obstacle_without_contact(spec: Sta
     d = start(spec, Goal("g", Pose2(5, 1, 0.5))).run(60)
     assert d.result == "SUCCEEDED"
     assert d.pose.distance(Pose2(5, 1)) <= 0.25
-    assert d.least > 0
+    assert d.min_clearance > 0
 
 
 @pytest.mark.parametrize("promise", [p for name, spec in SPECS.items() for p in promises_of(spec, name)], ids=str)

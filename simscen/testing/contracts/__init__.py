@@ -1,1 +1,1 @@
-"""One contract for each role: its promises, tried on a component as if by a stranger."""
+"""Contract of each plug-in role: the promises of its protocol, as checks of a component."""

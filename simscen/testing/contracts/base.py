@@ -31,10 +31,10 @@ class PromiseBroken(AssertionError):
     """A component breaks a promise of its protocol; the message describes the observation."""
 
 
-def require(kept: object, seen: str) -> None:
-    """Raise PromiseBroken with the observation `seen`, unless `kept` is true."""
-    if not kept:
-        raise PromiseBroken(seen)
+def require(condition: object, observation: str) -> None:
+    """Raise PromiseBroken with the observation, unless the condition is true."""
+    if not condition:
+        raise PromiseBroken(observation)
 
 
 @dataclass(frozen=True)
@@ -44,16 +44,16 @@ class Promise:
     role: str
     subject: str
     name: str
-    keep: Callable[[], None]
+    verify: Callable[[], None]
 
     def __str__(self) -> str:
         return f"{self.subject} {self.name}" if self.subject else self.name
 
     def check(self, limit: float = DEFAULT_LIMIT_S) -> None:
-        """Check the promise with a different state of the global random generators for each check."""
+        """Check the promise within `limit` seconds; each check starts with other global random generators."""
         reseed_global_generators()
         with time_limit(limit):
-            self.keep()
+            self.verify()
 
 
 def promise(method: Callable[[T], None]) -> Callable[[T], None]:
@@ -78,15 +78,15 @@ def _is_promise(value: Any) -> bool:
     return getattr(value, "__is_promise__", False)
 
 
-_turn = 0
+_reseed_count = 0
 
 
 def reseed_global_generators() -> None:
     """Seed the global generators of Python and numpy differently in each call, to detect components that use them."""
-    global _turn  # noqa: PLW0603
-    _turn += 1
-    random.seed(_turn)
-    np.random.seed(_turn)  # noqa: NPY002
+    global _reseed_count  # noqa: PLW0603
+    _reseed_count += 1
+    random.seed(_reseed_count)
+    np.random.seed(_reseed_count)  # noqa: NPY002
 
 
 @contextmanager
@@ -96,17 +96,17 @@ def time_limit(seconds: float) -> Iterator[None]:
         yield
         return
 
-    def give_up(_number: int, frame: FrameType | None) -> None:
+    def raise_timeout(_number: int, frame: FrameType | None) -> None:
         where = f", at {frame.f_code.co_filename}:{frame.f_lineno}" if frame else ""
-        raise PromiseBroken(f"does not come to an end within {seconds:g} s{where}")
+        raise PromiseBroken(f"does not return within {seconds:g} s{where}")
 
-    before = signal.signal(signal.SIGALRM, give_up)
+    previous = signal.signal(signal.SIGALRM, raise_timeout)
     signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGALRM, previous)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,21 +127,24 @@ class ComponentContract(Contract):
         return call_component("is built", lambda: spec.implementation()(spec, self.setting()))
 
 
-def call_component(when: str, call: Callable[..., T], *given: Any, **named: Any) -> T:
-    """Return the result of a call. Raises PromiseBroken for exceptions but NavigationFailure with an ErrorCode."""
+def call_component(action: str, call: Callable[..., T], *args: Any, **kwargs: Any) -> T:
+    """Return the result of a call. `action` completes "when it …" in messages.
+
+    Raises PromiseBroken for all exceptions except NavigationFailure with an ErrorCode, which passes through.
+    """
     try:
-        return call(*given, **named)
+        return call(*args, **kwargs)
     except NavigationFailure as failure:
-        require(isinstance(failure.code, ErrorCode), f"fails with {failure.code!r}, which is no ErrorCode")
+        require(isinstance(failure.code, ErrorCode), f"fails with {failure.code!r}, which is not an ErrorCode")
         raise
     except PromiseBroken:
         raise
     except Exception as error:  # plug-ins can raise anything
-        what = f"raises {type(error).__name__} when it {when}, not a NavigationFailure: {error}"
-        raise PromiseBroken(what) from error
+        message = f"raises {type(error).__name__} when it {action}, not a NavigationFailure: {error}"
+        raise PromiseBroken(message) from error
 
 
-def view_of(world: Flatland, robot: RobotModel, bounds: tuple[float, float, float, float]) -> CostmapView:
+def costmap_of_world(world: Flatland, robot: RobotModel, bounds: tuple[float, float, float, float]) -> CostmapView:
     """Return a costmap of the world with cells of 5 cm."""
     return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid(bounds), RATE)).view
 
@@ -157,7 +160,7 @@ def equal_costmaps(one: CostmapView, other: CostmapView) -> bool:
 
 
 def overwrite_costmap(view: CostmapView) -> None:
-    """Make all cells of a costmap lethal, to detect components that keep it."""
+    """Make all cells of a costmap lethal, to detect components that still use it."""
     view.costs.setflags(write=True)
     view.distance.setflags(write=True)
     view.costs[:], view.distance[:] = 254, 0.0

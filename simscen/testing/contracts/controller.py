@@ -16,20 +16,20 @@ from simscen.testing.contracts.base import (
     ComponentContract,
     call_component,
     copy_costmap,
+    costmap_of_world,
     equal_costmaps,
     overwrite_costmap,
     promise,
     require,
-    view_of,
 )
 from simscen.testing.flatland import Flatland
 
-PERIOD = 0.05
+PERIOD_S = 0.05
 GOAL = Goal("g", Pose2(7.0, 3.0, 1.0))
-STRAIGHT = np.column_stack((np.arange(1.0, 7.01, 0.05), np.full(121, 3.0), np.zeros(121)))
-SLACK = 1e-6
-NEAR, REST = 0.25, 3.0
-"""Maximum error in m and rad at the goal, and time in s for which the robot must stay there."""
+PATH_POINTS = np.column_stack((np.arange(1.0, 7.01, 0.05), np.full(121, 3.0), np.zeros(121)))
+TOLERANCE = 1e-6
+GOAL_TOLERANCE, DWELL_S = 0.25, 3.0
+"""Maximum error in m and rad at the goal, and time for which the robot must stay there."""
 
 
 class ControllerContract(ComponentContract):
@@ -39,27 +39,27 @@ class ControllerContract(ComponentContract):
 
     def view(self, *discs: tuple[float, float, float]) -> CostmapView:
         """Return the costmap of the room with discs (x, y, radius)."""
-        return view_of(Flatland(discs=list(discs)).room(9, 6), self.robot, (-0.5, -0.5, 9.5, 6.5))
+        return costmap_of_world(Flatland(discs=list(discs)).room(9, 6), self.robot, (-0.5, -0.5, 9.5, 6.5))
 
     def controller_on_path(self) -> Controller:
         """Build a controller that follows the path."""
         controller: Controller = self.build()
-        call_component("is given a path", lambda: controller.set_path(Path(STRAIGHT.copy())))
+        call_component("receives a path", lambda: controller.set_path(Path(PATH_POINTS.copy())))
         return controller
 
     def command(self, controller: Controller, pose: Pose2, twist: Twist, view: CostmapView) -> Twist:
         """Return the command, checked for type, finiteness and limits."""
-        command = call_component("is asked for a command", lambda: controller.command(pose, twist, view, GOAL))
+        command = call_component("computes a command", lambda: controller.command(pose, twist, view, GOAL))
         return checked_command(command, self.robot)
 
     def drive(self, controller: Controller, view: CostmapView, pose: Pose2, seconds: float) -> list[Pose2]:
-        """Return the track of an ideal base until it has been at the goal for REST seconds."""
-        track, twist, there = [pose], Twist(), 0
-        for _ in range(round(seconds / PERIOD)):
+        """Return the track of an ideal base until it has been at the goal for DWELL_S."""
+        track, twist, periods_at_goal = [pose], Twist(), 0
+        for _ in range(round(seconds / PERIOD_S)):
             twist = self.command(controller, track[-1], twist, view)
-            track.append(moved(track[-1], twist))
-            there = there + 1 if at_goal(track[-1]) else 0
-            if there * PERIOD >= REST:
+            track.append(move(track[-1], twist))
+            periods_at_goal = periods_at_goal + 1 if at_goal(track[-1]) else 0
+            if periods_at_goal * PERIOD_S >= DWELL_S:
                 break
         return track
 
@@ -67,11 +67,11 @@ class ControllerContract(ComponentContract):
     def it_follows_the_path_to_its_end_and_turns_to_the_goals_heading(self) -> None:
         """Given a free path then the robot reaches its end and heading, and deviates from it by at most 0.3 m."""
         track = self.drive(self.controller_on_path(), self.view(), Pose2(1.0, 3.1, 0.0), 40)
-        off, turn = track[-1].distance(GOAL.pose), abs(track[-1].yaw - GOAL.pose.yaw)
-        require(off < NEAR, f"ends {off:.2f} m from the end of the path after 40 s")
-        require(turn < NEAR, f"ends {turn:.2f} rad from the goal's heading after 40 s")
-        beside = max(abs(pose.y - 3.0) for pose in track)
-        require(beside < 0.3, f"is {beside:.2f} m beside the path")
+        distance, turn = track[-1].distance(GOAL.pose), abs(track[-1].yaw - GOAL.pose.yaw)
+        require(distance < GOAL_TOLERANCE, f"ends {distance:.2f} m from the end of the path after 40 s")
+        require(turn < GOAL_TOLERANCE, f"ends {turn:.2f} rad from the goal's heading after 40 s")
+        deviation = max(abs(pose.y - 3.0) for pose in track)
+        require(deviation < 0.3, f"deviates from the path by {deviation:.2f} m")
 
     @promise
     def no_command_exceeds_the_limits_of_the_base(self) -> None:
@@ -91,7 +91,7 @@ class ControllerContract(ComponentContract):
         )
         controller.set_speed_limit(0.15)
         slow = max(self.command(controller, Pose2(2.0, 3.0), Twist(0.15), view).vx for _ in range(20))
-        require(slow <= 0.15 + SLACK, f"drives at {slow:.3f} m/s under a limit of 0.15 m/s")
+        require(slow <= 0.15 + TOLERANCE, f"drives at {slow:.3f} m/s under a limit of 0.15 m/s")
         require(slow > 0.05, f"drives at no more than {slow:.3f} m/s under a limit of 0.15 m/s")
         controller.set_speed_limit(None)
         fast = max(self.command(controller, Pose2(2.0, 3.0), Twist(0.4), view).vx for _ in range(20))
@@ -108,7 +108,7 @@ class ControllerContract(ComponentContract):
                 for _ in range(5):
                     command = self.command(controller, pose, Twist(), view)
             except NavigationFailure as failure:
-                no_valid_control(failure)
+                require_no_valid_control(failure)
             else:
                 free = footprint.free(view, poses_along(pose, command, np.linspace(0, 0.5, 11))).all()
                 require(free, f"commands {tuple(command)} with an obstacle {gap:g} m ahead")
@@ -123,9 +123,9 @@ class ControllerContract(ComponentContract):
             try:
                 twist = self.command(controller, pose, twist, view)
             except NavigationFailure as failure:
-                no_valid_control(failure)
+                require_no_valid_control(failure)
                 twist = Twist()
-            pose = moved(pose, twist)
+            pose = move(pose, twist)
             require(footprint.free(view, np.array([pose]))[0], f"drives into the wall at ({pose.x:.2f}, {pose.y:.2f})")
 
     @promise
@@ -140,61 +140,63 @@ class ControllerContract(ComponentContract):
         """Given a path without points then fails with INVALID_PATH."""
         controller = self.build()
         try:
-            call_component("is given an empty path", lambda: controller.set_path(Path()))
+            call_component("receives an empty path", lambda: controller.set_path(Path()))
         except NavigationFailure as failure:
             require(failure.code == ErrorCode.INVALID_PATH, f"fails with {failure.code.name}, not with INVALID_PATH")
         else:
-            require(False, "takes a path without points")
+            require(False, "accepts a path without points")
 
     @promise
     def path_and_costmap_are_neither_changed_nor_kept(self) -> None:
         """Given a path and a costmap then they are not changed, and an old costmap changes no later command."""
-        view, controller, path = self.view(), self.build(), Path(STRAIGHT.copy())
+        view, controller, path = self.view(), self.build(), Path(PATH_POINTS.copy())
         other, pose = self.controller_on_path(), Pose2(1, 3)
         controller.set_path(path)
         old, untouched = copy_costmap(view), copy_costmap(view)
         self.command(controller, pose, Twist(), old)
-        require(np.array_equal(path.points, STRAIGHT), "the path is not what it was")
-        require(equal_costmaps(old, untouched), "the costmap is not what it was")
+        require(np.array_equal(path.points, PATH_POINTS), "changes the path")
+        require(equal_costmaps(old, untouched), "changes the costmap")
         overwrite_costmap(old)
         self.command(other, pose, Twist(), view)
         commands = [self.command(each, pose, Twist(), view) for each in (controller, other)]
-        require(commands[0] == commands[1], "an old costmap shows in a new command")
+        require(commands[0] == commands[1], "an old costmap affects a new command")
 
     @promise
     def its_local_plan_is_a_path_or_none(self) -> None:
         """Given a command then the local plan is a path of finite poses, or None."""
         controller = self.controller_on_path()
         self.command(controller, Pose2(1, 3), Twist(), self.view())
-        plan = call_component("is asked for its local plan", lambda: controller.local_plan)
-        fine = plan is None or (
+        plan = call_component("returns its local plan", lambda: controller.local_plan)
+        is_valid = plan is None or (
             isinstance(plan, Path) and plan.points.shape[1:] == (3,) and np.isfinite(plan.points).all()
         )
-        require(fine, "the local plan is no path of finite poses (n, 3)")
+        require(is_valid, "the local plan is not a path of finite poses (n, 3)")
 
 
 def checked_command(command: Twist, robot: RobotModel) -> Twist:
     """Return a command, checked for type, finiteness and the limits of the robot."""
     require(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
     require(all(map(math.isfinite, command)), f"commands {tuple(command)}")
-    within = -robot.max_reverse - SLACK <= command.vx <= robot.max_linear + SLACK
-    within = within and abs(command.vy) <= robot.max_lateral + SLACK and abs(command.wz) <= robot.max_angular + SLACK
-    require(within, f"commands {tuple(command)}, more than the base can do: {robot.max_linear:g} m/s ahead, "
-           f"{robot.max_reverse:g} back, {robot.max_lateral:g} sideways, {robot.max_angular:g} rad/s")  # fmt: skip
+    within = -robot.max_reverse - TOLERANCE <= command.vx <= robot.max_linear + TOLERANCE
+    within = (
+        within and abs(command.vy) <= robot.max_lateral + TOLERANCE and abs(command.wz) <= robot.max_angular + TOLERANCE
+    )
+    require(within, f"commands {tuple(command)}, beyond the limits of the base: {robot.max_linear:g} m/s forward, "
+           f"{robot.max_reverse:g} backward, {robot.max_lateral:g} sideways, {robot.max_angular:g} rad/s")  # fmt: skip
     return command
 
 
 def at_goal(pose: Pose2) -> bool:
     """Return whether the base is at the goal."""
-    return pose.distance(GOAL.pose) < NEAR and abs(pose.yaw - GOAL.pose.yaw) < NEAR
+    return pose.distance(GOAL.pose) < GOAL_TOLERANCE and abs(pose.yaw - GOAL.pose.yaw) < GOAL_TOLERANCE
 
 
-def moved(pose: Pose2, twist: Twist) -> Pose2:
+def move(pose: Pose2, twist: Twist) -> Pose2:
     """Return the pose after one period at this velocity."""
-    return Pose2(*poses_along(pose, twist, np.array([PERIOD]))[0].tolist())
+    return Pose2(*poses_along(pose, twist, np.array([PERIOD_S]))[0].tolist())
 
 
-def no_valid_control(failure: NavigationFailure) -> None:
+def require_no_valid_control(failure: NavigationFailure) -> None:
     """Require the error code NO_VALID_CONTROL."""
     require(failure.code == ErrorCode.NO_VALID_CONTROL, f"fails with {failure.code.name}, not with NO_VALID_CONTROL")
 
@@ -213,18 +215,19 @@ class GoalCheckerContract(ComponentContract):
     def answers_at(self, checker: GoalChecker, pose: Pose2, twist: Twist = STOP) -> list[bool]:
         """Return the answers of the checker during 2 s."""
         call_component("is reset", checker.reset)
-        said = [
-            call_component("is asked", lambda: checker.reached(REACHED_GOAL, pose, twist)) for _ in range(CALL_COUNT)
+        answers = [
+            call_component("checks a pose", lambda: checker.reached(REACHED_GOAL, pose, twist))
+            for _ in range(CALL_COUNT)
         ]
-        require(all(each in (True, False) for each in said), f"answers {said[0]!r}")
-        return said
+        require(all(each in (True, False) for each in answers), f"answers {answers[0]!r}")
+        return answers
 
     @promise
     def a_robot_that_stands_on_the_goal_has_reached_it_within_two_seconds(self) -> None:
         """Given a robot that stands at the goal then the goal is reached within two seconds."""
         require(
             self.answers_at(self.build(), REACHED_GOAL.pose)[-1],
-            "does not say that a robot that stands on the goal is there",
+            "does not say that a robot that stands at the goal has reached it",
         )
 
     @promise
@@ -238,9 +241,9 @@ class GoalCheckerContract(ComponentContract):
             Pose2(x, y, yaw + math.pi),
         ):
             for twist in MOTIONS:
-                said = self.answers_at(self.build(), pose, twist)
+                answers = self.answers_at(self.build(), pose, twist)
                 require(
-                    not any(said),
+                    not any(answers),
                     f"says that a robot at {tuple(pose)} has reached {tuple(REACHED_GOAL.pose)} ± 0.25 m, rad",
                 )
 
@@ -248,24 +251,28 @@ class GoalCheckerContract(ComponentContract):
     def a_heading_is_compared_around_the_circle(self) -> None:
         """Given a heading that differs by a whole turn then it is the same heading."""
         turned = Pose2(REACHED_GOAL.pose.x, REACHED_GOAL.pose.y, REACHED_GOAL.pose.yaw - 2 * math.pi)
-        require(self.answers_at(self.build(), turned)[-1], "takes a heading for another one after a whole turn")
+        require(
+            self.answers_at(self.build(), turned)[-1], "treats the goal's heading as another one after a whole turn"
+        )
 
     @promise
     def a_reset_forgets_the_goal_before(self) -> None:
         """Given a reached goal and a reset then the next goal is not reached."""
         checker, away = self.build(), Pose2(REACHED_GOAL.pose.x + 1.0, REACHED_GOAL.pose.y, REACHED_GOAL.pose.yaw)
         self.answers_at(checker, REACHED_GOAL.pose)
-        require(not any(self.answers_at(checker, away)), "says that a goal is reached because the one before was")
+        require(not any(self.answers_at(checker, away)), "says that a goal is reached because the previous one was")
 
     @promise
     def a_pose_that_is_no_number_reaches_nothing(self) -> None:
         """Given a pose of nan then the goal is not reached."""
         for pose in (Pose2(math.nan, math.nan, math.nan), Pose2(REACHED_GOAL.pose.x, REACHED_GOAL.pose.y, math.nan)):
-            require(not any(self.answers_at(self.build(), pose)), f"says that a robot at {tuple(pose)} is there")
+            require(
+                not any(self.answers_at(self.build(), pose)), f"says that a robot at {tuple(pose)} has reached the goal"
+            )
 
     @promise
     def the_same_calls_give_the_same_answers(self) -> None:
         """Given the same calls then the same answers, independent of clocks and global random generators."""
         near = Pose2(REACHED_GOAL.pose.x + 0.15, REACHED_GOAL.pose.y, REACHED_GOAL.pose.yaw + 0.15)
         answers = [[self.answers_at(self.build(), near, twist) for twist in MOTIONS] for _ in range(2)]
-        require(answers[0] == answers[1], "two checkers that are asked the same answer differently")
+        require(answers[0] == answers[1], "two checkers answer the same calls differently")

@@ -35,44 +35,45 @@ STATIONARY: dict[str, Any] = {"seconds": 2, "truth": [[0, 0, 0]], "belief": None
 TRUNCATED: dict[str, Any] = {**DRIVE, "seconds": 3, "ended": None, "events": DRIVE["events"][:2]}
 TRACES = {
     "a drive": DRIVE,
-    "a robot that stands, without belief or scans": STATIONARY,
-    "a log that was cut off": TRUNCATED,
+    "the trace of a stationary robot": STATIONARY,
+    "a truncated log": TRUNCATED,
 }
 
 
 @dataclass(frozen=True, eq=False)
 class CriterionContract(Contract):
-    """Contract of a criterion, on the traces of a drive, of a standing robot, and of a truncated log."""
+    """Contract of a criterion, on the traces of a drive, of a stationary robot, and of a truncated log."""
 
     role = "criterion"
     spec: Any
     subject: str = ""
 
-    def findings(self, trace: Trace, case: Case, what: str) -> list[Finding]:
+    def findings(self, trace: Trace, case: Case, label: str) -> list[Finding]:
         """Return the findings, checked for their type."""
         criterion: Criterion = self.spec
-        found = call_component(f"judges {what}", criterion.judge, trace, case)
-        require(isinstance(found, list) and all(isinstance(f, Finding) for f in found), f"finds {found!r} in {what}")
-        return found
+        findings = call_component(f"judges {label}", criterion.judge, trace, case)
+        is_valid = isinstance(findings, list) and all(isinstance(f, Finding) for f in findings)
+        require(is_valid, f"returns {findings!r} for {label}, not a list of findings")
+        return findings
 
     @promise
     def every_bound_yields_a_finding(self) -> None:
         """Given any trace then there is at least one finding."""
-        for what, words in TRACES.items():
-            found = self.findings(synthetic_trace(words), synthetic_case(CASE), what)
-            require(found, f"finds nothing in {what}, so it checks nothing")
-            for finding in found:
+        for label, description in TRACES.items():
+            findings = self.findings(synthetic_trace(description), synthetic_case(CASE), label)
+            require(findings, f"returns no finding for {label}, so it checks nothing")
+            for finding in findings:
                 require(isinstance(finding.status, Status), f"has the status {finding.status!r}")
                 require(finding.what or finding.limit, f"does not say what it checked: {finding}")
 
     @promise
     def a_margin_has_the_sign_of_the_status(self) -> None:
         """Given a finding with a margin then the margin is a number, and not negative if and only if it passes."""
-        for what, words in TRACES.items():
-            for finding in self.findings(synthetic_trace(words), synthetic_case(CASE), what):
+        for label, description in TRACES.items():
+            for finding in self.findings(synthetic_trace(description), synthetic_case(CASE), label):
                 if finding.margin is None or finding.status not in (Status.PASS, Status.FAIL):
                     continue
-                require(not math.isnan(finding.margin), f"has a margin of nan in {what}")
+                require(not math.isnan(finding.margin), f"returns a margin of nan for {label}")
                 passes = finding.status is Status.PASS
                 require(passes == (finding.margin >= 0), f"{finding.status.value} with a margin of {finding.margin:g}")
 
@@ -80,10 +81,10 @@ class CriterionContract(Contract):
     def the_same_trace_gives_the_same_findings(self) -> None:
         """Given the same trace and case then the same findings, independent of clocks and earlier calls."""
         first = self.findings(synthetic_trace(DRIVE), synthetic_case(CASE), "a drive")
-        self.findings(synthetic_trace(STATIONARY), synthetic_case(CASE), "a robot that stands")
+        self.findings(synthetic_trace(STATIONARY), synthetic_case(CASE), "the trace of a stationary robot")
         require(
             self.findings(synthetic_trace(DRIVE), synthetic_case(CASE), "a drive") == first,
-            "the same drive is judged otherwise",
+            "returns different findings for the same drive",
         )
 
     @promise
@@ -92,50 +93,50 @@ class CriterionContract(Contract):
         trace, case = synthetic_trace(DRIVE), synthetic_case(CASE)
         before = copy.deepcopy((trace, case))
         self.findings(trace, case, "a drive")
-        require(repr((trace, case)) == repr(before), "the trace is not what it was")
+        require(repr((trace, case)) == repr(before), "changes the trace")
 
     @promise
     def its_horizon_and_range_are_numbers(self) -> None:
         """Given a criterion then its horizon (s) and clearance range (m) are finite and not negative."""
-        for what in ("horizon", "clearance_range"):
-            value = call_component(f"is asked for its {what}", getattr, self.spec, what)
+        for name in ("horizon", "clearance_range"):
+            value = call_component(f"returns its {name}", getattr, self.spec, name)
             require(
-                isinstance(value, float | int) and math.isfinite(value) and value >= 0, f"has a {what} of {value!r}"
+                isinstance(value, float | int) and math.isfinite(value) and value >= 0, f"has a {name} of {value!r}"
             )
 
 
 @dataclass(frozen=True, eq=False)
 class MetricContract(Contract):
-    """Contract of a metric, on the traces of a drive, of a standing robot, and of a truncated log."""
+    """Contract of a metric, on the traces of a drive, of a stationary robot, and of a truncated log."""
 
     role = "metric"
     spec: Any
     subject: str = ""
 
-    def measured(self, words: dict[str, Any], what: str) -> float | str:
+    def measure(self, description: dict[str, Any], label: str) -> float | str:
         """Return the value of the metric."""
         value: float | str = call_component(
-            f"measures {what}", self.spec.measure, synthetic_trace(words), synthetic_case(CASE)
+            f"measures {label}", self.spec.measure, synthetic_trace(description), synthetic_case(CASE)
         )
         return value
 
     @promise
     def it_returns_a_finite_number_or_a_reason(self) -> None:
         """Given any trace then the value is a finite number, or a text with the reason why there is none."""
-        for what, words in TRACES.items():
-            value = self.measured(words, what)
+        for label, description in TRACES.items():
+            value = self.measure(description, label)
             if isinstance(value, str):
-                require(value, f"does not say why there is no number in {what}")
+                require(value, f"gives no reason why there is no number for {label}")
             else:
                 number = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
-                require(number, f"measures {value!r} in {what}")
+                require(number, f"returns {value!r} for {label}")
 
     @promise
     def the_same_trace_gives_the_same_number(self) -> None:
         """Given the same trace and case then the same number, independent of clocks and earlier calls."""
-        first = self.measured(DRIVE, "a drive")
-        self.measured(STATIONARY, "a robot that stands")
-        require(self.measured(DRIVE, "a drive") == first, "the same drive is measured otherwise")
+        first = self.measure(DRIVE, "a drive")
+        self.measure(STATIONARY, "the trace of a stationary robot")
+        require(self.measure(DRIVE, "a drive") == first, "returns different numbers for the same drive")
 
     @promise
     def a_trace_is_not_changed(self) -> None:
@@ -143,15 +144,15 @@ class MetricContract(Contract):
         trace, case = synthetic_trace(DRIVE), synthetic_case(CASE)
         before = copy.deepcopy((trace, case))
         call_component("measures a drive", self.spec.measure, trace, case)
-        require(repr((trace, case)) == repr(before), "the trace is not what it was")
+        require(repr((trace, case)) == repr(before), "changes the trace")
 
     @promise
     def it_has_a_unit_and_valid_evidence(self) -> None:
         """Given a metric then its unit is a text, and its evidence is None or a set of Evidence."""
         require(isinstance(self.spec.unit, str), f"has the unit {self.spec.unit!r}")
-        evidence = call_component("is asked for its evidence", getattr, self.spec, "evidence")
-        fine = evidence is None or all(isinstance(each, Evidence) for each in evidence)
-        require(fine, f"needs {evidence!r}, which is no evidence")
+        evidence = call_component("returns its evidence", getattr, self.spec, "evidence")
+        is_valid = evidence is None or all(isinstance(each, Evidence) for each in evidence)
+        require(is_valid, f"has the evidence {evidence!r}, not a set of Evidence")
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +163,7 @@ class ActionContract(Contract):
     spec: Any
     subject: str = ""
 
-    def performed(self) -> tuple[Effect, list[Any]]:
+    def perform(self) -> tuple[Effect, list[Any]]:
         """Return the effect and the recorded calls."""
         stage = FakeStage()
         effect = call_component("is performed", self.spec.perform, stage)
@@ -171,16 +172,16 @@ class ActionContract(Contract):
     @promise
     def it_returns_an_effect(self) -> None:
         """Given a stage then the action returns an Effect with a description, and happened only if it did something."""
-        effect, done = self.performed()
-        require(isinstance(effect, Effect), f"answers {effect!r}, not an Effect")
+        effect, done = self.perform()
+        require(isinstance(effect, Effect), f"returns {effect!r}, not an Effect")
         require(isinstance(effect.happened, bool), f"happened is {effect.happened!r}")
-        require(isinstance(effect.what, str) and effect.what, "does not say what came of it")
-        require(done or not effect.happened, f"says that something happened ({effect.what}) and did nothing")
+        require(isinstance(effect.what, str) and effect.what, "has an effect without a description")
+        require(done or not effect.happened, f"reports an effect ({effect.what}) but did nothing")
 
     @promise
     def the_same_stage_gives_the_same_calls(self) -> None:
         """Given the same stage then the action makes the same calls, independent of clocks and earlier calls."""
-        require(self.performed() == self.performed(), "does something else the second time")
+        require(self.perform() == self.perform(), "makes different calls the second time")
 
 
 MOMENTS = (
@@ -201,10 +202,10 @@ class TriggerContract(Contract):
 
     def answers(self, order: list[int]) -> dict[int, bool]:
         """Return the answer for each moment."""
-        said = {k: call_component("is asked", self.spec.holds, FakeStage(**MOMENTS[k])) for k in order}
-        for answer in said.values():
+        answers = {k: call_component("is evaluated", self.spec.holds, FakeStage(**MOMENTS[k])) for k in order}
+        for answer in answers.values():
             require(answer is True or answer is False, f"answers {answer!r}")
-        return said
+        return answers
 
     @promise
     def it_returns_true_or_false_at_every_moment(self) -> None:
@@ -214,12 +215,16 @@ class TriggerContract(Contract):
     @promise
     def the_same_situation_gives_the_same_answer(self) -> None:
         """Given the same situation then the same answer, independent of earlier calls and random numbers."""
-        forth, back, again = self.answers([0, 1, 2, 3]), self.answers([3, 2, 1, 0]), self.answers([1, 3, 0, 2])
-        require(forth == back == again, "answers depend on what was asked before")
+        ascending, descending, mixed = (
+            self.answers([0, 1, 2, 3]),
+            self.answers([3, 2, 1, 0]),
+            self.answers([1, 3, 0, 2]),
+        )
+        require(ascending == descending == mixed, "answers depend on earlier calls")
 
     @promise
     def it_changes_nothing(self) -> None:
         """Given a situation then the trigger changes nothing."""
         stage = FakeStage(**MOMENTS[1])  # type: ignore[arg-type]
-        call_component("is asked", self.spec.holds, stage)
-        require(not stage.done, f"does something: {stage.done}")
+        call_component("is evaluated", self.spec.holds, stage)
+        require(not stage.done, f"changes the world: {stage.done}")

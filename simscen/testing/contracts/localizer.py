@@ -16,18 +16,18 @@ from simscen.stack.protocols import Localizer
 from simscen.testing.contracts.base import Contract, call_component, promise, require
 from simscen.testing.synthetic_room import BEAMS, Drive, Noise, drive, errors, localizer, record, run, scan
 
-SILENT = Noise(lidar=0, translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
+NO_NOISE = Noise(lidar=0, translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
 
 
 @cache
-def short() -> Drive:
+def short_drive() -> Drive:
     """Return six seconds of a drive through the room."""
     return drive(6.0)
 
 
-def here() -> Estimate:
-    """Return the start of that drive as an estimate."""
-    return Estimate(Pose2(*short().truth[0]), (0.1, 0.1, 0.05))
+def start_estimate() -> Estimate:
+    """Return the start pose of the short drive as an estimate."""
+    return Estimate(Pose2(*short_drive().truth[0]), (0.1, 0.1, 0.05))
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class LocalizerContract(Contract):
     spec: Any
     subject: str = ""
 
-    def told(self, estimate: Estimate) -> Localizer:
+    def build_at(self, estimate: Estimate) -> Localizer:
         """Build a localizer that starts from this estimate."""
         subject = call_component("is built", lambda: localizer(self.spec, estimate, 1))
         call_component("is reset", lambda: subject.reset(estimate))
@@ -47,9 +47,10 @@ class LocalizerContract(Contract):
     @promise
     def the_same_calls_give_the_same_beliefs_bit_for_bit(self) -> None:
         """Given the same readings with the same generator then bit-identical beliefs."""
-        for pose in (here().pose, None):
+        for pose in (start_estimate().pose, None):
             first, again = (
-                call_component("localizes", run, self.told(Estimate(pose)), short(), 4, imu=True) for _ in range(2)
+                call_component("localizes", run, self.build_at(Estimate(pose)), short_drive(), 4, imu=True)
+                for _ in range(2)
             )
             for one, other in zip(first, again, strict=True):
                 require(one.pose == other.pose and one.map_from_odom == other.map_from_odom, "two runs differ in pose")
@@ -59,127 +60,124 @@ class LocalizerContract(Contract):
     @promise
     def without_motion_the_belief_does_not_drift(self) -> None:
         """Given no motion and perfect readings then the belief stays within 5 cm and 0.03 rad."""
-        still = record(np.tile(short().truth[:1], (400, 1)))
-        start = Estimate(here().pose, (0.02, 0.02, 0.01))
-        beliefs = call_component("localizes", lambda: run(self.told(start), still, 1, SILENT, imu=True))
+        still = record(np.tile(short_drive().truth[:1], (400, 1)))
+        start = Estimate(start_estimate().pose, (0.02, 0.02, 0.01))
+        beliefs = call_component("localizes", lambda: run(self.build_at(start), still, 1, NO_NOISE, imu=True))
         error = errors(beliefs, still.truth)
-        off, turn = float(np.abs(error[:, :2]).max()), float(np.abs(error[:, 2]).max())
-        require(off < 0.05, f"wanders off by {off:.3f} m while the robot stands")
-        require(turn < 0.03, f"turns away by {turn:.3f} rad while the robot stands")
+        offset, turn = float(np.abs(error[:, :2]).max()), float(np.abs(error[:, 2]).max())
+        require(offset < 0.05, f"drifts by {offset:.3f} m while the robot stands")
+        require(turn < 0.03, f"drifts by {turn:.3f} rad while the robot stands")
 
     @promise
     def a_belief_does_not_change_after_it_was_given(self) -> None:
         """Given a belief then later readings do not change its arrays."""
-        subject = self.told(here())
-        step(subject, 0, Pose2(0, 0, 0))
+        subject = self.build_at(start_estimate())
+        send_odometry(subject, 0, Pose2(0, 0, 0))
         belief = valid_belief(subject)
         covariance, particles = belief.covariance.copy(), belief.particles.copy()
         for k in range(1, 20):
-            step(subject, k, Pose2(0.3 * k, 0, 0.1 * k))
-            call_component("takes a scan", subject.on_scan, scan(short().ranges[k], 24 * k))
-        require(np.array_equal(belief.covariance, covariance), "a covariance changes after it was given")
-        require(np.array_equal(belief.particles, particles), "particles change after they were given")
+            send_odometry(subject, k, Pose2(0.3 * k, 0, 0.1 * k))
+            call_component("receives a scan", subject.on_scan, scan(short_drive().ranges[k], 24 * k))
+        require(np.array_equal(belief.covariance, covariance), "a covariance changes after it was returned")
+        require(np.array_equal(belief.particles, particles), "particles change after they were returned")
 
     @promise
     def a_scan_is_neither_changed_nor_kept_to_be_changed_later(self) -> None:
         """Given a scan then its ranges are not changed, and later changes of them do not affect the belief."""
-        subject, ranges = self.told(here()), short().ranges[0].copy()
-        call_component("takes a scan", lambda: subject.on_scan(scan(ranges, 24)))
-        require(np.array_equal(ranges, short().ranges[0]), "the ranges of a scan are not what they were")
+        subject, ranges = self.build_at(start_estimate()), short_drive().ranges[0].copy()
+        call_component("receives a scan", lambda: subject.on_scan(scan(ranges, 24)))
+        require(np.array_equal(ranges, short_drive().ranges[0]), "changes the ranges of a scan")
         ranges[:] = np.nan
-        step(subject, 1, Pose2(0, 0, 0))
-        other = self.told(here())
-        call_component("takes a scan", lambda: other.on_scan(scan(short().ranges[0], 24)))
-        step(other, 1, Pose2(0, 0, 0))
-        require(subject.belief.pose == other.belief.pose, "a scan that was changed later shows in the belief")
+        send_odometry(subject, 1, Pose2(0, 0, 0))
+        other = self.build_at(start_estimate())
+        call_component("receives a scan", lambda: other.on_scan(scan(short_drive().ranges[0], 24)))
+        send_odometry(other, 1, Pose2(0, 0, 0))
+        require(subject.belief.pose == other.belief.pose, "a later change of a scan affects the belief")
 
     @promise
     def invalid_ranges_never_make_the_belief_invalid(self) -> None:
         """Given ranges that are nan, infinite, negative or huge then the belief stays finite and semidefinite."""
-        for start in (here(), Estimate(None)):
-            subject = self.told(start)
+        for start in (start_estimate(), Estimate(None)):
+            subject = self.build_at(start)
             for k in range(30):
-                step(subject, k, Pose2(0.3 * k, 0.01 * k, 0.3 * k))
-                call_component("takes a scan", subject.on_scan, scan(_lies(k % 14), 24 * k))
+                send_odometry(subject, k, Pose2(0.3 * k, 0.01 * k, 0.3 * k))
+                call_component("receives a scan", subject.on_scan, scan(_invalid_ranges(k % 14), 24 * k))
                 valid_belief(subject)
 
     @promise
     def invalid_odometry_never_makes_the_belief_invalid(self) -> None:
         """Given odometry and turn rates that are nan, infinite or huge then the belief stays valid."""
-        subject, rng = self.told(here()), np.random.default_rng(5)
+        subject, rng = self.build_at(start_estimate()), np.random.default_rng(5)
         for k in range(40):
             x, y, yaw = rng.choice([0.0, np.nan, np.inf, -np.inf, 1e300, -9e5, 4.0, 1e-300], 3).tolist()
             rate = float(rng.choice([np.nan, np.inf, 99.0, -1e9]))
             imu = Imu("imu", 24 * k, (0.0, 0.0, rate), (0.0, 0.0, 9.8))
-            call_component("takes a turn rate", subject.on_imu, imu)
-            step(subject, k, Pose2(x, y, yaw))
-            call_component("takes a scan", subject.on_scan, scan(short().ranges[k % 20], 24 * k))
+            call_component("receives a turn rate", subject.on_imu, imu)
+            send_odometry(subject, k, Pose2(x, y, yaw))
+            call_component("receives a scan", subject.on_scan, scan(short_drive().ranges[k % 20], 24 * k))
             valid_belief(subject)
 
     @promise
     def scans_of_any_size_range_and_mount_are_accepted(self) -> None:
         """Given a scan of 0 to 4096 beams, of any range and mount, then the belief stays finite and semidefinite."""
-        subject = self.told(here())
+        subject = self.build_at(start_estimate())
         for k, size in enumerate((0, 1, 2, 3, 59, 60, 61, 4096)):
-            step(subject, k, Pose2(0.3 * k, 0, 0))
+            send_odometry(subject, k, Pose2(0.3 * k, 0, 0))
             limits = {"range_max": [12.0, 0.0, np.nan, 1e6][k % 4], "mount": Pose2(0.3, -2.0, 5.0)}
-            taken = scan(np.full(size, 2.0), 24 * k, **limits)
-            call_component("takes a scan", subject.on_scan, taken)
+            call_component("receives a scan", subject.on_scan, scan(np.full(size, 2.0), 24 * k, **limits))
             valid_belief(subject)
 
     @promise
     def a_reset_forgets_everything(self) -> None:
         """Given a reset then the belief is within three standard deviations of the estimate."""
-        used = self.told(Estimate(Pose2(3, 3, 3)))
-        drive_ = short()
-        begun = Drive(drive_.truth[:80], drive_.steps[:80], drive_.ranges[:20])
-        call_component("localizes", lambda: run(used, begun, 1, imu=True))
-        call_component("is reset", lambda: used.reset(here()))
-        near(valid_belief(used), "after a reset")
-        step(used, 0, Pose2(-8, 4, 2))
-        near(valid_belief(used), "after a reset and the first odometry")
+        used = self.build_at(Estimate(Pose2(3, 3, 3)))
+        whole = short_drive()
+        first_part = Drive(whole.truth[:80], whole.steps[:80], whole.ranges[:20])
+        call_component("localizes", lambda: run(used, first_part, 1, imu=True))
+        call_component("is reset", lambda: used.reset(start_estimate()))
+        require_near_start(valid_belief(used), "after a reset")
+        send_odometry(used, 0, Pose2(-8, 4, 2))
+        require_near_start(valid_belief(used), "after a reset and the first odometry")
 
 
-def near(belief: Belief, when: str) -> None:
-    """Require that a belief is near `here`."""
-    start = here()
+def require_near_start(belief: Belief, when: str) -> None:
+    """Require that a belief is within three standard deviations of `start_estimate`."""
+    start = start_estimate()
     assert start.pose is not None
     x, y, yaw = np.abs(tuple(start.pose.between(belief.pose))).tolist()
     close = max(x, y) <= 3 * start.std[0] and yaw <= 3 * start.std[2]
-    require(close, f"believes to be at {belief.pose} {when}, and was told {start.pose}")
+    require(close, f"believes to be at {belief.pose} {when}, but was reset to {start.pose}")
 
 
-def step(subject: Localizer, number: int, pose: Pose2) -> None:
-    """Pass an odometry reading at 10 Hz."""
-    call_component("takes odometry", lambda: subject.on_odometry(Odometry("odom", 24 * number, pose, Twist())))
+def send_odometry(subject: Localizer, number: int, pose: Pose2) -> None:
+    """Send odometry reading `number` of a 10 Hz sensor to the localizer."""
+    call_component("receives odometry", lambda: subject.on_odometry(Odometry("odom", 24 * number, pose, Twist())))
 
 
 def valid_belief(subject: Localizer) -> Belief:
     """Return the belief, checked to be finite, with a positive semidefinite covariance and normalized weights."""
-    belief: Belief = call_component("is asked for its belief", lambda: subject.belief)
-    require(isinstance(belief, Belief), f"believes {type(belief).__name__}, not a Belief")
+    belief: Belief = call_component("returns its belief", lambda: subject.belief)
+    require(isinstance(belief, Belief), f"returns {type(belief).__name__}, not a Belief")
     covariance, particles = belief.covariance, belief.particles
     require(np.isfinite([*belief.pose, *belief.map_from_odom]).all(), f"believes to be at {belief.pose}")
+    require(covariance.shape == (3, 3) and np.isfinite(covariance).all(), "returns a covariance that is not finite")
+    require(np.allclose(covariance, covariance.T), "returns a covariance that is not symmetric")
+    min_eigenvalue = float(np.linalg.eigvalsh(covariance).min())
     require(
-        covariance.shape == (3, 3) and np.isfinite(covariance).all(), "believes with a covariance that is not finite"
-    )
-    require(np.allclose(covariance, covariance.T), "believes with a covariance that is not symmetric")
-    least = float(np.linalg.eigvalsh(covariance).min())
-    require(
-        least >= -1e-9 * float(np.trace(covariance)), "believes with a covariance that is not positive semidefinite"
+        min_eigenvalue >= -1e-9 * float(np.trace(covariance)), "returns a covariance that is not positive semidefinite"
     )
     require(
         particles.shape[1:] == (4,) and np.isfinite(particles).all(),
-        "believes with particles that are not finite (n, 4)",
+        "returns particles that are not finite (n, 4)",
     )
     weight = float(particles[:, 3].sum())
-    require(not len(particles) or abs(weight - 1) < 1e-9, f"believes with weights that add up to {weight:g}")
+    require(not len(particles) or abs(weight - 1) < 1e-9, f"returns weights that add up to {weight:g}")
     return belief
 
 
-def _lies(seed: int) -> Array:
+def _invalid_ranges(seed: int) -> Array:
     """Return invalid ranges of a different kind for each seed."""
     rng = np.random.default_rng(seed)
     kinds = [np.nan, np.inf, -np.inf, 0.0, -5.0, 1e300, 12.0, 0.05, 3.0]
-    wild = rng.choice([np.nan, np.inf, -1.0, 1e9, 2.0, 0.3], BEAMS)
-    return np.full(BEAMS, kinds[seed]) if seed < len(kinds) else rng.choice([wild, rng.uniform(0, 12, BEAMS)])
+    mixed = rng.choice([np.nan, np.inf, -1.0, 1e9, 2.0, 0.3], BEAMS)
+    return np.full(BEAMS, kinds[seed]) if seed < len(kinds) else rng.choice([mixed, rng.uniform(0, 12, BEAMS)])

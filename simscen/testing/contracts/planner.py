@@ -14,16 +14,16 @@ from simscen.testing.contracts.base import (
     ComponentContract,
     call_component,
     copy_costmap,
+    costmap_of_world,
     equal_costmaps,
     overwrite_costmap,
     promise,
     require,
-    view_of,
 )
 from simscen.testing.flatland import Flatland
 
 START, GOAL = Pose2(1.5, 1.5, 0.3), Pose2(10.0, 5.5, 0.5)
-APART = 0.1
+MAX_POINT_SPACING_M = 0.1
 IMPOSSIBLE = (
     (Pose2(-3, 1), GOAL, ErrorCode.START_OUTSIDE_MAP),
     (START, Pose2(30, 1), ErrorCode.GOAL_OUTSIDE_MAP),
@@ -44,8 +44,8 @@ def house() -> Flatland:
 
 
 @cache
-def _house_for(robot: RobotModel) -> CostmapView:
-    return view_of(house(), robot, (-0.5, -0.5, 17.0, 7.5))
+def _house_costmap(robot: RobotModel) -> CostmapView:
+    return costmap_of_world(house(), robot, (-0.5, -0.5, 17.0, 7.5))
 
 
 class PlannerContract(ComponentContract):
@@ -55,76 +55,75 @@ class PlannerContract(ComponentContract):
 
     def view(self) -> CostmapView:
         """Return a copy of the costmap of the house."""
-        return copy_costmap(_house_for(self.robot))
+        return copy_costmap(_house_costmap(self.robot))
 
-    def planned(
-        self, planner: Planner, view: CostmapView, seed: int, ends: tuple[Pose2, Pose2] = (START, GOAL)
-    ) -> Array:
+    def plan(self, planner: Planner, view: CostmapView, seed: int, ends: tuple[Pose2, Pose2] = (START, GOAL)) -> Array:
         """Return the points of a plan, checked for shape and finiteness."""
         path = call_component("plans", lambda: planner.plan(view, *ends, seed))
         require(isinstance(path, Path), f"returns {type(path).__name__}, not a Path")
         points = path.points
         require(isinstance(points, np.ndarray) and points.ndim == 2 and points.shape[1] == 3, "points are not (n, 3)")
         require(len(points) > 0, "returns a path without points instead of failing with NO_VALID_PATH")
-        require(points.dtype == np.float64 and np.isfinite(points).all(), "points are no finite float64 numbers")
+        require(points.dtype == np.float64 and np.isfinite(points).all(), "points are not finite float64 numbers")
         return points
 
     @promise
     def success_begins_at_the_start_and_ends_near_the_goal(self) -> None:
         """Given success then the path begins at the start and ends within the tolerance of the goal."""
         for seed in (1, 2, 3):
-            points = self.planned(self.build(), self.view(), seed)
-            off = float(np.hypot(*(points[0, :2] - START[:2])))
-            require(off < 1e-9, f"the path begins {off:.3f} m from the start")
-            off = float(np.hypot(*(points[-1, :2] - GOAL[:2])))
+            points = self.plan(self.build(), self.view(), seed)
+            offset = float(np.hypot(*(points[0, :2] - START[:2])))
+            require(offset < 1e-9, f"the path begins {offset:.3f} m from the start")
+            offset = float(np.hypot(*(points[-1, :2] - GOAL[:2])))
             require(
-                off <= self.spec.tolerance,
-                f"the path ends {off:.3f} m from the goal, tolerance {self.spec.tolerance:g}",
+                offset <= self.spec.tolerance,
+                f"the path ends {offset:.3f} m from the goal, tolerance {self.spec.tolerance:g}",
             )
 
     @promise
     def points_are_at_most_a_tenth_of_a_meter_apart(self) -> None:
-        """Given success then no two points that follow each other are further apart than 0.1 m."""
-        widest = float(np.hypot(*np.diff(self.planned(self.build(), self.view(), 1)[:, :2], axis=0).T).max())
-        require(widest <= APART + 1e-9, f"two points are {widest:.3f} m apart")
+        """Given success then consecutive points are at most 0.1 m apart."""
+        widest = float(np.hypot(*np.diff(self.plan(self.build(), self.view(), 1)[:, :2], axis=0).T).max())
+        require(widest <= MAX_POINT_SPACING_M + 1e-9, f"two points are {widest:.3f} m apart")
 
     @promise
     def the_footprint_is_never_on_a_lethal_cell(self) -> None:
-        """Given success then at no point after the start does the robot's hull touch a lethal cell."""
+        """Given success then at no point after the start does the robot's footprint touch a lethal cell."""
         footprint = Footprint(self.robot, 0.05)
         for seed in (1, 2, 3):
             view = self.view()
-            points = self.planned(self.build(), view, seed)
-            bad = ~footprint.free(view, points)
-            bad[0] = False
-            require(not bad.any(), f"the robot does not fit at {points[bad.argmax()].round(3).tolist()} (x, y, yaw)")
+            points = self.plan(self.build(), view, seed)
+            in_collision = ~footprint.free(view, points)
+            in_collision[0] = False
+            at = points[in_collision.argmax()].round(3).tolist()
+            require(not in_collision.any(), f"the robot is in collision at {at} (x, y, yaw)")
 
     @promise
     def an_impossible_request_fails_with_its_error_code(self) -> None:
         """Given a start or goal outside the map or in an obstacle, or no path, then it fails with the error code."""
         for start, goal, code in IMPOSSIBLE:
             try:
-                self.planned(self.build(), self.view(), 1, (start, goal))
+                self.plan(self.build(), self.view(), 1, (start, goal))
             except NavigationFailure as failure:
                 require(failure.code == code, f"fails with {failure.code.name}, not with {code.name}")
             else:
-                require(False, f"finds a path where {code.name} is the only answer")
+                require(False, f"finds a path instead of failing with {code.name}")
 
     @promise
     def the_same_seed_gives_the_same_path_bit_for_bit_whatever_was_planned_before(self) -> None:
         """Given the same costmap, ends and seed then bit-identical paths, independent of earlier calls."""
-        one = self.planned(self.build(), self.view(), 7)
-        again = self.build()
-        self.planned(again, self.view(), 3, (GOAL, START))
-        require(np.array_equal(self.planned(again, self.view(), 7), one), "two paths from the same seed differ")
+        first = self.plan(self.build(), self.view(), 7)
+        other = self.build()
+        self.plan(other, self.view(), 3, (GOAL, START))
+        require(np.array_equal(self.plan(other, self.view(), 7), first), "two paths from the same seed differ")
 
     @promise
     def a_costmap_is_neither_changed_nor_kept(self) -> None:
         """Given a costmap then it is not changed, and later changes of it do not affect later plans."""
         planner, view, untouched = self.build(), self.view(), self.view()
-        first = self.planned(planner, view, 1)
-        require(equal_costmaps(view, untouched), "the costmap is not what it was before planning")
-        kept = first.copy()
+        first = self.plan(planner, view, 1)
+        require(equal_costmaps(view, untouched), "changes the costmap")
+        original = first.copy()
         overwrite_costmap(view)
-        require(np.array_equal(self.planned(planner, untouched, 1), kept), "an old costmap shows in a new plan")
-        require(np.array_equal(first, kept), "a path changes after it was returned")
+        require(np.array_equal(self.plan(planner, untouched, 1), original), "an old costmap affects a new plan")
+        require(np.array_equal(first, original), "a path changes after it was returned")

@@ -16,21 +16,20 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages import sensor_data
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
-from simscen.core.records.events import BELIEF, COMMAND, MAP, WHEELS
-from simscen.core.records.events import FAULT_TARGET_KINDS as EVERY
+from simscen.core.records.events import BELIEF, COMMAND, FAULT_TARGET_KINDS, MAP, WHEELS
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.sensors.sensor import Sensor, SensorSetting
 from simscen.testing.contracts.base import Contract, call_component, promise, require
 from simscen.testing.fakes import DRIVE, FakeSensorView, SquareRoomRays
 
-KINDS: dict[str, Callable[[int], Reading]] = {
+READINGS: dict[str, Callable[[int], Reading]] = {
     "Scan": lambda k: Scan("it", 24 * k, np.linspace(0.5, 5.0, 60) + 0.01 * k, -3.0, 0.1, 0.05, 8.0),
     "Odometry": lambda k: Odometry("it", 24 * k, Pose2(0.05 * k, 0.01 * k, 0.02 * k), Twist(0.5, 0.0, 0.2)),
     "Imu": lambda k: Imu("it", 24 * k, (0.0, 0.0, 0.2), (0.1, 0.0, 9.81)),
     "Bump": lambda k: Bump("it", 24 * k, k % 2 == 0),
     "Image": lambda k: Image("it", 24 * k, np.full((4, 6, 3), k % 200, np.uint8), np.full((4, 6), 2.0, np.float32)),
 }
-COUNT = 40
+FAULT_READING_COUNT = 40
 GRID = OccupancyGrid(np.where(np.eye(20, dtype=bool), OCCUPIED, FREE).astype(np.int8), 0.25)
 
 
@@ -54,7 +53,7 @@ class FaultContract(Contract):
     spec: Any
     subject: str = ""
 
-    def started(self, kind: str, now: Callable[[], int] = lambda: 0) -> Disturbance:
+    def start(self, kind: str, now: Callable[[], int] = lambda: 0) -> Disturbance:
         """Start a new fault on a kind of target, always with the same generator."""
         fault: Fault = self.spec
         setting = FaultSetting(0.3, now=now, kind=kind, sight=FakeSight() if kind in ("Scan", "Image") else None)
@@ -63,29 +62,31 @@ class FaultContract(Contract):
     def outputs(self, kind: str) -> list[Any]:
         """Return the outputs for readings or commands of a kind, including delayed ones."""
         tick = 0
-        answers: list[Any] = []
-        work = self.started(kind, lambda: tick)
-        for k in range(COUNT):
+        outputs: list[Any] = []
+        disturbance = self.start(kind, lambda: tick)
+        for k in range(FAULT_READING_COUNT):
             tick = 24 * k
             if kind in (COMMAND, WHEELS):
-                answers.append(call_component("is asked for a late command", work.arriving_command))
-                answers.append(call_component("is handed a command", work.command, Twist(0.4, 0.0, 0.1 * (k % 5))))
+                outputs.append(call_component("returns delayed commands", disturbance.arriving_command))
+                outputs.append(
+                    call_component("receives a command", disturbance.command, Twist(0.4, 0.0, 0.1 * (k % 5)))
+                )
             elif kind == BELIEF:
-                answers.append(call_component("is handed a belief", work.belief, _belief(k)))
+                outputs.append(call_component("receives a belief", disturbance.belief, _belief(k)))
             elif kind == MAP:
-                answers.append(call_component("is handed a map", work.map, GRID))
+                outputs.append(call_component("receives a map", disturbance.map, GRID))
             else:
-                answers += call_component("is asked for what arrives", work.arriving)
-                answers.append(call_component(f"is handed a {kind}", work.reading, KINDS[kind](k)))
-        return answers
+                outputs += call_component("returns delayed readings", disturbance.arriving)
+                outputs.append(call_component(f"receives a {kind}", disturbance.reading, READINGS[kind](k)))
+        return outputs
 
     @promise
     def it_affects_known_targets(self) -> None:
         """Given a fault then `affects` contains at least one target, and only known ones."""
         affects = self.spec.affects
         require(affects, "affects nothing")
-        strange = sorted(set(affects) - set(EVERY))
-        require(not strange, f"affects {strange}, which there is not")
+        unknown = sorted(set(affects) - set(FAULT_TARGET_KINDS))
+        require(not unknown, f"affects {unknown}, which are not targets of faults")
 
     @promise
     def it_returns_the_same_type_or_none(self) -> None:
@@ -94,42 +95,42 @@ class FaultContract(Contract):
         Beliefs and maps must have an output.
         """
         for kind in sorted(self.spec.affects):
-            for answer in self.outputs(kind):
+            for output in self.outputs(kind):
                 if kind in (COMMAND, WHEELS):
-                    fine = answer is None or (isinstance(answer, Twist) and bool(np.isfinite(answer).all()))
+                    is_valid = output is None or (isinstance(output, Twist) and bool(np.isfinite(output).all()))
                 elif kind == BELIEF:
-                    fine = isinstance(answer, Belief) and bool(np.isfinite(answer.pose).all())
+                    is_valid = isinstance(output, Belief) and bool(np.isfinite(output.pose).all())
                 elif kind == MAP:
-                    fine = isinstance(answer, OccupancyGrid)
+                    is_valid = isinstance(output, OccupancyGrid)
                 else:
-                    asked = KINDS[kind](0)
-                    fine = answer is None or (type(answer) is type(asked) and answer.sensor == asked.sensor)
-                require(fine, f"makes {answer!r} of a {kind}")
+                    reading = READINGS[kind](0)
+                    is_valid = output is None or (type(output) is type(reading) and output.sensor == reading.sensor)
+                require(is_valid, f"returns {output!r} for a {kind}")
 
     @promise
     def the_same_generator_gives_the_same_answers_bit_for_bit(self) -> None:
-        """Given the same readings and generator then the same answers."""
+        """Given the same readings and generator then the same outputs."""
         for kind in sorted(self.spec.affects):
             one, other = (self.outputs(kind) for _ in range(2))
-            require(all(map(equal, one, other)), f"disturbs the same {kind} in two ways")
+            require(all(map(equal, one, other)), f"returns different outputs for the same {kind} and generator")
 
     @promise
     def a_reading_is_never_changed(self) -> None:
         """Given a reading then it is not changed, because the log contains it."""
-        for kind in sorted(set(self.spec.affects) & set(KINDS)):
-            work = self.started(kind)
-            for k in range(COUNT):
-                reading = KINDS[kind](k)
+        for kind in sorted(set(self.spec.affects) & set(READINGS)):
+            disturbance = self.start(kind)
+            for k in range(FAULT_READING_COUNT):
+                reading = READINGS[kind](k)
                 before = copy.deepcopy(reading)
-                call_component(f"is handed a {kind}", work.reading, reading)
-                require(equal(reading, before), f"changes the {kind} that it was handed")
+                call_component(f"receives a {kind}", disturbance.reading, reading)
+                require(equal(reading, before), f"changes the {kind} that it receives")
 
     @promise
     def its_end_leaves_a_disturbance_or_nothing(self) -> None:
         """Given the end of a fault then the remaining disturbance is a Disturbance or None."""
         for kind in sorted(self.spec.affects):
-            left = call_component("ends", self.started(kind).end)
-            require(left is None or isinstance(left, Disturbance), f"leaves {left!r}")
+            remaining = call_component("ends", self.start(kind).end)
+            require(remaining is None or isinstance(remaining, Disturbance), f"leaves {remaining!r}")
 
 
 def equal(one: Any, other: Any) -> bool:
@@ -149,7 +150,8 @@ def _belief(number: int) -> Belief:
 
 NAME = "it"
 READING_COUNT = 20
-MAY_BE_MISSING = ("ranges", "depth")
+FIELDS_WITH_NAN = ("ranges", "depth")
+"""Fields whose values may be infinite or nan, because a beam or pixel has no return."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +164,7 @@ class SensorContract(Contract):
 
     def readings(self, seed: int = 1) -> list[Reading]:
         """Return twenty readings of a new sensor."""
-        return self.measured(*self.build(seed))
+        return self.measure(*self.build(seed))
 
     def build(self, seed: int = 1) -> tuple[Sensor, FakeSensorView, int]:
         """Build a sensor. Return it with its view and its period in ticks."""
@@ -171,13 +173,13 @@ class SensorContract(Contract):
         setting = SensorSetting(NAME, period, clock.seconds(period), rng, view, SquareRoomRays(), DRIVE)
         return call_component("is built", lambda: self.spec.implementation()(self.spec, setting)), view, period
 
-    def measured(self, sensor: Sensor, view: FakeSensorView, period: int) -> list[Reading]:
+    def measure(self, sensor: Sensor, view: FakeSensorView, period: int) -> list[Reading]:
         """Return the next twenty readings."""
-        taken = []
+        readings = []
         for k in range(1, READING_COUNT + 1):
             view.seconds = k * period / 240
-            taken.append(call_component("reads", sensor.read, k * period))
-        return taken
+            readings.append(call_component("reads", sensor.read, k * period))
+        return readings
 
     @promise
     def a_reading_has_the_declared_type_name_and_tick(self) -> None:
@@ -186,10 +188,10 @@ class SensorContract(Contract):
         require(sensor.name == NAME, f"is called {sensor.name!r}, not {NAME!r}")
         require(sensor.period == period, f"has a period of {sensor.period!r} ticks, not {period}")
         kind = getattr(sensor_data, self.spec.reading_type)
-        for k, reading in enumerate(self.measured(sensor, view, period), start=1):
+        for k, reading in enumerate(self.measure(sensor, view, period), start=1):
             require(type(reading) is kind, f"returns {type(reading).__name__}, not {self.spec.reading_type}")
-            signed = (reading.sensor, reading.tick)
-            require(signed == (NAME, k * period), f"signs a reading of tick {k * period} as {signed}")
+            label = (reading.sensor, reading.tick)
+            require(label == (NAME, k * period), f"labels a reading of tick {k * period} as {label}")
 
     @promise
     def the_numbers_of_a_reading_are_finite(self) -> None:
@@ -198,21 +200,21 @@ class SensorContract(Contract):
             for field in fields(reading):
                 value = getattr(reading, field.name)
                 is_unset = value is None and field.default is None
-                if is_unset or isinstance(value, str | bool) or field.name in MAY_BE_MISSING:
+                if is_unset or isinstance(value, str | bool) or field.name in FIELDS_WITH_NAN:
                     continue
-                require(np.isfinite(np.asarray(value, dtype=np.float64)).all(), f"says {field.name} of {value!r}")
+                require(np.isfinite(np.asarray(value, dtype=np.float64)).all(), f"returns {field.name} = {value!r}")
 
     @promise
     def the_same_world_and_generator_give_the_same_readings_bit_for_bit(self) -> None:
         """Given the same world and generator then the same readings."""
         one, other = self.readings(), self.readings()
-        require(all(map(equal, one, other)), "measures the same world in two ways")
+        require(all(map(equal, one, other)), "returns different readings for the same world and generator")
 
     @promise
     def a_reading_does_not_change_after_it_was_given(self) -> None:
         """Given a reading then later measurements do not change it."""
         sensor, view, period = self.build()
-        first = self.measured(sensor, view, period)
-        kept = copy.deepcopy(first)
-        self.measured(sensor, view, period)
-        require(all(map(equal, first, kept)), "a reading changes when the next one is taken")
+        first = self.measure(sensor, view, period)
+        original = copy.deepcopy(first)
+        self.measure(sensor, view, period)
+        require(all(map(equal, first, original)), "a reading changes when the next one is taken")

@@ -22,7 +22,7 @@ from simscen.testing.flatland import CONTROL, RATE, Drive, Flatland, round_robot
 
 START, NEAR, FAR = Pose2(1, 2), Goal("near", Pose2(1.8, 2.0, 0.0)), Goal("far", Pose2(5, 2, 0.0))
 ASIDE = Goal("aside", Pose2(1.5, 3.2, 1.5))
-ENDINGS = {EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED}
+GOAL_END_KINDS = {EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED}
 
 
 class CheckedStack:
@@ -35,14 +35,14 @@ class CheckedStack:
         """Return the checked decision of the stack."""
         ranges = [reading.ranges.copy() for reading in readings if isinstance(reading, Scan)]
         decision = call_component("decides", lambda: self.stack.decide(tick, readings))
-        require(isinstance(decision, Decision), f"decides {type(decision).__name__}, not a Decision")
+        require(isinstance(decision, Decision), f"returns {type(decision).__name__}, not a Decision")
         require(all(map(math.isfinite, decision.command)), f"commands {tuple(decision.command)}")
         scans = [reading for reading in readings if isinstance(reading, Scan)]
         unchanged = all(np.array_equal(a, b.ranges, equal_nan=True) for a, b in zip(ranges, scans, strict=True))
-        require(unchanged, "the ranges of a scan are not what they were")
+        require(unchanged, "changes the ranges of a scan")
         for event in decision.events:
-            require(isinstance(event, Event) and isinstance(event.kind, EventKind), f"tells of {event!r}")
-            require(event.tick == tick, f"tells at tick {tick} of {event.kind} at tick {event.tick}")
+            require(isinstance(event, Event) and isinstance(event.kind, EventKind), f"reports {event!r}, not an Event")
+            require(event.tick == tick, f"reports at tick {tick} the event {event.kind} of tick {event.tick}")
         return decision
 
     def __getattr__(self, name: str) -> Any:
@@ -63,12 +63,14 @@ class StackContract(Contract):
         robot, world = self.robot or round_robot(), Flatland().room(6, 4)
         grid = world.grid((-0.5, -0.5, 6.5, 4.5))
         world.discs += discs
-        around = Surroundings(robot, grid, RATE, lidars=("lidar",))
-        setting = Setting(around, "stack", Streams(seed), CONTROL / RATE, estimate=Estimate(START, (0.05, 0.05, 0.02)))
+        surroundings = Surroundings(robot, grid, RATE, lidars=("lidar",))
+        setting = Setting(
+            surroundings, "stack", Streams(seed), CONTROL / RATE, estimate=Estimate(START, (0.05, 0.05, 0.02))
+        )
         stack = call_component("is built", lambda: self.spec.implementation()(self.spec, setting))
         call_component("starts", lambda: stack.start(setting.estimate, goals))
-        truth = ("odom", "ground_truth") if self.has_true_poses else ("odom",)
-        return Drive(world, robot, CheckedStack(stack), START, odometry=truth)
+        odometry = ("odom", "ground_truth") if self.has_true_poses else ("odom",)
+        return Drive(world, robot, CheckedStack(stack), START, odometry=odometry)
 
     @property
     def has_true_poses(self) -> bool:
@@ -80,16 +82,16 @@ class StackContract(Contract):
         """Given a goal and an obstacle in the way that is on no map then the robot gets there and touches nothing."""
         d = self.new_drive(FAR, discs=((3.2, 1.9, 0.25),)).run(90)
         require(d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / RATE:.0f} s")
-        off = d.pose.distance(FAR.pose)
-        require(off <= FAR.xy_tolerance, f"says that it has reached a goal that is {off:.2f} m away")
-        require(d.least > 0, f"the hull touches something: {d.least:.3f} m")
+        distance = d.pose.distance(FAR.pose)
+        require(distance <= FAR.xy_tolerance, f"says that it has reached a goal that is {distance:.2f} m away")
+        require(d.min_clearance > 0, f"the robot touches something: clearance {d.min_clearance:.3f} m")
 
     @promise
     def without_a_goal_it_commands_zero(self) -> None:
         """Given no goal then the command is zero, and there is no plan."""
         d = self.new_drive().run(0.5)
         require(set(d.commands) == {STOP}, "commands a velocity without a goal")
-        require(d.stack.goal is None and d.stack.plan is None, "has a goal or a plan without being given one")
+        require(d.stack.goal is None and d.stack.plan is None, "has a goal or a plan although it received none")
 
     @promise
     def once_a_task_has_ended_it_commands_zero(self) -> None:
@@ -106,10 +108,10 @@ class StackContract(Contract):
         """Given a cancel then goal and task end as canceled, and the command is zero from the next step on."""
         d = self.new_drive(FAR, NEAR).run(2)
         call_component("is canceled", lambda: d.stack.cancel(d.tick))
-        begun = len(d.commands)
+        canceled_at = len(d.commands)
         d.run(0.5, until="")
-        require(set(d.commands[begun:]) == {STOP}, "commands a velocity after it was canceled")
-        require([e.name for e in d.kinds("goal.canceled")] == ["far"], "does not tell that its goal is canceled")
+        require(set(d.commands[canceled_at:]) == {STOP}, "commands a velocity after it was canceled")
+        require([e.name for e in d.kinds("goal.canceled")] == ["far"], "does not report that its goal is canceled")
         require([e.name for e in d.kinds("navigation.ended")] == ["CANCELED"], "does not end its task as CANCELED")
 
     @promise
@@ -121,7 +123,7 @@ class StackContract(Contract):
         require(d.stack.goal == ASIDE, f"drives to {d.stack.goal} after it was sent to {ASIDE}")
         d.run(60)
         canceled = [e.name for e in d.kinds("goal.canceled")]
-        require(canceled == ["far"], f"tells that {canceled or 'nothing'} is canceled, not far")
+        require(canceled == ["far"], f"reports that {canceled or 'nothing'} is canceled, not far")
         require([e.name for e in d.kinds("goal.reached")] == ["aside"], "does not reach the goal that it was sent to")
 
     @promise
@@ -129,7 +131,7 @@ class StackContract(Contract):
         """Given goals of which the last is unreachable then each goal is accepted once and ends once, in order."""
         d = self.new_drive(NEAR, Goal("never", Pose2(40.0, 0.0), timeout=3.0)).run(60)
         accepted = [e.name for e in d.kinds("goal.accepted")]
-        ended = [e.name for e in d.log if e.kind in ENDINGS]
+        ended = [e.name for e in d.log if e.kind in GOAL_END_KINDS]
         require(accepted == ["near", "never"], f"accepts {accepted}, not near, then never")
         require(ended == ["near", "never"], f"ends {ended}, not near, then never")
         require([e.name for e in d.kinds("goal.failed")] == ["never"], "does not fail a goal outside the map")

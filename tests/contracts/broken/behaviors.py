@@ -25,7 +25,7 @@ class WaitsForEver(Wrapper):
         return Twist()
 
 
-@breaks(SPIN, "it ends", "more than the base can do")
+@breaks(SPIN, "it ends", "beyond the limits of the base")
 class SpinsTooFast(Stepping):
     def changed(self, command, seconds):
         return command and command._replace(wz=5.0)
@@ -51,13 +51,13 @@ class FailsInItsOwnWay(Wrapper):
             raise RuntimeError("no room") from failure
 
 
-@breaks(BACKUP, "the same calls", "two tries with the same generator differ")
+@breaks(BACKUP, "the same calls", "two runs with the same generator differ")
 class BacksByChance(Stepping):
     def changed(self, command, seconds):
         return command and command._replace(vx=command.vx * (0.9 + 0.1 * random.random()))
 
 
-@breaks(BACKUP, "a costmap is not changed", "not what it was")
+@breaks(BACKUP, "a costmap is not changed", "changes the costmap")
 class ClearsTheCostmapItself(Wrapper):
     def step(self, pose, costmap, seconds):
         costmap.costs[:] = 0

@@ -26,7 +26,7 @@ class StandsStill(Commanding):
         return Twist()
 
 
-@breaks(CONTROLLER, "it follows the path", "m beside the path")
+@breaks(CONTROLLER, "it follows the path", "deviates from the path by")
 class Swerves(Commanding):
     k = 0
 
@@ -35,13 +35,13 @@ class Swerves(Commanding):
         return Twist(0.3, 0.0, 0.4) if self.k < 60 else command
 
 
-@breaks(CONTROLLER, "no command exceeds", "more than the base can do")
+@breaks(CONTROLLER, "no command exceeds", "beyond the limits of the base")
 class TurnsTooFast(Commanding):
     def changed(self, command):
         return command._replace(wz=9.0)
 
 
-@breaks(CONTROLLER, "no command exceeds", "more than the base can do")
+@breaks(CONTROLLER, "no command exceeds", "beyond the limits of the base")
 class SlidesSideways(Commanding):
     def changed(self, command):
         return command._replace(vy=0.1)
@@ -86,21 +86,21 @@ class Trembles(Commanding):
         return command._replace(wz=command.wz * (1.0 + 1e-9 * random.random()))
 
 
-@breaks(CONTROLLER, "an empty path", "takes a path without points")
+@breaks(CONTROLLER, "an empty path", "accepts a path without points")
 class TakesEverything(Wrapper):
     def set_path(self, path):
         if len(path.points):
             self.inner.set_path(path)
 
 
-@breaks(CONTROLLER, "path and costmap", "the path is not what it was")
+@breaks(CONTROLLER, "path and costmap", "changes the path")
 class StraightensThePath(Wrapper):
     def set_path(self, path):
         self.inner.set_path(path)
         path.points[:, 1] += 0.01
 
 
-@breaks(CONTROLLER, "path and costmap", "an old costmap shows in a new command")
+@breaks(CONTROLLER, "path and costmap", "an old costmap affects a new command")
 class KeepsACostmap(Wrapper):
     kept = None
 
@@ -111,6 +111,6 @@ class KeepsACostmap(Wrapper):
         return command._replace(vx=slower * command.vx, wz=slower * command.wz)
 
 
-@breaks(CONTROLLER, "its local plan", "no path of finite poses")
+@breaks(CONTROLLER, "its local plan", "not a path of finite poses")
 class ExpectsPoints(Wrapper):
     local_plan = ((0.0, 0.0), (1.0, 0.0))

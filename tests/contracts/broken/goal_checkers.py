@@ -37,7 +37,7 @@ class CountsTurns(Checking):
         return goal.pose.distance(pose) <= 0.25 and abs(goal.pose.yaw - pose.yaw) <= 0.25
 
 
-@breaks(CHECKER, "a reset forgets", "because the one before was")
+@breaks(CHECKER, "a reset forgets", "because the previous one was")
 class StaysContent(Checking):
     content = False
 
@@ -49,13 +49,13 @@ class StaysContent(Checking):
         return self.content
 
 
-@breaks(CHECKER, "a pose that is no number", "is there")
+@breaks(CHECKER, "a pose that is no number", "has reached the goal")
 class ComparesTheWrongWay(Checking):
     def reached(self, goal, pose, twist):
         return not (goal.pose.distance(pose) > 0.25 or abs(goal.pose.yaw - pose.yaw) > 0.25)
 
 
-@breaks(CHECKER, "the same calls", "answer differently")
+@breaks(CHECKER, "the same calls", "answer the same calls differently")
 class TossesACoin(Checking):
     def reached(self, *asked):
         return self.inner.reached(*asked) and random.random() < 0.9

@@ -27,7 +27,7 @@ class BelievesInChance(Believing):
         return replace(belief, pose=belief.pose._replace(x=belief.pose.x + 1e-9 * random.random()))
 
 
-@breaks(LOCALIZER, "without motion the belief does not drift", "wanders off")
+@breaks(LOCALIZER, "without motion the belief does not drift", "drifts by")
 class Drifts(Believing):
     off = 0.0
 
@@ -50,13 +50,13 @@ class UsesOneArray(Believing):
         self.array += 1.0
 
 
-@breaks(LOCALIZER, "a scan is neither", "ranges of a scan are not what they were")
+@breaks(LOCALIZER, "a scan is neither", "changes the ranges of a scan")
 class CleansTheScan(Wrapper):
     def on_scan(self, scan):
         scan.ranges[:] = 1.0
 
 
-@breaks(LOCALIZER, "a scan is neither", "shows in the belief")
+@breaks(LOCALIZER, "a scan is neither", "affects the belief")
 class KeepsTheScan(Believing):
     scan = None
 
@@ -79,7 +79,7 @@ class BelievesTheLidar(Believing):
         return replace(belief, pose=belief.pose._replace(x=self.last))
 
 
-@breaks(LOCALIZER, "invalid odometry never makes the belief invalid", "with a covariance that is not")
+@breaks(LOCALIZER, "invalid odometry never makes the belief invalid", "a covariance that is not")
 class BelievesTheGyroscope(Believing):
     rate = 0.0
 
@@ -96,7 +96,7 @@ class IsTooSure(Believing):
         return replace(belief, covariance=-belief.covariance)
 
 
-@breaks(LOCALIZER, "scans of any size range and mount are accepted", "raises IndexError when it takes a scan")
+@breaks(LOCALIZER, "scans of any size range and mount are accepted", "raises IndexError when it receives a scan")
 class WantsAllBeams(Wrapper):
     def on_scan(self, scan):
         scan.ranges[359]

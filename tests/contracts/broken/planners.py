@@ -40,7 +40,7 @@ class LeavesOutPoints(Wrapper):
         return Path(self.inner.plan(*asked).points[::4])
 
 
-@breaks(PLANNER, "the footprint is never", "does not fit at")
+@breaks(PLANNER, "the footprint is never", "is in collision at")
 class GoesThroughWalls(Wrapper):
     def plan(self, costmap, start, goal, seed):
         self.inner.plan(costmap, start, goal, seed)
@@ -61,7 +61,7 @@ class RaisesWhatItLikes(Wrapper):
             raise ValueError("no way") from failure
 
 
-@breaks(PLANNER, "an impossible request fails with its error code", "which is no ErrorCode")
+@breaks(PLANNER, "an impossible request fails with its error code", "which is not an ErrorCode")
 class HasItsOwnCodes(Wrapper):
     def plan(self, *asked):
         try:
@@ -79,7 +79,7 @@ class AnswersWithNothing(Wrapper):
             return Path()
 
 
-@breaks(PLANNER, "an impossible request fails with its error code", "does not come to an end")
+@breaks(PLANNER, "an impossible request fails with its error code", "does not return")
 class NeverGivesUp(Wrapper):
     def plan(self, *asked):
         while True:
@@ -110,14 +110,14 @@ class RemembersHowOften(Wrapper):
         return self.inner.plan(costmap, start, goal, seed + 101 * self.plans)
 
 
-@breaks(PLANNER, "a costmap is neither", "not what it was before")
+@breaks(PLANNER, "a costmap is neither", "changes the costmap")
 class DrawsIntoTheCostmap(Wrapper):
     def plan(self, costmap, *asked):
         costmap.costs[0, 0] = 7
         return self.inner.plan(costmap, *asked)
 
 
-@breaks(PLANNER, "a costmap is neither", "an old costmap shows in a new plan")
+@breaks(PLANNER, "a costmap is neither", "an old costmap affects a new plan")
 class KeepsItsFirstCostmap(Wrapper):
     kept = None
 
@@ -127,7 +127,7 @@ class KeepsItsFirstCostmap(Wrapper):
         return self.inner.plan(costmap, start, goal, seed + int(lethal))
 
 
-@breaks(PLANNER, "success begins", "no finite float64")
+@breaks(PLANNER, "success begins", "not finite float64")
 class PlansNothings(Wrapper):
     def plan(self, *asked):
         points = self.inner.plan(*asked).points.copy()

@@ -13,7 +13,7 @@ from tests.contracts.broken.cases import Wrapper, breaks
 SENSOR = Bumper()
 
 
-@breaks(SENSOR, "a reading has the declared type name and tick", "signs a reading of tick")
+@breaks(SENSOR, "a reading has the declared type name and tick", "labels a reading of tick")
 class SignsForAnother(Wrapper):
     def read(self, tick):
         return replace(self.inner.read(tick), sensor="other")
@@ -25,13 +25,13 @@ class SaysSomethingElse(Wrapper):
         return Odometry(self.name, tick, Pose2(0, 0, 0), Twist())
 
 
-@breaks(Lidar(), "the numbers of a reading are finite", "says angle_min of nan")
+@breaks(Lidar(), "the numbers of a reading are finite", "returns angle_min = nan")
 class KnowsNoAngles(Wrapper):
     def read(self, tick):
         return replace(self.inner.read(tick), angle_min=math.nan)
 
 
-@breaks(Lidar(), "the same world", "in two ways")
+@breaks(Lidar(), "the same world", "for the same")
 class MeasuresByChance(Wrapper):
     def read(self, tick):
         scan = self.inner.read(tick)

@@ -55,7 +55,7 @@ class GoesOn(Deciding):
         return replace(decision, command=Twist(0.05)) if self.ended else decision
 
 
-@breaks(STACK, "a canceled task", "does not tell that its goal is canceled")
+@breaks(STACK, "a canceled task", "does not report that its goal is canceled")
 class TellsNobody(Deciding):
     def changed(self, decision):
         kept = tuple(event for event in decision.events if event.kind != EventKind.GOAL_CANCELED)
@@ -88,7 +88,7 @@ class DrivesByChance(Deciding):
         return replace(decision, command=Twist(vx, vy, wz * (1 + 1e-12 * random.random()) + 1e-15 * random.random()))
 
 
-@breaks(STACK, "without a goal", "of goal.reached at tick -5")
+@breaks(STACK, "without a goal", "the event goal.reached of tick -5")
 class TellsOfThePast(Deciding):
     def changed(self, decision):
         return replace(decision, events=(Event(-5, EventKind.GOAL_REACHED, "x"),))
@@ -103,7 +103,7 @@ class CannotBeBlind(Deciding):
         return self.inner.decide(tick, readings)
 
 
-@breaks(STACK, "it reaches a goal", "the ranges of a scan are not what they were")
+@breaks(STACK, "it reaches a goal", "changes the ranges of a scan")
 class CleansScans(Deciding):
     def decide(self, tick, readings):
         for reading in readings:

@@ -20,13 +20,13 @@ from tests.contracts.broken.cases import COUNT, word
 FINE = Finding(Status.PASS, "it", "0", "≤ 1", margin=1.0)
 
 
-@word("every bound yields", "finds nothing in")
+@word("every bound yields", "returns no finding for")
 class ChecksNothing(Spec, Criterion):
     def judge(self, trace, case):
         return []
 
 
-@word("every bound yields", "raises IndexError when it judges a robot that stands")
+@word("every bound yields", "raises IndexError when it judges the trace of a stationary robot")
 class NeedsABelief(Spec, Criterion):
     def judge(self, trace, case):
         trace.belief.values[0]
@@ -39,13 +39,13 @@ class PassesBelow(Spec, Criterion):
         return [replace(FINE, margin=-1.0)]
 
 
-@word("the same trace gives", "judged otherwise")
+@word("the same trace gives", "different findings for the same drive")
 class Counts(Spec, Criterion):
     def judge(self, trace, case):
         return [replace(FINE, measured=str(next(COUNT)))]
 
 
-@word("a trace is not changed", "not what it was")
+@word("a trace is not changed", "changes the trace")
 class SmoothesTheTrace(Spec, Criterion):
     def judge(self, trace, case):
         trace.truth.values[:] = 0.0
@@ -80,7 +80,7 @@ class OnScans(Spec, Fault):
         return reading
 
 
-@word("it affects known targets", "which there is not")
+@word("it affects known targets", "which are not targets")
 class AffectsGhosts(OnScans):
     affects: ClassVar[frozenset[str]] = frozenset({"Sonar"})
 
@@ -90,13 +90,13 @@ class AffectsNothing(OnScans):
     affects: ClassVar[frozenset[str]] = frozenset()
 
 
-@word("it returns the same type or none", "of a Scan")
+@word("it returns the same type or none", "for a Scan")
 class AnswersForAnother(OnScans):
     def changed(self, reading):
         return replace(reading, sensor="other")
 
 
-@word("the same generator", "in two ways")
+@word("the same generator", "for the same")
 class IsUnsteady(OnScans):
     def changed(self, reading):
         return replace(reading, ranges=reading.ranges + random.random())
@@ -132,13 +132,13 @@ class AnswersANumber(Spec, Condition):
         return now.tick and 240
 
 
-@word("the same situation", "depend on what was asked before")
+@word("the same situation", "depend on earlier calls")
 class HoldsEverySecondTime(Spec, Condition):
     def holds(self, now):
         return next(COUNT) % 3 == 0
 
 
-@word("it changes nothing", "does something")
+@word("it changes nothing", "changes the world")
 class Meddles(Spec, Condition):
     def holds(self, now):
         now.push((1.0, 0.0))
@@ -148,20 +148,20 @@ class Meddles(Spec, Condition):
 # actions
 
 
-@word("it returns an effect", "does not say what came of it")
+@word("it returns an effect", "without a description")
 class SaysNothing(Spec, Action):
     def perform(self, stage):
         stage.push((1.0, 0.0))
         return Effect(True, "")
 
 
-@word("it returns an effect", "and did nothing")
+@word("it returns an effect", "but did nothing")
 class Boasts(Spec, Action):
     def perform(self, stage):
         return Effect(True, "moved the earth")
 
 
-@word("the same stage gives the same calls", "something else the second time")
+@word("the same stage gives the same calls", "different calls the second time")
 class ActsByChance(Spec, Action):
     def perform(self, stage):
         stage.push((random.random(), 0.0))
@@ -171,19 +171,19 @@ class ActsByChance(Spec, Action):
 # metrics
 
 
-@word("it returns a finite number or a reason", "measures nan")
+@word("it returns a finite number or a reason", "returns nan")
 class MeasuresNothing(Spec, Measure):
     def measure(self, trace, case):
         return math.nan
 
 
-@word("the same trace gives", "measured otherwise")
+@word("the same trace gives", "different numbers for the same drive")
 class CountsCalls(Spec, Measure):
     def measure(self, trace, case):
         return float(next(COUNT))
 
 
-@word("a trace is not changed", "not what it was")
+@word("a trace is not changed", "changes the trace")
 class Resets(Spec, Measure):
     def measure(self, trace, case):
         trace.truth.values[:] = 0.0

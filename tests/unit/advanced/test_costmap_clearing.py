@@ -29,7 +29,7 @@ def test_a_wall_across_a_hall_whose_ends_are_never_in_sight_together_ends_with_n
     d = in_a_hall(60)
     assert [event.data["error_name"] for event in d.kinds("goal.failed")] == ["NO_VALID_PATH"]
     assert d.tick / 240 < 40
-    assert d.least > 0.02
+    assert d.min_clearance > 0.02
 
 
 def test_nav2s_tree_forgets_all_each_time() -> None:

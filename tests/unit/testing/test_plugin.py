@@ -84,7 +84,7 @@ def test_with_workers_a_mistake_is_told_in_words_as_well(run) -> None:
 
 REFUSED = {
     "own:Checker": "part: Field required",
-    "own:Checker={part: 1}": "is no JSON",
+    "own:Checker={part: 1}": "is not valid JSON",
     "own:Unannotated": "its first argument is not annotated with a specification",
     "own:Nothing": "has no attribute 'Nothing'",
     "nowhere:Nothing": "No module named 'nowhere'",

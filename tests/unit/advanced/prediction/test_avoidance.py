@@ -74,12 +74,12 @@ def test_every_controller_of_ours_passes_what_comes_towards_it_or_across(
 ) -> None:
     d = among(start(FAR, controller=controller), discs, 30.0)
     assert d.result == "SUCCEEDED"
-    assert d.least > 0.1
+    assert d.min_clearance > 0.1
 
 
 def test_without_prediction_it_would_have_been_met() -> None:
     d = among(start(FAR, enabled=False), oncoming, 30.0)
-    assert d.least < 0.1
+    assert d.min_clearance < 0.1
 
 
 def test_a_robot_that_has_arrived_steps_aside_and_comes_back() -> None:
@@ -91,12 +91,12 @@ def test_a_robot_that_has_arrived_steps_aside_and_comes_back() -> None:
     def through(t: float) -> list[Disc]:
         return [(stood.x + 0.05, stood.y - 6.0 + 1.0 * (t - began), 0.4)]
 
-    d.least = math.inf
+    d.min_clearance = math.inf
     farthest = 0.0
     for _ in range(20):
         among(d, through, 1.0)
         farthest = max(farthest, d.pose.distance(stood))
-    assert d.least > 0.05
+    assert d.min_clearance > 0.05
     assert farthest > 0.4
     assert d.pose.distance(goal.pose) < goal.xy_tolerance
     assert abs(d.pose.yaw - stood.yaw) < 0.25

@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from simscen.testing.synthetic_room import BEAMS, BOXES, EACH, SCAN_PERIOD, TICK_RATE, Drive, cast
+from simscen.testing.synthetic_room import BEAMS, BOXES, READINGS_PER_SCAN, SCAN_PERIOD, TICK_RATE, Drive, cast
 
 
 def kidnapped(before: Drive, after: Drive) -> Drive:
     """The robot is carried from the end of one drive to the start of the next; its wheels do not notice."""
-    count = len(before.truth) // EACH * EACH
+    count = len(before.truth) // READINGS_PER_SCAN * READINGS_PER_SCAN
     return Drive(
         np.concatenate((before.truth[:count], after.truth)),
         np.concatenate((before.steps[:count], after.steps)),
-        np.concatenate((before.ranges[: count // EACH], after.ranges)),
+        np.concatenate((before.ranges[: count // READINGS_PER_SCAN], after.ranges)),
     )
 
 
@@ -29,10 +29,10 @@ def crowded(way: Drive, seed: int, people: int = 8) -> Drive:
     People are 0.6 m wide and walk 0.5 to 3 m from the robot. Slipping wheels turn up to 30 % too far, for seconds.
     """
     rng, angles = np.random.default_rng((seed, 7)), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
-    ranges = cast(way.truth[::EACH], angles, np.concatenate((np.delete(BOXES, GONE, axis=0), NEW)))
+    ranges = cast(way.truth[::READINGS_PER_SCAN], angles, np.concatenate((np.delete(BOXES, GONE, axis=0), NEW)))
     bearing, distance = rng.uniform(-np.pi, np.pi, people), rng.uniform(0.6, 2.5, people)
     phase, period = rng.uniform(0, 2 * np.pi, people), rng.uniform(8, 30, people)
-    for row, (seen, yaw) in enumerate(zip(ranges, way.truth[::EACH, 2], strict=True)):
+    for row, (seen, yaw) in enumerate(zip(ranges, way.truth[::READINGS_PER_SCAN, 2], strict=True)):
         bearing += rng.normal(0, 0.05, people)
         distance = np.clip(distance + rng.normal(0, 0.05, people), 0.5, 3)
         here = np.sin(2 * np.pi * row * SCAN_PERIOD / TICK_RATE / period + phase) > 0

@@ -17,7 +17,7 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf
 from simscen.model.localizers import Localizer as Spec
-from simscen.testing.synthetic_room import USUAL, Drive, Noise, drive, errors, localizer, nees, run, scan
+from simscen.testing.synthetic_room import DEFAULT_NOISE, Drive, Noise, drive, errors, localizer, nees, run, scan
 
 SUM = Amcl(laser_model_type="likelihood_field")
 PROB = Amcl(laser_model_type="likelihood_field_prob")
@@ -48,7 +48,9 @@ class Tracked:
     anees: Array
 
 
-def tracking(spec: Spec, seeds: Iterable[int], seconds: float, noise: Noise = USUAL, imu: bool = False) -> Tracked:
+def tracking(
+    spec: Spec, seeds: Iterable[int], seconds: float, noise: Noise = DEFAULT_NOISE, imu: bool = False
+) -> Tracked:
     """Drives from an estimate that is as good as it says; the 25 times are spread over the last three quarters."""
     squares, consistency, way = [], [], drive(seconds)
     for seed in seeds:
@@ -160,15 +162,15 @@ def print_costs() -> None:
 def print_tracking(seeds: Iterable[int]) -> None:
     """How well each localizer knows where it is on the way round the room."""
     tracked: list[tuple[str, Spec, Noise, bool]] = [
-        ("amcl", SUM, USUAL, False),
-        ("amcl, recovery", RECOVERING, USUAL, False),
-        ("amcl, prob", PROB, USUAL, False),
-        ("amcl, prob, recovery", RECOVERING_PROB, USUAL, False),
-        ("amcl, prob, tuned", TUNED, USUAL, False),
-        ("amcl, beam", BEAM, USUAL, False),
+        ("amcl", SUM, DEFAULT_NOISE, False),
+        ("amcl, recovery", RECOVERING, DEFAULT_NOISE, False),
+        ("amcl, prob", PROB, DEFAULT_NOISE, False),
+        ("amcl, prob, recovery", RECOVERING_PROB, DEFAULT_NOISE, False),
+        ("amcl, prob, tuned", TUNED, DEFAULT_NOISE, False),
+        ("amcl, beam", BEAM, DEFAULT_NOISE, False),
         ("ekf, odometry only, noise as specified", EXACT_EKF, Noise(drift=0.01, gyro_bias=0.002), False),
         ("ekf, with gyroscope, noise as specified", EXACT_EKF, Noise(drift=0.01, gyro_bias=0.002), True),
-        ("ekf, defaults", Ekf(type="ekf"), USUAL, True),
+        ("ekf, defaults", Ekf(type="ekf"), DEFAULT_NOISE, True),
     ]
     for name, spec, noise, imu in tracked:
         result = tracking(spec, seeds, 60.0, noise, imu)
