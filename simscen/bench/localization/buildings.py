@@ -12,7 +12,7 @@ from simscen.core.random_streams import Streams
 from simscen.worlds.geometry.triangulation import merge_solids
 
 HEIGHT_M = 1.0
-"""Height of all walls and furniture. The lidar measures in a horizontal plane, so it does not matter."""
+"""Height of all walls and furniture. Its value has no effect, because the lidar measures in a horizontal plane."""
 
 
 def boxes(rows: Iterable[Sequence[float]]) -> Array:
@@ -100,9 +100,9 @@ def generate_building(number: int, rebuilt: int = 0) -> Building:
         for name, ends in (("left", (0.0, middle)), (f"right {rebuilt}" if rebuilt else "right", (middle, length)))
     ]
     corners = ((0, 0), (length, 0), (length, depth), (0, depth))
-    hull = [wall_boxes(corners[a], corners[b], 0.3) for a, b in ((0, 1), (3, 2), (0, 3), (1, 2))]
+    outer_walls = [wall_boxes(corners[a], corners[b], 0.3) for a, b in ((0, 1), (3, 2), (0, 3), (1, 2))]
     walls, glass, furniture, rooms, doors = (np.concatenate(part) for part in zip(*halves, strict=True))
-    return Building((length, depth), middle, np.concatenate((*hull, walls)), glass, furniture, rooms, doors)
+    return Building((length, depth), middle, np.concatenate((*outer_walls, walls)), glass, furniture, rooms, doors)
 
 
 def _half(
@@ -186,14 +186,14 @@ def _is_clear_of(doors: Array, box: tuple[float, float, float, float]) -> bool:
 def rearranged_furniture(floor: Building, rng: np.random.Generator) -> Array:
     """Return the furniture (n, 4) after some of it was moved, removed, and added since the map was made."""
     draws = rng.random(len(floor.furniture))
-    now = floor.furniture[draws > REMOVED_SHARE].copy()
+    furniture = floor.furniture[draws > REMOVED_SHARE].copy()
     moved = draws[draws > REMOVED_SHARE] < REMOVED_SHARE + MOVED_SHARE
     shift = rng.normal(0, 0.6, (int(moved.sum()), 2))
-    now[moved] += np.hstack((shift, shift))
+    furniture[moved] += np.hstack((shift, shift))
     added = []
     for _ in range(int(ADDED_SHARE * len(floor.furniture))):
         x, y = floor.rooms[rng.integers(len(floor.rooms))] + rng.normal(0, 1.2, 2)
         a, b = rng.uniform(0.3, 0.9, 2)
         if _is_clear_of(floor.doors, (x, y, x + a, y + b)):
             added.append((x, y, x + a, y + b))
-    return np.concatenate((now, boxes(added)))
+    return np.concatenate((furniture, boxes(added)))

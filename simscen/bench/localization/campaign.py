@@ -45,7 +45,7 @@ Interval = tuple[float, float] | None
 
 @dataclass(frozen=True)
 class Trial:
-    """Result of one log: errors in m, times in s.
+    """Result of one log: errors in m, times in s. The names of the fields are keys of the JSON output.
 
     `tracked`: the error never exceeded LOST_M. `found` is the time until the robot was localized for good, or None.
     `nees` are the normalized estimation errors squared at MOMENTS_S. `ms` is the mean CPU time per scan, and
@@ -73,7 +73,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Share:
-    """Share of successful logs: `count` of `of`, with the 95 % interval by bootstrap over buildings."""
+    """Share of successful logs: `count` of `of` logs, with the 95 % interval by bootstrap over buildings."""
 
     count: int
     of: int
@@ -98,7 +98,7 @@ class Consistency:
 
 @dataclass(frozen=True)
 class Row:
-    """Results of one parameter set.
+    """Results of one parameter set. The names of the fields are keys of the JSON output.
 
     `shares` are the successful logs by circumstance. `median` is the median over tracked logs of the median error in a
     log, in m. `sure` is the consistency by circumstance. `ms` is the mean CPU time per scan with odometry, and
@@ -160,8 +160,8 @@ def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
 
 def _time_found(times: Array, distance: Array) -> float | None:
     """Return the first time with an error below FOUND_M after the last one above LOST_M, or None."""
-    last = np.flatnonzero((distance > LOST_M) & (times >= 0))
-    begin = int(last[-1]) + 1 if len(last) else int(np.searchsorted(times, 0.0))
+    lost = np.flatnonzero((distance > LOST_M) & (times >= 0))
+    begin = int(lost[-1]) + 1 if len(lost) else int(np.searchsorted(times, 0.0))
     near = np.flatnonzero(distance[begin:] < FOUND_M)
     return max(0.0, float(times[begin + near[0]])) if len(near) else None
 
@@ -174,7 +174,7 @@ def summarize(name: str, trials: Sequence[Trial]) -> Row:
         parameters=name,
         shares={group: _share(members) for group, members in groups.items()},
         median=float(np.median([trial.median for trial in tracked])),
-        median_interval=_interval(_building_means(tracked, [trial.median for trial in tracked])),
+        median_interval=_interval(_means_by_building(tracked, [trial.median for trial in tracked])),
         sure={group: _consistency(groups[group]) for group in CONSISTENCY_CIRCUMSTANCES if groups[group]},
         ms=float(np.mean([trial.ms for trial in trials])),
         slowest_ms=max(trial.slowest_ms for trial in trials),
@@ -185,7 +185,7 @@ def _consistency(trials: Sequence[Trial]) -> Consistency:
     values = [value for trial in trials for value in trial.nees]
     return Consistency(
         anees=anees(values),
-        bounds=grouped_anees_bounds(_building_means(trials, [anees(trial.nees) for trial in trials])),
+        bounds=grouped_anees_bounds(_means_by_building(trials, [anees(trial.nees) for trial in trials])),
         inside=share_in_ellipsoid(values),
         moments=[anees([trial.nees[k] for trial in trials]) for k in range(len(MOMENTS_S))],
         moment_bounds=anees_bounds(len(trials)),
@@ -194,10 +194,11 @@ def _consistency(trials: Sequence[Trial]) -> Consistency:
 
 def _share(trials: Sequence[Trial]) -> Share:
     successes = [trial.succeeded for trial in trials]
-    return Share(sum(successes), len(trials), _interval(_building_means(trials, [float(one) for one in successes])))
+    means = _means_by_building(trials, [float(success) for success in successes])
+    return Share(sum(successes), len(trials), _interval(means))
 
 
-def _building_means(trials: Sequence[Trial], values: Sequence[float]) -> list[float]:
+def _means_by_building(trials: Sequence[Trial], values: Sequence[float]) -> list[float]:
     """Return the mean of the values of each building."""
     numbers = sorted({trial.building for trial in trials})
     return [
@@ -211,7 +212,7 @@ def _interval(values: Sequence[float]) -> Interval:
 
 
 MIN_GROUPS = 3
-"""Number of buildings from which on their variation gives bounds."""
+"""Minimum number of buildings for bounds from the variation between buildings."""
 
 
 def nees(error: Array, covariance: Array) -> float:

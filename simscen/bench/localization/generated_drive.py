@@ -25,7 +25,7 @@ MAX_FAILED_GOALS = 30
 
 
 class EnclosedStart(ValueError):
-    """No path leads out of the room in which the drive would begin."""
+    """No path leads out of the room in which the drive would start."""
 
 
 def drive_between_rooms(
@@ -61,20 +61,20 @@ def drive_between_rooms(
 
 def _waypoints(floor: Building, paths: ShortestPaths, rng: np.random.Generator, alternate: bool) -> Iterator[Array]:
     """Yield the corners of shortest paths between random points in rooms, without end."""
-    here: Array | None = None
+    position: Array | None = None
     right, failed = False, 0
     while True:
         side = (floor.rooms[:, 0] > floor.middle) == right
         rooms = floor.rooms[side] if alternate else floor.rooms
         target = rooms[rng.integers(len(rooms))] + rng.normal(0, 0.8, 2)
-        start = target if here is None else here
-        path = paths.path(Pose2(*start), Pose2(*target))
+        start = target if position is None else position
+        path = paths.way(Pose2(*start), Pose2(*target))
         failed = failed + 1 if path is None else 0
         if failed > MAX_FAILED_GOALS:  # furniture blocks the door of this room
             raise EnclosedStart(tuple(start))
         if path is not None:
-            yield from path[:1] if here is None else path[1:]
-            here, right = path[-1], not right
+            yield from path[:1] if position is None else path[1:]
+            position, right = path[-1], not right
 
 
 def mapping_tour(floor: Building) -> Array:
@@ -82,17 +82,17 @@ def mapping_tour(floor: Building) -> Array:
     mesh = extruded_mesh(floor.walls, floor.glass)
     paths = ShortestPaths(mesh, (0.0, 0.0, *floor.size), CLEARANCE_M, min_resolution=SEARCH_CELL_M)
     order = floor.rooms[np.argsort(floor.rooms[:, 0], kind="stable")]
-    points, here = [order[:1]], order[0]
+    points, position = [order[:1]], order[0]
     for room in order[1:]:
-        path = paths.path(Pose2(*here), Pose2(*room))
+        path = paths.way(Pose2(*position), Pose2(*room))
         if path is None:
             continue
         length = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))))
         samples = np.arange(0.0, length[-1], 0.5)
         points.append(np.column_stack([np.interp(samples, length, axis) for axis in path.T]))
-        here = room
-    found = np.concatenate(points)
-    return np.column_stack((found, np.zeros(len(found))))
+        position = room
+    tour = np.concatenate(points)
+    return np.column_stack((tour, np.zeros(len(tour))))
 
 
 MEAN_SLIP_INTERVAL_S = 25.0

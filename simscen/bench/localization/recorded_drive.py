@@ -27,7 +27,7 @@ MAX_TIME_DIFFERENCE_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Localized:
-    """Beliefs of the localizer: `times` (n,) in s, `poses` (n, 3) in the map frame, and `covariances` (n, 3, 3).
+    """Beliefs of a localizer on a log: `times` (n,) in s, `poses` (n, 3) in the map frame, and `covariances` (n, 3, 3).
 
     `scans` is the number of processed scans. `cpu` is the total CPU time in s, and `slowest` that of the slowest
     message; both differ between runs.
@@ -74,7 +74,7 @@ class Errors:
 
 
 def localize(
-    sensed: LocalizationLog, spec: StackSpec, surroundings: Surroundings, estimate: Estimate, seed: int
+    log: LocalizationLog, spec: StackSpec, surroundings: Surroundings, estimate: Estimate, seed: int
 ) -> Localized:
     """Pass all readings of a log to the localizer of a stack, and return its belief after each odometry message.
 
@@ -83,7 +83,7 @@ def localize(
     localizer = CheckedLocalizer(spec.localizer, Setting(surroundings, "localizer", Streams(seed)))
     localizer.reset(estimate)
     times, poses, covariances, scans, cpu, slowest = [], [], [], 0, 0.0, 0.0
-    for reading in sensed.readings:
+    for reading in log.readings:
         start = time.process_time()
         match reading:
             case Scan():
@@ -99,27 +99,27 @@ def localize(
     return Localized(np.array(times), np.array(poses), np.array(covariances), scans, cpu, slowest)
 
 
-def compare_with_reference(localized: Localized, sensed: LocalizationLog, lost_distance: float) -> Errors | None:
+def compare_with_reference(localized: Localized, log: LocalizationLog, lost_distance: float) -> Errors | None:
     """Return the errors at all times with a reference, or None if there are none.
 
     The reference is interpolated, except over gaps longer than MAX_GAP_S; within a gap, only beliefs at its ends count.
     The robot is lost while the error exceeds `lost_distance` in m.
     """
-    if len(sensed.ticks) < 2:
+    if len(log.ticks) < 2:
         return None
-    known = sensed.ticks / TICK_RATE_HZ
-    inside = (localized.times >= known[0]) & (localized.times <= known[-1])
-    after = np.clip(np.searchsorted(known, localized.times), 1, len(known) - 1)
+    known_times = log.ticks / TICK_RATE_HZ
+    inside = (localized.times >= known_times[0]) & (localized.times <= known_times[-1])
+    after = np.clip(np.searchsorted(known_times, localized.times), 1, len(known_times) - 1)
     near = (
-        np.minimum(np.abs(known[after] - localized.times), np.abs(localized.times - known[after - 1]))
+        np.minimum(np.abs(known_times[after] - localized.times), np.abs(localized.times - known_times[after - 1]))
         <= MAX_TIME_DIFFERENCE_S
     )
-    inside &= near | (known[after] - known[after - 1] <= MAX_GAP_S)
+    inside &= near | (known_times[after] - known_times[after - 1] <= MAX_GAP_S)
     times = localized.times[inside]
     if not len(times):
         return None
-    yaw = np.unwrap(sensed.truth[:, 2])
-    x, y, heading = (np.interp(times, known, values) for values in (*sensed.truth[:, :2].T, yaw))
+    yaw = np.unwrap(log.truth[:, 2])
+    x, y, heading = (np.interp(times, known_times, values) for values in (*log.truth[:, :2].T, yaw))
     poses = localized.poses[inside]
     distance = np.hypot(poses[:, 0] - x, poses[:, 1] - y)
     return Errors(

@@ -30,7 +30,7 @@ LOCALIZERS: Mapping[str, AmclParameters] = {
     "amcl, recovery": Amcl.model_validate(RECOVERY),
     "scan_matching_amcl": ScanMatchingAmcl(),
 }
-SEEDS = 5
+SEED_COUNT = 5
 SPACING_M, SPACING_RAD = 1.0, 0.5
 """Motion between two scans: at least one of these."""
 DURATION_S = 180.0
@@ -44,7 +44,7 @@ The odometry of the public log MIT CSAIL has a few such steps.
 MISSED_TURNS = "as mapped, turns that odometry misses"
 KINDS: Mapping[str, tuple[str, bool]] = {
     "as mapped, slipping wheels": ("slipping", False),
-    "as mapped, turns that odometry misses": ("slipping", False),
+    MISSED_TURNS: ("slipping", False),
     "people, moved furniture, glass": ("tracked", False),
     "the same, ends after a turn": ("tracked", True),
     "half rebuilt": ("outdated", False),
@@ -66,40 +66,40 @@ class SparseTrial:
     lost: bool
 
 
-def thinned(log: Log, ends_after_turn: bool = False) -> Log:
+def thin_scans(log: Log, ends_after_turn: bool = False) -> Log:
     """Return the log with scans at least SPACING_M or SPACING_RAD apart by odometry.
 
     With `ends_after_turn`, it ends at the last scan after a turn of END_TURN_RAD, if there is one.
     """
     readings: list[Odometry | Scan] = []
-    kept: list[tuple[int, Pose2]] = []  # tick and odometry of each scan that is kept
+    selected: list[tuple[int, Pose2]] = []  # tick and odometry of each selected scan
     odometry, end = Pose2(0.0, 0.0, 0.0), 0
     for reading in log.sensed.readings:
         if isinstance(reading, Odometry):
             odometry = reading.pose
         elif isinstance(reading, Scan):
-            if kept and not _is_apart(kept[-1][1], odometry):
+            if selected and not _is_far_enough(selected[-1][1], odometry):
                 continue
-            kept.append((reading.tick, odometry))
-            if len(kept) > 2 and abs(wrap(odometry.yaw - kept[-3][1].yaw)) > END_TURN_RAD:
+            selected.append((reading.tick, odometry))
+            if len(selected) > 2 and abs(wrap(odometry.yaw - selected[-3][1].yaw)) > END_TURN_RAD:
                 end = reading.tick
         readings.append(reading)
     if not ends_after_turn or not end:
         return replace(log, sensed=replace(log.sensed, readings=readings))
-    before = log.sensed.ticks <= end
-    sensed = LocalizationLog([one for one in readings if one.tick <= end], log.sensed.ticks[before],
-                             log.sensed.truth[before])  # fmt: skip
+    until_end = log.sensed.ticks <= end
+    sensed = LocalizationLog([reading for reading in readings if reading.tick <= end], log.sensed.ticks[until_end],
+                             log.sensed.truth[until_end])  # fmt: skip
     return replace(log, sensed=sensed)
 
 
 def with_missed_turns(log: Log) -> Log:
-    """Return a sparse log whose odometry misses some turns: it continues with a wrong heading."""
+    """Return a sparse log whose odometry misses some turns, so that its heading is wrong afterwards."""
     rng = Streams(log.building).generator("missed turns")
     readings: list[Odometry | Scan] = []
-    before, reported, turn = Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0), 0.0
+    previous, reported, turn = Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0), 0.0
     for reading in log.sensed.readings:
         if isinstance(reading, Odometry):
-            step, before = before.between(reading.pose), reading.pose
+            step, previous = previous.between(reading.pose), reading.pose
             reported, turn = reported.compose(Pose2(step.x, step.y, step.yaw + turn)), 0.0
             readings.append(replace(reading, pose=reported))
         elif isinstance(reading, Scan):
@@ -108,7 +108,7 @@ def with_missed_turns(log: Log) -> Log:
     return replace(log, sensed=replace(log.sensed, readings=readings))
 
 
-def _is_apart(last: Pose2, now: Pose2) -> bool:
+def _is_far_enough(last: Pose2, now: Pose2) -> bool:
     return last.distance(now) >= SPACING_M or abs(wrap(now.yaw - last.yaw)) >= SPACING_RAD
 
 
@@ -116,7 +116,7 @@ def _is_apart(last: Pose2, now: Pose2) -> bool:
 def sparse_log(kind: str, building: int) -> Log:
     """Return the sparse log of a kind in a building, the same every time."""
     circumstance, ends_after_turn = KINDS[kind]
-    log = thinned(generate_log(building, building, circumstance, DURATION_S), ends_after_turn)
+    log = thin_scans(generate_log(building, building, circumstance, DURATION_S), ends_after_turn)
     return with_missed_turns(log) if kind == MISSED_TURNS else log
 
 
@@ -129,7 +129,7 @@ def run_sparse(buildings: Sequence[int], workers: int) -> Iterator[Sequence[Spar
 
 def run_sparse_log(kind: str, building: int) -> Sequence[SparseTrial]:
     """Run the log of a kind in a building through all localizers, with each seed."""
-    return [run_sparse_trial(kind, building, name, seed) for name in LOCALIZERS for seed in range(1, SEEDS + 1)]
+    return [run_sparse_trial(kind, building, name, seed) for name in LOCALIZERS for seed in range(1, SEED_COUNT + 1)]
 
 
 def run_sparse_trial(kind: str, building: int, name: str, seed: int) -> SparseTrial:
@@ -149,12 +149,12 @@ def sparse_table(trials: Sequence[SparseTrial]) -> list[tuple[str, ...]]:
     """
     rows = [("log", *LOCALIZERS)]
     for kind in KINDS:
-        groups = [[one for one in trials if (one.kind, one.localizer) == (kind, name)] for name in LOCALIZERS]
+        groups = [[trial for trial in trials if (trial.kind, trial.localizer) == (kind, name)] for name in LOCALIZERS]
         rows.append((kind, *map(_cell, groups)))
     return rows
 
 
 def _cell(trials: Sequence[SparseTrial]) -> str:
-    lost = sum(one.lost for one in trials)
-    median, end = (float(np.median([getattr(one, name) for one in trials])) for name in ("median", "end"))
+    lost = sum(trial.lost for trial in trials)
+    median, end = (float(np.median([getattr(trial, name) for trial in trials])) for name in ("median", "end"))
     return f"{lost} of {len(trials)}, {median:.2f} m, {end:.2f} m"

@@ -38,8 +38,8 @@ TUNED_FOR_MOVING_WORLDS = TUNED.replace(LOCALIZER, f"{{{WHEELS}}}")
 DEFAULT = f"  localizer: {LOCALIZER}\n"
 """Default parameters: 0.5 m/s."""
 CONTROLLERS = {
-    f"{name} at 0.5 m/s": f"  localizer: {LOCALIZER}\n  costmap: {COSTMAP}\n  controller: {said}\n"
-    for name, said in (
+    f"{name} at 0.5 m/s": f"  localizer: {LOCALIZER}\n  costmap: {COSTMAP}\n  controller: {parameters}\n"
+    for name, parameters in (
         ("regulated pure pursuit", "{type: regulated_pure_pursuit, desired_linear_vel: 0.5 m/s}"),
         ("dwb", "{type: dwb, max_vel_x: 0.5 m/s}"),
         ("mppi", "{type: mppi, vx_max: 0.5 m/s}"),

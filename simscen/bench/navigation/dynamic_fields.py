@@ -80,12 +80,14 @@ def _path(rng: np.random.Generator) -> Array:
     Raises RuntimeError after MAX_ATTEMPTS, which never happened so far.
     """
     for _ in range(MAX_ATTEMPTS):
-        way = _polynomial_in_arena(rng)
-        along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
-        if along[-1] < MIN_PATH_LENGTH_M:
+        curve = _polynomial_in_arena(rng)
+        length_at = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))))
+        if length_at[-1] < MIN_PATH_LENGTH_M:
             continue
-        at = np.linspace(0.0, along[-1], round(along[-1] / KEYFRAME_DISTANCE_M) + 1)
-        points = np.column_stack((np.interp(at, along, way[:, 0]), np.interp(at, along, way[:, 1])))
+        lengths = np.linspace(0.0, length_at[-1], round(length_at[-1] / KEYFRAME_DISTANCE_M) + 1)
+        points = np.column_stack(
+            (np.interp(lengths, length_at, curve[:, 0]), np.interp(lengths, length_at, curve[:, 1]))
+        )
         points = points[:, ::-1] if rng.integers(2) else points
         return points[::-1] if rng.integers(2) else points
     raise RuntimeError(f"none of {MAX_ATTEMPTS} polynomials stays within the arena for {MIN_PATH_LENGTH_M:g} m")
@@ -96,13 +98,13 @@ def _polynomial_in_arena(rng: np.random.Generator) -> Array:
     order = int(rng.integers(DEGREE_RANGE[0], DEGREE_RANGE[1] + 1))
     # Spread over the arena, so that the polynomial does not oscillate between points that nearly coincide.
     edges = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 2)
-    through = rng.uniform(edges[:-1], edges[1:])
+    x_points = rng.uniform(edges[:-1], edges[1:])
     polynomial = np.polynomial.Polynomial.fit(
-        through, rng.uniform(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 1), order
+        x_points, rng.uniform(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 1), order
     )
     x = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, 401)
     y = polynomial(x)
     outside = np.flatnonzero(np.abs(y) > ARENA_HALF_WIDTH_M)
     pieces = np.split(np.column_stack((x, y)), outside)
-    kept = [piece[np.abs(piece[:, 1]) <= ARENA_HALF_WIDTH_M] for piece in pieces]
-    return max(kept, key=len)
+    inside = [piece[np.abs(piece[:, 1]) <= ARENA_HALF_WIDTH_M] for piece in pieces]
+    return max(inside, key=len)

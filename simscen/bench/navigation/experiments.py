@@ -55,7 +55,7 @@ NARROW_MARGINS_M = (0.30, 0.20, 0.10)
 """Width of the widest path through a narrow field minus the width of the robot."""
 ROBOT_WIDTH_M = 0.42
 """Width of the robot across its wheels."""
-LOCALIZATIONS = ("tour", "told 0.5 m and 20° off", "start unknown", "kidnapped")
+LOCALIZATIONS = ("tour", "start 0.5 m and 20° off", "start unknown", "kidnapped")
 """Names of the localization experiments."""
 
 
@@ -74,27 +74,27 @@ def barn_challenge(
 
 def generated_fields(folder: Path, numbers: Iterable[int]) -> Experiment:
     """Return drives in generated fields like those of BARN, with one seed each."""
-    drives = [_field(folder / "fields", obstacle_field(number)) for number in numbers]
+    drives = [_field_drive(folder / "fields", obstacle_field(number)) for number in numbers]
     return Experiment("generated fields", tuple(drives), folder, mapless=True)
 
 
 def narrow_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
-    """Return one experiment for each width in NARROW_MARGINS_M, with fields whose widest path has this width."""
+    """Return one experiment for each of NARROW_MARGINS_M, with fields whose widest path has this margin."""
     experiments = []
-    for room in NARROW_MARGINS_M:
-        gap, too_wide = (ROBOT_WIDTH_M + room) / 2, (ROBOT_WIDTH_M + room + 0.1) / 2
-        to = folder / f"narrow/{round(100 * room)}_cm"
-        drives = [_field(to, obstacle_field(number, gap, too_wide)) for number in numbers]
-        experiments.append(Experiment(narrow_name(room), tuple(drives), folder, mapless=True))
+    for margin in NARROW_MARGINS_M:
+        gap, too_wide = (ROBOT_WIDTH_M + margin) / 2, (ROBOT_WIDTH_M + margin + 0.1) / 2
+        target = folder / f"narrow/{round(100 * margin)}_cm"
+        drives = [_field_drive(target, obstacle_field(number, gap, too_wide)) for number in numbers]
+        experiments.append(Experiment(narrow_name(margin), tuple(drives), folder, mapless=True))
     return experiments
 
 
-def narrow_name(room: float) -> str:
-    """Return the name of the experiment with `room` in m beside the robot."""
-    return f"narrow fields, robot + {100 * room:.0f} cm"
+def narrow_name(margin: float) -> str:
+    """Return the name of the experiment with a margin in m."""
+    return f"narrow fields, robot + {100 * margin:.0f} cm"
 
 
-def _field(folder: Path, field: ObstacleField) -> Drive:
+def _field_drive(folder: Path, field: ObstacleField) -> Drive:
     world = write_scenario(folder / f"field_{field.number}.world.yaml", _world_text(field))
     text = barn.scenario(f"field {field.number}", world.name)
     file = write_scenario(folder / f"field_{field.number}.scenario.yaml", text)
@@ -158,7 +158,7 @@ def case_name(file: Path) -> str:
     return file.name.split(".")[0].replace("_", " ")
 
 
-def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequence[int]) -> list[Experiment]:
+def localization_experiments(folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequence[int]) -> list[Experiment]:
     """Return the localization experiments in the shipped house.
 
     The robot drives a tour with a known start for each of `seeds`. For each seed in `lost`, the initial estimate is
@@ -168,19 +168,19 @@ def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequen
     def experiment(name: str, *drives: Drive, known: bool = False) -> Experiment:
         return Experiment(f"localization, {name}", drives, folder, (worlds,), localization=known)
 
-    def one(stem: str, text: str, seeds: Sequence[int]) -> Drive:
+    def drive(stem: str, text: str, seeds: Sequence[int]) -> Drive:
         return Drive(write_scenario(folder / f"localization/{stem}.scenario.yaml", text), seeds)
 
     directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in lost}
-    misled = [one(f"misled_{n}", misled_scenario(directions[n], n % 2 == 0), [n]) for n in lost]
-    tour = experiment(LOCALIZATIONS[0], one("tour", tour_scenario(), seeds), known=True)
+    wrong_start = [drive(f"wrong_start_{n}", wrong_start_scenario(directions[n], n % 2 == 0), [n]) for n in lost]
+    tour = experiment(LOCALIZATIONS[0], drive("tour", tour_scenario(), seeds), known=True)
     if not lost:
         return [tour]
     return [
         tour,
-        experiment(LOCALIZATIONS[1], *misled, known=True),
-        experiment(LOCALIZATIONS[2], one("start_unknown", start_unknown_scenario(), lost)),
-        experiment(LOCALIZATIONS[3], one("kidnapped", kidnapped_scenario(), lost)),
+        experiment(LOCALIZATIONS[1], *wrong_start, known=True),
+        experiment(LOCALIZATIONS[2], drive("start_unknown", start_unknown_scenario(), lost)),
+        experiment(LOCALIZATIONS[3], drive("kidnapped", kidnapped_scenario(), lost)),
     ]
 
 
@@ -288,7 +288,7 @@ robot: {{pose: dock}}
 """
 
 
-def misled_scenario(direction: float, left: bool) -> str:
+def wrong_start_scenario(direction: float, left: bool) -> str:
     """Return the text of a drive with a wrong initial estimate, and a correct one required at the goal.
 
     The estimate is off by ESTIMATE_OFFSET_M in `direction` (rad), and by ESTIMATE_ROTATION_RAD to the `left` or right.
@@ -297,7 +297,7 @@ def misled_scenario(direction: float, left: bool) -> str:
     yaw = START[2] + (ESTIMATE_ROTATION_RAD if left else -ESTIMATE_ROTATION_RAD)
     return f"""\
 simscen: 1
-name: told the wrong place
+name: wrong initial estimate
 world: house.world.yaml
 robot:
   pose: dock

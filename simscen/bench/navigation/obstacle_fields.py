@@ -20,8 +20,8 @@ COLUMNS, FIELD_ROWS, ROWS = 30, 30, 64
 HEIGHT_M = 1.0
 FILL_RANGE = (0.20, 0.35)
 """Range of the share of cells that are filled first. It gives densities of 5 to 22 %, like six worlds of BARN."""
-FILL_AT, CLEAR_AT = 5, 1
-"""Cells with at least FILL_AT of eight neighbors filled are filled; with at most CLEAR_AT, they are cleared."""
+FILL_NEIGHBORS, CLEAR_NEIGHBORS = 5, 1
+"""Smallest number of filled neighbors, of eight, that fills a cell, and largest number that clears it."""
 START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
 GAP_RADIUS_M = 0.37
 """Radius of the disc that can cross every field, as it can cross every world of BARN."""
@@ -55,7 +55,7 @@ def obstacle_field(number: int, gap: float = GAP_RADIUS_M, too_wide: float | Non
     """
     rng = Streams(number).generator("obstacle field" if gap == GAP_RADIUS_M else f"obstacle field {gap:g}")
     for _ in range(MAX_ATTEMPTS):
-        centers = _centers(_smoothed_field(rng))
+        centers = _cylinder_centers(_smoothed_field(rng))
         if _is_crossable(centers, gap, too_wide) and np.isfinite(length := _shortest_path_length(centers, gap)):
             return ObstacleField(number, centers, length)
     raise RuntimeError(f"none of {MAX_ATTEMPTS} fields with number {number} can be crossed")
@@ -66,21 +66,21 @@ def _smoothed_field(rng: np.random.Generator) -> Cells:
     cells: Cells = rng.random((FIELD_ROWS, COLUMNS)) < rng.uniform(*FILL_RANGE)
     for _ in range(int(rng.integers(2, 5))):
         cells[:, [0, -1]] = True
-        around = _neighbors(cells)
-        cells = (cells | (around >= FILL_AT)) & (around > CLEAR_AT)
+        neighbors = _count_neighbors(cells)
+        cells = (cells | (neighbors >= FILL_NEIGHBORS)) & (neighbors > CLEAR_NEIGHBORS)
     cells[:, [0, -1]] = True
     return cells
 
 
-def _neighbors(cells: Cells) -> npt.NDArray[np.int64]:
+def _count_neighbors(cells: Cells) -> npt.NDArray[np.int64]:
     """Return the number of filled neighbors of each cell. Cells beyond the edge count as empty."""
-    wide = np.pad(cells.astype(np.int64), 1)
+    padded = np.pad(cells.astype(np.int64), 1)
     rows, columns = cells.shape
-    around = sum(wide[i : i + rows, j : j + columns] for i in range(3) for j in range(3))
-    return np.asarray(around - cells)
+    filled = sum(padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3))
+    return np.asarray(filled - cells)
 
 
-def _centers(field: Cells) -> Array:
+def _cylinder_centers(field: Cells) -> Array:
     """Return the cylinders (n, 2) of the lane: the walls, which are closed behind the start, and the field."""
     lane = np.zeros((ROWS, COLUMNS), np.bool_)
     lane[:, [0, -1]], lane[0] = True, True
@@ -100,14 +100,14 @@ def _is_crossable(centers: Array, gap: float, too_wide: float | None) -> bool:
     x, y = np.meshgrid(np.arange(-COLUMNS * CELL_SIZE_M, 0.0, step), np.arange(0.0, GOAL.y + 1.0, step))
     distance, _ = spatial.cKDTree(centers).query(np.stack((x, y), axis=-1))
 
-    def joined(radius: float) -> bool:
+    def is_connected(radius: float) -> bool:
         pieces, _ = ndimage.label(distance > radius + CELL_SIZE_M / 2)
         start, goal = (
             pieces[round(pose.y / step), round((pose.x + COLUMNS * CELL_SIZE_M) / step)] for pose in (START, GOAL)
         )
         return bool(start and start == goal)
 
-    return joined(gap) and not (too_wide is not None and joined(too_wide))
+    return is_connected(gap) and not (too_wide is not None and is_connected(too_wide))
 
 
 def _shortest_path_length(centers: Array, gap: float) -> float:

@@ -1,6 +1,6 @@
 """Generated worlds of the benchmark: office maps, corridors in which two robots meet, and halls with ramps.
 
-Office maps look as if SLAM had made them: cells of 5 to 25 cm, thin walls, gray pockets. They are written as ROS maps.
+Office maps are ROS maps like those of SLAM: cells of 5 to 25 cm, thin walls, unknown cells.
 """
 
 from collections.abc import Callable, Iterable
@@ -29,11 +29,11 @@ class _Floor:
     """Image of a floor; row 0 has the lowest y."""
 
     image: Image
-    thick: float
+    wall_thickness: float
 
-    def wall(self, x0: float, y0: float, x1: float, y1: float, thick: float | None = None) -> None:
+    def wall(self, x0: float, y0: float, x1: float, y1: float, thickness: float | None = None) -> None:
         """Draw a wall between two points with the same x or y, and a box between other points."""
-        half = (self.thick if thick is None else thick) / 2
+        half = (self.wall_thickness if thickness is None else thickness) / 2
         rows = slice(max(0, int((min(y0, y1) - half) / FINE_CELL_M)), int((max(y0, y1) + half) / FINE_CELL_M) + 1)
         columns = slice(max(0, int((min(x0, x1) - half) / FINE_CELL_M)), int((max(x0, x1) + half) / FINE_CELL_M) + 1)
         self.image[rows, columns] = WALL
@@ -48,24 +48,24 @@ def building(number: int) -> tuple[Image, float]:
     floor = _Floor(image, float(rng.choice([0.05, 0.1, 0.2])))
     for wall in ((0, 0, width, 0), (0, depth, width, depth), (0, 0, 0, depth), (width, 0, width, depth)):
         floor.wall(*wall)
-    broad = float(rng.uniform(*CORRIDOR_WIDTHS_M))
+    corridor_width = float(rng.uniform(*CORRIDOR_WIDTHS_M))
     for y in np.arange(rng.uniform(4, 6), depth - 4, rng.uniform(9, 13)).tolist():
         for side in (-1, 1):
-            _rooms(floor, rng, y + side * broad / 2, side)
-    _crossing_corridors(floor, rng, broad)
+            _draw_rooms(floor, rng, y + side * corridor_width / 2, side)
+    _draw_crossing_corridors(floor, rng, corridor_width)
     image[[0, -1]], image[:, [0, -1]] = WALL, WALL
-    return _reduced_to_map(image, resolution, rng), resolution
+    return _reduce_to_map(image, resolution, rng), resolution
 
 
-def _rooms(floor: _Floor, rng: np.random.Generator, y: float, side: int) -> None:
+def _draw_rooms(floor: _Floor, rng: np.random.Generator, y: float, side: int) -> None:
     """Draw rooms with doors and furniture along a corridor."""
     depth, width = (size * FINE_CELL_M for size in floor.image.shape)
     x = 0.0
     while x < width:
         room, door = float(rng.uniform(3, 7)), float(rng.uniform(*DOOR_WIDTHS_M))
-        before = float(rng.uniform(0.3, room - door - 0.3))
-        floor.wall(x, y, min(width, x + before), y)
-        floor.wall(min(width, x + before + door), y, min(width, x + room), y)
+        door_start = float(rng.uniform(0.3, room - door - 0.3))
+        floor.wall(x, y, min(width, x + door_start), y)
+        floor.wall(min(width, x + door_start + door), y, min(width, x + room), y)
         far = min(max(y + side * float(rng.uniform(3.0, 3.8)), 0.0), depth)
         floor.wall(min(width, x + room), y, min(width, x + room), far)
         for _ in range(int(rng.integers(0, 3))):
@@ -75,29 +75,29 @@ def _rooms(floor: _Floor, rng: np.random.Generator, y: float, side: int) -> None
         x += room
 
 
-def _crossing_corridors(floor: _Floor, rng: np.random.Generator, broad: float) -> None:
+def _draw_crossing_corridors(floor: _Floor, rng: np.random.Generator, corridor_width: float) -> None:
     """Draw crossing corridors, whose walls have gaps with the width of doors."""
     depth, width = (size * FINE_CELL_M for size in floor.image.shape)
     for x in np.arange(rng.uniform(5, 9), width - 3, rng.uniform(12, 20)).tolist():
         floor.image[
             int(0.5 / FINE_CELL_M) : -int(0.5 / FINE_CELL_M),
-            int((x - broad / 2) / FINE_CELL_M) : int((x + broad / 2) / FINE_CELL_M),
+            int((x - corridor_width / 2) / FINE_CELL_M) : int((x + corridor_width / 2) / FINE_CELL_M),
         ] = FREE
         for side in (-1, 1):
             y = 0.5
             while y < depth - 1:
-                long = float(rng.uniform(2, 6))
+                length = float(rng.uniform(2, 6))
                 if rng.random() < 0.6:
-                    floor.wall(x + side * broad / 2, y, x + side * broad / 2, min(depth, y + long))
-                y += long + float(rng.uniform(0.9, 1.6))
+                    floor.wall(x + side * corridor_width / 2, y, x + side * corridor_width / 2, min(depth, y + length))
+                y += length + float(rng.uniform(0.9, 1.6))
 
 
-def _reduced_to_map(image: Image, resolution: float, rng: np.random.Generator) -> Image:
+def _reduce_to_map(image: Image, resolution: float, rng: np.random.Generator) -> Image:
     """Reduce the image to the resolution of the map. Some cells become unknown, as if no scan had reached them."""
     step = round(resolution / FINE_CELL_M)
     rows, columns = (size // step * step for size in image.shape)
-    parts = image[:rows, :columns].reshape(rows // step, step, columns // step, step)
-    mapped = np.where((parts == WALL).mean(axis=(1, 3)) > (0.3 if step > 2 else 0.49), WALL, FREE).astype(np.uint8)
+    blocks = image[:rows, :columns].reshape(rows // step, step, columns // step, step)
+    mapped = np.where((blocks == WALL).mean(axis=(1, 3)) > (0.3 if step > 2 else 0.49), WALL, FREE).astype(np.uint8)
     mapped[(mapped == FREE) & (rng.random(mapped.shape) < 0.001)] = UNKNOWN
     mapped[[0, -1]], mapped[:, [0, -1]] = WALL, WALL
     return mapped
@@ -144,8 +144,8 @@ def _numbered_experiment(name: str, stem: Path, numbers: Iterable[int], text: Ca
 def _meeting_scenario(number: int) -> str:
     rng, length = Streams(number).generator("corridor"), MEETING_LENGTH_M
     width = float(rng.uniform(*MEETING_WIDTHS_M))
-    free = width / 2 - 0.35
-    west, east = rng.uniform(-free, free, 2).tolist()
+    max_offset = width / 2 - 0.35
+    west, east = rng.uniform(-max_offset, max_offset, 2).tolist()
     return f"""\
 simscen: 1
 name: two robots meet in {width:.2f} m

@@ -31,23 +31,23 @@ class RandomDrive:
 
 
 def random_drives(
-    built: BuiltWorld, radius: float, numbers: Iterable[int], least: float = 5.0
+    built: BuiltWorld, radius: float, numbers: Iterable[int], min_length: float = 5.0
 ) -> Iterator[RandomDrive]:
-    """Yield a drive for each number, for a robot that is a disc of `radius` m. Paths are at least `least` m long.
+    """Yield a drive for each number, for a robot that is a disc of `radius` m. Paths have at least `min_length` m.
 
     The same number gives the same drive. A number without a drive after MAX_ATTEMPTS is skipped.
     """
-    ways = ShortestPaths(built.mesh, built.world.bounds, radius + WALL_MARGIN_M)
+    paths = ShortestPaths(built.mesh, built.world.bounds, radius + WALL_MARGIN_M)
     free = np.argwhere(built.map.cells == 0)
     for number in numbers if len(free) else ():
         rng = Streams(number).generator("errand")
         for _ in range(MAX_ATTEMPTS):
             ends = built.map.center_of(free[rng.integers(0, len(free), 2)]).tolist()
             start, goal = (Pose2(x, y, float(rng.uniform(-math.pi, math.pi))) for x, y in ends)
-            if start.distance(goal) < least / 2 or any(_is_near_movable(end, built) for end in (start, goal)):
+            if start.distance(goal) < min_length / 2 or any(_is_near_movable(end, built) for end in (start, goal)):
                 continue
-            length = ways.length(start, goal)
-            if math.isfinite(length) and length >= least:
+            length = paths.length(start, goal)
+            if math.isfinite(length) and length >= min_length:
                 yield RandomDrive(number, start, goal, length)
                 break
 
@@ -71,7 +71,7 @@ FAULTS = {
     "odometry slip": ("{sensor: odom, slip: {left: …, right: 0 %}}", ("3 %", "10 %", "25 %")),
     "late commands": ("{sensor: cmd_vel, delay: {latency: …}}", ("50 ms", "120 ms", "250 ms")),
 }
-"""Fault during the whole drive, and its values for the three STRENGTHS."""
+"""Template of a fault during the whole drive, and its values for the three STRENGTHS."""
 STRENGTHS = ("weak", "medium", "strong")
 FIRST_FAULTY_DRIVE = 1_000_000
 """First number of the drives with a fault, so that they differ from those without."""
@@ -79,11 +79,11 @@ FIRST_FAULTY_DRIVE = 1_000_000
 
 def scenario(name: str, world: str, drive: RandomDrive, faults: Sequence[str] = ()) -> str:
     """Return the text of a scenario with one drive of the default robot, which must not collide."""
-    disturbed = "".join(["faults:\n", *(f"  - {fault}\n" for fault in faults)]) if faults else ""
+    fault_lines = "".join(["faults:\n", *(f"  - {fault}\n" for fault in faults)]) if faults else ""
     limit = drive.length / MIN_AVERAGE_SPEED_M_S + 30.0
     return (
         f"simscen: 1\nname: {name}\nworld: {world}\nrobot: {{pose: {_pose(drive.start)}}}\n"
-        f"goals:\n  - {{pose: {_pose(drive.goal)}}}\n{disturbed}time_limit: {limit:.0f} s\n"
+        f"goals:\n  - {{pose: {_pose(drive.goal)}}}\n{fault_lines}time_limit: {limit:.0f} s\n"
         "pass:\n  - goals_reached: {}\n  - collisions: {max: 0}\n"
     )
 
@@ -108,15 +108,15 @@ def degraded(
     `first` is the number of the first drives and the seed.
     """
     faults = dict(enumerate(FAULTS, start=FIRST_FAULTY_DRIVE + first * len(FAULTS)))
-    drives_in = {world: list(random_drives(built, ROBOT_RADIUS_M, faults)) for world, built in worlds.items()}
+    drives_by_world = {world: list(random_drives(built, ROBOT_RADIUS_M, faults)) for world, built in worlds.items()}
     experiments = []
     for level, strength in enumerate(STRENGTHS):
         drives = []
-        for world, found in drives_in.items():
-            for drive in found:
+        for world, world_drives in drives_by_world.items():
+            for drive in world_drives:
                 fault = faults[drive.number]
-                said, values = FAULTS[fault]
-                text = scenario(f"{fault}, {strength}", world, drive, [said.replace("…", values[level])])
+                template, values = FAULTS[fault]
+                text = scenario(f"{fault}, {strength}", world, drive, [template.replace("…", values[level])])
                 file = folder / strength / f"{_stem(fault)}_{_stem(world)}.scenario.yaml"
                 drives.append(Drive(write_scenario(file, text), [first], world=world))
         experiments.append(Experiment(f"degraded sensing, {strength}", tuple(drives), folder, world_path))

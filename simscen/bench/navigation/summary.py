@@ -11,7 +11,7 @@ from simscen.core.records.verdict import Status
 from simscen.core.statistics import MIN_PAIRS, bootstrap_mean_interval, wilson_interval
 from simscen.judge.metrics.compute import barn_score
 
-TIME_IS_UP = "time limit"
+TIME_LIMIT_REACHED = "time limit"
 """Value of `ended` of a run that reached its time limit."""
 
 
@@ -38,7 +38,7 @@ class Trial:
     top_speed: float | None = None
 
     @property
-    def fate(self) -> DriveOutcome:
+    def drive_outcome(self) -> DriveOutcome:
         """Outcome of the run: collisions have priority over other failures, timeouts over the remaining ones."""
         if self.run.outcome is Outcome.ERROR:
             return DriveOutcome.ERROR
@@ -46,7 +46,7 @@ class Trial:
             return DriveOutcome.COLLISION
         if self.run.outcome is Outcome.PASSED:
             return DriveOutcome.SUCCESS
-        return DriveOutcome.TIMEOUT if self.run.result.ended == TIME_IS_UP else DriveOutcome.FAILED
+        return DriveOutcome.TIMEOUT if self.run.result.ended == TIME_LIMIT_REACHED else DriveOutcome.FAILED
 
     @property
     def score(self) -> float | None:
@@ -55,7 +55,7 @@ class Trial:
             return None
         seconds = self.metric("time_to_goal")
         return barn_score(
-            self.fate is DriveOutcome.SUCCESS and seconds is not None, seconds or 0.0, self.reference_length
+            self.drive_outcome is DriveOutcome.SUCCESS and seconds is not None, seconds or 0.0, self.reference_length
         )
 
     @property
@@ -64,13 +64,13 @@ class Trial:
 
         The shortest path at top speed gives the minimum time.
         """
-        if self.fate is not DriveOutcome.SUCCESS:
+        if self.drive_outcome is not DriveOutcome.SUCCESS:
             return 0.0
-        seconds, way = self.metric("time_to_goal"), self.metric("shortest_length")
-        if seconds is None or way is None or self.top_speed is None:
+        seconds, length = self.metric("time_to_goal"), self.metric("shortest_length")
+        if seconds is None or length is None or self.top_speed is None:
             return None
-        least = way / self.top_speed
-        return least / max(least, seconds)
+        min_seconds = length / self.top_speed
+        return min_seconds / max(min_seconds, seconds)
 
     def metric(self, name: str) -> float | None:
         """Return a metric of the run, averaged over all robots."""
@@ -79,7 +79,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Row:
-    """Row of the table. Rates refer to all runs, `seconds` and `path_ratio` to the runs that arrived.
+    """Row of the table. Rates refer to all runs, `seconds` and `path_ratio` to the runs that reached all goals.
 
     `path_ratio` is the driven length divided by the shortest length. `sct` is None without goals. `success_interval` is
     the 95 % interval of the success rate over worlds, or None with fewer than five worlds: seeds sample the noise in a
@@ -102,35 +102,35 @@ class Row:
 
 def summarize(case: str, trials: Sequence[Trial]) -> Row:
     """Return the row of a case. `trials` must not be empty."""
-    fates = [trial.fate for trial in trials]
-    weighted = [trial.sct for trial in trials]
-    good = [trial for trial in trials if trial.fate is DriveOutcome.SUCCESS]
-    arrived = [trial for trial in good if trial.metric("time_to_goal") is not None]
+    outcomes = [trial.drive_outcome for trial in trials]
+    sct_values = [trial.sct for trial in trials]
+    successful = [trial for trial in trials if trial.drive_outcome is DriveOutcome.SUCCESS]
+    arrived = [trial for trial in successful if trial.metric("time_to_goal") is not None]
     return Row(
         case=case,
         runs=len(trials),
-        success=_rate(fates, DriveOutcome.SUCCESS),
-        success_interval=over_worlds(trials),
-        collisions=_rate(fates, DriveOutcome.COLLISION),
-        timeouts=_rate(fates, DriveOutcome.TIMEOUT),
-        failed=_rate(fates, DriveOutcome.FAILED),
-        errors=_rate(fates, DriveOutcome.ERROR),
+        success=_rate(outcomes, DriveOutcome.SUCCESS),
+        success_interval=success_interval(trials),
+        collisions=_rate(outcomes, DriveOutcome.COLLISION),
+        timeouts=_rate(outcomes, DriveOutcome.TIMEOUT),
+        failed=_rate(outcomes, DriveOutcome.FAILED),
+        errors=_rate(outcomes, DriveOutcome.ERROR),
         seconds=mean([trial.metric("time_to_goal") for trial in arrived]),
         score=mean([trial.score for trial in trials]),
         path_ratio=mean([trial.metric("path_length_ratio") for trial in arrived]),
-        sct=None if None in weighted else mean(weighted),
+        sct=None if None in sct_values else mean(sct_values),
     )
 
 
-def over_worlds(trials: Sequence[Trial]) -> tuple[float, float] | None:
+def success_interval(trials: Sequence[Trial]) -> tuple[float, float] | None:
     """Return the 95 % interval of the success rate over worlds, or None with fewer than five worlds."""
     return ClusteredMean.of(
-        (trial.world, float(trial.fate is DriveOutcome.SUCCESS)) for trial in trials
+        (trial.world, float(trial.drive_outcome is DriveOutcome.SUCCESS)) for trial in trials
     ).interval_of_rates()
 
 
-def _rate(fates: Sequence[DriveOutcome], which: DriveOutcome) -> float:
-    return fates.count(which) / len(fates) if fates else 0.0
+def _rate(outcomes: Sequence[DriveOutcome], outcome: DriveOutcome) -> float:
+    return outcomes.count(outcome) / len(outcomes) if outcomes else 0.0
 
 
 def mean(values: Sequence[float | None]) -> float | None:
@@ -146,7 +146,7 @@ Interval = tuple[float, float]
 class ClusteredMean:
     """Values of drives, grouped by world. Every drive has the same weight; the bootstrap resamples whole worlds."""
 
-    of_worlds: tuple[tuple[float, ...], ...]
+    values_by_world: tuple[tuple[float, ...], ...]
 
     @classmethod
     def of(cls, values: Iterable[tuple[str, float]]) -> "ClusteredMean":
@@ -159,14 +159,14 @@ class ClusteredMean:
     @property
     def mean(self) -> float | None:
         """Mean over all drives, or None without drives."""
-        drives = sum(map(len, self.of_worlds))
-        return sum(map(sum, self.of_worlds)) / drives if drives else None
+        drives = sum(map(len, self.values_by_world))
+        return sum(map(sum, self.values_by_world)) / drives if drives else None
 
     def interval(self) -> Interval | None:
         """Return the 95 % bootstrap interval of the mean, or None with fewer than five worlds."""
-        means = [sum(values) / len(values) for values in self.of_worlds]
+        means = [sum(values) / len(values) for values in self.values_by_world]
         return bootstrap_mean_interval(
-            means, Streams(1).generator("worlds"), [len(values) for values in self.of_worlds]
+            means, Streams(1).generator("worlds"), [len(values) for values in self.values_by_world]
         )
 
     def interval_of_rates(self) -> Interval | None:
@@ -175,23 +175,24 @@ class ClusteredMean:
         If all worlds have the same rate, the bootstrap interval is empty. Then, the result is the Wilson interval with
         one trial per world.
         """
-        rate = self._common()
-        return self.interval() if rate is None else wilson_interval(rate * len(self.of_worlds), len(self.of_worlds))
+        rate = self._common_mean()
+        count = len(self.values_by_world)
+        return self.interval() if rate is None else wilson_interval(rate * count, count)
 
     def interval_of_changes(self) -> Interval | None:
         """Return the interval of a difference of rates: a Wilson interval if all worlds have the same difference."""
-        change = self._common()
+        change = self._common_mean()
         if change is None:
             return self.interval()
-        low, high = wilson_interval(abs(change) * len(self.of_worlds), len(self.of_worlds))
+        low, high = wilson_interval(abs(change) * len(self.values_by_world), len(self.values_by_world))
         if change == 0.0:
             return -high, high
         return (low, high) if change > 0.0 else (-high, -low)
 
-    def _common(self) -> float | None:
+    def _common_mean(self) -> float | None:
         """Return the value that all worlds have, or None if they differ or are too few."""
-        means = {sum(values) / len(values) for values in self.of_worlds}
-        return means.pop() if len(self.of_worlds) >= MIN_PAIRS and len(means) == 1 else None
+        means = {sum(values) / len(values) for values in self.values_by_world}
+        return means.pop() if len(self.values_by_world) >= MIN_PAIRS and len(means) == 1 else None
 
 
 Pair = tuple[Trial, Trial]
@@ -225,31 +226,32 @@ class DriveComparison:
 def compare_drives(case: str, reference: Sequence[Trial], other: Sequence[Trial]) -> DriveComparison:
     """Compare trials of the same drives and seeds in the same order. Raises ValueError if they differ."""
     pairs = list(zip(reference, other, strict=True))
-    if any(one.world != two.world or one.run.key.seed != two.run.key.seed for one, two in pairs):
+    if any(first.world != second.world or first.run.key.seed != second.run.key.seed for first, second in pairs):
         raise ValueError(f"{case}: the runs are not of the same drives")
-    decided = [pair for pair in pairs if DriveOutcome.ERROR not in (pair[0].fate, pair[1].fate)]
-    success = _difference(decided, lambda trial: float(_won(trial)), rate=True)
+    completed = [pair for pair in pairs if DriveOutcome.ERROR not in (pair[0].drive_outcome, pair[1].drive_outcome)]
+    both_succeeded = [pair for pair in completed if all(map(_has_succeeded, pair))]
+    success = _difference(completed, lambda trial: float(_has_succeeded(trial)), rate=True)
     return DriveComparison(
         case=case,
-        pairs=len(decided),
-        better=sum(_won(two) > _won(one) for one, two in decided),
-        worse=sum(_won(two) < _won(one) for one, two in decided),
+        pairs=len(completed),
+        better=sum(_has_succeeded(second) > _has_succeeded(first) for first, second in completed),
+        worse=sum(_has_succeeded(second) < _has_succeeded(first) for first, second in completed),
         success=success or Difference(0.0, None),
-        seconds=_difference([pair for pair in decided if all(map(_won, pair))], lambda t: t.metric("time_to_goal")),
-        sct=_difference(decided, lambda trial: trial.sct),
-        score=_difference(decided, lambda trial: trial.score),
+        seconds=_difference(both_succeeded, lambda trial: trial.metric("time_to_goal")),
+        sct=_difference(completed, lambda trial: trial.sct),
+        score=_difference(completed, lambda trial: trial.score),
     )
 
 
-def _won(trial: Trial) -> bool:
-    return trial.fate is DriveOutcome.SUCCESS
+def _has_succeeded(trial: Trial) -> bool:
+    return trial.drive_outcome is DriveOutcome.SUCCESS
 
 
 def _difference(
     pairs: Sequence[Pair], measure: Callable[[Trial], float | None], rate: bool = False
 ) -> Difference | None:
     """Return the difference of a measure, or None if no pair has it."""
-    both = ((one.world, measure(one), measure(two)) for one, two in pairs)
+    both = ((first.world, measure(first), measure(second)) for first, second in pairs)
     differences = ClusteredMean.of((world, b - a) for world, a, b in both if a is not None and b is not None)
     if differences.mean is None:
         return None

@@ -1,1 +1,1 @@
-"""Speed benchmarks: what a simulated second costs, held against PyBullet alone."""
+"""Speed benchmarks: CPU time per simulated second, compared with PyBullet without simscen."""

@@ -23,11 +23,12 @@ from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.ros_map import save_map
 
 HOUSE = Path(__file__).parents[2] / "data" / "bench" / "house.scenario.yaml"
-MOVABLE = 40
-STATIC, MOVING = 4980, 20
+MOVABLE_COUNT = 40
+"""Number of movable meshes in the hall."""
+STATIC_COUNT, MOVING_COUNT = 4980, 20
 """Numbers of objects in the warehouse."""
-SIDE_CELLS = 2000
-"""Cells of 5 cm along each side of the map: 100 x 100 m."""
+MAP_SIDE_CELLS = 2000
+"""Number of cells of 5 cm along each side of the map: 100 x 100 m."""
 SCENARIO = """\
 simscen: 1
 seed: 1
@@ -42,7 +43,7 @@ pass:
 
 @dataclass(frozen=True)
 class Cost:
-    """Cost of runs in a world.
+    """Cost of runs in a world. The names of the fields are keys of the JSON output.
 
     triangles:    of static solids
     movable:      number of movable bodies
@@ -63,20 +64,20 @@ class Cost:
 def measure_worlds(rounds: int) -> Iterator[Cost]:
     """Yield the costs of a house, a hall with movable meshes, a warehouse, and a map of 100 x 100 m."""
     with TemporaryDirectory() as folder:
-        yield _measured("house, patrol of five rooms", HOUSE, rounds)
-        yield _measured(f"hall, {MOVABLE} movable meshes", write_hall(Path(folder, "hall")), rounds)
-        objects = f"{STATIC + MOVING} objects, {MOVING} moving"
-        yield _measured(f"warehouse, {objects}", write_warehouse(Path(folder, "warehouse")), rounds)
-        yield _measured("map of 100 x 100 m", write_arena(Path(folder, "arena")), rounds)
+        yield _measure_world("house, patrol of five rooms", HOUSE, rounds)
+        yield _measure_world(f"hall, {MOVABLE_COUNT} movable meshes", write_hall(Path(folder, "hall")), rounds)
+        objects = f"{STATIC_COUNT + MOVING_COUNT} objects, {MOVING_COUNT} moving"
+        yield _measure_world(f"warehouse, {objects}", write_warehouse(Path(folder, "warehouse")), rounds)
+        yield _measure_world("map of 100 x 100 m", write_arena(Path(folder, "arena")), rounds)
 
 
-def _measured(name: str, file: Path, rounds: int) -> Cost:
+def _measure_world(name: str, file: Path, rounds: int) -> Cost:
     import time
 
-    gc.collect()  # the last world must not count as memory of this one
-    begun = time.process_time()
+    gc.collect()  # the memory of the previous world must not count
+    start = time.process_time()
     prepared = prepare(load_scenario(file, file.parent))
-    preparing = time.process_time() - begun
+    preparing = time.process_time() - start
     timed_run(prepared)  # the first run pays for imports and caches
     runs = [timed_run(prepared) for _ in range(rounds)]
     simulated = runs[0][0]
@@ -87,22 +88,22 @@ def _measured(name: str, file: Path, rounds: int) -> Cost:
         simulated=simulated,
         milliseconds=1e3 * statistics.median(cpu for _, cpu, _ in runs) / simulated,
         preparing=preparing,
-        memory=_most_memory(),
+        memory=_peak_memory_mb(),
     )
 
 
-def _most_memory() -> float:
-    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return used / 1e6 if sys.platform == "darwin" else used / 1e3
+def _peak_memory_mb() -> float:
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
 
 
 def write_hall(folder: Path) -> Path:
     """Write a hall of 30 x 20 m with chairs, movable meshes of 432 triangles, as an SDF world; return its scenario."""
     folder.mkdir()
     for number in range(4):
-        (folder / f"mesh_{number}.obj").write_text(_obj(_chair(0.4 + 0.05 * number)))
-    places = [(2.5 + 3.5 * column, 2.0 + 4.0 * row) for row, column in product(range(5), range(8))]
-    models = "".join(_mesh_model(number, x, y) for number, (x, y) in enumerate(places))
+        (folder / f"mesh_{number}.obj").write_text(_obj_text(_chair(0.4 + 0.05 * number)))
+    positions = [(2.5 + 3.5 * column, 2.0 + 4.0 * row) for row, column in product(range(5), range(8))]
+    models = "".join(_mesh_model(number, x, y) for number, (x, y) in enumerate(positions))
     walls = "".join(
         _box_model(name, x, y, length, width)
         for name, x, y, length, width in (
@@ -119,13 +120,13 @@ def write_hall(folder: Path) -> Path:
 def _chair(width: float) -> list[Solid]:
     """Return a chair: slats of a seat and of a back, on four legs."""
     half, slats = width / 2 - 0.02, np.linspace(-1, 1, 16).tolist()
-    parts = [((width, width / 20, 0.04), (0.0, half * place, 0.46)) for place in slats]
-    parts += [((0.04, width / 20, 0.5), (-half, half * place, 0.73)) for place in slats]
+    parts = [((width, width / 20, 0.04), (0.0, half * offset, 0.46)) for offset in slats]
+    parts += [((0.04, width / 20, 0.5), (-half, half * offset, 0.73)) for offset in slats]
     parts += [((0.04, 0.04, 0.44), (x, y, 0.22)) for x in (-half, half) for y in (-half, half)]
-    return [Solid(Box(size), Pose3(*place), "chair") for size, place in parts]
+    return [Solid(Box(size), Pose3(*position), "chair") for size, position in parts]
 
 
-def _obj(solids: list[Solid]) -> str:
+def _obj_text(solids: list[Solid]) -> str:
     mesh = merge_solids(solids)
     corners = [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
     return "\n".join([*corners, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces.tolist())]) + "\n"
@@ -158,9 +159,13 @@ def write_warehouse(folder: Path) -> Path:
     columns = [*np.arange(4.0, 46.0, 0.75).tolist(), *np.arange(54.5, 96.5, 0.75).tolist()]
     bays = list(product(columns, (row + side for row in range(4, 97, 4) for side in (-0.4, 0.4))))
     stock = [
-        f"  - {{name: unit {n}, {_unit(n)}, pose: {{x: {bays[bay][0]:.2f}, y: {bays[bay][1]:.2f}, yaw: {turn:.2f}}}}}"
+        f"  - {{name: unit {n}, {_shape(n)}, pose: {{x: {bays[bay][0]:.2f}, y: {bays[bay][1]:.2f}, yaw: {turn:.2f}}}}}"
         for n, (bay, turn) in enumerate(
-            zip(rng.permutation(len(bays))[:STATIC].tolist(), rng.uniform(-0.2, 0.2, STATIC), strict=True)
+            zip(
+                rng.permutation(len(bays))[:STATIC_COUNT].tolist(),
+                rng.uniform(-0.2, 0.2, STATIC_COUNT),
+                strict=True,
+            )
         )
     ]
     carts = [
@@ -174,8 +179,8 @@ def write_warehouse(folder: Path) -> Path:
     return _scenario(folder, "warehouse.world.yaml", ((8.0, 33.8), (48.0, 33.8), (50.0, 42.0)))
 
 
-def _unit(number: int) -> str:
-    """Return a box between 0.5 and 0.65 m wide, or every fourth time a drum."""
+def _shape(number: int) -> str:
+    """Return the YAML of a box between 0.5 and 0.65 m wide, or of a drum for every fourth number."""
     width = 0.5 + 0.05 * (number % 4)
     return f"cylinder: [{width / 2:.3f}, 1.0]" if number % 4 == 0 else f"box: [{width:.2f}, {width:.2f}, 1.2]"
 
@@ -184,27 +189,27 @@ def write_arena(folder: Path) -> Path:
     """Write a ROS map of 100 x 100 m with 400 blocks and 0.5 % noise, as from SLAM; return its scenario."""
     folder.mkdir()
     rng = np.random.default_rng(7)
-    cells = np.full((SIDE_CELLS, SIDE_CELLS), FREE, dtype=np.int8)
-    cells[rng.random((SIDE_CELLS, SIDE_CELLS)) < 0.005] = OCCUPIED
+    cells = np.full((MAP_SIDE_CELLS, MAP_SIDE_CELLS), FREE, dtype=np.int8)
+    cells[rng.random((MAP_SIDE_CELLS, MAP_SIDE_CELLS)) < 0.005] = OCCUPIED
     cells[:4] = cells[-4:] = cells[:, :4] = cells[:, -4:] = OCCUPIED
     for column, row, width, depth in rng.integers(
-        (10, 10, 8, 8), (SIDE_CELLS - 60, SIDE_CELLS - 60, 50, 50), (400, 4)
+        (10, 10, 8, 8), (MAP_SIDE_CELLS - 60, MAP_SIDE_CELLS - 60, 50, 50), (400, 4)
     ).tolist():
         cells[row : row + depth, column : column + width] = OCCUPIED
-    middle = SIDE_CELLS // 2
+    middle = MAP_SIDE_CELLS // 2
     cells[middle - 12 : middle + 12, 60:-60] = FREE
     save_map(OccupancyGrid(cells, 0.05, Pose2(0.0, 0.0)), folder / "arena.yaml")
     return _scenario(folder, "arena.yaml", ((5.0, 50.0), (25.0, 50.0), (50.0, 50.0)))
 
 
-def _scenario(folder: Path, world: str, way: tuple[tuple[float, float], ...]) -> Path:
-    goals = ", ".join(f"{{pose: {{x: {x}, y: {y}, yaw: {yaw:.4f}}}}}" for x, y, yaw in _headed(way))
+def _scenario(folder: Path, world: str, waypoints: tuple[tuple[float, float], ...]) -> Path:
+    goals = ", ".join(f"{{pose: {{x: {x}, y: {y}, yaw: {yaw:.4f}}}}}" for x, y, yaw in _with_arrival_yaw(waypoints))
     file = folder / f"{folder.name}.scenario.yaml"
-    file.write_text(SCENARIO.format(world=world, start=way[0], goals=goals))
+    file.write_text(SCENARIO.format(world=world, start=waypoints[0], goals=goals))
     return file
 
 
-def _headed(way: tuple[tuple[float, float], ...]) -> Iterator[tuple[float, float, float]]:
-    """Yield the points of a path after the first, with the yaw of arrival."""
-    for (ax, ay), (bx, by) in pairwise(way):
+def _with_arrival_yaw(waypoints: tuple[tuple[float, float], ...]) -> Iterator[tuple[float, float, float]]:
+    """Yield the waypoints after the first, with the yaw of arrival."""
+    for (ax, ay), (bx, by) in pairwise(waypoints):
         yield bx, by, math.atan2(by - ay, bx - ax)

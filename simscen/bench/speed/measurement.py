@@ -34,26 +34,26 @@ class Stopwatch:
     """
 
     seconds: dict[str, float] = field(default_factory=dict)
-    _under_way: list[float] = field(default_factory=list)
+    _nested_seconds: list[float] = field(default_factory=list)
 
-    def watch(self, part: str, thing: object, *methods: str) -> None:
-        """Measure these methods of `thing` as `part`."""
+    def watch(self, part: str, instance: object, *methods: str) -> None:
+        """Measure these methods of `instance` as `part`."""
         self.seconds.setdefault(part, 0.0)
         for name in methods:
-            setattr(thing, name, self._timed(part, getattr(thing, name)))
+            setattr(instance, name, self._timed(part, getattr(instance, name)))
 
     def _timed(self, part: str, method: Callable[..., Any]) -> Callable[..., Any]:
-        seconds, under_way, now = self.seconds, self._under_way, time.perf_counter
+        seconds, nested, now = self.seconds, self._nested_seconds, time.perf_counter
 
         def timed(*args: Any, **kwargs: Any) -> Any:
-            begun = now()
-            under_way.append(0.0)
+            start = now()
+            nested.append(0.0)
             try:
                 return method(*args, **kwargs)
             finally:
-                took = now() - begun
-                seconds[part] += took - under_way.pop()
-                if under_way:
-                    under_way[-1] += took
+                duration = now() - start
+                seconds[part] += duration - nested.pop()
+                if nested:
+                    nested[-1] += duration
 
         return timed

@@ -1,4 +1,4 @@
-"""Speed of a whole run and its parts, compared with PyBullet alone in the same world."""
+"""Speed of a whole run and its parts, compared with PyBullet without simscen in the same world."""
 
 import gc
 import statistics
@@ -29,17 +29,17 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 PATROL = Path(__file__).parents[2] / "data" / "bench" / "patrol.scenario.yaml"
 SEED = 1
 ProgressCallback = Callable[[str], None]
-"""Receives the name of the present measurement."""
+"""Receives the name of the current measurement."""
 BEAMS = 720
 
 
 @dataclass(frozen=True)
 class Patrol:
-    """CPU times in s of a run with `simulated` seconds.
+    """CPU times in s of a run with `simulated` seconds. The names of the fields are keys of the JSON output.
 
     cpu, cpus:      whole run, median and all rounds
     parts, parted:  by part, median and all rounds
-    bare, bares:    PyBullet alone with the same steps and scans, median and all rounds; measured after each run
+    bare, bares:    PyBullet baseline with the same steps and scans, median and all rounds; measured after each run
     """
 
     simulated: float
@@ -52,7 +52,7 @@ class Patrol:
 
     @property
     def ratios(self) -> tuple[float, ...]:
-        """Ratio of each run to PyBullet alone."""
+        """Ratio of the CPU time of each run to that of the PyBullet baseline."""
         return tuple(cpu / bare for cpu, bare in zip(self.cpus, self.bares, strict=True))
 
     @property
@@ -68,7 +68,10 @@ class Patrol:
 
 @dataclass(frozen=True)
 class Field:
-    """Time of a scan with 720 beams and of a step among obstacles, in simscen and in PyBullet with one body each."""
+    """Time of a scan with 720 beams and of a step among obstacles.
+
+    The `bare_` times are those of the PyBullet baseline with one body for each obstacle.
+    """
 
     obstacles: int
     scan_ms: float
@@ -81,20 +84,20 @@ def no_progress(_: str) -> None:
     """Ignore the progress."""
 
 
-def measure_patrol(rounds: int, tell: ProgressCallback = no_progress) -> Patrol:
+def measure_patrol(rounds: int, report_progress: ProgressCallback = no_progress) -> Patrol:
     """Measure several runs of the patrol with a log, then the parts of half as many more runs."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     simulated, *_ = timed_run(prepared)  # the first run pays for imports and caches
     cpus, bares = list[float](), list[float]()
     for number in range(rounds):
-        tell(f"patrol, round {number + 1} of {rounds}")
+        report_progress(f"patrol, round {number + 1} of {rounds}")
         cpus.append(timed_run(prepared)[1])
-        bares.append(bare_patrol(prepared, simulated))
+        bares.append(time_baseline_patrol(prepared, simulated))
     cpu = statistics.median(cpus)
-    tell("parts of the patrol")
-    measured = [_measure_parts(prepared, cpu) for _ in range((rounds + 1) // 2)]
-    parted = {name: tuple(one[name] for one in measured) for name in measured[0]}
-    parts = {name: statistics.median(each) for name, each in parted.items()}
+    report_progress("parts of the patrol")
+    part_rounds = [_measure_parts(prepared, cpu) for _ in range((rounds + 1) // 2)]
+    parted = {name: tuple(parts[name] for parts in part_rounds) for name in part_rounds[0]}
+    parts = {name: statistics.median(times) for name, times in parted.items()}
     return Patrol(simulated, cpu, parts, statistics.median(bares), tuple(cpus), tuple(bares), parted)
 
 
@@ -111,19 +114,20 @@ def timed_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tup
     """Return simulated, CPU, and wall seconds of a run from setup to verdicts. `watch` measures its parts."""
     gc.collect()
     gc.freeze()  # as the warm process does, so that older objects are not searched for garbage
-    before = gc.get_threshold()
+    previous = gc.get_threshold()
     gc.set_threshold(GC_THRESHOLD)  # as a run's own process does
     with TemporaryDirectory() as folder:
-        begun, begun_wall = time.process_time(), time.perf_counter()
-        run = simulate(prepared, SEED, log=Path(folder, "run.mcap"), attach=partial(_watched, watch) if watch else None)
-        cpu, wall = time.process_time() - begun, time.perf_counter() - begun_wall
-    gc.set_threshold(*before)
+        cpu_start, wall_start = time.process_time(), time.perf_counter()
+        attach = partial(_watch_parts, watch) if watch else None
+        run = simulate(prepared, SEED, log=Path(folder, "run.mcap"), attach=attach)
+        cpu, wall = time.process_time() - cpu_start, time.perf_counter() - wall_start
+    gc.set_threshold(*previous)
     gc.unfreeze()
     return run.result.simulated, cpu, wall
 
 
-def _watched(watch: Stopwatch, setup: RunSetup, own: Sequence[MomentSink]) -> Sequence[MomentSink]:
-    """Measure the parts of a run, and its `own` listeners: trace and log."""
+def _watch_parts(watch: Stopwatch, setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
+    """Measure the parts of a run, and its listeners: trace and log."""
     (agent,) = setup.robots
     watch.watch("physics", setup.simulation, "step")
     watch.watch("physics", agent.robot, "drive")
@@ -134,22 +138,23 @@ def _watched(watch: Stopwatch, setup: RunSetup, own: Sequence[MomentSink]) -> Se
         for name, component, methods in agent.stack.inner.components:
             watch.watch(name, component, *methods)
     watch.watch("navigator", agent.stack, "decide")
-    for name, listener, methods in zip(("trace", "log"), own, (("append",), ("append", "flush_if_due")), strict=True):
+    methods_of = {"trace": ("append",), "log": ("append", "flush_if_due")}
+    for (name, methods), listener in zip(methods_of.items(), listeners, strict=True):
         watch.watch(name, listener, *methods)
     return ()
 
 
-def bare_patrol(prepared: PreparedScenario, simulated: float) -> float:
-    """Return the CPU seconds that PyBullet alone takes for as many steps and scans in the same world."""
+def time_baseline_patrol(prepared: PreparedScenario, simulated: float) -> float:
+    """Return the CPU time in s that the PyBullet baseline takes for as many steps and scans in the same world."""
     lidar = next(sensor.lidar for sensor in prepared.robot.sensors.values() if sensor.lidar)
-    bare = PyBulletBaseline(prepared.built.mesh, prepared.body, prepared.start, triangulate)
-    around = _circle(lidar.beams)
-    begun = time.process_time()
+    baseline = PyBulletBaseline(prepared.built.mesh, prepared.body, prepared.start, triangulate)
+    directions = _circle(lidar.beams)
+    start = time.process_time()
     for _ in range(round(simulated * lidar.rate)):
-        bare.step(round(240 / lidar.rate))
-        bare.scan(around, lidar.min_range, lidar.max_range, lidar_height(prepared.robot))
-    cpu = time.process_time() - begun
-    bare.close()
+        baseline.step(round(240 / lidar.rate))
+        baseline.scan(directions, lidar.min_range, lidar.max_range, lidar_height(prepared.robot))
+    cpu = time.process_time() - start
+    baseline.close()
     return cpu
 
 
@@ -159,20 +164,20 @@ def measure_field(obstacles: int) -> Field:
     solids = cylinders(obstacles)
     mesh, start, height = merge_solids(solids), Pose2(0.0, 0.0, 0.0), lidar_height(prepared.robot)
     rays = RayScene(mesh)
-    around = _circle(BEAMS)
-    directions = np.column_stack((around, np.zeros(BEAMS)))
+    planar = _circle(BEAMS)
+    directions = np.column_stack((planar, np.zeros(BEAMS)))
     origins = np.tile([0.0, 0.0, height], (BEAMS, 1))
-    fused = PyBulletBaseline(mesh, prepared.body, start, triangulate)
-    bare = PyBulletBaseline(solids, prepared.body, start, triangulate)
+    merged = PyBulletBaseline(mesh, prepared.body, start, triangulate)
+    separate = PyBulletBaseline(solids, prepared.body, start, triangulate)
     field = Field(
         obstacles,
-        scan_ms=1e3 * _each(lambda: rays.cast(origins, directions), 200),
-        step_us=1e6 * _each(lambda: fused.step(1), 2000),
-        bare_scan_ms=1e3 * _each(lambda: bare.scan(around, 0.12, 30.0, height), 10),
-        bare_step_us=1e6 * _each(lambda: bare.step(1), 500),
+        scan_ms=1e3 * _cpu_per_call(lambda: rays.cast(origins, directions), 200),
+        step_us=1e6 * _cpu_per_call(lambda: merged.step(1), 2000),
+        bare_scan_ms=1e3 * _cpu_per_call(lambda: separate.scan(planar, 0.12, 30.0, height), 10),
+        bare_step_us=1e6 * _cpu_per_call(lambda: separate.step(1), 500),
     )
-    fused.close()
-    bare.close()
+    merged.close()
+    separate.close()
     return field
 
 
@@ -186,17 +191,19 @@ def cylinders(count: int) -> list[Solid]:
     """Return `count` random cylinders with a radius of 7.5 cm, none within 1 m of the origin."""
     rng = np.random.default_rng(SEED)
     edge = (count / 0.9) ** 0.5 / 2
-    places = rng.uniform(-edge, edge, (4 * count + 40, 2))
-    places = places[np.hypot(*places.T) > 1.0][:count]
-    return [Solid(Cylinder(0.075, 1.0), Pose3(x, y, 0.5), f"cylinder {k}") for k, (x, y) in enumerate(places.tolist())]
+    positions = rng.uniform(-edge, edge, (4 * count + 40, 2))
+    positions = positions[np.hypot(*positions.T) > 1.0][:count]
+    return [
+        Solid(Cylinder(0.075, 1.0), Pose3(x, y, 0.5), f"cylinder {k}") for k, (x, y) in enumerate(positions.tolist())
+    ]
 
 
-def _each(what: Callable[[], Any], times: int) -> float:
+def _cpu_per_call(call: Callable[[], Any], times: int) -> float:
     """Return the CPU seconds of one call, as median of five rounds."""
     rounds = []
     for _ in range(5):
-        begun = time.process_time()
+        start = time.process_time()
         for _ in range(times):
-            what()
-        rounds.append((time.process_time() - begun) / times)
+            call()
+        rounds.append((time.process_time() - start) / times)
     return statistics.median(rounds)

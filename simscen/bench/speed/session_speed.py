@@ -12,7 +12,7 @@ from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
 
 from simscen.bench.speed.measurement import Measurement, Measurements, Stopwatch
-from simscen.bench.speed.run_speed import PATROL, SEED, ProgressCallback, bare_patrol, no_progress
+from simscen.bench.speed.run_speed import PATROL, SEED, ProgressCallback, no_progress, time_baseline_patrol
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.trace import Moment
@@ -32,17 +32,17 @@ from simscen.run.sessions.run_session import SessionOptions, plan_jobs
 from simscen.run.simulate import simulate
 
 SHORT_RUN_S = 0.1
-"""Simulated time of a run that is nearly only overhead."""
+"""Simulated time of a run that consists almost only of overhead."""
 WALL_LIMIT_S = 300.0
 MILLISECONDS, MEGABYTES = "ms", "MB"
 
 
 @dataclass(frozen=True)
 class Overhead:
-    """Overhead in several rounds: CPU time in ms.
+    """Overhead in several rounds: CPU time in ms. The names of the fields are keys of the JSON output.
 
     run:        a run of SHORT_RUN_S in this process
-    beyond:     its time before the first and after the last cycle: setup, begin and end of the log, verdicts
+    beyond:     its time before the first and after the last cycle: setup, start and end of the log, verdicts
     process:    the same run in a session, from the fork on, with its picture
     wall:       wall time of this process in ms
     memory:     maximum memory of this process in MB
@@ -76,26 +76,26 @@ class Overhead:
 
 
 class _SimulationTimer:
-    """Log that measures the CPU time in ms from the first to the last cycle of a run, including the first plan."""
+    """Listener that measures the CPU time from the first to the last cycle of a run, including the first plan."""
 
-    def attach(self, rig: RunSetup, own: Sequence[MomentSink]) -> Sequence[MomentSink]:
-        """Start the timer at the begin of a run."""
-        self.begun = self.ended = time.process_time()
+    def attach(self, setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
+        """Start the timer at the start of a run."""
+        self.start = self.end = time.process_time()
         return (self,)
 
     def append(self, moment: Moment) -> None:
         """Update the end of the run."""
-        self.ended = time.process_time()
+        self.end = time.process_time()
 
     @property
     def duration(self) -> float:
         """CPU time of the last run in ms."""
-        return 1e3 * (self.ended - self.begun)
+        return 1e3 * (self.end - self.start)
 
 
-def measure_overhead(rounds: int, entry: Sequence[str], tell: ProgressCallback = no_progress) -> Overhead:
+def measure_overhead(rounds: int, entry: Sequence[str], report_progress: ProgressCallback = no_progress) -> Overhead:
     """Measure short runs of the patrol. `entry` are the arguments with which Python becomes a warm process."""
-    tell("overhead of a run")
+    report_progress("overhead of a run")
     with TemporaryDirectory() as folder:
         file = short_patrol(Path(folder))
         loaded = load_scenario(file, file.parent)
@@ -109,7 +109,7 @@ def measure_overhead(rounds: int, entry: Sequence[str], tell: ProgressCallback =
             return simulate(prepared, SEED, log=log, attach=timer.attach)
 
         run()
-        each = [(_cpu(run), timer.duration) for _ in range(rounds)]
+        durations = [(_cpu_ms(run), timer.duration) for _ in range(rounds)]
         keys = [RunKey(loaded.id, seed + 1) for seed in range(rounds + 1)]
         jobs = [Job(n, loaded, key, run_folder(Path(folder), key), WALL_LIMIT_S) for n, key in enumerate(keys)]
         with Supervisor(1, entry) as supervisor:
@@ -118,16 +118,16 @@ def measure_overhead(rounds: int, entry: Sequence[str], tell: ProgressCallback =
                 for update in supervisor.run(jobs)
                 if isinstance(update, Ended) and isinstance(end := update.end, ProcessEnd)
             ]
-        others = ends[1:]  # the first run includes the import of the engines
+        measured = ends[1:]  # the first run includes the import of the engines
         return Overhead(
-            run=tuple(whole for whole, _ in each),
-            beyond=tuple(whole - simulated for whole, simulated in each),
-            process=tuple(1e3 * end.cpu for end in others),
-            wall=tuple(1e3 * end.wall for end in others),
-            memory=tuple(end.peak_bytes / 1e6 for end in others),
-            preparing=tuple(_cpu(lambda: prepare(loaded)) for _ in range(rounds)),
-            start=tuple(_child("-c", f"import {entry[-1]}") for _ in range(rounds)),
-            validate=tuple(_child("-m", "simscen", "validate", str(file)) for _ in range(rounds)),
+            run=tuple(whole for whole, _ in durations),
+            beyond=tuple(whole - simulated for whole, simulated in durations),
+            process=tuple(1e3 * end.cpu for end in measured),
+            wall=tuple(1e3 * end.wall for end in measured),
+            memory=tuple(end.peak_bytes / 1e6 for end in measured),
+            preparing=tuple(_cpu_ms(lambda: prepare(loaded)) for _ in range(rounds)),
+            start=tuple(_child_cpu_ms("-c", f"import {entry[-1]}") for _ in range(rounds)),
+            validate=tuple(_child_cpu_ms("-m", "simscen", "validate", str(file)) for _ in range(rounds)),
         )
 
 
@@ -138,15 +138,15 @@ def short_patrol(folder: Path, seconds: float = SHORT_RUN_S) -> Path:
     return file
 
 
-def _cpu(what: Callable[[], object]) -> float:
+def _cpu_ms(call: Callable[[], object]) -> float:
     """Return the CPU time of a call in ms."""
     gc.collect()
-    begun = time.process_time()
-    what()
-    return 1e3 * (time.process_time() - begun)
+    start = time.process_time()
+    call()
+    return 1e3 * (time.process_time() - start)
 
 
-def _child(*arguments: str) -> float:
+def _child_cpu_ms(*arguments: str) -> float:
     """Return the CPU time in ms of a Python process with these arguments."""
     before = getrusage(RUSAGE_CHILDREN)
     subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
@@ -154,18 +154,18 @@ def _child(*arguments: str) -> float:
     return 1e3 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
 
 
-BARE_SECONDS = 60.0
+BASELINE_DURATION_S = 60.0
 
 
 @dataclass(frozen=True)
 class Suite:
-    """A session with several runs.
+    """A session with several runs. The names of the fields are keys of the JSON output.
 
     simulated:  simulated time of all runs in s
     wall:       wall time of the session in s
     cpu:        CPU time of all runs in s
     memory:     maximum memory of each run's process in MB
-    bare:       CPU time in s of PyBullet alone per simulated second of the patrol, measured before and after
+    bare:       CPU time in s of the PyBullet baseline per simulated second of the patrol, measured before and after
     unfinished: runs that ended with an error
     """
 
@@ -181,22 +181,22 @@ class Suite:
     @property
     def figures(self) -> Measurements:
         """The figures that are printed and compared."""
-        alone = self.bare * self.simulated
+        baseline_s = self.bare * self.simulated
         return {
             "suite: runs a minute": Measurement(60 * self.runs / self.wall, "", more_is_better=True),
             "suite: wall time": Measurement(self.wall, "s"),
-            "suite: wall time, times PyBullet alone on one core": Measurement(self.wall / alone, ""),
-            "suite: CPU time, times PyBullet alone": Measurement(self.cpu / alone, ""),
+            "suite: wall time, times PyBullet alone on one core": Measurement(self.wall / baseline_s, ""),
+            "suite: CPU time, times PyBullet alone": Measurement(self.cpu / baseline_s, ""),
             "suite: memory of a worker": Measurement(statistics.median(self.memory), "MB"),
             "suite: memory of the largest worker": Measurement(max(self.memory), "MB"),
         }
 
 
-def evenly_spaced(scenarios: Sequence[LoadedScenario], most: int) -> list[LoadedScenario]:
-    """Return at most `most` scenarios, evenly selected."""
-    if len(scenarios) <= most:
+def evenly_spaced(scenarios: Sequence[LoadedScenario], max_count: int) -> list[LoadedScenario]:
+    """Return at most `max_count` scenarios, evenly spaced."""
+    if len(scenarios) <= max_count:
         return list(scenarios)
-    return [scenarios[number * len(scenarios) // most] for number in range(most)]
+    return [scenarios[number * len(scenarios) // max_count] for number in range(max_count)]
 
 
 def measure_suite(
@@ -204,32 +204,32 @@ def measure_suite(
     workers: int,
     out: Path,
     entry: Sequence[str],
-    tell: ProgressCallback = no_progress,
+    report_progress: ProgressCallback = no_progress,
 ) -> Suite:
     """Run each scenario once with a log. `entry` are the arguments with which Python becomes a warm process."""
     patrol = prepare(load_scenario(PATROL, PATROL.parent))
-    bares = [bare_patrol(patrol, BARE_SECONDS)]
-    begun = time.perf_counter()
+    baselines = [time_baseline_patrol(patrol, BASELINE_DURATION_S)]
+    start = time.perf_counter()
     jobs = plan_jobs(scenarios, SessionOptions(workers=workers), out)
-    answers, ends = list[RunFinished](), list[ProcessEnd]()
+    finished_runs, ends = list[RunFinished](), list[ProcessEnd]()
     with Supervisor(workers, entry) as supervisor:
-        for happening in supervisor.run(jobs, plugins_of_all(scenarios)):
-            if isinstance(happening, Ended):
-                answers.append(finished_run(happening.job, happening.end))
-                if isinstance(happening.end, ProcessEnd):
-                    ends.append(happening.end)
-                tell(f"{len(answers)} of {len(jobs)} runs")
-    wall = time.perf_counter() - begun
-    bares.append(bare_patrol(patrol, BARE_SECONDS))
+        for update in supervisor.run(jobs, plugins_of_all(scenarios)):
+            if isinstance(update, Ended):
+                finished_runs.append(finished_run(update.job, update.end))
+                if isinstance(update.end, ProcessEnd):
+                    ends.append(update.end)
+                report_progress(f"{len(finished_runs)} of {len(jobs)} runs")
+    wall = time.perf_counter() - start
+    baselines.append(time_baseline_patrol(patrol, BASELINE_DURATION_S))
     return Suite(
         runs=len(jobs),
-        unfinished=tuple(answer.key.test for answer in answers if answer.result.error is not None),
+        unfinished=tuple(finished.key.test for finished in finished_runs if finished.result.error is not None),
         workers=workers,
-        simulated=sum(answer.result.simulated for answer in answers),
+        simulated=sum(finished.result.simulated for finished in finished_runs),
         wall=wall,
         cpu=sum(end.cpu for end in ends),
         memory=tuple(end.peak_bytes / 1e6 for end in ends),
-        bare=statistics.mean(bares) / BARE_SECONDS,
+        bare=statistics.mean(baselines) / BASELINE_DURATION_S,
     )
 
 
@@ -253,26 +253,27 @@ class ExternalStackCost:
 def measure_external(rounds: int) -> ExternalStackCost:
     """Measure several patrols without a log, with the stack in this process and as an external process."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
-    here = [_each_beat(prepared) for _ in range(rounds)]
-    there = [_each_beat(with_external_reference(prepared)) for _ in range(rounds)]
+    in_process = [_wait_per_cycle(prepared) for _ in range(rounds)]
+    external = [_wait_per_cycle(with_external_reference(prepared)) for _ in range(rounds)]
     return ExternalStackCost(
-        here[0][0], statistics.median(us for _, us in here), statistics.median(us for _, us in there)
+        in_process[0][0], statistics.median(us for _, us in in_process), statistics.median(us for _, us in external)
     )
 
 
-def _each_beat(prepared: PreparedScenario) -> tuple[int, float]:
-    watch, beats = Stopwatch(), _CycleCounter()
+def _wait_per_cycle(prepared: PreparedScenario) -> tuple[int, float]:
+    """Return the number of cycles of a run, and the mean wall time in µs that the engine waits for the stack."""
+    watch, cycles = Stopwatch(), _CycleCounter()
 
     def attach(setup: RunSetup, _: Sequence[MomentSink]) -> Sequence[MomentSink]:
         watch.watch("stack", setup.robots[0].stack, "decide")
-        return (beats,)
+        return (cycles,)
 
     simulate(prepared, SEED, attach=attach)
-    return beats.count, 1e6 * watch.seconds["stack"] / beats.count
+    return cycles.count, 1e6 * watch.seconds["stack"] / cycles.count
 
 
 class _CycleCounter:
-    """Log that counts the cycles of a run."""
+    """Listener that counts the cycles of a run."""
 
     def __init__(self) -> None:
         self.count = 0

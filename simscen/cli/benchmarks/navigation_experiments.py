@@ -131,7 +131,7 @@ def _offers(
         AvailableExperiment(
             "localization",
             worlds,
-            lambda: experiments.localizations(made, worlds, sizes.seeded(20), sizes.numbers(sizes.lost)),
+            lambda: experiments.localization_experiments(made, worlds, sizes.seeded(20), sizes.numbers(sizes.lost)),
         ),
     ]
 

@@ -9,7 +9,7 @@ from simscen.bench.navigation.experiments import (
     corner_cases,
     dynamic_fields,
     generated_fields,
-    localizations,
+    localization_experiments,
     sandbox,
 )
 from simscen.cli.benchmarks.navigation import with_stack
@@ -42,7 +42,7 @@ def test_dynamic_fields_load_at_three_speeds(tmp_path: Path) -> None:
 
 
 def test_localization_loads_and_misleads_in_another_direction_each_time(tmp_path: Path) -> None:
-    experiments = localizations(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
+    experiments = localization_experiments(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
     for experiment in experiments:
         loads(experiment)
     _, misled, unknown, _ = experiments
@@ -78,7 +78,7 @@ def test_every_experiment_can_be_driven_by_a_stack_of_other_parts_from_a_file_of
         generated_fields(tmp_path / "made", (1,)),
         *dynamic_fields(tmp_path / "made", (1,))[:1],
         *corner_cases(PROJECT / "scenarios", PROJECT, range(1, 2)),
-        *localizations(tmp_path / "made", PROJECT / "worlds", range(1, 2), range(1, 2)),
+        *localization_experiments(tmp_path / "made", PROJECT / "worlds", range(1, 2), range(1, 2)),
     ]
     for other in with_stack(tmp_path / "ours.stack.yaml", experiments, tmp_path / "made", PROJECT):
         for drive in other.drives:

@@ -35,7 +35,7 @@ def test_fields_are_as_dense_as_the_worlds_of_barn() -> None:
 def test_lonely_cells_vanish_and_crowded_ones_fill() -> None:
     alone = np.zeros((3, 3), np.bool_)
     alone[1, 1] = True
-    assert obstacle_fields._neighbors(alone).tolist() == [[1, 1, 1], [1, 0, 1], [1, 1, 1]]
+    assert obstacle_fields._count_neighbors(alone).tolist() == [[1, 1, 1], [1, 0, 1], [1, 1, 1]]
 
 
 def test_a_narrow_field_has_a_way_for_the_robot_and_none_for_a_wider_one_by_the_word_of_another_library() -> None:

@@ -37,7 +37,7 @@ def two_rooms() -> BuiltWorld:
 
 
 def test_every_errand_can_be_driven_and_has_room_at_both_ends() -> None:
-    found = list(random_drives(two_rooms(), 0.22, range(1, 21), least=2.0))
+    found = list(random_drives(two_rooms(), 0.22, range(1, 21), min_length=2.0))
     assert len(found) == 20
     for one in found:
         assert (one.start.x < 5.0) == (one.goal.x < 5.0)  # nothing leads through the wall
@@ -49,9 +49,9 @@ def test_every_errand_can_be_driven_and_has_room_at_both_ends() -> None:
 
 
 def test_a_drive_is_that_of_its_number_whichever_others_are_drawn() -> None:
-    one, two, three = random_drives(two_rooms(), 0.22, (1, 2, 3), least=2.0)
+    one, two, three = random_drives(two_rooms(), 0.22, (1, 2, 3), min_length=2.0)
     assert [one, two, three] != [one, one, one]
-    assert list(random_drives(two_rooms(), 0.22, (3, 1), least=2.0)) == [three, one]
+    assert list(random_drives(two_rooms(), 0.22, (3, 1), min_length=2.0)) == [three, one]
     assert [each.number for each in (one, two, three)] == [1, 2, 3]
 
 

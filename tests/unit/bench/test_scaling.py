@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.bench.speed.scaling import AXES, write_more
+from simscen.bench.speed.scaling import QUANTITIES, write_scaled_patrol
 from simscen.bench.speed.session_speed import SHORT_RUN_S, Suite, evenly_spaced, short_patrol
 from simscen.loading.builders import load_robot, load_world
 from simscen.loading.loaded import LoadedScenario
@@ -26,9 +26,11 @@ def count(axis: str, loaded: LoadedScenario) -> int:
             return len(loaded.robots)
 
 
-@pytest.mark.parametrize(("axis", "many"), [(axis, many) for axis, counts in AXES.items() for many in counts[::2]])
+@pytest.mark.parametrize(
+    ("axis", "many"), [(axis, many) for axis, counts in QUANTITIES.items() for many in counts[::2]]
+)
 def test_growth_scenario_has_the_stated_amount(tmp_path, axis, many):
-    assert count(axis, load_scenario(write_more(tmp_path, axis, many), tmp_path)) == many
+    assert count(axis, load_scenario(write_scaled_patrol(tmp_path, axis, many), tmp_path)) == many
 
 
 def test_short_patrol_has_the_stated_time_limit(tmp_path):

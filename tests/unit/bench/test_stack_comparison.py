@@ -1,7 +1,7 @@
 import pytest
 from finishedruns import ARRIVED, HIT, run
 
-from simscen.bench.navigation.summary import Trial, compare_drives, over_worlds, summarize
+from simscen.bench.navigation.summary import Trial, compare_drives, success_interval, summarize
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.statistics import wilson_interval
@@ -12,18 +12,18 @@ SLOW = run(Outcome.PASSED, seconds=12.0)
 def test_the_interval_is_over_worlds_however_many_seeds_each_has() -> None:
     few = [Trial(r, world=f"{n}") for n, r in enumerate((ARRIVED, HIT, ARRIVED, ARRIVED, HIT, ARRIVED))]
     many = [Trial(trial.run, world=trial.world) for trial in few for _ in range(20)]
-    assert over_worlds(few) == over_worlds(many)
-    low, high = over_worlds(few) or (0.0, 0.0)
+    assert success_interval(few) == success_interval(many)
+    low, high = success_interval(few) or (0.0, 0.0)
     assert low == pytest.approx(1 / 3, abs=0.01)  # of six worlds, four or so good ones: 2.5 % have at most two
     assert high == 1.0
 
 
 def test_worlds_that_all_say_the_same_leave_wilsons_doubt() -> None:
-    assert over_worlds([Trial(ARRIVED, world=f"{n}") for n in range(10)]) == pytest.approx((0.722, 1.0), abs=1e-3)
+    assert success_interval([Trial(ARRIVED, world=f"{n}") for n in range(10)]) == pytest.approx((0.722, 1.0), abs=1e-3)
 
 
 def test_worlds_in_which_every_second_drive_succeeds_leave_doubt_too() -> None:
-    low, high = over_worlds([Trial(r, world=f"{n}") for n in range(6) for r in (ARRIVED, HIT)]) or (0.5, 0.5)
+    low, high = success_interval([Trial(r, world=f"{n}") for n in range(6) for r in (ARRIVED, HIT)]) or (0.5, 0.5)
     assert (low, high) == pytest.approx(wilson_interval(3, 6))
 
 

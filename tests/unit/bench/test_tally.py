@@ -9,7 +9,7 @@ from simscen.core.records.session_events import RunFinished
 
 
 @pytest.mark.parametrize(
-    ("finished", "fate"),
+    ("finished", "drive_outcome"),
     [
         (ARRIVED, DriveOutcome.SUCCESS),
         (HIT, DriveOutcome.COLLISION),
@@ -19,8 +19,8 @@ from simscen.core.records.session_events import RunFinished
         (run(Outcome.ERROR), DriveOutcome.ERROR),
     ],
 )
-def test_a_run_has_exactly_one_fate(finished: RunFinished, fate: DriveOutcome) -> None:
-    assert Trial(finished).fate is fate
+def test_a_run_has_exactly_one_fate(finished: RunFinished, drive_outcome: DriveOutcome) -> None:
+    assert Trial(finished).drive_outcome is drive_outcome
 
 
 def test_rates_are_of_all_runs_and_times_of_the_good_ones() -> None:
