@@ -42,7 +42,7 @@ class Criterion(ABC):
 
 
 class Measure(ABC):
-    """Number that a scenario requests for a run. Unlike a criterion, it has no bound and fails no run.
+    """Metric that a scenario requests for a run. Unlike a criterion, it has no bound and cannot fail a run.
 
     *Given* the same trace and case *then* the same number.
     """

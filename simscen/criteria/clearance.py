@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 SEARCH_MARGIN_M = 0.5
-"""Distance in m beyond the bound that is measured."""
+"""Distance in m beyond the bound up to which the clearance is measured."""
 
 
 class Clearance(Spec, Criterion):
@@ -56,14 +56,16 @@ class Clearance(Spec, Criterion):
             return [undecided("clearance", "no clearance was recorded", f"≥ {self.min:.2f} m")]
         k = int(np.argmin(distances))
         if case.clearance_range <= distances[k] < self.min:
-            because = f"nothing was nearer than {case.clearance_range:.2f} m, and further was not searched"
+            because = (
+                f"nothing was nearer than {case.clearance_range:.2f} m, and the clearance was not measured beyond that"
+            )
             return [undecided("clearance", because, f"≥ {self.min:.2f} m")]
         at = (trace, int(trace.clearance.ticks[k]))
         return [at_least("clearance", float(distances[k]), self.min, "m", at=at)]
 
 
 DRIVING_SPEED_M_S = 0.1
-"""Speed in m/s of a standing robot, which people may approach."""
+"""Speed in m/s above which a robot is driving; people may approach a slower robot."""
 
 
 class PersonalSpace(Spec, Criterion):
@@ -96,12 +98,12 @@ class PersonalSpace(Spec, Criterion):
         limit = f"≥ {self.min:.2f} m"
         try:
             gaps = pedestrian_gap(trace, case)
-        except SignalUnavailable as why:
-            return [undecided("distance to people", str(why), limit)]
+        except SignalUnavailable as reason:
+            return [undecided("distance to people", str(reason), limit)]
         if self.while_driving:
             gaps = np.where(speed(trace).at(trace.truth.ticks)[:, 0] > DRIVING_SPEED_M_S, gaps, np.inf)
         nearest = int(np.argmin(gaps))
         if np.isinf(gaps[nearest]):
-            return [undecided("distance to people", "nobody was there while the robot drove", limit)]
+            return [undecided("distance to people", "no pedestrian was present while the robot drove", limit)]
         at = (trace, int(trace.truth.ticks[nearest]))
         return [at_least("distance to people", float(gaps[nearest]), self.min, "m", at=at)]

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 
 class TimeToGoal(Spec, Criterion):
-    """The robot was at its goal in time.
+    """The robot reached its goal in time.
 
     What is measured: simulated time from the first goal's acceptance to the report that the last one is reached; with
         `goal`, from that goal's acceptance to the report that it is reached. Goals that events send count too; those
         that they preempt, and goals that are expected to fail, need not be reached.
     When it fails: it took longer, or the goal was never reached.
-    Why this: a robot that hesitates arrives, too. Use goals_reached to check the true arrival.
+    Why this: a robot that hesitates also arrives. Use goals_reached to check the true arrival.
     Source: the time of the BARN challenge and of Nav2's own benchmarks (nav2#3239).
 
     Example: `time_to_goal: {max: 45 s}`
@@ -50,28 +50,28 @@ class TimeToGoal(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding, or one for each goal with the same name."""
-        told = goal_outcomes(trace, case)
+        outcomes = goal_outcomes(trace, case)
         if self.goal is not None:
-            own = [outcome for outcome in told if matches_goal_name(outcome.goal.name, self.goal)]
+            own = [outcome for outcome in outcomes if matches_goal_name(outcome.goal.name, self.goal)]
             if not own:
                 known = any(matches_goal_name(goal.name, self.goal) for goal in case.every_goal)
                 because = "never sent" if known else f"the scenario has no goal `{self.goal}`"
                 return [undecided(f"goal {self.goal}", because)]
-            return [self._timed(trace, f"goal {outcome.goal.name}", outcome.accepted, outcome) for outcome in own]
-        if not told:
+            return [self._judge_time(trace, f"goal {outcome.goal.name}", outcome.accepted, outcome) for outcome in own]
+        if not outcomes:
             return [undecided("time_to_goal", "the scenario has no goals")]
-        start = next((outcome.accepted for outcome in told if outcome.accepted is not None), None)
-        awaited = [outcome for outcome in told if outcome.must_be_reached]
-        if not awaited:
-            return [undecided("time_to_goal", "every goal was preempted, or is to fail")]
-        unreached = [outcome for outcome in awaited if outcome.reached is None]
-        return [self._timed(trace, "time_to_goal", start, unreached[0] if unreached else awaited[-1])]
+        start = next((outcome.accepted for outcome in outcomes if outcome.accepted is not None), None)
+        required = [outcome for outcome in outcomes if outcome.must_be_reached]
+        if not required:
+            return [undecided("time_to_goal", "every goal was preempted or is expected to fail")]
+        unreached = [outcome for outcome in required if outcome.reached is None]
+        return [self._judge_time(trace, "time_to_goal", start, unreached[0] if unreached else required[-1])]
 
-    def _timed(self, trace: Trace, what: str, start: int | None, outcome: GoalOutcome) -> Finding:
+    def _judge_time(self, trace: Trace, what: str, start: int | None, outcome: GoalOutcome) -> Finding:
         if outcome.failure:
-            return undecided(what, "the robot is to fail there, not to arrive")
+            return undecided(what, "the robot is expected to fail at this goal")
         if start is None:
-            return self._never_begun(trace, what, outcome)
+            return self._judge_without_start(trace, what, outcome)
         if outcome.reached is not None:
             return at_most(what, trace.seconds(outcome.reached - start), self.max, "s", at=(trace, outcome.reached))
         if outcome.preempted:
@@ -90,17 +90,17 @@ class TimeToGoal(Spec, Criterion):
         if outcome.end is None and not has_ended(trace):
             return undecided(what, f"the log stops {so_far:.2f} s after the start, {outcome.summary}", expected)
         tick = trace.end if outcome.end is None else outcome.end.tick
-        fate = f"goal {outcome.goal.name}: {outcome.summary}"
-        return missed(what, "never reached", expected, (trace, tick), [fate])
+        detail = f"goal {outcome.goal.name}: {outcome.summary}"
+        return missed(what, "never reached", expected, (trace, tick), [detail])
 
-    def _never_begun(self, trace: Trace, what: str, outcome: GoalOutcome) -> Finding:
+    def _judge_without_start(self, trace: Trace, what: str, outcome: GoalOutcome) -> Finding:
         """Return the finding for a goal without an acceptance. A log that starts later can contain the arrival."""
         expected = f"to be there within {self.max:.2f} s"
         if outcome.end is None and has_ended(trace):
             return missed(
                 what, "never reached", expected, (trace, trace.end), [f"goal {outcome.goal.name}: {outcome.summary}"]
             )
-        return undecided(what, "when its goal was accepted was not recorded", expected)
+        return undecided(what, "the acceptance of its goal was not recorded", expected)
 
 
 class PathLength(Spec, Criterion):
@@ -123,7 +123,7 @@ class PathLength(Spec, Criterion):
     """Maximum multiple of the shortest path; 1 is a perfect drive."""
 
     @model_validator(mode="after")
-    def _some_bound(self) -> PathLength:
+    def _check_bounds(self) -> PathLength:
         if self.max is None and self.max_ratio is None:
             raise ValueError("expected max or max_ratio")
         return self
@@ -135,47 +135,47 @@ class PathLength(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings for the length and for the ratio, both with margins in m."""
-        way = drive(trace)
-        findings = [] if self.max is None else [_bound(trace, way, "path_length", self.max)]
+        path = drive(trace)
+        findings = [] if self.max is None else [_judge_length(trace, path, "path_length", self.max)]
         if self.max_ratio is not None:
-            findings.append(self._ratio(trace, case, way))
+            findings.append(self._judge_ratio(trace, case, path))
         return findings
 
-    def _ratio(self, trace: Trace, case: Case, way: Drive) -> Finding:
+    def _judge_ratio(self, trace: Trace, case: Case, path: Drive) -> Finding:
         assert self.max_ratio is not None
         what = "path_length ratio"
-        shortest, because = shortest_way(trace, case)
+        shortest, because = shortest_path_length(trace, case)
         if because:
             return undecided(what, because, f"≤ {self.max_ratio:g}")
         limit = self.max_ratio * shortest
-        context = f"({self.max_ratio:g} times the shortest way of {shortest:.2f} m)"
+        context = f"({self.max_ratio:g} times the shortest path of {shortest:.2f} m)"
         unreached = [
             outcome for outcome in goal_outcomes(trace, case) if outcome.reached is None and not outcome.failure
         ]
-        if unreached and way.length <= limit:
+        if unreached and path.length <= limit:
             name = unreached[0].goal.name
-            return undecided(what, f"goal {name} was not reached, so there is no whole way to compare", context)
-        return _bound(trace, way, what, limit, context)
+            return undecided(what, f"goal {name} was not reached, so the path is incomplete", context)
+        return _judge_length(trace, path, what, limit, context)
 
 
-def shortest_way(trace: Trace, case: Case) -> tuple[float, str]:
+def shortest_path_length(trace: Trace, case: Case) -> tuple[float, str]:
     """Return the length in m of the shortest path through all goals, or nan and the reason why there is none."""
     names = [goal.name for goal in case.goals if goal.name not in case.expected]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    without = [name for name in names if not math.isfinite(case.shortest.get(name, math.nan))]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    unknown = [name for name in names if not math.isfinite(case.shortest.get(name, math.nan))]
     length = sum(case.shortest.get(name, math.nan) for name in names)
     sent = trace.of_kind(EventKind.GOAL_ACCEPTED)
-    on_the_way = sorted({event.name for event in sent} & {goal.name for goal in case.sent})
-    if on_the_way:
-        return math.nan, f"{', '.join(on_the_way)} was sent on the way, from where nobody could know before"
-    if twice:
-        return math.nan, f"several goals are called {', '.join(twice)}: their shortest ways cannot be told apart"
-    if without:
-        return math.nan, f"no shortest way to {', '.join(without)} is known"
-    return (length, "") if length > 0 else (math.nan, "the shortest way has no length")
+    sent_by_events = sorted({event.name for event in sent} & {goal.name for goal in case.sent})
+    if sent_by_events:
+        return math.nan, f"{', '.join(sent_by_events)} was sent by an event, from a position not known in advance"
+    if repeated:
+        return math.nan, f"several goals are called {', '.join(repeated)}, so their shortest paths are ambiguous"
+    if unknown:
+        return math.nan, f"no shortest path to {', '.join(unknown)} is known"
+    return (length, "") if length > 0 else (math.nan, "the shortest path has no length")
 
 
-def _bound(trace: Trace, way: Drive, what: str, limit: float, context: str = "") -> Finding:
-    over = int(np.argmax(way.travelled > limit)) if way.length > limit else len(way.ticks) - 1
-    at = (trace, int(way.ticks[over])) if len(way.ticks) else None
-    return at_most(what, way.length, limit, "m", at=at, context=context)
+def _judge_length(trace: Trace, path: Drive, what: str, limit: float, context: str = "") -> Finding:
+    decisive = int(np.argmax(path.travelled > limit)) if path.length > limit else len(path.ticks) - 1
+    at = (trace, int(path.ticks[decisive])) if len(path.ticks) else None
+    return at_most(what, path.length, limit, "m", at=at, context=context)

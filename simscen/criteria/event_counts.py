@@ -1,4 +1,4 @@
-"""Bounds on how often something happened."""
+"""Criteria that count events: `replans` and `recoveries`."""
 
 from __future__ import annotations
 
@@ -19,14 +19,10 @@ from simscen.spec.extensible_union import BehaviorName
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Trace
-if TYPE_CHECKING:
-    from simscen.core.records.case import Case
-    from simscen.core.records.trace import Trace
-
-if TYPE_CHECKING:
-    from simscen.core.records.trace import Trace
 
 Count = Annotated[int, Field(ge=0, le=100_000)]
+MAX_DETAILS = 8
+"""Maximum number of events that a finding lists."""
 
 
 class CountBounds(Spec):
@@ -38,13 +34,13 @@ class CountBounds(Spec):
     """Maximum number."""
 
     @model_validator(mode="after")
-    def _some_bound(self) -> CountBounds:
+    def _check_bounds(self) -> CountBounds:
         if self.min is None and self.max is None:
             raise ValueError("expected min or max")
         if self.max is None and self.min == 0:
-            raise ValueError("`min: 0` alone always holds; expected a larger min, or max")
+            raise ValueError("`min: 0` is always met; expected a larger min, or max")
         if self.min is not None and self.max is not None and self.min > self.max:
-            raise ValueError(f"min {self.min} is above max {self.max}, which nothing can be")
+            raise ValueError(f"min {self.min} is above max {self.max}, so no number is allowed")
         return self
 
     def bound(self, trace: Trace, what: str, noun: str, hits: Sequence[Event], detail: Sequence[str]) -> list[Finding]:
@@ -61,7 +57,7 @@ class Replans(CountBounds, Criterion):
 
     What is measured: the number of plans made for any reason but a new goal.
     When it fails: fewer than `min` or more than `max`.
-    Why this: a scenario that drops a pallet on the plan proves nothing unless the robot had to plan again; and one
+    Why this: a scenario that drops a pallet on the plan proves nothing unless the robot had to replan; and a robot
         that replans at every beat has no plan.
     Source: Nav2's navigate_to_pose_w_replanning trees.
 
@@ -81,11 +77,13 @@ class Replans(CountBounds, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each bound."""
         plans = trace.of_kind(EventKind.PLAN_MADE)
-        again = [plan for plan in plans if plan.data.get("reason", "goal") != "goal"]
+        replans = [plan for plan in plans if plan.data.get("reason", "goal") != "goal"]
         if self.reason is not None:
-            again = [plan for plan in again if plan.data.get("reason") == self.reason]
-        told = [f"t = {trace.seconds(plan.tick):.2f} s: {plan.data.get('reason', 'goal')}" for plan in plans[:8]]
-        return self.bound(trace, "replans", "replan", again, told or ["no plan was ever made"])
+            replans = [plan for plan in replans if plan.data.get("reason") == self.reason]
+        details = [
+            f"t = {trace.seconds(plan.tick):.2f} s: {plan.data.get('reason', 'goal')}" for plan in plans[:MAX_DETAILS]
+        ]
+        return self.bound(trace, "replans", "replan", replans, details or ["no plan was ever made"])
 
 
 class Recoveries(CountBounds, Criterion):
@@ -110,8 +108,8 @@ class Recoveries(CountBounds, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each bound."""
-        every = trace.of_kind(EventKind.RECOVERY_STARTED)
-        counting = [start for start in every if self.name in (None, start.name)]
-        told = [f"t = {trace.seconds(start.tick):.2f} s: {start.name}" for start in every[:8]]
+        starts = trace.of_kind(EventKind.RECOVERY_STARTED)
+        counted_starts = [start for start in starts if self.name in (None, start.name)]
+        details = [f"t = {trace.seconds(start.tick):.2f} s: {start.name}" for start in starts[:MAX_DETAILS]]
         noun = "recovery" if self.name is None else f"{self.name} recovery"
-        return self.bound(trace, "recoveries", noun, counting, told)
+        return self.bound(trace, "recoveries", noun, counted_starts, details)

@@ -30,7 +30,7 @@ def at_most(
     context: str = "",
     detail: Sequence[str] = (),
 ) -> Finding:
-    """Return a finding that holds if `value` <= `limit`.
+    """Return a finding that passes if `value` <= `limit`.
 
     `at` is the tick of the smallest margin, `context` the text after the limit ("after lidar.off"). Raises InvalidTrace
     if `value` is nan, because comparisons with nan are meaningless.
@@ -48,7 +48,7 @@ def at_least(
     context: str = "",
     detail: Sequence[str] = (),
 ) -> Finding:
-    """Return a finding that holds if `value` >= `limit`; otherwise like `at_most`."""
+    """Return a finding that passes if `value` >= `limit`; otherwise like `at_most`."""
     return _bound(what, value, limit, unit, value - limit, "≥", at, context, detail)
 
 
@@ -75,28 +75,28 @@ def counted(
             float(margin),
             "",
             float(count),
-            *_spot(at),
-            detail=_if_bad(margin, detail),
+            *_tick_and_place(at),
+            detail=_detail_if_failed(margin, detail),
         )
         for margin, limit in bounds
     ]
 
 
 def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = ()) -> Finding:
-    """Return an inconclusive finding: nothing to check, or the trace is too short."""
+    """Return an inconclusive finding: there is nothing to check, or the trace is too short."""
     return Finding(Status.INCONCLUSIVE, what, because, limit, detail=tuple(detail))
 
 
 def missed(
     what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None, detail: Sequence[str] = ()
 ) -> Finding:
-    """Return a failed finding without a number."""
-    return Finding(Status.FAIL, what, measured, limit, None, "", None, *_spot(at), detail=tuple(detail))
+    """Return a failed finding without a numeric value."""
+    return Finding(Status.FAIL, what, measured, limit, None, "", None, *_tick_and_place(at), detail=tuple(detail))
 
 
 def held(what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None) -> Finding:
-    """Return a passed finding without a number."""
-    return Finding(Status.PASS, what, measured, limit, None, "", None, *_spot(at))
+    """Return a passed finding without a numeric value."""
+    return Finding(Status.PASS, what, measured, limit, None, "", None, *_tick_and_place(at))
 
 
 def quantity(value: float, unit: str, digits: int = 2) -> str:
@@ -127,8 +127,8 @@ def _bound(
         margin,
         unit,
         value,
-        *_spot(at),
-        detail=_if_bad(margin, detail),
+        *_tick_and_place(at),
+        detail=_detail_if_failed(margin, detail),
     )
 
 
@@ -136,11 +136,11 @@ def _status(margin: float) -> Status:
     return Status.PASS if margin >= 0 else Status.FAIL
 
 
-def _if_bad(margin: float, detail: Sequence[str]) -> tuple[str, ...]:
+def _detail_if_failed(margin: float, detail: Sequence[str]) -> tuple[str, ...]:
     return tuple(detail) if margin < 0 else ()
 
 
-def _spot(at: tuple[Trace, int] | None) -> tuple[int | None, tuple[float, float] | None]:
+def _tick_and_place(at: tuple[Trace, int] | None) -> tuple[int | None, tuple[float, float] | None]:
     if at is None:
         return None, None
     trace, tick = at

@@ -25,7 +25,7 @@ _GOAL_ENDS = (*_ARRIVED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 
 @dataclass(frozen=True)
 class GoalOutcome:
-    """When the robot accepted a goal (tick), and the event that ended it; None for what was never reported.
+    """Tick at which the robot accepted a goal, and the event that ended it; None if it was not reported.
 
     `failure` is the expected failure: "failed", or the name of an error code; "" for a goal that must be reached.
     """
@@ -84,7 +84,7 @@ def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
     found = [_with_outcome_of_drive(outcome, found[k + 1 :], reports) for k, outcome in enumerate(found)]
     for goal in case.sent:
         own = reports.get(goal.name, [])
-        # One sent goal may preempt several poses of one drive, all at the same tick.
+        # A sent goal may preempt several poses of one drive at the same tick.
         preempting = {event.tick for event in trace.events if event.data.get("preempted_by") == goal.name}
         sent = max(len(own), len(preempting))
         found += [GoalOutcome(goal, *_nth(own, k)) for k in range(sent)]
@@ -101,7 +101,7 @@ def outcome_start(outcome: GoalOutcome) -> float:
 def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[GoalOutcome]) -> tuple[int, float]:
     """Return the tick at which the robot was truly nearest to a via pose during its drive, and the distance in meters.
 
-    The stack reports a via pose as passed once it is near enough, and may come nearer afterwards. The whole drive
+    The stack reports a via pose as passed once the robot is near enough; it may come nearer afterwards. The whole drive
     counts: from the acceptance of this pose to the end of the goal at which the drive stops.
     """
     later = outcomes[outcomes.index(outcome) :]
@@ -109,13 +109,13 @@ def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[Goal
     last = trace.end if stop is None or stop.end is None else stop.end.tick
     poses = truth(trace)
     first = 0 if outcome.accepted is None else outcome.accepted
-    inside = (poses.ticks >= first) & (poses.ticks <= last)
-    if not inside.any():
-        inside = np.ones(len(poses.ticks), dtype=bool)
+    is_in_drive = (poses.ticks >= first) & (poses.ticks <= last)
+    if not is_in_drive.any():
+        is_in_drive = np.ones(len(poses.ticks), dtype=bool)
     x, y = outcome.goal.pose.x, outcome.goal.pose.y
-    distances = np.hypot(poses.values[inside, 0] - x, poses.values[inside, 1] - y)
+    distances = np.hypot(poses.values[is_in_drive, 0] - x, poses.values[is_in_drive, 1] - y)
     k = int(np.argmin(distances))
-    return int(poses.ticks[inside][k]), float(distances[k])
+    return int(poses.ticks[is_in_drive][k]), float(distances[k])
 
 
 def _with_outcome_of_drive(
@@ -130,11 +130,11 @@ def _with_outcome_of_drive(
 
 def _earlier_uses(names: list[str]) -> list[int]:
     """Return, for each name, how often it occurs before."""
-    seen: dict[str, int] = {}
+    uses: dict[str, int] = {}
     counts = []
     for name in names:
-        counts.append(seen.get(name, 0))
-        seen[name] = counts[-1] + 1
+        counts.append(uses.get(name, 0))
+        uses[name] = counts[-1] + 1
     return counts
 
 
@@ -177,14 +177,14 @@ def parse(value: Any) -> ErrorCode:
     )
 
 
-class _Documented:
-    """Return the JSON schema of a code: one of the names or numbers."""
+class _CodeSchema:
+    """JSON schema of an error code: one of the names or numbers."""
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         return {"enum": [*ErrorCode.__members__, *(int(code) for code in ErrorCode)]}
 
 
-Code = Annotated[ErrorCode, PlainValidator(parse), _Documented()]
+Code = Annotated[ErrorCode, PlainValidator(parse), _CodeSchema()]
 
 
 def code_of(event: Event) -> str:

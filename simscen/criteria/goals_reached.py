@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class GoalsReached(Spec, Criterion):
-    """Every goal was reached: the robot says so, and at that moment it truly was there.
+    """Every goal was reached: the robot reported it, and its true pose was at the goal at that moment.
 
     A goal with `expect` must fail with the expected error code. Poses that navigate_through_poses passes must be
     passed closely enough with any heading. At a goal with `on_reached: {wait: …}`, the robot must stay for that time.
@@ -70,41 +70,42 @@ class GoalsReached(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings on distance, heading and time of each goal, or one finding for a missed goal."""
-        told = goal_outcomes(trace, case)
+        outcomes = goal_outcomes(trace, case)
         chosen = [
             outcome
-            for outcome in told
+            for outcome in outcomes
             if any(matches_goal_name(outcome.goal.name, name) for name in self.goals or (None,))
         ]
-        findings = self._untold(trace, case, {outcome.goal.name for outcome in chosen})
+        findings = self._judge_unsent(trace, case, {outcome.goal.name for outcome in chosen})
         if not chosen and not findings:
             return [undecided("goals_reached", "the scenario has no goals", "reached")]
         for outcome in chosen:
             if outcome.failure and not outcome.preempted:
-                findings.append(_failed(trace, outcome))
+                findings.append(_judge_expected_failure(trace, outcome))
             elif outcome.reached is None:
-                findings.append(self._missing(trace, outcome))
+                findings.append(self._judge_unreached(trace, outcome))
             else:
-                findings += self._passed(trace, outcome, told) if outcome.goal.via else self._reached(trace, outcome)
-                findings += _waited(trace, case, outcome, told)
+                is_via = outcome.goal.via
+                findings += self._judge_via(trace, outcome, outcomes) if is_via else self._judge_reached(trace, outcome)
+                findings += _judge_wait(trace, case, outcome, outcomes)
         if self.goals is None and all(outcome.preempted for outcome in chosen):
             findings.append(undecided("goals_reached", "every goal was preempted", "reached"))
         return findings
 
-    def _untold(self, trace: Trace, case: Case, told: set[str]) -> list[Finding]:
-        """Return findings for goals that the criterion names and that have no outcome."""
+    def _judge_unsent(self, trace: Trace, case: Case, sent: set[str]) -> list[Finding]:
+        """Return findings for goals that the criterion names but that were never sent."""
         names = [goal.name for goal in case.every_goal]
         findings = []
         for name in dict.fromkeys(self.goals or ()):
             if not any(matches_goal_name(each, name) for each in names):
                 because, detail = f"the scenario has no goal `{name}`", [f"goals: {', '.join(names)}"]
                 findings.append(undecided(f"goal {name}", because, "reached", detail))
-            elif not any(matches_goal_name(each, name) for each in told):
-                tell = missed if has_ended(trace) else undecided
-                findings.append(tell(f"goal {name}", "never sent", "reached"))
+            elif not any(matches_goal_name(each, name) for each in sent):
+                make_finding = missed if has_ended(trace) else undecided
+                findings.append(make_finding(f"goal {name}", "never sent", "reached"))
         return findings
 
-    def _missing(self, trace: Trace, outcome: GoalOutcome) -> Finding:
+    def _judge_unreached(self, trace: Trace, outcome: GoalOutcome) -> Finding:
         if not outcome.preempted:
             return _not_reached(trace, outcome)
         assert outcome.end is not None
@@ -112,11 +113,11 @@ class GoalsReached(Spec, Criterion):
             return held(f"goal {outcome.goal.name}", outcome.summary, "reached", (trace, outcome.end.tick))
         return undecided(f"goal {outcome.goal.name}", outcome.summary, "reached")
 
-    def _reached(self, trace: Trace, outcome: GoalOutcome) -> list[Finding]:
+    def _judge_reached(self, trace: Trace, outcome: GoalOutcome) -> list[Finding]:
         goal, tick = outcome.goal, outcome.reached
         assert tick is not None
         what, pose = f"goal {goal.name}", true_pose(trace, tick)
-        believed = _believed(trace, outcome)
+        details = _believed_distance(trace, outcome)
         findings = [
             at_most(
                 what,
@@ -124,8 +125,8 @@ class GoalsReached(Spec, Criterion):
                 self._limit(outcome),
                 "m",
                 at=(trace, tick),
-                context="from the goal when the robot said it was there",
-                detail=believed,
+                context="from the goal when the robot reported it reached",
+                detail=details,
             ),
             at_most(
                 f"{what} heading",
@@ -133,58 +134,58 @@ class GoalsReached(Spec, Criterion):
                 self.yaw_tolerance or goal.yaw_tolerance + self.localization_yaw_margin,
                 "rad",
                 at=(trace, tick),
-                context="from the goal's heading when the robot said it was there",
-                detail=believed,
+                context="from the goal's heading when the robot reported it reached",
+                detail=details,
             ),
         ]
         if self.within is not None:
-            findings.append(self._time(trace, outcome, self.within))
+            findings.append(self._judge_time(trace, outcome, self.within))
         return findings
 
-    def _passed(self, trace: Trace, outcome: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
-        """Return the finding for a via pose: the smallest distance counts, and the heading is free."""
-        tick, apart = closest_approach(trace, outcome, told)
-        limit, context = self._limit(outcome), "from the pose where it came nearest to it"
-        findings = [at_most(f"goal {outcome.goal.name}", apart, limit, "m", at=(trace, tick), context=context)]
+    def _judge_via(self, trace: Trace, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> list[Finding]:
+        """Return the finding for a via pose: the smallest distance counts, and any heading is allowed."""
+        tick, distance = closest_approach(trace, outcome, outcomes)
+        limit, context = self._limit(outcome), "from the pose at the closest approach"
+        findings = [at_most(f"goal {outcome.goal.name}", distance, limit, "m", at=(trace, tick), context=context)]
         if self.within is not None:
-            findings.append(self._time(trace, outcome, self.within))
+            findings.append(self._judge_time(trace, outcome, self.within))
         return findings
 
     def _limit(self, outcome: GoalOutcome) -> float:
-        """Return the largest true distance from a goal that passes, in m."""
+        """Return the maximum true distance from a goal in m."""
         return self.tolerance or outcome.goal.xy_tolerance + self.localization_margin
 
-    def _time(self, trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
+    def _judge_time(self, trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
         what = f"goal {outcome.goal.name} time"
         if outcome.accepted is None or outcome.reached is None:
-            return undecided(what, "when it was accepted was not recorded", f"≤ {within:.2f} s")
-        taken = trace.seconds(outcome.reached - outcome.accepted)
-        return at_most(what, taken, within, "s", at=(trace, outcome.reached))
+            return undecided(what, "its acceptance was not recorded", f"≤ {within:.2f} s")
+        elapsed = trace.seconds(outcome.reached - outcome.accepted)
+        return at_most(what, elapsed, within, "s", at=(trace, outcome.reached))
 
 
-def _failed(trace: Trace, outcome: GoalOutcome) -> Finding:
+def _judge_expected_failure(trace: Trace, outcome: GoalOutcome) -> Finding:
     """Return the finding for a goal at which the robot must fail with the expected code."""
     what, expected = f"goal {outcome.goal.name}", _expected(outcome)
     if outcome.end is None and not has_ended(trace):
         return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}", expected)
     at = (trace, trace.end if outcome.end is None else outcome.end.tick)
-    on_the_way = outcome.goal.via and outcome.reached is not None  # it may come past some poses before it fails
-    return (held if outcome.failed_as_expected or on_the_way else missed)(what, outcome.summary, expected, at)
+    is_passed_via = outcome.goal.via and outcome.reached is not None  # the drive may fail after passing some poses
+    return (held if outcome.failed_as_expected or is_passed_via else missed)(what, outcome.summary, expected, at)
 
 
 def _expected(outcome: GoalOutcome) -> str:
     return FAILED if outcome.failure == FAILED else f"failed with {outcome.failure}"
 
 
-def _waited(trace: Trace, case: Case, outcome: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
+def _judge_wait(trace: Trace, case: Case, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> list[Finding]:
     """Return the finding on the required waiting time at a goal before the next goal."""
     later = next(
-        (each for each in told if outcome_start(each) > outcome_start(outcome) and each.goal in case.goals), None
+        (each for each in outcomes if outcome_start(each) > outcome_start(outcome) and each.goal in case.goals), None
     )
     if not outcome.goal.wait or outcome.reached is None or later is None or later.accepted is None:
         return []
-    stayed = trace.seconds(later.accepted - outcome.reached)
-    return [at_least(f"goal {outcome.goal.name} wait", stayed, outcome.goal.wait, "s", at=(trace, later.accepted))]
+    waited = trace.seconds(later.accepted - outcome.reached)
+    return [at_least(f"goal {outcome.goal.name} wait", waited, outcome.goal.wait, "s", at=(trace, later.accepted))]
 
 
 def _not_reached(trace: Trace, outcome: GoalOutcome) -> Finding:
@@ -192,17 +193,17 @@ def _not_reached(trace: Trace, outcome: GoalOutcome) -> Finding:
     if outcome.end is None and not has_ended(trace):
         return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}", "reached")
     tick = trace.end if outcome.end is None else outcome.end.tick
-    why = f"the run ended at t = {trace.seconds(trace.end):.2f} s: {end_reason(trace)}"
-    details = [why] if outcome.end is None else []
+    reason = f"the run ended at t = {trace.seconds(trace.end):.2f} s: {end_reason(trace)}"
+    details = [reason] if outcome.end is None else []
     if len(trace.truth):
-        details.insert(0, f"{true_pose(trace, tick).distance(outcome.goal.pose):.2f} m from the goal then")
+        details.insert(0, f"{true_pose(trace, tick).distance(outcome.goal.pose):.2f} m from the goal at that time")
     return missed(what, outcome.summary, "reached", (trace, tick), details)
 
 
-def _believed(trace: Trace, outcome: GoalOutcome) -> list[str]:
+def _believed_distance(trace: Trace, outcome: GoalOutcome) -> list[str]:
     tick, goal = outcome.reached, outcome.goal.pose
     if tick is None or not len(trace.belief):
         return []
     x, y, yaw = check_samples(trace.belief, "the belief", trace).at(np.array([tick]))[0, :3].tolist()
-    off = math.degrees(abs(wrap(yaw - goal.yaw)))
-    return [f"it believed itself {math.hypot(x - goal.x, y - goal.y):.2f} m and {off:.0f}° from the goal"]
+    angle = math.degrees(abs(wrap(yaw - goal.yaw)))
+    return [f"its believed pose was {math.hypot(x - goal.x, y - goal.y):.2f} m and {angle:.0f}° from the goal"]

@@ -26,21 +26,21 @@ if TYPE_CHECKING:
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Samples, Trace
 
-    Away = Callable[[Array], Array]
+    DistanceFunction = Callable[[Array], Array]
 
 RESOLUTION_M = 0.005
 """Resolution in m of the search for the smallest distance between two samples."""
 POINT = ((0.0, 0.0),)
-"""Footprint of a robot that has only an inscribed radius."""
+"""Footprint of a robot that only has an inscribed radius."""
 
 
 class Keepout(Spec, Criterion):
-    """The robot stayed out of a region, or out of what a keepout mask forbids, with its whole hull.
+    """The robot stayed with its whole hull out of a region, or out of the occupied cells of a keepout mask.
 
     What is measured: the smallest distance between the robot's footprint and the region, or the occupied cells of the
-        mask, over the whole run, where between two samples of the truth the robot moves straight; negative by how far
-        it would have to be moved to be out again (out of the deepest convex piece, where one of the two is not convex;
-        out of the deepest of the rectangles that equal cells of a mask make).
+        mask, over the whole run, with straight motion between two samples of the truth. Inside, it is negative: the
+        distance to move the robot out again (out of the deepest convex piece if footprint or region is not convex; out
+        of the deepest rectangle of equal cells of a mask).
     When it fails: it is below `distance`.
     Why this: a keepout filter affects the costmap of the planner, but recoveries and controllers can leave the plan.
     Source: Nav2's keepout filter tutorial.
@@ -53,9 +53,9 @@ class Keepout(Spec, Criterion):
     region: RegionName | None = None
     """Name of the region."""
     mask: MaskFile | None = None
-    """Instead of a region: map yaml of a filter mask, relative to this file; lighter cells than occupied ones are free.
+    """Instead of a region: map YAML file of a filter mask, relative to this file; only occupied cells are forbidden.
 
-    The stack only gets the mask if `stack.keepout_mask` names it, too."""
+    The stack only gets the mask if `stack.keepout_mask` names it as well."""
     distance: NonNegativeLength = 0.0
     """Minimum distance from the region."""
     while_on: bool = False
@@ -68,7 +68,7 @@ class Keepout(Spec, Criterion):
         if (self.region is None) == (self.mask is None):
             raise ValueError("expected either region or mask")
         if self.grace and not self.while_on:
-            raise ValueError("grace is for a zone that is switched on: `while_on: true`")
+            raise ValueError("grace only applies to a zone that is switched on; add `while_on: true`")
         return self
 
     @property
@@ -80,24 +80,24 @@ class Keepout(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the smallest distance."""
         what, limit = f"keepout {self.region or self.mask}", f"≥ {self.distance:.2f} m"
-        away = self._away(case)
-        if isinstance(away, str):
-            return [undecided(what, away, limit)]
+        distances = self._distance_function(case)
+        if isinstance(distances, str):
+            return [undecided(what, distances, limit)]
         poses = truth(trace)
         if not len(poses):
-            return [undecided(what, "the robot's way was not recorded", limit)]
+            return [undecided(what, "the robot's path was not recorded", limit)]
         if not self.while_on:
-            distance, tick = _nearest(trace, poses, case, away)
+            distance, tick = _nearest(trace, poses, case, distances)
             return [at_least(what, distance, self.distance, "m", at=(trace, tick))]
-        ways = [clip_samples(poses, *span) for span in enabled_spans(trace, "keepout", self.region, self.grace)]
-        found = [_nearest(trace, way, case, away) for way in ways if len(way)]
+        paths = [clip_samples(poses, *span) for span in enabled_spans(trace, "keepout", self.region, self.grace)]
+        found = [_nearest(trace, path, case, distances) for path in paths if len(path)]
         if not found:
             return [undecided(what, NEVER_SWITCHED, limit)]
         distance, tick = min(found)
         return [at_least(what, distance, self.distance, "m", at=(trace, tick), context="while it was on")]
 
-    def _away(self, case: Case) -> Away | str:
-        """Return a function for the distance of the footprint at poses, or the reason why there is none."""
+    def _distance_function(self, case: Case) -> DistanceFunction | str:
+        """Return a function from poses (n, 3) to distances (n,) of the footprint, or the reason why there is none."""
         hull = case.footprint or POINT
         if self.region is None:
             mask = case.masks.get(self.mask or "")
@@ -110,38 +110,38 @@ class Keepout(Spec, Criterion):
         if self.region not in case.regions:
             return f"the world has no region `{self.region}`"
         region = case.regions[self.region]
-        wrong = polygon_defect(region)
-        if wrong:
-            raise InvalidTrace(f"region `{self.region}` {wrong}, so nothing is inside or outside of it")
+        defect = polygon_defect(region)
+        if defect:
+            raise InvalidTrace(f"region `{self.region}` {defect}, so it has no inside and outside")
         return lambda poses: separation(poses, hull, region)
 
 
-def _nearest(trace: Trace, poses: Samples, case: Case, away: Away) -> tuple[float, int]:
+def _nearest(trace: Trace, poses: Samples, case: Case, distances: DistanceFunction) -> tuple[float, int]:
     """Return the smallest signed distance along the driven path, and its tick. Teleportation is not part of the path.
 
-    If no point of the robot moves by more than m, the distance changes by at most m. Intervals that cannot improve the
-    smallest known distance by FINE are skipped, the others are bisected.
+    If no point of the robot moves by more than d, the distance changes by at most d. Intervals that cannot improve the
+    smallest known distance by RESOLUTION_M are skipped, the others are bisected.
     """
-    reach = max(math.hypot(x, y) for x, y in case.footprint or POINT)
+    radius = max(math.hypot(x, y) for x, y in case.footprint or POINT)
     yaw = np.unwrap(poses.values[:, 2])
-    states = np.column_stack((poses.values[:, :2], yaw, away(poses.values), poses.ticks))
+    states = np.column_stack((poses.values[:, :2], yaw, distances(poses.values), poses.ticks))
     best = states[np.argmin(states[:, 3])]
-    driven = ~_carried(trace, poses)
+    driven = ~_is_teleported(trace, poses)
     begin, end = states[:-1][driven], states[1:][driven]
     while len(begin):
-        moved = np.hypot(*(end - begin)[:, :2].T) + reach * np.abs(end[:, 2] - begin[:, 2])
-        hopeful = (begin[:, 3] + end[:, 3] - moved) / 2 < best[3] - RESOLUTION_M
-        begin, end = begin[hopeful], end[hopeful]
+        moved = np.hypot(*(end - begin)[:, :2].T) + radius * np.abs(end[:, 2] - begin[:, 2])
+        may_improve = (begin[:, 3] + end[:, 3] - moved) / 2 < best[3] - RESOLUTION_M
+        begin, end = begin[may_improve], end[may_improve]
         middle = (begin + end) / 2
-        middle[:, 3] = away(middle[:, :3])
+        middle[:, 3] = distances(middle[:, :3])
         best = min((best, *middle), key=lambda state: float(state[3]))
         begin, end = np.vstack((begin, middle)), np.vstack((middle, end))
     return float(best[3]) - (0.0 if case.footprint else case.inscribed_radius), int(best[4])
 
 
-def _carried(trace: Trace, poses: Samples) -> Flags:
+def _is_teleported(trace: Trace, poses: Samples) -> Flags:
     """Return, for each interval between two samples, whether the robot was teleported in it."""
     placed = [event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)]
-    carried = np.zeros(len(poses) + 1, dtype=bool)
-    carried[np.searchsorted(poses.ticks, placed, side="right")] = True
-    return carried[1:-1]
+    teleported = np.zeros(len(poses) + 1, dtype=bool)
+    teleported[np.searchsorted(poses.ticks, placed, side="right")] = True
+    return teleported[1:-1]

@@ -21,11 +21,9 @@ from simscen.spec.quantities import Duration, PositiveAngle, PositiveDuration, P
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
-    from simscen.core.records.trace import Trace
-
-if TYPE_CHECKING:
-    from simscen.core.records.case import Case
     from simscen.core.records.trace import Samples, Trace
+
+NO_BELIEF = "the robot never reported a believed pose"
 
 
 class LocalizationError(Spec, Criterion):
@@ -52,7 +50,7 @@ class LocalizationError(Spec, Criterion):
     """Start of the evaluation in simulated time, after the filter has converged."""
 
     @model_validator(mode="after")
-    def _some_bound(self) -> LocalizationError:
+    def _check_bounds(self) -> LocalizationError:
         if self.max is None and self.rmse is None and self.final is None and self.max_yaw is None:
             raise ValueError("expected at least one of: max, rmse, final, max_yaw")
         return self
@@ -71,34 +69,34 @@ class LocalizationError(Spec, Criterion):
         """Return one finding for each given bound."""
         error = pose_error(trace)
         if not len(error):
-            return [undecided("localization_error", "the robot never said where it believes to be")]
-        counts = error.ticks >= self.after * trace.tick_rate
-        if not counts.any():
+            return [undecided("localization_error", NO_BELIEF)]
+        is_counted = error.ticks >= self.after * trace.tick_rate
+        if not is_counted.any():
             last = trace.seconds(int(error.ticks[-1]))
-            because = f"the last belief is from t = {last:.2f} s, but judging begins at {self.after:.2f} s"
+            because = f"the last belief is from t = {last:.2f} s, but the evaluation begins at {self.after:.2f} s"
             return [undecided("localization_error", because)]
-        return self._bounds(trace, type(error)(error.ticks[counts], error.values[counts]))
+        return self._bounds(trace, type(error)(error.ticks[is_counted], error.values[is_counted]))
 
     def _bounds(self, trace: Trace, error: Samples) -> list[Finding]:
-        off, turned = error.values.T
+        distances, angles = error.values.T
         findings = []
         if self.max is not None:
-            findings.append(_worst(trace, error, off, "localization_error", self.max, "m"))
+            findings.append(_worst(trace, error, distances, "localization_error", self.max, "m"))
         if self.rmse is not None:
-            rmse = float(np.sqrt(np.mean(off**2)))
+            rmse = float(np.sqrt(np.mean(distances**2)))
             bound = at_most("localization_error rmse", rmse, self.rmse, "m", context="(not aligned)")
-            findings.append(_of_a_whole_run(trace, bound))
+            findings.append(_if_complete(trace, bound))
         if self.final is not None:
             at = (trace, int(error.ticks[-1]))
-            bound = at_most("localization_error final", float(off[-1]), self.final, "m", at=at)
-            findings.append(_of_a_whole_run(trace, bound))
+            bound = at_most("localization_error final", float(distances[-1]), self.final, "m", at=at)
+            findings.append(_if_complete(trace, bound))
         if self.max_yaw is not None:
-            findings.append(_worst(trace, error, turned, "localization_error yaw", self.max_yaw, "rad"))
+            findings.append(_worst(trace, error, angles, "localization_error yaw", self.max_yaw, "rad"))
         return findings
 
 
-def _of_a_whole_run(trace: Trace, finding: Finding) -> Finding:
-    """Return an inconclusive finding if the log is truncated, because the final error is unknown."""
+def _if_complete(trace: Trace, finding: Finding) -> Finding:
+    """Return the finding, or an inconclusive one if the log is truncated, because the final error is then unknown."""
     if has_ended(trace):
         return finding
     return undecided(finding.what, f"{finding.measured} so far", finding.limit)
@@ -145,12 +143,12 @@ class RelocalizedWithin(Spec, Criterion):
         """Return one finding for each start of `after`."""
         error = pose_error(trace)
         if not len(error):
-            return [undecided("relocalized_within", "the robot never said where it believes to be")]
+            return [undecided("relocalized_within", NO_BELIEF)]
         happened = [Span(0, trace.end, False)] if self.after is None else spans(trace, self.after)
         if not happened:
             because, detail = never_started(trace, str(self.after))
             return [undecided("relocalized_within", because, self._limit, detail)]
-        return [self._once(trace, span.start, error) for span in happened]
+        return [self._judge_start(trace, span.start, error) for span in happened]
 
     @property
     def _limit(self) -> str:
@@ -160,26 +158,28 @@ class RelocalizedWithin(Spec, Criterion):
     def _context(self) -> str:
         return f"after {self.after}" if self.after is not None else "after the start"
 
-    def _once(self, trace: Trace, start: int, error: Samples) -> Finding:
+    def _judge_start(self, trace: Trace, start: int, error: Samples) -> Finding:
         later = error.ticks >= start
-        ticks, off = error.ticks[later], error.values[later]
-        right = (off[:, 0] <= self.tolerance) & (off[:, 1] <= self.yaw_tolerance)
-        if right[ticks <= start + self.time * trace.tick_rate].all():
+        ticks, errors = error.ticks[later], error.values[later]
+        is_localized = (errors[:, 0] <= self.tolerance) & (errors[:, 1] <= self.yaw_tolerance)
+        if is_localized[ticks <= start + self.time * trace.tick_rate].all():
             return undecided("relocalized_within", f"the robot was never lost {self._context}", self._limit)
-        # What held before it lost itself is no finding again.
-        lost = int(np.argmin(right))
-        found, lasted = first_sustained(ticks[lost:], right[lost:], round(self.hold * trace.tick_rate), trace.end)
+        # Only samples after the loss count as relocalization.
+        lost = int(np.argmin(is_localized))
+        found, lasted = first_sustained(
+            ticks[lost:], is_localized[lost:], round(self.hold * trace.tick_rate), trace.end
+        )
         tick = trace.end if found is None else found
         elapsed = trace.seconds(tick - start)
         if not lasted and elapsed <= self.time:
-            state = "still lost" if found is None else f"right for only {trace.seconds(trace.end - tick):.2f} s"
+            state = "still lost" if found is None else f"correct for only {trace.seconds(trace.end - tick):.2f} s"
             because = (
                 f"the run was over at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)}), the belief {state}"
             )
             return undecided("relocalized_within", because, self._limit)
-        detail = [f"its belief was off by {off[:, 0].max():.2f} m at worst and {off[-1, 0]:.2f} m at the end"]
+        detail = [f"the position error was at most {errors[:, 0].max():.2f} m, and {errors[-1, 0]:.2f} m at the end"]
         if found is None:
-            detail.append("it never found itself again")
+            detail.append("the robot never relocalized")
         return at_most(
             "relocalized_within", elapsed, self.time, "s", at=(trace, tick), context=self._context, detail=detail
         )
@@ -189,7 +189,7 @@ class LocalizationConsistency(Spec, Criterion):
     """The covariance of the believed pose matched its error.
 
     What is measured: the normalized estimation error squared e' P⁻¹ e of the believed pose (x, y, wrapped heading) with
-        its covariance P, every so often, averaged over the run; 3 for a correct covariance.
+        its covariance P, sampled every `every` seconds, averaged over the run; 3 for a correct covariance.
     When it fails: the average is above what a consistent belief keeps with this probability (the robot is
         overconfident), or with `both_sides` below it; or a covariance is singular, like that of a
         collapsed particle set.
@@ -249,10 +249,10 @@ class LocalizationConsistency(Spec, Criterion):
         """Return the NEES sampled at regular times from `after` to the last belief."""
         from simscen.core.records.trace import Samples
 
-        every = nees_samples(trace)
-        if not len(every):
+        all_samples = nees_samples(trace)
+        if not len(all_samples):
             return None
-        first, last = max(self.after * trace.tick_rate, int(every.ticks[0])), int(every.ticks[-1])
+        first, last = max(self.after * trace.tick_rate, int(all_samples.ticks[0])), int(all_samples.ticks[-1])
         times = np.arange(first, last + 1, self.every * trace.tick_rate).astype(np.int64)
-        chosen = np.searchsorted(every.ticks, times, side="right") - 1
-        return Samples(every.ticks[chosen], every.values[chosen])
+        chosen = np.searchsorted(all_samples.ticks, times, side="right") - 1
+        return Samples(all_samples.ticks[chosen], all_samples.values[chosen])

@@ -1,4 +1,4 @@
-"""Reported result of the navigation: `result`, `error_code` and `no_false_success`."""
+"""Criteria on the reported result of the navigation: `result`, `error_code`, and `no_false_success`."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Result(Spec, Criterion):
         """Return one finding for the result, and one for the code if it is given."""
         end = _last(trace, EventKind.NAVIGATION_ENDED)
         if end is None:
-            return [_no_answer(trace, "result", self.status)]
+            return [_missing_result(trace, "result", self.status)]
         findings = [_compare(trace, end, "result", end.name, self.status)]
         if self.error_code is not None:
             findings.append(_compare(trace, end, "error code", code_of(end), self.error_code.name))
@@ -56,7 +56,7 @@ class Result(Spec, Criterion):
 
 
 class ErrorCodeIs(Spec, Criterion):
-    """The robot gave this error code, for a goal or for the navigation as a whole.
+    """The robot reported this error code, for a goal or for the navigation as a whole.
 
     What is measured: the error code of the last report about the goal, or of the end of navigation.
     When it fails: another code, or no report when the run ended.
@@ -86,7 +86,7 @@ class ErrorCodeIs(Spec, Criterion):
         what = "error code" if self.goal is None else f"error code of goal {self.goal}"
         end = _last(trace, *kinds, name=self.goal)
         if end is None:
-            return [_no_answer(trace, what, self.code.name)]
+            return [_missing_result(trace, what, self.code.name)]
         return [_compare(trace, end, what, code_of(end), self.code.name)]
 
 
@@ -95,19 +95,19 @@ def _last(trace: Trace, *kinds: EventKind, name: str | None = None) -> Event | N
     return events[-1] if events else None
 
 
-def _compare(trace: Trace, end: Event, what: str, got: str, expected: str) -> Finding:
-    if got == expected:
-        return held(what, got, expected, (trace, end.tick))
+def _compare(trace: Trace, end: Event, what: str, reported: str, expected: str) -> Finding:
+    if reported == expected:
+        return held(what, reported, expected, (trace, end.tick))
     message = end.data.get("message")
     details = [f"it ended with {end.name}, {code_of(end)}"] + ([str(message)] if message else [])
-    return missed(what, got, expected, (trace, end.tick), details)
+    return missed(what, reported, expected, (trace, end.tick), details)
 
 
-def _no_answer(trace: Trace, what: str, expected: str) -> Finding:
+def _missing_result(trace: Trace, what: str, expected: str) -> Finding:
     when = f"t = {trace.seconds(trace.end):.2f} s"
     if has_ended(trace):
         return missed(
-            what, "no answer", expected, (trace, trace.end), [f"the run ended at {when}: {end_reason(trace)}"]
+            what, "no result", expected, (trace, trace.end), [f"the run ended at {when}: {end_reason(trace)}"]
         )
     return undecided(what, f"the log stops at {when}, before navigation ended", expected)
 
@@ -118,7 +118,7 @@ class NoFalseSuccess(Spec, Criterion):
     What is measured: the true distance to the goal whenever the robot reports it reached; and whether navigation was
         reported SUCCEEDED with every goal reached that was not preempted by another.
     When it fails: a goal was reported reached from further away than `tolerance`, or SUCCEEDED with a goal missing.
-    Why this: a failed delivery is retried, but a false success is not noticed. Arena's result says
+    Why this: a failed delivery is retried, but a false success is not noticed. Arena reports
         GOAL_REACHED without ever checking the goal.
     Source: BARN challenge, run.py, for the meter.
 
@@ -135,30 +135,32 @@ class NoFalseSuccess(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each goal reported as reached, and one for the end of navigation."""
-        told = goal_outcomes(trace, case)
+        outcomes = goal_outcomes(trace, case)
         ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
-        strange = [
+        unknown = [
             event
             for event in trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
-            if event.name not in _names(case)
+            if event.name not in _goal_names(case)
         ]
-        if not ended and not strange and all(outcome.end is None for outcome in told):
+        if not ended and not unknown and all(outcome.end is None for outcome in outcomes):
             return [undecided("no_false_success", "the robot reported nothing that could be false")]
-        findings = [self._at_goal(trace, outcome, told) for outcome in told if outcome.reached is not None]
+        findings = [self._judge_goal(trace, outcome, outcomes) for outcome in outcomes if outcome.reached is not None]
         findings += [
-            undecided(f"goal {event.name}", "reported reached, but the scenario has no such goal") for event in strange
+            undecided(f"goal {event.name}", "reported reached, but the scenario has no such goal") for event in unknown
         ]
-        findings += [finding for k in range(len(ended)) if (finding := _success(trace, case, ended, k)) is not None]
+        findings += [
+            finding for k in range(len(ended)) if (finding := _judge_success(trace, case, ended, k)) is not None
+        ]
         return findings or [held("no_false_success", "no success was claimed", "no false success")]
 
-    def _at_goal(self, trace: Trace, outcome: GoalOutcome, told: list[GoalOutcome]) -> Finding:
+    def _judge_goal(self, trace: Trace, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> Finding:
         assert outcome.reached is not None
         what, at = f"goal {outcome.goal.name}", (trace, outcome.reached)
         if outcome.goal.via:
-            tick, apart = closest_approach(trace, outcome, told)
-            context = "from the pose where it came nearest to it, which it says it has passed"
-            return at_most(what, apart, self.tolerance, "m", at=(trace, tick), context=context)
-        context = "from the goal when the robot said it was there"
+            tick, distance = closest_approach(trace, outcome, outcomes)
+            context = "from the pose at the closest approach, which the robot reported passed"
+            return at_most(what, distance, self.tolerance, "m", at=(trace, tick), context=context)
+        context = "from the goal when the robot reported it reached"
         return at_most(
             what,
             true_pose(trace, outcome.reached).distance(outcome.goal.pose),
@@ -169,11 +171,11 @@ class NoFalseSuccess(Spec, Criterion):
         )
 
 
-def _names(case: Case) -> set[str]:
+def _goal_names(case: Case) -> set[str]:
     return {goal.name for goal in case.every_goal}
 
 
-def _success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Finding | None:
+def _judge_success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Finding | None:
     """Return a failed finding if the k-th end of navigation does not match its goals, otherwise None.
 
     It covers the goals since the previous end. The first one covers all goals of the scenario, accepted or not.
@@ -181,16 +183,17 @@ def _success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Find
     end = ended[k]
     if end.name != "SUCCEEDED":
         return None
-    own = [s for s in goal_outcomes(trace, case) if _task(s, ended) == k or (k == 0 and s.goal in case.goals)]
-    late = [s for s in own if s.must_be_reached and (s.reached is None or s.reached > end.tick)]
-    if not late:
+    outcomes = goal_outcomes(trace, case)
+    own = [each for each in outcomes if _end_index(each, ended) == k or (k == 0 and each.goal in case.goals)]
+    unreached = [each for each in own if each.must_be_reached and (each.reached is None or each.reached > end.tick)]
+    if not unreached:
         return None
-    names = ", ".join(outcome.goal.name for outcome in late)
+    names = ", ".join(outcome.goal.name for outcome in unreached)
     expected = "SUCCEEDED only with every goal reached"
     return missed("result", "SUCCEEDED", expected, (trace, end.tick), [f"not reached: {names}"])
 
 
-def _task(outcome: GoalOutcome, ended: tuple[Event, ...]) -> int | None:
-    """Return the end of navigation that belongs to a goal: the first one after the goal was accepted."""
-    over = math.inf if outcome.end is None else outcome.end.tick
-    return next((k for k, end in enumerate(ended) if outcome_start(outcome) < end.tick or over <= end.tick), None)
+def _end_index(outcome: GoalOutcome, ended: tuple[Event, ...]) -> int | None:
+    """Return the index of the end of navigation that belongs to a goal: the first one after its acceptance."""
+    end_tick = math.inf if outcome.end is None else outcome.end.tick
+    return next((k for k, end in enumerate(ended) if outcome_start(outcome) < end.tick or end_tick <= end.tick), None)

@@ -1,4 +1,4 @@
-"""The criterion `smoothness`: acceleration, jerk, SPARC and LDLJ."""
+"""The criterion `smoothness`: acceleration, jerk, SPARC, and LDLJ."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 class Smoothness(Spec, Criterion):
     """The robot drove smoothly.
 
-    What is measured: of the true speed over ground, over the whole run: its change by time, either way
-        (acceleration), its second difference by time squared (jerk), and two measures of smoothness without a unit,
-        spectral arc length (SPARC, 0 = smooth) and log dimensionless jerk (LDLJ, greater = smoother).
+    What is measured: from the true speed over ground, over the whole run: its absolute change by time (acceleration),
+        its absolute second difference by time squared (jerk), and two dimensionless measures of smoothness, spectral
+        arc length (SPARC, 0 = smooth) and log dimensionless jerk (LDLJ, larger = smoother).
     When it fails: the largest acceleration or jerk or the mean jerk is above its bound, or SPARC or LDLJ below.
     Why this: jerk tips cargo over and is uncomfortable; an oscillating controller wears out gears although it arrives.
-    Source: Balasubramanian et al. 2015 and the authors' code for SPARC and LDLJ; HuNavSim and Arena report jerk, the
-        one as a first difference, the other without the time step.
+    Source: Balasubramanian et al. 2015 and the authors' code for SPARC and LDLJ; HuNavSim and Arena also report
+        jerk, HuNavSim as a first difference, Arena without the time step.
 
     SPARC is sensitive to slow oscillation, LDLJ to stops, and both depend on the duration: use them only in scenarios
     with a fixed drive. They are inconclusive for a robot that never moved.
@@ -53,7 +53,7 @@ class Smoothness(Spec, Criterion):
     """Minimum log dimensionless jerk."""
 
     @model_validator(mode="after")
-    def _some_bound(self) -> Smoothness:
+    def _check_bounds(self) -> Smoothness:
         if not self.model_dump(exclude_none=True):
             raise ValueError(f"expected at least one of: {', '.join(type(self).model_fields)}")
         return self
@@ -73,9 +73,9 @@ class Smoothness(Spec, Criterion):
         if self.max_mean_jerk is not None:
             findings.append(_mean_jerk(trace, case, self.max_mean_jerk))
         if self.min_sparc is not None:
-            findings.append(_without_unit(trace, "sparc", self.min_sparc))
+            findings.append(_dimensionless(trace, "sparc", self.min_sparc))
         if self.min_ldlj is not None:
-            findings.append(_without_unit(trace, "ldlj", self.min_ldlj))
+            findings.append(_dimensionless(trace, "ldlj", self.min_ldlj))
         return findings
 
 
@@ -98,19 +98,19 @@ def _read(trace: Trace, case: Case, name: SignalName) -> Array | str:
     """Return the signal, or the reason why there is none."""
     try:
         return read_signal(name, trace, case, {})
-    except SignalUnavailable as why:
-        return str(why)
+    except SignalUnavailable as reason:
+        return str(reason)
 
 
-def _without_unit(trace: Trace, name: str, limit: float) -> Finding:
-    fast = speed(trace)
-    if not len(fast) or fast.values.max() < MOVED_SPEED_M_S:
+def _dimensionless(trace: Trace, name: str, limit: float) -> Finding:
+    speeds = speed(trace)
+    if not len(speeds) or speeds.values.max() < MOVED_SPEED_M_S:
         return undecided(name, "the robot never moved", f"≥ {limit:g}")
     try:
-        even, rate = evenly_sampled_speed(trace)
+        even_speeds, rate = evenly_sampled_speed(trace)
     except SignalUnavailable as reason:
         return undecided(name, str(reason), f"≥ {limit:g}")
-    value = (sparc if name == "sparc" else ldlj)(even, rate)
+    value = (sparc if name == "sparc" else ldlj)(even_speeds, rate)
     if value is None:
         return undecided(name, "the speed never changed", f"≥ {limit:g}")
     return at_least(name, value, limit, "")

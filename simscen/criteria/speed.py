@@ -27,8 +27,8 @@ class Speed(Spec, Criterion):
     """The robot never went too fast.
 
     What is measured: the largest true speed over ground, and the largest true turn rate, over the whole run, or while
-        the robot's center was in a region. With a mask of speed limits, also the true speed against the limit of the
-        cell that the robot's center truly was in, where it was furthest above it.
+        the robot's center was in a region. With a mask of speed limits, also the largest excess of the true speed over
+        the limit of the cell at the robot's true center.
     When it fails: one is above its bound; the speed is more than `tolerance` above a limit of the mask, for which the
         highest limit within `grace` before and after counts.
     Why this: slopes, slip and overshoot can exceed the limits in the parameters of the controller.
@@ -60,7 +60,7 @@ class Speed(Spec, Criterion):
     """Time for slowing down at a lower limit or after a zone was enabled, and tolerance for leaving it early."""
 
     @model_validator(mode="after")
-    def _some_bound(self) -> Speed:
+    def _check_bounds(self) -> Speed:
         if self.max is None and self.max_turn_rate is None and self.mask is None:
             raise ValueError("expected max, max_turn_rate or mask")
         return self
@@ -68,16 +68,16 @@ class Speed(Spec, Criterion):
     @model_validator(mode="after")
     def _check_zone(self) -> Speed:
         if self.while_on and (self.in_ is None or self.mask is not None):
-            raise ValueError("while_on is for the zone of a region: `in`, and no mask")
+            raise ValueError("while_on only applies to the zone of a region: give `in` and no mask")
         return self
 
     @model_validator(mode="after")
     def _check_reference_speed(self) -> Speed:
         percent = self.mask is not None and self.mask.type == "percent"
         if percent and self.full_speed is None:
-            raise ValueError("expected full_speed, which the percents of the mask are of (or `type: absolute`)")
+            raise ValueError("expected full_speed, to which the percentages of the mask refer (or `type: absolute`)")
         if not percent and self.full_speed is not None:
-            raise ValueError("full_speed is for a mask of percents")
+            raise ValueError("full_speed only applies to a mask of percentages")
         return self
 
     @property
@@ -89,47 +89,48 @@ class Speed(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each bound."""
-        wanted = [("speed", self.max, "m/s"), ("turn_rate", self.max_turn_rate, "rad/s")]
-        found = [self._fastest(trace, case, name, limit, unit) for name, limit, unit in wanted if limit is not None]
+        bounds = [("speed", self.max, "m/s"), ("turn_rate", self.max_turn_rate, "rad/s")]
+        found = [self._fastest(trace, case, name, limit, unit) for name, limit, unit in bounds if limit is not None]
         return found if self.mask is None else [*found, self._by_mask(trace, case, self.mask)]
 
     def _fastest(self, trace: Trace, case: Case, name: str, limit: float, unit: str) -> Finding:
-        what, told = name.replace("_", " "), f"≤ {limit:.2f} {unit}"
+        what, limit_text = name.replace("_", " "), f"≤ {limit:.2f} {unit}"
         signal = ground_truth.speed(trace) if name == "speed" else ground_truth.turn_rate(trace)
         if not len(signal):
-            return undecided(what, "no velocity was recorded", told)
+            return undecided(what, "no velocity was recorded", limit_text)
         inside = self._inside(trace, case, signal)
         if inside is None:
-            return undecided(what, f"the world has no region `{self.in_}`", told)
+            return undecided(what, f"the world has no region `{self.in_}`", limit_text)
         if self.while_on:
             spans = enabled_spans(trace, "speed", self.in_, self.grace)
             if not spans:
-                return undecided(what, NEVER_SWITCHED, told)
+                return undecided(what, NEVER_SWITCHED, limit_text)
             inside &= np.any([(first <= signal.ticks) & (signal.ticks <= last) for first, last in spans], axis=0)
         if not inside.any():
-            return undecided(what, f"the robot never was in `{self.in_}`{' while it was on' * self.while_on}", told)
+            because = f"the robot never was in `{self.in_}`{' while it was on' * self.while_on}"
+            return undecided(what, because, limit_text)
         k = int(np.flatnonzero(inside)[np.argmax(signal.values[inside, 0])])
         context = "" if self.in_ is None else f"in {self.in_}"
         return at_most(what, float(signal.values[k, 0]), limit, unit, at=(trace, int(signal.ticks[k])), context=context)
 
     def _by_mask(self, trace: Trace, case: Case, mask: SpeedMask) -> Finding:
-        told, signal = f"≤ what {mask.file} allows", ground_truth.speed(trace)
+        limit_text, signal = f"≤ the limits of {mask.file}", ground_truth.speed(trace)
         if not len(signal):
-            return undecided("speed", "no velocity was recorded", told)
+            return undecided("speed", "no velocity was recorded", limit_text)
         if mask.file not in case.masks:
-            return undecided("speed", f"the log has no mask `{mask.file}`", told)
+            return undecided("speed", f"the log has no mask `{mask.file}`", limit_text)
         inside = self._inside(trace, case, signal)
         if inside is None:
-            return undecided("speed", f"the world has no region `{self.in_}`", told)
+            return undecided("speed", f"the world has no region `{self.in_}`", limit_text)
         limits = mask.over(case.masks[mask.file].grid)
-        here = limits.along(ground_truth.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
-        highest = _highest_around(here, signal.ticks, round(self.grace * trace.tick_rate))
+        local_limits = limits.along(ground_truth.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
+        highest = _highest_around(local_limits, signal.ticks, round(self.grace * trace.tick_rate))
         limited = inside & np.isfinite(highest)
         if not limited.any():
-            because = f"the robot never was where the mask limits it for longer than {2 * self.grace:g} s"
-            return undecided("speed", because, told)
-        above = np.where(limited, signal.values[:, 0] - highest, -np.inf)
-        k = int(np.argmax(above))
+            because = f"the robot never was in a limited part of the mask for longer than {2 * self.grace:g} s"
+            return undecided("speed", because, limit_text)
+        excess = np.where(limited, signal.values[:, 0] - highest, -np.inf)
+        k = int(np.argmax(excess))
         value, limit = float(signal.values[k, 0]), float(highest[k]) + self.tolerance
         context = f"by {mask.file} (tolerance {self.tolerance:g} m/s)"
         return at_most("speed", value, limit, "m/s", at=(trace, int(signal.ticks[k])), context=context)
@@ -142,14 +143,14 @@ class Speed(Spec, Criterion):
             return np.ones(len(signal), dtype=bool)
         if self.in_ not in case.regions:
             return None
-        where = ground_truth.truth(trace).at(signal.ticks)[:, :2]
-        return points_in_polygon(where, np.array(case.regions[self.in_], dtype=np.float64))
+        positions = ground_truth.truth(trace).at(signal.ticks)[:, :2]
+        return points_in_polygon(positions, np.array(case.regions[self.in_], dtype=np.float64))
 
 
 def _highest_around(values: Array, ticks: Ticks, reach: int) -> Array:
     """Return, for each sample, the largest value within `reach` ticks."""
     first = np.searchsorted(ticks, ticks - reach, side="left")
-    behind = np.searchsorted(ticks, ticks + reach, side="right")
+    end = np.searchsorted(ticks, ticks + reach, side="right")
     padded = np.append(values, -np.inf)
-    highest: Array = np.maximum.reduceat(padded, np.column_stack((first, behind)).ravel())[::2]
+    highest: Array = np.maximum.reduceat(padded, np.column_stack((first, end)).ravel())[::2]
     return highest

@@ -1,4 +1,4 @@
-"""Stopping and standstill: `stopped_within` and `stuck`."""
+"""Criteria on stopping and on standstill: `stopped_within` and `stuck`."""
 
 from __future__ import annotations
 
@@ -68,10 +68,10 @@ class StoppedWithin(Spec, Criterion):
             because, detail = never_started(trace, self.after)
             return [undecided("stopped_within", because, self._limit, detail)]
         rest = self._rest(trace)
-        if all(_stood(trace, rest, span.start) for span in happened):
+        if all(_stood_before(trace, rest, span.start) for span in happened):
             because = f"the robot was not moving when `{self.after}` started, so nothing had to stop"
             return [undecided("stopped_within", because, self._limit)]
-        return [finding for span in happened for finding in self._once(trace, span, rest)]
+        return [finding for span in happened for finding in self._judge_span(trace, span, rest)]
 
     @property
     def _limit(self) -> str:
@@ -83,7 +83,7 @@ class StoppedWithin(Spec, Criterion):
         steady = turn_rate(trace).values[:, 0] <= self.turn_rate
         return slow & steady
 
-    def _once(self, trace: Trace, span: Span, rest: Flags) -> list[Finding]:
+    def _judge_span(self, trace: Trace, span: Span, rest: Flags) -> list[Finding]:
         first = max(int(np.searchsorted(trace.velocity.ticks, span.start, side="right")) - 1, 0)
         hold = round(self.hold * trace.tick_rate)
         stop, lasted = first_sustained(trace.velocity.ticks[first:], rest[first:], hold, trace.end)
@@ -92,10 +92,10 @@ class StoppedWithin(Spec, Criterion):
         elapsed = trace.seconds(until - span.start)
         if elapsed <= self.time and not (stop is not None and lasted):
             over = f"`{self.after}`" if span.lasting and stop is None else f"the run ({end_reason(trace)})"
-            state = "still moving" if stop is None else "hardly at rest"
+            state = "still moving" if stop is None else "at rest too briefly"
             because = f"{over} was over {elapsed:.2f} s after it started, with the robot {state}"
             return [undecided("stopped_within", because, self._limit)]
-        detail = _explained(trace, span.start, until) + ([] if stop is not None else ["it never came to rest"])
+        detail = _describe_motion(trace, span.start, until) + ([] if stop is not None else ["it never came to rest"])
         context = f"after {self.after}"
         found = at_most("stopped_within", elapsed, self.time, "s", at=(trace, until), context=context, detail=detail)
         return [found, self._stayed(trace, span, until, rest)] if self.stay and stop is not None else [found]
@@ -112,21 +112,21 @@ class StoppedWithin(Spec, Criterion):
         )
 
 
-def _stood(trace: Trace, rest: Flags, tick: int) -> bool:
+def _stood_before(trace: Trace, rest: Flags, tick: int) -> bool:
     """Return whether the robot stood just before `tick`."""
     return bool(rest[max(int(np.searchsorted(trace.velocity.ticks, tick, side="left")) - 1, 0)])
 
 
-def _explained(trace: Trace, start: int, end: int) -> list[str]:
+def _describe_motion(trace: Trace, start: int, end: int) -> list[str]:
     """Describe the motion of the robot between two ticks."""
-    way, fast = drive(trace), speed(trace)
-    length, seconds = way.until(end) - way.until(start), trace.seconds(end - start)
-    seen = trace.scans[trace.scans <= end]
-    age = trace.seconds(end - int(seen[-1])) if len(seen) else math.inf
+    path, speeds = drive(trace), speed(trace)
+    length, seconds = path.until(end) - path.until(start), trace.seconds(end - start)
+    received = trace.scans[trace.scans <= end]
+    age = trace.seconds(end - int(received[-1])) if len(received) else math.inf
     line = f"drove {length:.2f} m{' blind' if age > STALE_SCAN_S else ''} at {length / max(seconds, 1e-9):.2f} m/s"
     if STALE_SCAN_S < age < math.inf:
         line += f"; the newest scan was {age:.1f} s old"
-    top = float(fast.values[(fast.ticks >= start) & (fast.ticks <= end), 0].max(initial=0.0))
+    top = float(speeds.values[(speeds.ticks >= start) & (speeds.ticks <= end), 0].max(initial=0.0))
     return [line, f"its top speed in that time was {top:.2f} m/s"]
 
 
@@ -154,12 +154,12 @@ class Stuck(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the longest standstill over all goals."""
         poses = truth(trace)
-        ways = [
+        drives = [
             (outcome.accepted, trace.end if outcome.end is None else outcome.end.tick)
             for outcome in goal_outcomes(trace, case)
             if outcome.accepted is not None
         ]
-        stays = [stay for start, end in ways for stay in _stays(poses, start, end, self.radius)]
+        stays = [stay for start, end in drives for stay in _stays(poses, start, end, self.radius)]
         if not stays:
             return [undecided("stuck", "no goal was ever under way", f"≤ {self.max:.2f} s")]
         longest, tick = max(stays, key=lambda stay: (stay[0], -stay[1]))
@@ -168,7 +168,7 @@ class Stuck(Spec, Criterion):
 
 
 def _stays(poses: Samples, start: int, end: int, radius: float) -> list[tuple[int, int]]:
-    """Yield the duration and end in ticks of each stay between `start` and `end`, as measured by a progress checker."""
+    """Return the duration and end in ticks of each stay between two ticks, as measured by a progress checker."""
     first, last = np.searchsorted(poses.ticks, (start, end + 1), side="left").tolist()
     if first == last:
         return []

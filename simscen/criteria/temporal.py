@@ -1,4 +1,4 @@
-"""Temporal criteria: `always`, `eventually`, `until` and `whenever … then`."""
+"""Temporal criteria: `always`, `eventually`, `until`, and `whenever … then`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class WindowedCriterion(Windowed, TemporalCriterion):
-    """A condition at every moment, or at some moment, of a window, as the `operator` says."""
+    """A condition that must be true at every moment or at some moment of a window, depending on the `operator`."""
 
     operator: ClassVar[Literal["always", "eventually"]]
 
@@ -35,7 +35,7 @@ class WindowedCriterion(Windowed, TemporalCriterion):
 
     @property
     def horizon(self) -> float:
-        """Seconds of the run it needs: the whole window, or its first moment."""
+        """Minimum simulated time in s for a decision: the whole window, or its first moment."""
         return window_horizon(self.operator, self, self)
 
     def evaluate(self, context: EvaluationContext) -> Robustness:
@@ -83,7 +83,7 @@ class Until(Release, TemporalCriterion):
     What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the best
         release: the lesser of the margins of `release` there and of `hold` at every sample before it.
     When it fails: `release` was not true in the window, or `hold` was false before it was.
-    Why this: order matters. Not to move before the map is there can be said neither with always nor with eventually.
+    Why this: order matters. Neither always nor eventually can require that a robot does not move before it has a map.
     Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
 
     Inconclusive if the window goes on after the end of the run, with `hold` true so far and no release.
@@ -101,7 +101,7 @@ class Until(Release, TemporalCriterion):
 
     @property
     def horizon(self) -> float:
-        """Seconds until the first moment at which the release counts."""
+        """Minimum simulated time in s for a decision: the first moment at which the release counts."""
         return until_horizon(self.release, self)
 
     def evaluate(self, context: EvaluationContext) -> Robustness:
@@ -122,21 +122,21 @@ class Whenever(Windowed):
     and if the window of an answer goes on after the end of the run.
 
     Example: `{whenever: {signal: scan_age, op: ">", value: 0.3 s}, then: {eventually: {signal: speed, op: "<", value: 1 cm/s, within: 1 s}}}`
-    """  # noqa: E501 (an example stands on one line)
+    """  # noqa: E501 (an example is on one line)
 
     required: bool = True
     """Whether the premise must be true at least once. With `false`, a run in which it never was passes."""
 
 
 class Response(Spec, TemporalCriterion):
-    """A premise with its answer, which are separate keys of a scenario."""
+    """The premise `whenever` and the response `then`, which are separate keys of a scenario."""
 
     premise: Whenever
     answer: Condition
 
     @classmethod
     def of(cls, premise: BaseModel | None, answer: BaseModel | None) -> Response:
-        """Return the criterion of two parts that are validated already."""
+        """Return the criterion of two validated parts."""
         assert isinstance(premise, Whenever) and isinstance(answer, Condition)
         return cls.model_construct(premise=premise, answer=answer)
 
@@ -150,7 +150,7 @@ class Response(Spec, TemporalCriterion):
 
     @property
     def horizon(self) -> float:
-        """Seconds until the window ends in which the premise counts, and the last answer is due."""
+        """Minimum simulated time in s for a decision: until the last response to a premise in the window is due."""
         return window_horizon("always", self.answer, self.premise)
 
     def evaluate(self, context: EvaluationContext) -> Robustness:

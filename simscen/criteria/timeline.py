@@ -1,4 +1,4 @@
-"""When faults, events, marks and zones were active in a run, and how the run ended."""
+"""Intervals in which faults, events, marks, and zones were active in a run, and how the run ended."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class Span:
 def spans(trace: Trace, label: str) -> list[Span]:
     """Return the intervals of the fault, event or mark `label`, by start.
 
-    What never ended, or takes no time, lasts to the end of the run. Several entries of a scenario may share a label;
-    starts and ends are paired within each entry.
+    An interval without an end or without duration lasts to the end of the run. Several entries of a scenario may share
+    a label; starts and ends are paired within each entry.
     """
     starts = [event for event in trace.of_kind(*_STARTS) if event.name == label]
     ends = [event for event in trace.of_kind(*_ENDS) if event.name == label]
@@ -67,7 +67,7 @@ def end_reason(trace: Trace) -> str:
 
 
 def has_ended(trace: Trace) -> bool:
-    """Return True if the run came to its end (the time limit included), False for a truncated log."""
+    """Return True if the run was completed, also by its time limit, and False for a truncated log."""
     return bool(trace.of_kind(EventKind.RUN_ENDED))
 
 
@@ -93,7 +93,7 @@ def enabled_spans(trace: Trace, what: Filter, region: str | None, grace: float) 
 
 
 def clip_samples(samples: Samples, first: int, last: int) -> Samples:
-    """Return the samples from tick `first` to `last`, with a held sample at both ends."""
+    """Return the samples from tick `first` to `last`, with the value held at both ends."""
     inner = samples.ticks[(samples.ticks > first) & (samples.ticks < last)]
     ticks = np.unique(np.concatenate(([first], inner, [last])))
     ticks = ticks[(ticks >= samples.ticks[0]) & (ticks <= samples.ticks[-1])]

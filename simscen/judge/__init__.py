@@ -1,1 +1,1 @@
-"""Criteria × trace → verdicts, metrics and the result of a run. Needs a log, never a simulator."""
+"""Judges a run by its log: evaluates criteria, computes metrics, and builds the result. Needs no simulator."""

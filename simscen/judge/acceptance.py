@@ -1,4 +1,4 @@
-"""Tests of the claim that a robot passes at least a share of all runs.
+"""Statistical tests of the claim that a robot passes at least a share of all runs.
 
 The runs must be independent: each has its own seed, and its own random values if the scenario is varied. Each test has
 the stated error rates whatever the true rate is: a robot below `min` is accepted with a probability of at most
@@ -39,24 +39,24 @@ def evaluate_claim(claim: PassRate, results: Sequence[RunResult]) -> ClaimResult
 
 
 def is_counted(result: RunResult) -> bool:
-    """Return whether a run says something about the robot: it was judged, or the stack under test broke down."""
+    """Return whether a run counts for the pass rate: it was judged, or the stack under test crashed."""
     return result.outcome is not Outcome.ERROR or (result.error is not None and result.error.by_stack)
 
 
 def decide(claim: PassRate, outcomes: Sequence[bool]) -> tuple[int, ClaimStatus]:
     """Return the number of runs that decide the claim, and the decision; all runs if it is undecided.
 
-    `outcomes` say in order whether the runs passed, at most `max_runs` of them.
+    `outcomes` are True for passed runs, in order, at most `max_runs` of them.
     """
     if claim.method == "fixed":
         runs = len(outcomes)
         is_complete = runs == claim.max_runs
         return runs, _by_limits(claim, sum(outcomes), runs) if is_complete else ClaimStatus.UNDECIDED
-    look = _by_likelihood_ratio if claim.method == "sprt" else _by_mixture
+    test = _by_likelihood_ratio if claim.method == "sprt" else _by_mixture
     passed = 0
     for runs, has_passed in enumerate(outcomes, start=1):
         passed += has_passed
-        status = look(claim, passed, runs)
+        status = test(claim, passed, runs)
         if status is not ClaimStatus.UNDECIDED:
             return runs, status
     return len(outcomes), ClaimStatus.UNDECIDED
@@ -79,8 +79,8 @@ def _by_mixture(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
 def _by_likelihood_ratio(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
     """Compare the likelihoods of `target` and `min`.
 
-    The limits 1 / alpha and beta are those of Wald's inequalities: each error rate is kept exactly, while Wald's usual
-    approximation (1 - beta) / alpha only keeps their sum. (Wald: Sequential Tests of Statistical Hypotheses, 1945.)
+    The limits 1 / alpha and beta are those of Wald's inequalities: they bound each error rate, while Wald's usual
+    approximation (1 - beta) / alpha only bounds their sum. (Wald: Sequential Tests of Statistical Hypotheses, 1945.)
     """
     assert claim.target is not None
     ratio = passed * math.log(claim.target / claim.min)
@@ -111,7 +111,7 @@ def clopper_pearson_limits(passed: int, runs: int, confidence: float) -> tuple[f
 
 
 def anytime_limits(passed: int, runs: int, confidence: float) -> tuple[float, float]:
-    """Return the limits of a rate that hold with the probability `confidence` after all runs at once.
+    """Return limits of a rate that are valid after every run at the same time, with the probability `confidence`.
 
     They contain the rates p with (runs + 1) · P(passed | runs, p) > 1 - confidence: the beta-binomial mixture with a
     uniform prior. (Robbins: Statistical Methods Related to the Law of the Iterated Logarithm, 1970.)
@@ -123,7 +123,7 @@ def anytime_limits(passed: int, runs: int, confidence: float) -> tuple[float, fl
 
 
 def _boundary(passed: int, runs: int, confidence: float, inside: float, outside: float) -> float:
-    """Return the limit between a compatible rate and an incompatible one, by bisection."""
+    """Return the boundary between a compatible rate `inside` and an incompatible rate `outside`, by bisection."""
     while (middle := (inside + outside) / 2) not in (inside, outside):
         if _is_compatible(middle, passed, runs, confidence):
             inside = middle
@@ -134,5 +134,5 @@ def _boundary(passed: int, runs: int, confidence: float, inside: float, outside:
 
 def _is_compatible(rate: float, passed: int, runs: int, confidence: float) -> bool:
     """Return whether (runs + 1) · P(passed | runs, rate) > 1 - confidence. 0 < rate < 1."""
-    choices = math.lgamma(runs + 2) - math.lgamma(passed + 1) - math.lgamma(runs - passed + 1)
-    return choices + passed * math.log(rate) + (runs - passed) * math.log1p(-rate) > math.log(1 - confidence)
+    log_count = math.lgamma(runs + 2) - math.lgamma(passed + 1) - math.lgamma(runs - passed + 1)
+    return log_count + passed * math.log(rate) + (runs - passed) * math.log1p(-rate) > math.log(1 - confidence)

@@ -15,14 +15,16 @@ from simscen.criteria.findings import missed, undecided
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.judge.finding_text import DISTURBANCE
 
-WHAT = "disturbance did not happen"
+FINDING_NAME = "disturbance did not happen"
 
 
 def disturbance_outcomes(trace: Trace, case: Case) -> tuple[DisturbanceOutcome, ...]:
     """Return the outcome of each disturbance of the scenario in order: events, then faults."""
     return tuple(
-        _event(trace, case, ordered, entry) if ordered.kind == "event" else _fault(trace, ordered, entry)
-        for entry, ordered in _numbered(case.disturbances)
+        _event_outcome(trace, case, ordered, entry)
+        if ordered.kind == "event"
+        else _fault_outcome(trace, ordered, entry)
+        for entry, ordered in _with_entries(case.disturbances)
     )
 
 
@@ -34,28 +36,28 @@ def missing_disturbances(
     It is inconclusive if the log is truncated, because the disturbance might have happened later. Of a sequence, only
     the first missing step gets a verdict. A name that is already used, also by `others`, gets a number.
     """
-    lacking = [one for one in happened if one.missing and not _excused(one, happened)]
+    missing = [one for one in happened if one.missing and not _is_reported_earlier(one, happened)]
     seen = Counter(verdict.id for verdict in others)
     found = []
-    for one in lacking:
-        name = one.disturbance.name
+    for one in missing:
+        name = one.ordered.name
         seen[name] += 1
         unique = name if seen[name] == 1 else f"{name}#{seen[name]}"
         found.append((Verdict(DISTURBANCE, unique, "fail", (_finding(trace, one),)), one.disturbance.line))
     return tuple(found)
 
 
-def _excused(one: DisturbanceOutcome, happened: Sequence[DisturbanceOutcome]) -> bool:
+def _is_reported_earlier(one: DisturbanceOutcome, happened: Sequence[DisturbanceOutcome]) -> bool:
     """Return whether the step waited for an earlier step of its sequence that already has a verdict."""
     after = one.disturbance.after
     if after is None or one.fired:
         return False
-    before = [other for other in happened if other.disturbance.kind == "event"][after]
-    return not before.fired and (before.missing or _excused(before, happened))
+    before = [other for other in happened if other.ordered.kind == "event"][after]
+    return not before.fired and (before.missing or _is_reported_earlier(before, happened))
 
 
-def _numbered(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
-    """Return the disturbances with their numbers among those of the same kind, which events of the log refer to."""
+def _with_entries(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
+    """Yield the disturbances with their numbers among those of the same kind, to which events of the log refer."""
     counts = {"event": 0, "fault": 0}
     for one in ordered:
         yield counts[one.kind], one
@@ -63,50 +65,50 @@ def _numbered(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance
 
 
 def _finding(trace: Trace, one: DisturbanceOutcome) -> Finding:
-    told = f"{one.disturbance.name} ({one.disturbance.trigger})"
+    text = f"{one.ordered.name} ({one.ordered.trigger})"
     if not has_ended(trace):
-        because = f"{told}, until the log stops at t = {trace.seconds(trace.end):.2f} s"
-        return undecided(WHAT, because, detail=(one.effect,))
-    return missed(WHAT, told, "", None if one.tick is None else (trace, one.tick), (one.effect,))
+        because = f"{text}, until the log stops at t = {trace.seconds(trace.end):.2f} s"
+        return undecided(FINDING_NAME, because, detail=(one.effect,))
+    return missed(FINDING_NAME, text, "", None if one.tick is None else (trace, one.tick), (one.effect,))
 
 
-def _of_entry(trace: Trace, kind: EventKind, entry: int) -> list[Event]:
+def _events_of_entry(trace: Trace, kind: EventKind, entry: int) -> list[Event]:
     return [event for event in trace.of_kind(kind) if event.data.get("entry") == entry]
 
 
-def _event(trace: Trace, case: Case, ordered: Disturbance, entry: int) -> DisturbanceOutcome:
+def _event_outcome(trace: Trace, case: Case, ordered: Disturbance, entry: int) -> DisturbanceOutcome:
     """Return the outcome of an event. Each action must take effect once, and the run must continue after that."""
-    started = _of_entry(trace, EventKind.EVENT_STARTED, entry)
+    started = _events_of_entry(trace, EventKind.EVENT_STARTED, entry)
     fired = tuple(event.tick for event in started)
-    ended = _of_entry(trace, EventKind.EVENT_ENDED, entry)
+    ended = _events_of_entry(trace, EventKind.EVENT_ENDED, entry)
     if not started:
-        return DisturbanceOutcome(ordered, (), False, _waited(trace, case, ordered) + _never(trace))
+        return DisturbanceOutcome(ordered, (), False, _sequence_state(trace, case, ordered) + _never_began(trace))
     in_time = [event for event in ended if event.tick < trace.end]
     if not in_time:
         return DisturbanceOutcome(ordered, fired, False, _too_late(trace), fired[0])
-    told = [_effects(event) for event in in_time]
-    for number in range(len(told[0])):
-        if not any(effects[number][0] for effects in told):
-            return DisturbanceOutcome(ordered, fired, False, told[0][number][1], in_time[0].tick)
-    if not told[0]:
-        return DisturbanceOutcome(ordered, fired, True, "as was waited for", in_time[0].tick)
-    first = next(k for k, effects in enumerate(told) if any(did for did, _ in effects))
-    what = "; ".join(what for did, what in told[first] if did)
+    starts = [_effects(event) for event in in_time]
+    for action in range(len(starts[0])):
+        if not any(effects[action][0] for effects in starts):
+            return DisturbanceOutcome(ordered, fired, False, starts[0][action][1], in_time[0].tick)
+    if not starts[0]:
+        return DisturbanceOutcome(ordered, fired, True, "its trigger fired", in_time[0].tick)
+    first = next(k for k, effects in enumerate(starts) if any(happened for happened, _ in effects))
+    what = "; ".join(what for happened, what in starts[first] if happened)
     return DisturbanceOutcome(ordered, fired, True, what, in_time[first].tick)
 
 
-def _waited(trace: Trace, case: Case, ordered: Disturbance) -> str:
+def _sequence_state(trace: Trace, case: Case, ordered: Disturbance) -> str:
     """Return since when a missing step of a sequence was due, or which earlier step was missing."""
     if ordered.after is None:
         return ""
     events = [one for one in case.disturbances if one.kind == "event"]
-    waiting = events[ordered.after]
-    begun = _of_entry(trace, EventKind.EVENT_STARTED, ordered.after)
+    awaited = events[ordered.after]
+    begun = _events_of_entry(trace, EventKind.EVENT_STARTED, ordered.after)
     if begun:
-        return f"it was waited for from t = {trace.seconds(begun[0].tick):.2f} s, when {waiting.name} had happened; "
-    while waiting.after is not None and not _of_entry(trace, EventKind.EVENT_STARTED, waiting.after):
-        waiting = events[waiting.after]
-    return f"its turn never came, as {waiting.name} was still waited for; "
+        return f"it was due from t = {trace.seconds(begun[0].tick):.2f} s, after {awaited.name}; "
+    while awaited.after is not None and not _events_of_entry(trace, EventKind.EVENT_STARTED, awaited.after):
+        awaited = events[awaited.after]
+    return f"it was not due, because {awaited.name} had not happened; "
 
 
 def _effects(ended: Event) -> list[tuple[bool, str]]:
@@ -116,13 +118,15 @@ def _effects(ended: Event) -> list[tuple[bool, str]]:
     return [(bool(one["happened"]), str(one["what"])) for one in effects if isinstance(one, dict)]
 
 
-def _fault(trace: Trace, ordered: Disturbance, entry: int) -> DisturbanceOutcome:
-    started = _of_entry(trace, EventKind.FAULT_STARTED, entry)
+def _fault_outcome(trace: Trace, ordered: Disturbance, entry: int) -> DisturbanceOutcome:
+    started = _events_of_entry(trace, EventKind.FAULT_STARTED, entry)
     fired = tuple(event.tick for event in started)
     if not started:
-        return DisturbanceOutcome(ordered, (), False, _never(trace))
-    sensor, ended = started[0].data.get("sensor"), _of_entry(trace, EventKind.FAULT_ENDED, entry)
-    touched = [event.tick for event in _of_entry(trace, EventKind.FAULT_TOOK_EFFECT, entry) if event.tick < trace.end]
+        return DisturbanceOutcome(ordered, (), False, _never_began(trace))
+    sensor, ended = started[0].data.get("sensor"), _events_of_entry(trace, EventKind.FAULT_ENDED, entry)
+    touched = [
+        event.tick for event in _events_of_entry(trace, EventKind.FAULT_TOOK_EFFECT, entry) if event.tick < trace.end
+    ]
     if touched:
         counts = [event.data.get("touched") for event in ended]
         number = sum(count for count in counts if isinstance(count, int))
@@ -136,9 +140,9 @@ def _fault(trace: Trace, ordered: Disturbance, entry: int) -> DisturbanceOutcome
     return DisturbanceOutcome(ordered, fired, False, why, fired[0])
 
 
-def _never(trace: Trace) -> str:
+def _never_began(trace: Trace) -> str:
     return f"it never began; the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
 
 
 def _too_late(trace: Trace) -> str:
-    return f"it came with the end of the run at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
+    return f"it began only when the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"

@@ -1,4 +1,4 @@
-"""Text of findings for the console, JUnit, JSON and pictures."""
+"""Texts of findings and disturbances for the console, JUnit, JSON, and pictures."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -8,7 +8,7 @@ from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
 
 DISTURBANCE = "disturbance"
-"""Criterion names of the verdicts on missing events and faults; the ID is the name of the event or fault."""
+"""Criterion name of the verdicts on missing events and faults; their ID is the name of the event or fault."""
 ARRIVAL = "goals_reached"
 """Name of the criterion on the distance from a goal."""
 MAX_TIMES_SHOWN = 5
@@ -24,25 +24,23 @@ def comparison(finding: Finding) -> str:
     if holds:
         relation = holds if finding.status is Status.PASS else violated
         return f"{finding.measured} {relation}{finding.limit[2:]}"
-    disturbance_line = finding.status is Status.PASS or not finding.limit
-    return finding.measured if disturbance_line else f"{finding.measured}; expected {finding.limit}"
+    is_sufficient = finding.status is Status.PASS or not finding.limit
+    return finding.measured if is_sufficient else f"{finding.measured}; expected {finding.limit}"
 
 
 def time_and_place(finding: Finding, tick_rate: int) -> str:
     """Return time and place, e.g. "at t = 10.84 s, (2.10, 3.41)", or "" if unknown."""
     if finding.tick is None:
         return ""
-    disturbance_times = f"at t = {finding.tick / tick_rate:.2f} s"
-    return (
-        disturbance_times
-        if finding.place is None
-        else f"{disturbance_times}, ({finding.place[0]:.2f}, {finding.place[1]:.2f})"
-    )
+    time = f"at t = {finding.tick / tick_rate:.2f} s"
+    return time if finding.place is None else f"{time}, ({finding.place[0]:.2f}, {finding.place[1]:.2f})"
 
 
 def subject(verdict: Verdict, finding: Finding) -> str:
     """Return the criterion and the item that it checks, e.g. "goals_reached: goal shelf"."""
-    if verdict.criterion == DISTURBANCE:  # its id is a name that an author gave, and would read as a criterion
+    if (
+        verdict.criterion == DISTURBANCE
+    ):  # its ID is the name of an event or fault, which could be mistaken for a criterion
         return finding.what
     rest = finding.what.removeprefix(verdict.criterion).removeprefix(":").strip()
     return f"{verdict.id}: {rest}" if rest else verdict.id
@@ -63,24 +61,24 @@ def disturbance_times(one: DisturbanceOutcome, tick_rate: int) -> str:
 
 def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
     """Return the complete line: "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
-    came = (
+    parts = (
         disturbance_times(one, tick_rate) if one.fired else "",
         one.effect,
         "" if one.happened else "so it did not happen",
     )
-    return f"{one.disturbance.name}: {', '.join(part for part in came if part)}"
+    return f"{one.ordered.name}: {', '.join(part for part in parts if part)}"
 
 
 def violations(verdict: Verdict) -> tuple[Finding, ...]:
-    """Return the findings because of which the verdict does not pass, in order."""
+    """Return the findings that keep the verdict from passing, in order."""
     return tuple(finding for finding in verdict.findings if finding.status is not Status.PASS)
 
 
 def tightest_margin(verdicts: Sequence[Verdict]) -> str:
-    """Return the smallest relative margin: "path_length +0.14 m, 1 % of its limit"; "" if there is none.
+    """Return the smallest relative margin, e.g. "path_length +0.14 m, 1 % of its limit"; "" if there is none.
 
-    Counts of events are left out because they are trivial. So are the distance from a goal and the time at it: a robot
-    stops as soon as it is close enough, so that both are always near their limits.
+    Counts of events are left out. So are the distance from a goal and the waiting time there, because a robot stops as
+    soon as it is close enough, so that both are always near their limits.
     """
     tightest = _tightest_finding(verdicts)
     if tightest is None:
@@ -91,9 +89,9 @@ def tightest_margin(verdicts: Sequence[Verdict]) -> str:
 
 
 def run_margin(result: RunResult) -> float:
-    """Return how far a run is from failing, relative to the limit of its tightest criterion: negative if it failed.
+    """Return the smallest margin of a run relative to its limit; negative if the run failed.
 
-    -1 for a failure without a margin, 1 for a run that passed without any.
+    It is -1 for a failure without a margin, and 1 for a run that passed without a margin.
     """
     if result.outcome is Outcome.PASSED:
         tightest = _tightest_finding(result.verdicts)
@@ -104,13 +102,13 @@ def run_margin(result: RunResult) -> float:
 
 
 def _tightest_finding(verdicts: Sequence[Verdict]) -> tuple[Verdict, Finding] | None:
-    findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and not _stopping(v, f)]
+    findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and not _is_about_arrival(v, f)]
     measured = [(v, f) for v, f in findings if f.unit and f.margin is not None and isfinite(f.margin)]
     return min(measured, key=lambda pair: relative_margin(pair[1]), default=None)
 
 
-def _stopping(verdict: Verdict, finding: Finding) -> bool:
-    """Return whether the finding is about the place where the robot stopped."""
+def _is_about_arrival(verdict: Verdict, finding: Finding) -> bool:
+    """Return whether the finding is about where the robot stopped or how long it waited there."""
     return verdict.criterion == ARRIVAL and not (finding.unit == "s" and finding.limit.startswith("≤"))
 
 

@@ -1,4 +1,4 @@
-"""result.json: the result of a run as plain data and back; no wall clock, host or process in it."""
+"""Reads and writes result.json, which does not depend on the wall clock, the host, or the process."""
 
 import json
 import math
@@ -39,7 +39,7 @@ def result_data(result: RunResult) -> dict[str, Any]:
         "tick_rate": result.tick_rate,
         "again": result.again,
         "events": dict(result.events),
-        "disturbances": [_happening_data(one, result.tick_rate) for one in result.disturbances],
+        "disturbances": [_disturbance_data(one, result.tick_rate) for one in result.disturbances],
         "metrics": {name: number(value) for name, value in result.metrics.items()},
         "undefined": dict(result.undefined),
         "verdicts": [verdict_data(v, line, result.tick_rate) for v, line in zip(result.verdicts, lines, strict=True)],
@@ -73,12 +73,12 @@ def from_data(data: dict[str, Any]) -> RunResult:
         metrics=data["metrics"],
         undefined=data["undefined"],
         events=data["events"],
-        disturbances=tuple(_read_happening(one) for one in data["disturbances"]),
+        disturbances=tuple(_read_disturbance(one) for one in data["disturbances"]),
         ended=data["ended"],
         simulated=data["simulated_seconds"],
         tick_rate=data["tick_rate"],
         error=None if data["error"] is None else RunFailure(**data["error"]),
-        stack=data.get("stack", ""),  # older ones knew no other than the scenario's own
+        stack=data.get("stack", ""),  # missing in older files
         reason=data.get("reason", ""),
     )
 
@@ -94,7 +94,7 @@ def _error_data(error: RunFailure) -> dict[str, Any]:
     return {"kind": error.kind, "message": error.message, "tail": error.tail, **by_stack}
 
 
-def _happening_data(one: DisturbanceOutcome, tick_rate: int) -> dict[str, Any]:
+def _disturbance_data(one: DisturbanceOutcome, tick_rate: int) -> dict[str, Any]:
     return {
         **asdict(one.disturbance),
         "fired": list(one.fired),
@@ -105,7 +105,7 @@ def _happening_data(one: DisturbanceOutcome, tick_rate: int) -> dict[str, Any]:
     }
 
 
-def _read_happening(data: dict[str, Any]) -> DisturbanceOutcome:
+def _read_disturbance(data: dict[str, Any]) -> DisturbanceOutcome:
     ordered = Disturbance(data["name"], data["kind"], data["when"], data["required"], data["line"])
     return DisturbanceOutcome(ordered, tuple(data["fired"]), data["happened"], data["effect"], data["tick"])
 
@@ -129,7 +129,7 @@ def read_verdict(data: dict[str, Any]) -> Verdict:
 
 
 def number(value: float | None) -> float | None:
-    """Return the number, or a text for nan and infinity, which JSON lacks."""
+    """Return the number, or None for nan and infinity, which JSON does not have."""
     return value if value is not None and math.isfinite(value) else None
 
 

@@ -15,20 +15,20 @@ from simscen.model.acceptance import PassRate
 from simscen.spec.quantities import NUMBER_AND_UNIT, si_number
 
 MIN_RUNS_FOR_EFFECTS = 8
-"""Fewest runs for an effect: with fewer, no rank correlation of one of several parameters is significant."""
-RANGES = 4
+"""Minimum number of runs for effects: with fewer, no rank correlation of several parameters is significant."""
+RANGE_COUNT = 4
 """Number of ranges, with equal numbers of runs, into which many different numbers are divided."""
-MAX_VALUES = 10
-"""Most different values of a parameter that are listed one by one."""
+MAX_LISTED_VALUES = 10
+"""Maximum number of different values of a parameter that are listed individually."""
 
 
 @dataclass(frozen=True)
 class StudyPlan:
-    """What a study is about: how its runs were chosen, and the claim.
+    """How the runs of a study were chosen, and its claim.
 
-    `is_random`: each run has its own seed and its own random values. `values` are the varied values by run, `drawn` is
-    the number of values that were drawn to find those that meet `require`; 0 without conditions. `stops_early`: a
-    search ended when it had found enough failures.
+    `is_random` tells that each run has its own seed and random values. `values` are the varied values by run; `drawn`
+    is the number of draws that were needed to meet `require`, 0 without conditions. `stops_early` tells that a search
+    ended when it had found enough failures.
     """
 
     scenario: str
@@ -52,7 +52,7 @@ def evaluate_study(plan: StudyPlan, results: Iterable[RunResult]) -> Study:
     passed = sum(result.outcome is Outcome.PASSED for result in counted)
     margins = {result.key: _margins(result) for result in counted}
     limits = None
-    if counted and plan.is_random:  # a study that stops when it is decided needs limits that hold whenever it stops
+    if counted and plan.is_random:  # a study that can stop at any run needs limits that are valid after each run
         limits = (
             wilson_interval(passed, len(counted))
             if plan.has_fixed_runs
@@ -117,7 +117,7 @@ def _rates(plan: StudyPlan, results: Sequence[RunResult]) -> Iterable[RateRow]:
 
 
 def _label_order(labels: Sequence[str], plan: StudyPlan, path: str, results: Sequence[RunResult]) -> Any:
-    """Return a sort key that orders labels by the smallest value that they stand for."""
+    """Return a sort key that orders labels by the smallest value that they represent."""
     least: dict[str, tuple[int, float, str]] = {}
     for label, result in zip(labels, results, strict=True):
         value = si_number(plan.values.get(result.key, {}).get(path))
@@ -130,11 +130,11 @@ def _labels(values: Sequence[Any]) -> list[str]:
     """Return for each value its text, or its range if there are many different numbers."""
     texts = [value_text(value) for value in values]
     numbers = [si_number(value) for value in values]
-    if len(set(texts)) <= MAX_VALUES or not all(map(_is_number, numbers)):
+    if len(set(texts)) <= MAX_LISTED_VALUES or not all(map(_is_number, numbers)):
         return texts
     order = sorted(range(len(numbers)), key=numbers.__getitem__)
     labels = [""] * len(numbers)
-    size = math.ceil(len(numbers) / RANGES)
+    size = math.ceil(len(numbers) / RANGE_COUNT)
     for start in range(0, len(order), size):
         part = order[start : start + size]
         for index in part:
@@ -171,11 +171,11 @@ def _effects(
     found = []
     for path in _paths(plan):
         for criterion in sorted({criterion for own in margins.values() for criterion in own}):
-            having = [result.key for result in results if criterion in margins[result.key]]
-            values = [plan.values.get(key, {}).get(path) for key in having]
-            effect = _effect(values, [margins[key][criterion][0] for key in having])
+            keys = [result.key for result in results if criterion in margins[result.key]]
+            values = [plan.values.get(key, {}).get(path) for key in keys]
+            effect = _effect(values, [margins[key][criterion][0] for key in keys])
             if effect is not None:
-                found.append(ParameterEffect(path, criterion, *effect[:2], len(having), effect[2]))
+                found.append(ParameterEffect(path, criterion, *effect[:2], len(keys), effect[2]))
     adjusted = holm([one.p for one in found])
     effects = [
         ParameterEffect(one.path, one.criterion, one.effect, p, one.runs, one.is_ordered)
@@ -185,7 +185,7 @@ def _effects(
 
 
 def _effect(values: Sequence[Any], margins: Sequence[float]) -> tuple[float, float, bool] | None:
-    """Return effect, p-value, and whether the values are ordered; None if nothing can be said.
+    """Return effect, p-value, and whether the values are ordered; None if there are too few or equal values.
 
     Numbers: Spearman's rank correlation. Other values: the Kruskal-Wallis test, with epsilon squared as its effect.
     """
@@ -221,8 +221,8 @@ def _pair_coverage(plan: StudyPlan, results: Sequence[RunResult]) -> float | Non
     if not plan.is_designed_in_pairs or len(paths) < 2:
         return None
     rows = [[value_text(plan.values[result.key].get(path)) for path in paths] for result in results]
-    everything = [[value_text(values.get(path)) for path in paths] for values in plan.values.values()]
-    counts = [len({row[index] for row in everything}) for index in range(len(paths))]
+    all_rows = [[value_text(values.get(path)) for path in paths] for values in plan.values.values()]
+    counts = [len({row[index] for row in all_rows}) for index in range(len(paths))]
     possible = sum(counts[a] * counts[b] for a, b in combinations(range(len(paths)), 2))
-    seen = {(a, row[a], b, row[b]) for row in rows for a, b in combinations(range(len(paths)), 2)}
-    return len(seen) / possible
+    covered = {(a, row[a], b, row[b]) for row in rows for a, b in combinations(range(len(paths)), 2)}
+    return len(covered) / possible

@@ -1,4 +1,4 @@
-"""The result of a study as plain data, for results.json."""
+"""Converts the result of a study to plain data for results.json."""
 
 from typing import Any
 

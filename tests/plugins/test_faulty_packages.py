@@ -90,14 +90,14 @@ FINDING = "Finding(Status.{}, 'mine', '1', '2', {})"
     [
         ("return []", "it checked nothing (criterion `mine` of mines 0.3)"),
         ("return None", "it checked nothing"),
-        ("return [None]", "its finding is NoneType, which is none"),
+        ("return [None]", "it returned an invalid finding of type NoneType"),
         (
             f"return [{FINDING.format('PASS', 'float(chr(110) + chr(97) + chr(110))')}]",
-            "the margin of mine is no number",
+            "the margin of mine is not a number",
         ),
-        (f"return [{FINDING.format('PASS', -1.0)}]", "mine is a pass by a margin of -1"),
-        (f"return [{FINDING.format('FAIL', 1.0)}]", "mine is a fail by a margin of 1"),
-        ("return [Finding(Status.PASS, 'mine', 1, '2')]", "its finding says something that is no text"),
+        (f"return [{FINDING.format('PASS', -1.0)}]", "mine has the status pass but a margin of -1"),
+        (f"return [{FINDING.format('FAIL', 1.0)}]", "mine has the status fail but a margin of 1"),
+        ("return [Finding(Status.PASS, 'mine', 1, '2')]", "a text of its finding is not a string"),
         ("raise KeyError('gone')", "KeyError: 'gone' (criterion `mine` of mines 0.3)"),
     ],
 )
@@ -111,9 +111,12 @@ def test_a_criterion_that_does_not_judge_makes_the_run_an_error(run, text: str, 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("return float(chr(110) + chr(97) + chr(110))", "metric mine is no number: nan (metric `mine` of mines 0.3)"),
-        ("return None", "metric mine is no number: None"),
-        ("return True", "metric mine is no number: True"),
+        (
+            "return float(chr(110) + chr(97) + chr(110))",
+            "metric mine is not a finite number: nan (metric `mine` of mines 0.3)",
+        ),
+        ("return None", "metric mine is not a finite number: None"),
+        ("return True", "metric mine is not a finite number: True"),
         ("return 1 / 0", "metric mine: ZeroDivisionError: division by zero (metric `mine` of mines 0.3)"),
     ],
 )

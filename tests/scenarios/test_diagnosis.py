@@ -34,7 +34,7 @@ pass: [{goals_reached: {}}]
 """,
         "goals_reached",
         "why: crate (spawned by event `crate falls` at t = 1.00 s) closes the passage of 1.00 m between "
-        "`south of the door` and `north of the door` at (3.95, 2.00) on the shortest way: "
+        "`south of the door` and `north of the door` at (3.95, 2.00) on the shortest path: "
         "0.10 m are left, the robot is 0.44 m wide",
     ),
     "a robot that was carried off": (
@@ -43,7 +43,7 @@ events: [{name: carried off, when: {travelled: 1 m}, do: {kidnap: {pose: {x: 5, 
 pass: [{localization_error: {max: 0.5 m}}]
 """,
         "localization_error",
-        "why: event `carried off` had set it down elsewhere ",
+        "why: event `carried off` had moved the robot elsewhere ",
     ),
     "a box dropped before a robot at speed": (
         """\
@@ -51,7 +51,7 @@ events: [{name: box falls, when: {travelled: 1 m}, do: {spawn: {name: box, box: 
 pass: [{collisions: {max: 0}}]
 """,
         "collisions",
-        "why: box: event `box falls` had put it 0.30 m from the robot's middle ",
+        "why: box: event `box falls` had spawned it 0.30 m from the robot's center ",
     ),
     "a lidar that is silent": (
         """\
@@ -59,7 +59,7 @@ faults: [{sensor: lidar, off: {}, when: {time: 4 s}}]
 pass: [{goals_reached: {}}]
 """,
         "goals_reached",
-        "why: its collision monitor holds it, as it said at t = 5.25 s: lidar `lidar` has been silent for 1.35 s; ",
+        "why: its collision monitor has stopped it, as reported at t = 5.25 s: lidar `lidar` has been silent for 1.35",
     ),
 }
 

@@ -115,7 +115,7 @@ linger: 60
 """
     result, told = run(text, tmp_path)
     assert complaints(result).keys() == {"too late", "lidar.off"}
-    assert told["too late"] == told["lidar.off"] == "- it came with the end of the run at t = 20.00 s (time limit)"
+    assert told["too late"] == told["lidar.off"] == "- it began only when the run ended at t = 20.00 s (time limit)"
 
 
 CHANCE = "events: [{{name: maybe, when: {{time: 1 s, probability: {}}}, do: {{push: {{impulse: [0, 0.1]}}}}{}}}]\n"
@@ -153,9 +153,9 @@ events:
 def test_of_a_story_that_stops_the_step_that_was_waited_for_fails_the_run(tmp_path: Path) -> None:
     result, told = run(STORIES, tmp_path)
     assert complaints(result) == {"a story then 2": 18, "but this should": 27}
-    since = "it was waited for from t = 1.50 s, when a story then 1 had happened; it never began"
-    assert told["a story then 1"] == "+ as was waited for"
+    since = "it was due from t = 1.50 s, after a story then 1; it never began"
+    assert told["a story then 1"] == "+ its trigger fired"
     assert told["a story then 2"].startswith(f"- {since}")
-    assert told["the end"].startswith("- its turn never came, as a story then 2 was still waited for; it never began")
-    assert told["but this should"].startswith("- its turn never came, as never was still waited for")
+    assert told["the end"].startswith("- it was not due, because a story then 2 had not happened; it never began")
+    assert told["but this should"].startswith("- it was not due, because never had not happened")
     assert result.outcome is Outcome.FAILED

@@ -1,1 +1,1 @@
-"""Signal temporal logic: conditions over signals and time, their robustness and their wording."""
+"""Signal temporal logic: conditions on signals over time, their robustness, and their description in words."""

@@ -1,4 +1,4 @@
-"""Conditions as a user writes them: comparisons of signals, combined by logic and by time."""
+"""Specification of conditions: comparisons of signals, combined by logical and temporal operators."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Condition(Spec):
     signal: SignalName | None = None
     """A named signal; `simscen explain signals` lists them."""
     op: Op | None = None
-    """How the signal compares with `value`; left out for a yes-or-no signal."""
+    """Comparison of the signal with `value`; omitted for a yes-or-no signal."""
     value: Annotated[float, AnyQuantity()] | None = None
-    """The bound, with a unit of the signal's dimension or in SI."""
+    """Bound, with a unit of the signal's dimension or in SI units."""
     scale: Annotated[float, AnyQuantity()] | None = None
-    """The amount that counts as much as one scale of another signal; the margin is then in scales."""
+    """Amount that makes this signal comparable with others: margins are divided by the scales of their signals."""
     object: MoverName | None = None
     """Movable object to which `distance_to` is measured."""
     point: PlaceOrPoint | None = None
@@ -69,14 +69,14 @@ class Condition(Spec):
     @classmethod
     def _check_operator(cls, op: Any) -> Any:
         if op in ("==", "=", "!="):
-            raise ValueError(f"`{op}` never holds for long for what is measured; use `<=` and `>=` around it")
+            raise ValueError(f"`{op}` is unsuitable for measured values; use `<=` and `>=` around the value")
         return op
 
     @field_validator("value", "scale", mode="before")
     @classmethod
     def _parse_value(cls, value: Any, info: ValidationInfo) -> Any:
         name = info.data.get("signal")
-        dimension = SIGNALS[name].dimension if name else _dimension_of(value)  # a misspelled signal is one mistake
+        dimension = SIGNALS[name].dimension if name else _dimension_of(value)  # a misspelled signal is reported once
         return Quantity(dimension).parse(value) if dimension in UNITS else value
 
     @model_validator(mode="after")
@@ -89,19 +89,19 @@ class Condition(Spec):
         if (self.whenever is None) != (self.then is None):
             raise ValueError("`whenever` and `then` belong together")
         if self.signal is None:
-            self._no_keys_of_a_signal(given[0])
+            self._reject_signal_keys(given[0])
         else:
             _check_signal(self, self.signal, SIGNALS[self.signal])
         return self
 
-    def _no_keys_of_a_signal(self, shape: str) -> None:
+    def _reject_signal_keys(self, operator: str) -> None:
         wrong = [name for name in ("op", "value", "scale", *ARGUMENT_KEYS) if getattr(self, name) is not None]
         if wrong:
-            raise ValueError(f"`{wrong[0].rstrip('_')}` belongs to a signal, not to `{shape}`")
+            raise ValueError(f"`{wrong[0].rstrip('_')}` belongs to a signal, not to `{operator}`")
 
     @property
     def definition(self) -> Signal:
-        """The signal that it compares. Raises AssertionError for a combination."""
+        """Definition of the compared signal. Raises AssertionError for a combination."""
         assert self.signal is not None
         return SIGNALS[self.signal]
 
@@ -165,13 +165,13 @@ class Release(Window):
 
 
 def _dimension_of(value: Any) -> str:
-    """Return the dimension of the unit at the end of a text; "" for none."""
+    """Return the dimension of the unit at the end of a text, or ""."""
     unit = str(value).split(maxsplit=1)[-1]
     return next((dimension for dimension, units in UNITS.items() if unit in units), "")
 
 
 def _check_signal(condition: Condition, name: str, signal: Signal) -> None:
-    """Raise ValueError if a comparison does not fit its signal, or if every run would decide it in the same way."""
+    """Raise ValueError if a comparison does not fit its signal, or if it has the same result in every run."""
     arguments = condition.arguments
     unknown = [key for key in arguments if key not in (*signal.required_arguments, *signal.optional_arguments)]
     if unknown:
@@ -191,13 +191,13 @@ def _check_signal(condition: Condition, name: str, signal: Signal) -> None:
 
 
 def _check_decidable(op: Op, value: float, name: str, signal: Signal) -> None:
-    least, most, unit = signal.minimum, signal.maximum, f" {signal.unit}".rstrip()
-    never_below = {">=": value <= least, ">": value < least, "<": value <= least, "<=": value < least}[op]
-    never_above = {"<=": value >= most, "<": value > most, ">": value >= most, ">=": value > most}[op]
+    minimum, maximum, unit = signal.minimum, signal.maximum, f" {signal.unit}".rstrip()
+    never_below = {">=": value <= minimum, ">": value < minimum, "<": value <= minimum, "<=": value < minimum}[op]
+    never_above = {"<=": value >= maximum, "<": value > maximum, ">": value >= maximum, ">=": value > maximum}[op]
     if never_below or never_above:
-        where = f"below {least:g}{unit}" if never_below else f"above {most:g}{unit}"
-        sure = "always" if (op in (">=", ">")) == never_below else "never"
-        raise ValueError(f"`{name}` is never {where}, so `{op} {value:g}{unit}` {sure} holds")
+        where = f"below {minimum:g}{unit}" if never_below else f"above {maximum:g}{unit}"
+        frequency = "always" if (op in (">=", ">")) == never_below else "never"
+        raise ValueError(f"`{name}` is never {where}, so `{op} {value:g}{unit}` is {frequency} true")
 
 
 for _model in (Condition, Windowed, Release):
@@ -205,14 +205,14 @@ for _model in (Condition, Windowed, Release):
 
 
 def decision_horizon(condition: Condition, holds: bool = True) -> float:
-    """Return the least number of seconds after which it can be known that a condition holds, or does not.
+    """Return the minimum time in s after which it can be known that a condition is true, or false (not `holds`).
 
     A window without an end is decided by the end of the run and adds nothing.
     """
     if condition.all is not None or condition.any is not None:
-        every = (condition.all is not None) == holds
+        needs_all = (condition.all is not None) == holds
         times = [decision_horizon(part, holds) for part in condition.all or condition.any or ()]
-        return max(times) if every else min(times)
+        return max(times) if needs_all else min(times)
     if condition.not_ is not None:
         return decision_horizon(condition.not_, not holds)
     if condition.always is not None:
@@ -225,12 +225,12 @@ def decision_horizon(condition: Condition, holds: bool = True) -> float:
 
 
 def window_horizon(operator: str, part: Condition, window: Window, holds: bool = True) -> float:
-    """Return the horizon of `always` or `eventually`: the whole window, or its first moment."""
+    """Return the horizon in s of `always` or `eventually`: the whole window, or its first moment."""
     begin, end = window.interval
-    whole = (operator == "always") == holds
-    return (begin if not whole or end is None else end) + decision_horizon(part, holds)
+    needs_whole_window = (operator == "always") == holds
+    return (begin if not needs_whole_window or end is None else end) + decision_horizon(part, holds)
 
 
 def until_horizon(release: Condition, window: Window) -> float:
-    """Return the horizon of a release in a window: its first moment."""
+    """Return the horizon in s of a release in a window: its first moment."""
     return window.interval[0] + decision_horizon(release)

@@ -1,4 +1,4 @@
-"""Base of the temporal criteria: from a condition over signals to a verdict, its margin and the deciding moment."""
+"""Base class of the temporal criteria: verdict, margin, and decisive moment of a condition on signals."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class TemporalCriterion(Criterion):
-    """A criterion made of comparisons of named signals."""
+    """A criterion that combines comparisons of named signals."""
 
     @abstractmethod
     def compared(self) -> list[Condition]:
@@ -52,13 +52,13 @@ class TemporalCriterion(Criterion):
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """What a log must hold: the evidence of every signal that is compared."""
+        """Evidence in the log that the criterion needs: that of all compared signals."""
         compared = self.compared()
         objects = {Evidence.OBJECTS} if any(one.object is not None for one in compared) else set()
         return frozenset(objects).union(*(signal_evidence(one.signal) for one in compared if one.signal is not None))
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return the verdict at the first sample, with the moment that decides it."""
+        """Return the finding for the condition at the first sample, with the decisive moment."""
         formula = self.formula()
         try:
             result = self.evaluate(EvaluationContext(trace, case, has_ended(trace)))
@@ -66,23 +66,23 @@ class TemporalCriterion(Criterion):
             return [undecided("", str(missing), formula)]
         low, high = float(result.low[0]), float(result.high[0])
         if low > 0:
-            return [self._decided(trace, result, "low", low)]
+            return [self._decisive_finding(trace, result, "low", low)]
         if high < 0:
-            return [self._decided(trace, result, "high", high)]
+            return [self._decisive_finding(trace, result, "high", high)]
         untested = next(result.untested(), None)
         if untested is not None:
-            return [_untested(untested, formula, optional=untested is result)]
+            return [_untested_finding(untested, formula, optional=untested is result)]
         ended = f"the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
         return [undecided("", f"{ended} before `{formula}` was decided", formula)]
 
-    def _decided(self, trace: Trace, result: Robustness, bound: Bound, value: float) -> Finding:
+    def _decisive_finding(self, trace: Trace, result: Robustness, bound: Bound, value: float) -> Finding:
         witness = result.witness(0, bound)
         tick = int(trace.truth.ticks[witness.sample])
         signal, unit, margin = witness.comparison.definition, _margin_unit(self.compared()), None
         if unit is None or math.isinf(value):
             unit = signal.unit
         else:
-            margin = 0.0 if value == TIE_MARGIN else value  # a tie that does not hold keeps its negative sign
+            margin = 0.0 if value == TIE_MARGIN else value  # a violated tie keeps its negative sign
         return Finding(
             status=Status.PASS if bound == "low" else Status.FAIL,
             what=describe_signal(witness.comparison),
@@ -97,23 +97,23 @@ class TemporalCriterion(Criterion):
         )
 
 
-def _untested(response: ResponseRobustness, formula: str, optional: bool) -> Finding:
-    """Return the finding of a condition that passes only because a premise never held."""
+def _untested_finding(response: ResponseRobustness, formula: str, optional: bool) -> Finding:
+    """Return the inconclusive finding of a condition whose premise was never true."""
     premise = describe(response.condition)
     if response.may_have_held:
-        because = f"the run ended before it was known whether `{premise}` held, so nothing was tested"
+        because = f"the run ended before it was known whether `{premise}` was true, so nothing was tested"
     else:
-        because = f"`{premise}` never held, so nothing was tested"
+        because = f"`{premise}` was never true, so nothing was tested"
     return undecided("", because, formula, ["`required: false` lets such a run pass"] if optional else [])
 
 
 def _detail(trace: Trace, formula: str, witness: Witness) -> tuple[str, ...]:
     times = [(what, trace.seconds(int(trace.truth.ticks[sample]))) for what, sample in witness.notes]
-    return (f"asked: {formula}", *(f"{what} at t = {seconds:.2f} s" for what, seconds in times))
+    return (f"condition: {formula}", *(f"{what} at t = {seconds:.2f} s" for what, seconds in times))
 
 
 def _margin_unit(compared: list[Condition]) -> str | None:
-    """Return the unit of the margin: the signals' own, "" for scales, None if signals differ in their units."""
+    """Return the common unit of the signals, "" if all have scales, or None if their units differ."""
     measured = [one for one in compared if not one.definition.is_boolean]
     if measured and all(one.scale is not None for one in measured):
         return ""
@@ -126,7 +126,7 @@ _OPPOSITE: dict[Op, Op] = {">=": "<", ">": "<=", "<=": ">", "<": ">="}
 
 
 def describe(condition: Condition) -> str:
-    """Return all of it, e.g. "whenever localization_error > 0.5 m, then eventually within 5 s speed < 1 m/s"."""
+    """Return all of it in words: "whenever localization_error > 0.5 m, then eventually within 5 s speed < 1 m/s"."""
     if condition.signal is not None:
         return f"{describe_signal(condition)} {_bound(condition)}".rstrip()
     if condition.all is not None:
@@ -176,7 +176,7 @@ def describe_signal(condition: Condition) -> str:
 
 
 def describe_value(witness: Witness) -> str:
-    """Return the deciding value with its unit."""
+    """Return the decisive value with its unit."""
     comparison = witness.comparison
     signal = comparison.definition
     if signal.is_boolean:
@@ -188,7 +188,7 @@ def describe_value(witness: Witness) -> str:
 
 
 def describe_limit(witness: Witness) -> str:
-    """Return the bound that the deciding value had to keep."""
+    """Return the bound of the decisive value."""
     comparison = witness.comparison
     signal = comparison.definition
     if signal.is_boolean:

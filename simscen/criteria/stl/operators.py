@@ -1,11 +1,11 @@
 """Temporal operators on robustness values, sampled at any times: how well a condition holds over a window.
 
-The semantics is the quantitative one of Donzé and Maler 2010, over samples: `always` is the least and `eventually` the
-greatest value of the samples in the window, `until` the best of its releases. Where rtamt passes vacuously beyond the
-end of a trace, each operator is evaluated twice, with the worst and with the best continuation of the trace (Deshmukh
-et al. 2017, robust online monitoring). The truth lies between the two; while their signs differ, nothing is decided.
+The semantics is the quantitative one of Donzé and Maler 2010, over samples: `always` is the smallest and `eventually`
+the largest value of the samples in the window, `until` the best of its releases. Unlike rtamt, which passes vacuously
+beyond the end of a trace, each operator is evaluated twice, with the worst and with the best continuation of the trace
+(Deshmukh et al. 2017, robust online monitoring). The true value is between both; with different signs, it is undecided.
 
-Samples need not be evenly spaced. A window without a sample takes the newest sample before its end (sample and hold).
+Samples need not be evenly spaced. A window without a sample uses the newest sample before its end (sample and hold).
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 
 class Continuation(NamedTuple):
-    """Assumption about what follows the last sample.
+    """Assumption about the time after the last sample.
 
-    `beyond` is the value assumed there: the worst or the best. `over` says that the run ended there: then a window
-    without an end closes at the last sample. In a truncated log it does not.
+    `beyond` is the value assumed there: the worst or the best. `over` tells that the run ended there, so that a window
+    without an end closes at the last sample; in a truncated log it does not.
     """
 
     beyond: float
@@ -42,7 +42,7 @@ class Continuation(NamedTuple):
 class SampleWindow:
     """Window of each sample as an inclusive range of sample indices.
 
-    `first` is the number of samples where the window begins after the last one. `exceeds` is True where the window
+    `first` is the number of samples if the window begins after the last one. `exceeds` is True where the window
     reaches beyond the last sample. `unbounded` windows last to the end of the run.
     """
 
@@ -61,50 +61,51 @@ class SampleWindow:
         last = np.searchsorted(ticks, ticks + end, side="right") - 1
         # The next sample would come one period after the last one.
         exceeds = ticks + end >= ticks[-1:] + period
-        held = (last < first) & (first < count)
-        return cls(np.where(held, last, first), last, exceeds, False)
+        is_held = (last < first) & (first < count)
+        return cls(np.where(is_held, last, first), last, exceeds, False)
 
 
 def always(values: Array, window: SampleWindow, ahead: Continuation) -> Array:
-    """Return the least value in the window of each sample."""
+    """Return the smallest value in the window of each sample."""
     return -eventually(-values, window, Continuation(-ahead.beyond, ahead.over))
 
 
 def eventually(values: Array, window: SampleWindow, ahead: Continuation) -> Array:
-    """Return the greatest value in the window of each sample."""
-    greatest = _range_maximum(values, window.first, window.last)
+    """Return the largest value in the window of each sample."""
+    largest = _range_maximum(values, window.first, window.last)
     open_end = window.exceeds | (window.unbounded and not ahead.over) | (window.first >= len(values))
-    values_in_window: Array = np.where(open_end, np.maximum(greatest, ahead.beyond), greatest)
+    values_in_window: Array = np.where(open_end, np.maximum(largest, ahead.beyond), largest)
     return values_in_window
 
 
 def until(hold: Array, release: Array, window: SampleWindow, ahead: Continuation) -> Array:
-    """Return how well `hold` holds from each sample on until `release` does, in its window.
+    """Return the robustness of `hold` until `release` in the window of each sample.
 
-    By an identity that needs no search over pairs of samples: `release` holds somewhere in the window, `hold` holds up
-    to the window, and from there on `hold` holds until `release` does, even if that is after the window.
+    It is the minimum of three terms, which avoids a search over pairs of samples: `release` is true somewhere in the
+    window; `hold` is true up to the window; and from there on, `hold` is true until `release` is, perhaps after the
+    window.
     """
     count = len(hold)
-    follows = np.append(_unbounded_until(hold, release, window, ahead), ahead.beyond)
+    from_window = np.append(_unbounded_until(hold, release, window, ahead), ahead.beyond)
     before = -_range_maximum(-hold, np.arange(count), np.minimum(window.first, count) - 1)
-    robustness: Array = np.minimum(follows[np.minimum(window.first, count)], before)
+    robustness: Array = np.minimum(from_window[np.minimum(window.first, count)], before)
     return robustness if window.unbounded else np.minimum(robustness, eventually(release, window, ahead))
 
 
 def _unbounded_until(hold: Array, release: Array, window: SampleWindow, ahead: Continuation) -> Array:
-    """From the last sample backwards: released now, or held now and released later."""
+    """Return the robustness without a window, computed backwards: released now, or held now and released later."""
     later = -math.inf if window.unbounded and ahead.over else ahead.beyond
-    answers = []
+    results = []
     for holds, releases in np.column_stack((hold, release))[::-1].tolist():
         later = max(releases, min(holds, later))
-        answers.append(later)
-    return np.array(answers[::-1])
+        results.append(later)
+    return np.array(results[::-1])
 
 
 def _range_maximum(values: Array, first: Indices, last: Indices) -> Array:
-    """Return the greatest of values[first[k]] … values[last[k]] for each k; -inf for an empty range.
+    """Return the maximum of values[first[k]] … values[last[k]] for each k; -inf for an empty range.
 
-    By a sparse table: level j holds the greatest of 2^j values from each index on, and two overlapping ranges of that
+    Uses a sparse table: level j has the maximum of 2^j values from each index on, and two overlapping ranges of that
     length cover any other range.
     """
     widths = last - first + 1
@@ -112,9 +113,9 @@ def _range_maximum(values: Array, first: Indices, last: Indices) -> Array:
     level, table = 0, np.asarray(values, dtype=np.float64)
     while True:
         length = 1 << level
-        fits = (widths >= length) & (widths < 2 * length)
-        if fits.any():
-            found[fits] = np.maximum(table[first[fits]], table[last[fits] - length + 1])
+        is_level = (widths >= length) & (widths < 2 * length)
+        if is_level.any():
+            found[is_level] = np.maximum(table[first[is_level]], table[last[is_level] - length + 1])
         if not (widths >= 2 * length).any():
             return found
         table = np.maximum(table[:-length], table[length:])

@@ -1,8 +1,8 @@
-"""Robustness of a condition on a run: how well it holds at each sample, and which moment decides that.
+"""Robustness of a condition on a run at each sample, and the moment that is decisive for it.
 
-The robustness of a comparison is the distance of its signal to the bound, positive where the comparison holds. Where
-signal and bound are equal, it is the smallest number with the right sign, so that `>=` and `>` differ and the sign
-alone is the verdict. A yes-or-no signal is infinitely far from its bound: it decides, and leaves the margin to others.
+The robustness of a comparison is the distance of its signal from the bound, positive if the comparison is true. If
+signal and bound are equal, it is the smallest number with the correct sign, so that `>=` and `>` differ and the sign
+alone is the verdict. A yes-or-no signal has an infinite robustness, so that other signals determine the margin.
 """
 
 from __future__ import annotations
@@ -31,16 +31,17 @@ if TYPE_CHECKING:
 TIE_MARGIN = sys.float_info.min
 """Robustness of a signal that equals its bound, with the sign of the verdict."""
 
-BROKEN, DUE = "what had to hold until then was broken", "the answer was due"
+HOLD_VIOLATED, RESPONSE_DUE = "`hold` was false", "the response was due"
+"""Notes of a witness."""
 
 Bound = Literal["low", "high"]
 
 
 @dataclass(frozen=True)
 class Witness:
-    """The comparison that decides, the sample at which it does, and the signal there; `negated` below a `not`.
+    """The decisive comparison, its decisive sample, and the value of the signal there; `negated` below a `not`.
 
-    `notes` name other samples that explain the verdict.
+    `notes` are other samples that explain the verdict, each with a text.
     """
 
     comparison: Condition
@@ -56,10 +57,9 @@ class Witness:
 
 @dataclass(frozen=True, eq=False)
 class Robustness:
-    """Interval of the robustness at each sample, over all ways in which the run could have gone on.
+    """Interval of the robustness at each sample, over all possible continuations of the run.
 
-    `low` assumes that what is not known is as bad as can be, `high` as good as can be. The verdict is known where both
-    have the same sign.
+    `low` assumes the worst for everything unknown, `high` the best. The verdict is known if both have the same sign.
     """
 
     low: Array
@@ -70,7 +70,7 @@ class Robustness:
         return self.low if bound == "low" else self.high
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return what decides the value at a sample where it is known."""
+        """Return the witness that decides the value at a sample where the verdict is known."""
         raise NotImplementedError
 
     def parts(self) -> Sequence[Robustness]:
@@ -78,7 +78,7 @@ class Robustness:
         return ()
 
     def untested(self) -> Iterator[ResponseRobustness]:
-        """Yield each `whenever` in it whose premise never held."""
+        """Yield each `whenever` in it whose premise was never true."""
         for part in self.parts():
             yield from part.untested()
 
@@ -138,7 +138,7 @@ class _UntilRobustness(Robustness):
     window: SampleWindow
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the best release, or what breaks the hold before it."""
+        """Return the witness of the best release, or that of `hold` before it if it is worse."""
         end = int(self.window.last[sample]) + 1
         first = int(self.window.first[sample]) - sample
         hold, release = self.hold.bound(bound)[sample:end], self.release.bound(bound)[sample:end]
@@ -146,15 +146,15 @@ class _UntilRobustness(Robustness):
         best = np.minimum(before, release)
         value = float(self.bound(bound)[sample])
         at = first + int(np.argmax(best[first:])) if first < len(best) else len(best)
-        if at < len(best) and best[at] != value:  # a release after the run would be better, but `hold` was broken
+        if at < len(best) and best[at] != value:  # a release after the run would be better, but `hold` was false before
             at = len(best)
         if at < len(best) and release[at] <= before[at]:
             decides = self.release.witness(sample + at, bound)
         else:
             decides = self.hold.witness(sample + int(np.argmin(hold[:at])), bound)
-        broken = np.flatnonzero(np.signbit(hold))
-        violated = np.signbit(value) and len(broken)
-        return decides.with_note(BROKEN, sample + int(broken[0])) if violated else decides
+        false_samples = np.flatnonzero(np.signbit(hold))
+        is_violated = np.signbit(value) and len(false_samples)
+        return decides.with_note(HOLD_VIOLATED, sample + int(false_samples[0])) if is_violated else decides
 
     def parts(self) -> Sequence[Robustness]:
         return (self.hold, self.release)
@@ -162,10 +162,10 @@ class _UntilRobustness(Robustness):
 
 @dataclass(frozen=True, eq=False)
 class ResponseRobustness(Robustness):
-    """Robustness of `whenever … then`: always, the premise does not hold or the answer does.
+    """Robustness of `whenever … then`: always, the premise is false or the response is true.
 
-    `reach` is the slice of samples at which the premise counts. A response whose premise never surely held there has
-    tested nothing: it does not pass, unless `required` is False.
+    `reach` is the slice of samples at which the premise counts. If the premise was never certainly true there, nothing
+    was tested: it does not pass, unless `required` is False.
     """
 
     premise: Robustness
@@ -178,25 +178,25 @@ class ResponseRobustness(Robustness):
 
     @property
     def tested(self) -> bool:
-        """True if the premise surely held at some sample."""
+        """True if the premise was certainly true at some sample."""
         return bool((self.premise.low[self.reach] > 0).any())
 
     @property
     def may_have_held(self) -> bool:
-        """True if the premise may have held at some sample, depending on how the run would have gone on."""
+        """True if the premise may have been true at some sample, depending on the continuation of the run."""
         return bool((self.premise.high[self.reach] > 0).any())
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return what decides the worst answer, and when it was due."""
+        """Return the witness of the worst response, with a note when it was due."""
         at = _first_equal(self.implied.bound(bound), self.bound(bound)[sample], sample, self.window)
-        return self.implied.witness(at, bound).with_note(DUE, at)
+        return self.implied.witness(at, bound).with_note(RESPONSE_DUE, at)
 
     def parts(self) -> Sequence[Robustness]:
-        """Return premise and answer."""
+        """Return premise and response."""
         return (self.premise, self.answer)
 
     def untested(self) -> Iterator[ResponseRobustness]:
-        """Yield itself and each nested `whenever` whose premise never surely held."""
+        """Yield itself and each nested `whenever` whose premise was never certainly true."""
         if self.required and not self.tested:
             yield self
         yield from super().untested()
@@ -204,9 +204,9 @@ class ResponseRobustness(Robustness):
 
 @dataclass(frozen=True, eq=False)
 class EvaluationContext:
-    """A run on which conditions are evaluated: at each sample of the truth, whenever that was.
+    """A run on which conditions are evaluated, at each sample of the truth.
 
-    `over` says that the run came to its end; a truncated log did not.
+    `over` tells that the run was completed, unlike a truncated log.
     """
 
     trace: Trace
@@ -227,7 +227,9 @@ class EvaluationContext:
             first_sample, last_sample = -(-round(start * rate) // self.period), last // self.period
             if last_sample < max(first_sample, 1):
                 spacing = self.trace.seconds(self.period)
-                raise InvalidTrace(f"the window up to {end:g} s ahead holds no sample: they are {spacing:g} s apart")
+                raise InvalidTrace(
+                    f"the window up to {end:g} s ahead contains no sample: samples are {spacing:g} s apart"
+                )
         return SampleWindow.over(self.trace.truth.ticks, self.period, round(start * rate), last)
 
     @cached_property
@@ -239,7 +241,7 @@ class EvaluationContext:
 def robustness(condition: Condition, context: EvaluationContext, begin: int = 0) -> Robustness:
     """Return the robustness of a condition at each sample.
 
-    `begin` is the first sample at which it counts. Raises SignalUnavailable or InvalidTrace for its signals.
+    `begin` is the first sample at which it counts. Raises SignalUnavailable or InvalidTrace if a signal is unusable.
     """
     if condition.signal is not None:
         return _compare(condition, context)
@@ -294,19 +296,20 @@ def response_robustness(
     begin: int = 0,
     required: bool = True,
 ) -> ResponseRobustness:
-    """Return the robustness of: whenever `premise` holds in the window, `answer` does.
+    """Return the robustness of: whenever `premise` is true in the window, `answer` is.
 
-    If the premise never surely holds although it is `required` to, `low` is -inf: then nothing was tested.
+    If the premise is `required` but never certainly true, `low` is -inf, because nothing was tested.
     """
     samples = context.rest_of_run if window is None else context.window(window)
     start = _start(samples, begin)
-    held, answered = robustness(premise, context, start), robustness(answer, context, start)
-    implied = _combine([_NegationRobustness(-held.high, -held.low, held), answered], "any")
+    premise_part, answer_part = robustness(premise, context, start), robustness(answer, context, start)
+    negated = _NegationRobustness(-premise_part.high, -premise_part.low, premise_part)
+    implied = _combine([negated, answer_part], "any")
     always = _windowed("always", implied, samples, context)
     # A nested response is evaluated at every later sample as well; one at the start of the run only there.
     end = None if window is None or samples.unbounded or not len(samples.last) else int(samples.last[begin]) + 1
     found = ResponseRobustness(
-        always.low, always.high, held, answered, implied, samples, premise, slice(start, end), required
+        always.low, always.high, premise_part, answer_part, implied, samples, premise, slice(start, end), required
     )
     return replace(found, low=np.full_like(found.low, -math.inf)) if required and not found.tested else found
 
@@ -314,8 +317,8 @@ def response_robustness(
 def _windowed(
     operator: Literal["always", "eventually"], part: Robustness, window: SampleWindow, context: EvaluationContext
 ) -> Robustness:
-    over = operators.always if operator == "always" else operators.eventually
-    low, high = (over(part.bound(bound), window, ahead) for bound, ahead in _continuations(context))
+    evaluate = operators.always if operator == "always" else operators.eventually
+    low, high = (evaluate(part.bound(bound), window, ahead) for bound, ahead in _continuations(context))
     return _WindowRobustness(low, high, part, window)
 
 
@@ -329,8 +332,8 @@ def _continuations(context: EvaluationContext) -> list[tuple[Bound, Continuation
 
 
 def _combine(parts: Sequence[Robustness], how: Literal["all", "any"]) -> Robustness:
-    pick = np.minimum if how == "all" else np.maximum
-    low, high = reduce(pick, [part.low for part in parts]), reduce(pick, [part.high for part in parts])
+    extremum = np.minimum if how == "all" else np.maximum
+    low, high = reduce(extremum, [part.low for part in parts]), reduce(extremum, [part.high for part in parts])
     return _BooleanRobustness(low, high, parts)
 
 
@@ -347,13 +350,13 @@ def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
     distances = _distances(condition, values)
     if condition.signal != "clearance":
         return _ComparisonRobustness(distances, distances, condition, values)
-    # Clearance was searched only to a range; beyond it, the true distance may be anything larger.
+    # Clearance is measured up to a maximum range; beyond it, the true distance may have any larger value.
     farther = _distances(condition, np.where(values >= context.case.clearance_range, math.inf, values))
     return _ComparisonRobustness(np.minimum(distances, farther), np.maximum(distances, farther), condition, values)
 
 
 def _distances(condition: Condition, values: Array) -> Array:
-    """Return the distances to the bound, divided by `scale` if given; positive where the comparison holds."""
+    """Return the distances to the bound, divided by `scale` if given; positive if the comparison is true."""
     assert condition.value is not None
     above = condition.op in (">=", ">")
     distances = (values - condition.value if above else condition.value - values) / (condition.scale or 1.0)
@@ -362,7 +365,7 @@ def _distances(condition: Condition, values: Array) -> Array:
     return signed
 
 
-def _first_equal(values: Array, wanted: float, sample: int, window: SampleWindow) -> int:
-    """Return the first sample of the window of `sample` with a value that occurs in it."""
+def _first_equal(values: Array, value: float, sample: int, window: SampleWindow) -> int:
+    """Return the first sample in the window of `sample` at which `values` has the given value."""
     begin = int(window.first[sample])
-    return begin + int(np.argmax(values[begin:] == wanted))
+    return begin + int(np.argmax(values[begin:] == value))

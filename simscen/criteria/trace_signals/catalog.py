@@ -1,4 +1,4 @@
-"""Catalog of the named signals, which temporal criteria compare and `simscen explain signals` lists."""
+"""Catalog of the named signals that temporal criteria compare and `simscen explain signals` lists."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class Signal:
     """Definition of a quantity that has a value at each sample of the truth.
 
     `dimension` is one of spec.quantities.UNITS, "number", or "yes or no". `read` returns the values of a run.
-    `evidence` is what a log must hold besides the truth, which is the clock. Values lie between `minimum` and
-    `maximum`, both possible. Exactly one of `required_arguments` must be given; `optional_arguments` may be.
+    `evidence` is what a log must contain besides the truth, which is the clock. Values lie between `minimum` and
+    `maximum`, inclusive. Exactly one of `required_arguments` must be given; `optional_arguments` may be.
     """
 
     text: str
@@ -149,8 +149,8 @@ SIGNALS: dict[SignalName, Signal] = {
         {Evidence.ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT},
     ),
     "localization_error": Signal(
-        "Distance between the newest believed position and the true one of the same time; once the belief is "
-        "over 1 s old, the true one of now. Not aligned.",
+        "Distance between the newest believed position and the true one of the same time; the current "
+        "true position if the belief is over 1 s old. Not aligned.",
         "length",
         readers.localization_error,
         {Evidence.ALIGNMENT, Evidence.BELIEF},
@@ -189,11 +189,18 @@ SIGNALS: dict[SignalName, Signal] = {
         readers.command_turn_rate,
         {Evidence.COMMANDS},
     ),
-    "collision_count": Signal("Contacts begun so far.", NUMBER, readers.collision_count, {Evidence.CONTACTS}),
-    "replan_count": Signal(
-        "Plans made so far for another reason than a new goal.", NUMBER, readers.replan_count, {Evidence.PLANNING}
+    "collision_count": Signal(
+        "Number of contacts that have begun so far.", NUMBER, readers.collision_count, {Evidence.CONTACTS}
     ),
-    "recovery_count": Signal("Recoveries begun so far.", NUMBER, readers.recovery_count, {Evidence.RECOVERIES}),
+    "replan_count": Signal(
+        "Number of plans made so far for another reason than a new goal.",
+        NUMBER,
+        readers.replan_count,
+        {Evidence.PLANNING},
+    ),
+    "recovery_count": Signal(
+        "Number of recoveries that have started so far.", NUMBER, readers.recovery_count, {Evidence.RECOVERIES}
+    ),
     "localized": Signal(
         f"The newest belief is at most {BELIEF_TIMEOUT_S:g} s old and its position_std at most "
         f"{readers.LOCALIZED_STD_M:g} m.",
@@ -263,13 +270,13 @@ SIGNALS: dict[SignalName, Signal] = {
 
 
 def signal_evidence(name: SignalName) -> frozenset[Evidence]:
-    """Return what a log must hold for a signal to be known; the truth is the clock of every signal."""
+    """Return the evidence that a log must contain for a signal; the truth is the clock of every signal."""
     return frozenset({*SIGNALS[name].evidence, Evidence.TRUTH})
 
 
 def read_signal(name: SignalName, trace: Trace, case: Case, arguments: SignalArguments) -> Array:
     """Return a signal at each sample of the truth.
 
-    Raises SignalUnavailable if the trace does not hold what it is made of, InvalidTrace if that is not finite.
+    Raises SignalUnavailable if the trace lacks the data, and InvalidTrace if the data are not finite.
     """
     return SIGNALS[name].read(SignalQuery(trace, case, arguments))

@@ -1,4 +1,4 @@
-"""Signals of distances between the robot and objects, goals, pedestrians and its plan."""
+"""Signals of distances between the robot and objects, goals, pedestrians, and its plan."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def distance_to(query: SignalQuery) -> Array:
     if isinstance(point, Sequence):
         return np.hypot(poses[:, 0] - float(point[0]), poses[:, 1] - float(point[1]))
     if goal is None:
-        return _to_object(query.trace, str(query.arguments["object"]), poses)
+        return _distance_to_object(query.trace, str(query.arguments["object"]), poses)
     goals = {known.name: known.pose for known in query.case.every_goal}
     if goal not in goals:
         raise SignalUnavailable(f"the scenario has no goal `{goal}`")
@@ -37,28 +37,28 @@ def distance_to(query: SignalQuery) -> Array:
     return np.hypot(poses[:, 0] - pose.x, poses[:, 1] - pose.y)
 
 
-def _to_object(trace: Trace, name: str, poses: Array) -> Array:
+def _distance_to_object(trace: Trace, name: str, poses: Array) -> Array:
     """Return the distance to an object; infinite while the object does not exist."""
-    where = object_positions(trace, name)
-    distance = np.hypot(poses[:, 0] - where[:, 0], poses[:, 1] - where[:, 1])
-    apart: Array = np.where(is_present(trace, name), distance, np.inf)
-    return apart
+    positions = object_positions(trace, name)
+    distance = np.hypot(poses[:, 0] - positions[:, 0], poses[:, 1] - positions[:, 1])
+    present_distance: Array = np.where(is_present(trace, name), distance, np.inf)
+    return present_distance
 
 
 def object_positions(trace: Trace, name: str) -> Array:
     """Return the positions of an object at each truth sample (n, 2 or 3), or its constant position (1, 2)."""
     if name in trace.objects:
         return check_samples(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
-    return _standing(trace, name)
+    return _static_position(trace, name)
 
 
-def _standing(trace: Trace, name: str) -> Array:
+def _static_position(trace: Trace, name: str) -> Array:
     """Return the position (1, 2) of an object that never moved."""
     for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
         x, y = event.data.get("x"), event.data.get("y")
         if event.name == name and isinstance(x, int | float) and isinstance(y, int | float):
             return np.array([[x, y]], dtype=np.float64)
-    raise SignalUnavailable(f"`{name}` never was there, or does not move")
+    raise SignalUnavailable(f"`{name}` never existed, or does not move")
 
 
 def is_present(trace: Trace, name: str) -> Array:
@@ -81,26 +81,26 @@ def distance_remaining(query: SignalQuery) -> Array:
     if not len(belief):
         raise SignalUnavailable("no belief was recorded")
     believed = belief.at(clock)[:, :2]
-    left = goal_distance(query)
+    remaining = goal_distance(query)
     for first, last, points in _plans(query.trace, clock):
-        left[first:last] = _along(believed[first:last], points)[1]
-    return left
+        remaining[first:last] = _project_on_path(believed[first:last], points)[1]
+    return remaining
 
 
 def plan_deviation(query: SignalQuery) -> Array:
     """Return the distance from the true position to the newest plan; 0 before the first plan."""
     poses = poses_of(query.trace)
-    off = np.zeros(len(poses))
+    deviation = np.zeros(len(poses))
     plans = _plans(query.trace, query.trace.truth.ticks)
     if not plans:
         raise SignalUnavailable("no plan was recorded")
     for first, last, points in plans:
-        off[first:last] = _along(poses[first:last, :2], points)[0]
-    return off
+        deviation[first:last] = _project_on_path(poses[first:last, :2], points)[0]
+    return deviation
 
 
 def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
-    """Yield first sample, sample after the last, and points of each plan that was followed for at least one sample."""
+    """Return first sample, sample after the last, and points of each plan that was current for at least one sample."""
     plans = [plan for plan in trace.plans if len(plan.points)]
     begins: list[int] = np.searchsorted(clock, [plan.tick for plan in plans]).tolist()
     ends = [*begins, len(clock)][1:]
@@ -108,18 +108,18 @@ def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
     return [(begins[k], ends[k], plans[k].points[:, :2]) for k in followed]
 
 
-def _along(points: Array, way: Array) -> tuple[Array, Array]:
+def _project_on_path(points: Array, path: Array) -> tuple[Array, Array]:
     """Return, for points (n, 2), the distances to a path (m, 2), and the remaining length of the path."""
-    if len(way) == 1:
-        way = np.vstack((way, way))
-    steps = np.diff(way, axis=0)
+    if len(path) == 1:
+        path = np.vstack((path, path))
+    steps = np.diff(path, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
-    nearest = _nearest_step(points, way[:-1], steps)
-    apart, step = points - way[nearest], steps[nearest]
-    share = np.clip((apart * step).sum(axis=1) / np.maximum(lengths[nearest] ** 2, _TINY), 0.0, 1.0)
-    off = np.hypot(*(apart - share[:, np.newaxis] * step).T)
+    nearest = _nearest_step(points, path[:-1], steps)
+    offsets, step = points - path[nearest], steps[nearest]
+    share = np.clip((offsets * step).sum(axis=1) / np.maximum(lengths[nearest] ** 2, _TINY), 0.0, 1.0)
+    distances = np.hypot(*(offsets - share[:, np.newaxis] * step).T)
     after = np.concatenate((np.cumsum(lengths[::-1])[::-1][1:], [0.0]))
-    return off, after[nearest] + (1.0 - share) * lengths[nearest]
+    return distances, after[nearest] + (1.0 - share) * lengths[nearest]
 
 
 def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
@@ -127,14 +127,14 @@ def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
     along = points @ steps.T - (begins * steps).sum(axis=1)
     squared = np.maximum((steps**2).sum(axis=1), _TINY)
     share = np.clip(along / squared, 0.0, 1.0)
-    beside = (begins**2).sum(axis=1) - 2.0 * (points @ begins.T)  # and |point|^2, the same for all steps
-    nearest: Array = (beside + share * (share * squared - 2.0 * along)).argmin(axis=1)
+    squared_offset = (begins**2).sum(axis=1) - 2.0 * (points @ begins.T)  # and |point|^2, the same for all steps
+    nearest: Array = (squared_offset + share * (share * squared - 2.0 * along)).argmin(axis=1)
     return nearest
 
 
 POINT = ((0.0, 0.0),)
 INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6
-"""Gap in m below which the robot is in the intimate space of a person (Hall 1966; as in HuNavSim)."""
+"""Gaps in m below which the robot is in the intimate, personal, or social space of a person (Hall 1966, HuNavSim)."""
 
 
 def pedestrian_radii(trace: Trace) -> dict[str, float]:
@@ -152,14 +152,14 @@ def pedestrian_gap(trace: Trace, case: Case) -> Array:
 
     The inscribed circle replaces a missing footprint. Raises SignalUnavailable for a run without any pedestrian.
     """
-    everybody = pedestrian_radii(trace)
-    if not everybody:
+    radii = pedestrian_radii(trace)
+    if not radii:
         raise SignalUnavailable("there were no people")
     poses = poses_of(trace)
     nearest = np.full(len(poses), np.inf)
-    for name, radius in sorted(everybody.items()):
-        places = np.broadcast_to(object_positions(trace, name)[:, :2], (len(poses), 2))
-        gap = _gap(poses, places, case) - radius
+    for name, radius in sorted(radii.items()):
+        positions = np.broadcast_to(object_positions(trace, name)[:, :2], (len(poses), 2))
+        gap = _footprint_distance(poses, positions, case) - radius
         nearest = np.minimum(nearest, np.where(is_present(trace, name), np.maximum(gap, 0.0), np.inf))
     return nearest
 
@@ -169,12 +169,12 @@ def person_distance(query: SignalQuery) -> Array:
     return pedestrian_gap(query.trace, query.case)
 
 
-def _gap(poses: Array, places: Array, case: Case) -> Array:
+def _footprint_distance(poses: Array, points: Array, case: Case) -> Array:
     """Return the distances from the footprint of a robot at `poses` (n, 3) to points (n, 2)."""
-    off = places - poses[:, :2]
+    offsets = points - poses[:, :2]
     if len(case.footprint) < 3:
-        circle: Array = np.hypot(off[:, 0], off[:, 1]) - case.inscribed_radius
+        circle: Array = np.hypot(offsets[:, 0], offsets[:, 1]) - case.inscribed_radius
         return circle
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    seen = np.stack((c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], np.zeros_like(c)), axis=1)
-    return separation(seen, POINT, case.footprint)
+    x, y = c * offsets[:, 0] + s * offsets[:, 1], c * offsets[:, 1] - s * offsets[:, 0]  # in the robot frame
+    return separation(np.stack((x, y, np.zeros_like(c)), axis=1), POINT, case.footprint)

@@ -1,4 +1,4 @@
-"""Signals of the true motion. All are checked to be finite, because comparisons with nan would hide failures."""
+"""Signals of the true motion, checked to be finite, because comparisons with nan would hide failures."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def true_pose(trace: Trace, tick: int) -> Pose2:
     """Return the true pose at `tick`. Raises MissingEvidence for a trace without the truth."""
     poses = truth(trace)
     if not len(poses):
-        raise MissingEvidence("the robot's true way was not recorded")
+        raise MissingEvidence("the robot's true path was not recorded")
     return Pose2(*poses.at(np.array([tick]))[0].tolist())
 
 
@@ -60,9 +60,9 @@ def clearance(trace: Trace) -> Samples:
 
 
 def check_finite(trace: Trace) -> None:
-    """Raise InvalidTrace for a signal that has to be finite and is not, whatever a criterion looks at.
+    """Raise InvalidTrace if a signal is not finite, whether a criterion uses it or not.
 
-    Odometry may be anything: it is a reading, and what a fault makes of readings is no defect of the run.
+    Odometry is not checked: it is a reading, which a fault may have corrupted.
     """
     truth(trace), speed(trace), clearance(trace)
     check_samples(trace.belief, "the belief", trace)
@@ -102,32 +102,32 @@ class Drive:
 
 
 def drive(trace: Trace) -> Drive:
-    """Return the driven path in the plane, in moves of at least SMALLEST_MOVE, without teleportation.
+    """Return the driven path in the plane, in moves of at least MIN_MOVE_M, without teleportation.
 
     Yaw is not part of the distance, unlike in Arena's get_metrics.py, which adds radians to meters.
     """
-    poses, carried = truth(trace), set(teleport_samples(trace))
-    kept, lengths = [0], [0.0]
+    poses, teleported = truth(trace), set(teleport_samples(trace))
+    indices, lengths = [0], [0.0]
     points = poses.values[:, :2].tolist()
     if not points:
         return Drive(np.empty(0, dtype=np.int64), np.empty(0))
     last = points[0]
     for k, point in enumerate(points[1:], start=1):
         step = math.dist(point, last)
-        if k in carried:
+        if k in teleported:
             step = 0.0
         elif step < MIN_MOVE_M:
             continue
-        kept.append(k)
+        indices.append(k)
         lengths.append(step)
         last = point
-    return Drive(poses.ticks[kept], np.cumsum(lengths))
+    return Drive(poses.ticks[indices], np.cumsum(lengths))
 
 
 def teleport_samples(trace: Trace, ticks: Ticks | None = None) -> list[int]:
-    """Return the indices of the samples before which the robot was set down elsewhere.
+    """Return the indices of the first samples after the robot was placed elsewhere.
 
-    Such a step is neither driving nor braking. `ticks` are the samples' ticks; by default those of the truth.
+    The step before such a sample is no motion. `ticks` are the samples' ticks; by default those of the truth.
     """
     placed = sorted({event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)})
     samples: list[int] = np.searchsorted(trace.truth.ticks if ticks is None else ticks, placed, side="right").tolist()
@@ -137,7 +137,8 @@ def teleport_samples(trace: Trace, ticks: Ticks | None = None) -> list[int]:
 def pose_error(trace: Trace) -> Samples:
     """Return the localization error (n, 2): distance in m and absolute heading error in rad.
 
-    The samples are the published beliefs, and all truth samples while the newest belief is older than STALE_AFTER.
+    The samples are the published beliefs, and all truth samples while the newest belief is older than
+    BELIEF_TIMEOUT_S.
     There is no alignment, because an offset in the map frame is an error (APE of evo without --align).
     """
     from simscen.core.records.trace import Samples
@@ -145,46 +146,45 @@ def pose_error(trace: Trace) -> Samples:
     belief, poses = check_samples(trace.belief, "the belief", trace), truth(trace)
     if not len(belief) or not len(poses):
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 2)))
-    ticks = np.union1d(belief.ticks, _stale(trace))
+    ticks = np.union1d(belief.ticks, _ticks_with_stale_belief(trace))
     believed = belief.at(ticks)
     x, y = (np.interp(ticks, poses.ticks, poses.values[:, axis]) for axis in (0, 1))
     yaw = np.interp(ticks, poses.ticks, np.unwrap(poses.values[:, 2]))
-    off = np.hypot(believed[:, 0] - x, believed[:, 1] - y)
-    return Samples(ticks, np.column_stack((off, np.abs(wrap_array(believed[:, 2] - yaw)))))
+    distances = np.hypot(believed[:, 0] - x, believed[:, 1] - y)
+    return Samples(ticks, np.column_stack((distances, np.abs(wrap_array(believed[:, 2] - yaw)))))
 
 
-def _stale(trace: Trace) -> Ticks:
-    ticks, came = trace.truth.ticks, trace.belief.ticks
-    newest = came[np.maximum(np.searchsorted(came, ticks) - 1, 0)]  # before each: where one comes, there is a sample
+def _ticks_with_stale_belief(trace: Trace) -> Ticks:
+    ticks, published = trace.truth.ticks, trace.belief.ticks
+    newest = published[np.maximum(np.searchsorted(published, ticks) - 1, 0)]  # strictly before each tick
     old: Ticks = ticks[ticks - newest > BELIEF_TIMEOUT_S * trace.tick_rate]
     return old
 
 
-def first_sustained(ticks: Ticks, true: Flags, hold: int, end: int) -> tuple[int | None, bool]:
-    """Return the first of `ticks` from which `true` lasts `hold` ticks or until `end`, and whether it lasted `hold`.
+def first_sustained(ticks: Ticks, is_true: Flags, hold: int, end: int) -> tuple[int | None, bool]:
+    """Return the first of `ticks` from which `is_true` lasts `hold` ticks or until `end`, and whether it lasted `hold`.
 
     An interval lasts until the next sample that is not true. Without such an interval, the result is (None, False).
     """
-    begins = np.flatnonzero(true & ~np.concatenate(([False], true[:-1])))
-    breaks = np.flatnonzero(~true & np.concatenate(([False], true[:-1])))
+    begins = np.flatnonzero(is_true & ~np.concatenate(([False], is_true[:-1])))
+    breaks = np.flatnonzero(~is_true & np.concatenate(([False], is_true[:-1])))
     stops = np.full(len(begins), end, dtype=np.int64)
     stops[: len(breaks)] = ticks[breaks]
     lasting = stops - ticks[begins] >= hold
     if lasting.any():
         return int(ticks[begins[int(np.argmax(lasting))]]), True
-    return (int(ticks[begins[-1]]), False) if len(true) and true[-1] else (None, False)
+    return (int(ticks[begins[-1]]), False) if len(is_true) and is_true[-1] else (None, False)
 
 
 DIMENSIONS = 3
-"""Degrees of freedom x, y and yaw, and the mean NEES of a correct covariance."""
+"""Number of degrees of freedom (x, y, yaw), which is the mean NEES of a correct covariance."""
 
 
 def nees(error: Array, covariance: Array) -> Array:
     """Return e' P^-1 e of errors (n, 3) in m, m, rad and covariances xx, xy, xa, yy, ya, aa (n, 6).
 
     The Cholesky decomposition is used. The result is infinite if P is not positive definite, for example for a
-    depleted particle set. (filterpy's stats.NEES; Bar-Shalom, Li, Kirubarajan 2001,
-    section 5.4.)
+    depleted particle set. (filterpy's stats.NEES; Bar-Shalom, Li, Kirubarajan 2001, section 5.4.)
     """
     xx, xy, xa, yy, ya, aa = covariance.T
     x, y, yaw = error.T

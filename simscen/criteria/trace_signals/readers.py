@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 LOCALIZED_STD_M = 0.5
-"""A robot whose position has a larger standard deviation is not localized; Nav2 starts with this value."""
+"""Largest standard deviation of the position of a localized robot in m; Nav2's initial value."""
 
 
 def clearance(query: SignalQuery) -> Array:
@@ -69,12 +69,12 @@ def yaw_rate(query: SignalQuery) -> Array:
 
 
 def acceleration(query: SignalQuery) -> Array:
-    """Return the change of the speed over ground since the sample before, by time."""
+    """Return the change of the speed over ground since the previous sample, divided by the time."""
     return _differences(query.trace, ground_speed(query), 1)
 
 
 def angular_acceleration(query: SignalQuery) -> Array:
-    """Return the change of the yaw rate since the sample before, by time."""
+    """Return the change of the yaw rate since the previous sample, divided by the time."""
     return _differences(query.trace, yaw_rate(query), 1)
 
 
@@ -92,7 +92,7 @@ def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
     rate = trace.tick_rate / float(even.ticks[1] - even.ticks[0])
     if rate < MIN_RATE_HZ:
         raise SignalUnavailable(
-            f"the truth has {rate:.1f} samples a second, too few to see changes up to {CUTOFF_HZ:g} Hz"
+            f"the truth has {rate:.1f} samples a second, too few for changes up to {CUTOFF_HZ:g} Hz"
         )
     return even.values[:, 0], rate
 
@@ -126,12 +126,12 @@ def nees(query: SignalQuery) -> Array:
 
 
 def belief_age(query: SignalQuery) -> Array:
-    """Return the time since the newest belief came."""
+    """Return the time since the newest belief was published."""
     return _age(query.trace, query.trace.belief.ticks)
 
 
 def scan_age(query: SignalQuery) -> Array:
-    """Return the time since the newest scan came."""
+    """Return the time since the newest scan was received."""
     return _age(query.trace, query.trace.scans)
 
 
@@ -139,9 +139,9 @@ def localized(query: SignalQuery) -> Array:
     """Return whether there is a recent belief with a small standard deviation."""
     if not len(query.trace.belief):
         return np.zeros(len(sample_ticks(query.trace)))
-    begun = sample_ticks(query.trace) >= query.trace.belief.ticks[0]
-    fresh = belief_age(query) <= BELIEF_TIMEOUT_S
-    return _as_numbers(begun & fresh & (position_std(query) <= LOCALIZED_STD_M))
+    has_belief = sample_ticks(query.trace) >= query.trace.belief.ticks[0]
+    is_fresh = belief_age(query) <= BELIEF_TIMEOUT_S
+    return _as_numbers(has_belief & is_fresh & (position_std(query) <= LOCALIZED_STD_M))
 
 
 def goal_distance(query: SignalQuery) -> Array:
@@ -157,8 +157,8 @@ def goal_heading_error(query: SignalQuery) -> Array:
 
 def travelled(query: SignalQuery) -> Array:
     """Return the distance driven so far, as path_length measures it."""
-    way, clock = drive(query.trace), sample_ticks(query.trace)
-    return way.travelled[np.searchsorted(way.ticks, clock, side="right") - 1]
+    path, clock = drive(query.trace), sample_ticks(query.trace)
+    return path.travelled[np.searchsorted(path.ticks, clock, side="right") - 1]
 
 
 def time(query: SignalQuery) -> Array:
@@ -188,7 +188,7 @@ def in_region(query: SignalQuery) -> Array:
 
 
 def in_collision(query: SignalQuery) -> Array:
-    """Return whether a contact lasts."""
+    """Return whether a contact is active."""
     return _as_numbers(
         _between(query.trace, EventKind.COLLISION_STARTED, (EventKind.COLLISION_ENDED,), query.arguments.get("with"))
     )
@@ -208,14 +208,14 @@ def goal_active(query: SignalQuery) -> Array:
 
 
 def recovery_active(query: SignalQuery) -> Array:
-    """Return whether a recovery lasts."""
+    """Return whether a recovery is active."""
     return _as_numbers(
         _between(query.trace, EventKind.RECOVERY_STARTED, (EventKind.RECOVERY_ENDED,), query.arguments.get("recovery"))
     )
 
 
 def is_active(query: SignalQuery) -> Array:
-    """Return whether the fault or event lasts."""
+    """Return whether the fault or event is active."""
     intervals = [(span.start, span.end + (not span.lasting)) for span in spans(query.trace, _label(query.arguments))]
     return _as_numbers(_flags(query.trace, intervals))
 
@@ -227,7 +227,7 @@ def has_just_started(query: SignalQuery) -> Array:
 
 
 def collision_count(query: SignalQuery) -> Array:
-    """Return the number of contacts begun so far."""
+    """Return the number of contacts that have begun so far."""
     return _count(query.trace, [event.tick for event in query.trace.of_kind(EventKind.COLLISION_STARTED)])
 
 
@@ -238,7 +238,7 @@ def replan_count(query: SignalQuery) -> Array:
 
 
 def recovery_count(query: SignalQuery) -> Array:
-    """Return the number of recoveries begun so far."""
+    """Return the number of recoveries that have started so far."""
     return _count(query.trace, [event.tick for event in query.trace.of_kind(EventKind.RECOVERY_STARTED)])
 
 
@@ -283,8 +283,8 @@ def _commanded(trace: Trace) -> Array:
 def _differences(trace: Trace, values: Array, order: int) -> Array:
     """Return differences of an order divided by the time step to that power; the ends repeat their neighbors.
 
-    Uneven samples are resampled first, and the differences held at the truth's own samples. Being set down elsewhere
-    is no change.
+    Uneven samples are resampled first, and the differences held at the truth's own samples. Teleportation does not
+    count as a change.
     """
     ticks = sample_ticks(trace)
     if len(ticks) <= order:
@@ -306,27 +306,27 @@ def _differences(trace: Trace, values: Array, order: int) -> Array:
     return Samples(even.ticks, found[:, np.newaxis]).at(ticks)[:, 0]
 
 
-def _age(trace: Trace, came: Ticks) -> Array:
+def _age(trace: Trace, received: Ticks) -> Array:
     """Return the seconds since the newest of these ticks; before the first, since the start."""
     clock = sample_ticks(trace)
-    if not len(came):
+    if not len(received):
         return clock / trace.tick_rate
-    at = np.searchsorted(came, clock, side="right") - 1
-    newest = np.where(at >= 0, came[np.maximum(at, 0)], 0)
+    at = np.searchsorted(received, clock, side="right") - 1
+    newest = np.where(at >= 0, received[np.maximum(at, 0)], 0)
     return (clock - newest) / trace.tick_rate
 
 
 def _current_goals(trace: Trace, case: Case) -> Array:
-    """Return x, y, yaw of the goal accepted last, (n, 3); of the first goal, (1, 3), if none ever is."""
+    """Return x, y, yaw of the goal accepted last, (n, 3); of the first goal, (1, 3), if none was accepted."""
     clock = sample_ticks(trace)
-    matches_goal_name = {goal.name: goal.pose for goal in reversed(case.every_goal)}
+    pose_by_name = {goal.name: goal.pose for goal in reversed(case.every_goal)}
     ticks, poses = [], []
     for event in trace.of_kind(EventKind.GOAL_ACCEPTED):
         pose = tuple(event.data.get(key) for key in ("x", "y", "yaw"))
         known = all(isinstance(part, int | float) for part in pose)
-        if known or event.name in matches_goal_name:
+        if known or event.name in pose_by_name:
             ticks.append(event.tick)
-            poses.append(pose if known else matches_goal_name[event.name])
+            poses.append(pose if known else pose_by_name[event.name])
     if not poses and not case.goals:
         raise SignalUnavailable("there was no goal")
     if not poses:
@@ -345,14 +345,16 @@ def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: 
         if name in (None, event.name) or (
             start is EventKind.GOAL_ACCEPTED and matches_goal_name(event.name, str(name))
         ):
-            later = (e.tick for e in trace.of_kind(*ends) if _ends(e.kind, e.name, event.name) and e.tick > event.tick)
+            later = (
+                e.tick for e in trace.of_kind(*ends) if _is_end(e.kind, e.name, event.name) and e.tick > event.tick
+            )
             intervals.append((event.tick, next(later, np.inf)))
     return _flags(trace, intervals)
 
 
-def _ends(kind: EventKind, name: str, begun: str) -> bool:
-    """Return whether an event ends what began as `begun`: the end of navigation and a new goal end every goal."""
-    return name == begun or kind in (EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
+def _is_end(kind: EventKind, name: str, started: str) -> bool:
+    """Return whether an event ends the goal, contact, or recovery `started`; a new goal ends any other goal."""
+    return name == started or kind in (EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
 
 
 def _flags(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Flags:

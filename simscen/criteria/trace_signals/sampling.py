@@ -1,13 +1,13 @@
-"""Sampling of signals: their common clock, holding of rarer signals, and resampling of uneven ones.
+"""Sampling of signals: their common clock, sample and hold of slower signals, and resampling of uneven ones.
 
-A signal has one value for each sample of the truth, at whatever times these came.
+A signal has one value for each sample of the truth, whenever it was taken.
 
-- What is published more rarely (belief, command, scans) keeps its newest value until the next one comes. Before its
-  first value, that first value counts.
-- What happens between two samples counts at the sample that follows.
-- Differences over time (acceleration, jerk, SPARC, LDLJ) need even samples. Where those of the truth are uneven, they
-  are resampled to their median spacing by linear interpolation. No gap may be longer than MAX_INTERPOLATED_GAP_S:
-  across a longer one the signal is not known.
+- Signals that are published more rarely (belief, command, scans) keep their newest value until the next one. Before the
+  first value, the first value counts.
+- Events between two samples count at the sample that follows.
+- Differences over time (acceleration, jerk, SPARC, LDLJ) need even samples. Uneven samples of the truth are resampled
+  to their median spacing by linear interpolation. Across a gap longer than MAX_INTERPOLATED_GAP_S, the signal is
+  unknown.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ SignalArguments = Mapping[str, object]
 
 
 class SignalUnavailable(ValueError):
-    """The trace does not hold what a signal is made of; the text says what is missing. Nothing can be decided."""
+    """The trace lacks the data of a signal, so that nothing can be decided; the message says what is missing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def sample_ticks(trace: Trace) -> Ticks:
 
 
 def hold(trace: Trace, samples: Samples, what: str) -> Array:
-    """Return the newest value at each sample of the truth. Raises SignalUnavailable if there is none at all."""
+    """Return the newest value at each sample of the truth. Raises SignalUnavailable without any value."""
     ticks = sample_ticks(trace)
     if not len(samples):
         raise SignalUnavailable(f"no {what} was recorded")
@@ -72,7 +72,7 @@ def usual_period(ticks: Ticks) -> int:
 def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
     """Return the samples themselves if they are evenly spaced, else resampled to their median spacing.
 
-    Raises SignalUnavailable if there are fewer than two, or a gap is too long to interpolate across.
+    Raises SignalUnavailable if there are fewer than two, or if a gap is too long for interpolation.
     """
     if len(samples) < 2:
         raise SignalUnavailable(f"the run is too short: {_samples(len(samples))} of the truth")
@@ -95,11 +95,11 @@ def _samples(count: int) -> str:
 
 
 MAX_GAP_S = 1.0
-"""Longest time without a sample of the truth; in a longer one, anything may have happened."""
+"""Longest time in s without a sample of the truth; after a longer gap, nothing passes."""
 
 
 def time_gaps(trace: Trace) -> dict[Evidence, str]:
-    """Return the evidence that the trace holds only for a part of the run, each with the first gap.
+    """Return the evidence that the trace contains only for a part of the run, each with its first gap.
 
     The truth and the clearance must have a sample at least every MAX_GAP_S, from the start of the run to its end.
     """
@@ -112,17 +112,17 @@ def time_gaps(trace: Trace) -> dict[Evidence, str]:
 
 
 def check_recorded_signals(trace: Trace) -> None:
-    """Raise InvalidTrace if a signal that simscen recorded is not finite, or its ticks do not rise."""
+    """Raise InvalidTrace if a signal that simscen recorded is not finite, or its ticks do not increase."""
     check_finite(trace)
     named = [("truth", trace.truth), ("clearance", trace.clearance), ("belief", trace.belief)]
     for name, samples in named:
         if (np.diff(samples.ticks) <= 0).any():
             at = trace.seconds(int(samples.ticks[int(np.argmax(np.diff(samples.ticks) <= 0))]))
-            raise InvalidTrace(f"the samples of the {name} are not in the order of time after t = {at:.2f} s")
+            raise InvalidTrace(f"the samples of the {name} are not in chronological order after t = {at:.2f} s")
 
 
 def _first_gap(trace: Trace, ticks: Ticks) -> str:
-    """Return the first gap that is too long, in words; "" if there is none, or no sample at all."""
+    """Return the first gap that is too long, as text; "" if there is none, or no sample at all."""
     if not len(ticks):
         return ""
     edges = np.concatenate(([0], ticks, [trace.end]))

@@ -1,8 +1,8 @@
 """Smoothness of a speed profile: spectral arc length (SPARC) and log dimensionless jerk (LDLJ).
 
 Source: Balasubramanian, Melendez-Calderon, Roby-Brami, Burdet 2015, "On the analysis of movement smoothness", and the
-authors' own code (siva82kb/SPARC), whose doctests are tests here. SPARC hardly reacts to a stop on the way, LDLJ hardly
-to a slow wobble, and both drift with the duration: compare only drives of the same path.
+authors' own code (siva82kb/SPARC), whose doctests are tests here. SPARC is insensitive to a stop, LDLJ to a slow
+oscillation, and both depend on the duration: compare only drives of the same path.
 """
 
 from __future__ import annotations
@@ -14,32 +14,32 @@ import numpy as np
 from simscen.core.geometry import Array
 
 MOVED_SPEED_M_S = 0.01
-"""A robot that was never faster did not move; its speed is noise."""
+"""Speed in m/s below which a robot does not move; its speed is noise."""
 
 CUTOFF_HZ = 10.0
-"""Faster changes of speed are noise."""
+"""Frequency above which changes of the speed are noise."""
 MIN_RATE_HZ = 18.0
-"""Samples a second that show changes up to the cutoff: twice that, with room for jitter."""
+"""Minimum sample rate: nearly twice the cutoff, with a margin for jitter."""
 MIN_RELATIVE_AMPLITUDE = 0.05
-"""Share of the greatest amplitude; both ends of the spectrum below it are cut off."""
+"""Share of the largest amplitude; both ends of the spectrum below it are cut off."""
 PADDING_LEVEL = 4
 """The profile is padded with zeros to 2^4 times its length, for a finer spectrum."""
 
 
 def sparc(speeds: Array, rate: float) -> float | None:
-    """Return the spectral arc length of speeds (n,) sampled at `rate` Hz: 0 is smooth, less is less smooth.
+    """Return the spectral arc length of speeds (n,) sampled at `rate` Hz: 0 is smooth, lower is less smooth.
 
-    It is None for a robot that never moved.
+    Returns None for a robot that never moved.
     """
     if len(speeds) < 2 or not np.any(speeds):
         return None
-    padded = 2 ** (math.ceil(math.log2(len(speeds))) + PADDING_LEVEL)
-    amplitudes = np.abs(np.fft.rfft(speeds, padded))
+    padded_length = 2 ** (math.ceil(math.log2(len(speeds))) + PADDING_LEVEL)
+    amplitudes = np.abs(np.fft.rfft(speeds, padded_length))
     amplitudes = amplitudes / amplitudes.max()
-    frequencies = np.arange(len(amplitudes)) * (rate / padded)
-    loud = np.flatnonzero((amplitudes >= MIN_RELATIVE_AMPLITUDE) & (frequencies <= CUTOFF_HZ))
-    kept = slice(int(loud[0]), int(loud[-1]) + 1)
-    band, heights = frequencies[kept], amplitudes[kept]
+    frequencies = np.arange(len(amplitudes)) * (rate / padded_length)
+    significant = np.flatnonzero((amplitudes >= MIN_RELATIVE_AMPLITUDE) & (frequencies <= CUTOFF_HZ))
+    selected = slice(int(significant[0]), int(significant[-1]) + 1)
+    band, heights = frequencies[selected], amplitudes[selected]
     if len(band) < 2:
         return None
     steps = np.diff(band) / (band[-1] - band[0])
@@ -47,9 +47,9 @@ def sparc(speeds: Array, rate: float) -> float | None:
 
 
 def ldlj(speeds: Array, rate: float) -> float | None:
-    """Return -ln(T^3 / v_max^2 * sum(jerk^2) dt) of speeds (n,) sampled at `rate` Hz; greater is smoother.
+    """Return -ln(T^3 / v_max^2 * sum(jerk^2) dt) of speeds (n,) sampled at `rate` Hz; larger is smoother.
 
-    It is None for a robot that never moved, or whose speed never changed its slope.
+    Returns None for a robot that never moved, or whose acceleration never changed.
     """
     if not np.any(speeds):
         return None

@@ -29,12 +29,14 @@ MAX_LINES = 6
 def explain_failures(verdicts: Sequence[Verdict], trace: Trace, case: Case) -> tuple[Verdict, ...]:
     """Return the verdicts with the likely causes inserted before the details of each failed finding."""
     return tuple(
-        replace(one, findings=tuple(_explained(one.criterion, finding, trace, case) for finding in one.findings))
-        for one in verdicts
+        replace(
+            verdict, findings=tuple(_with_causes(verdict.criterion, each, trace, case) for each in verdict.findings)
+        )
+        for verdict in verdicts
     )
 
 
-def _explained(criterion: str, finding: Finding, trace: Trace, case: Case) -> Finding:
+def _with_causes(criterion: str, finding: Finding, trace: Trace, case: Case) -> Finding:
     if finding.status is not Status.FAIL or finding.tick is None:
         return finding
     lines = causes(criterion, finding.tick, trace, case)
@@ -45,16 +47,16 @@ def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
     """Return lines about the likely causes of a failure of a criterion at a tick."""
     lines: list[str] = []
     named: set[str] = set()
-    parts = [
+    diagnoses = [
         diagnose_goal_failure(trace, case, tick) if criterion in GOAL_CRITERIA else ([], set()),
         diagnose_collision(trace, tick) if criterion == "collisions" else ([], set()),
         diagnose_localization(trace, tick, known=criterion not in GOAL_CRITERIA)
         if criterion in LOCALIZATION_CRITERIA
         else ([], set()),
     ]
-    for told, events in parts:
-        lines += [f"why: {text}" for text in told]
-        named |= events
+    for sentences, disturbances in diagnoses:
+        lines += [f"why: {text}" for text in sentences]
+        named |= disturbances
     lines += [f"meanwhile: {text}" for text in concurrent_disturbances(trace, tick, named)]
     return lines[:MAX_LINES]
 
@@ -64,30 +66,30 @@ RECENT_FAULT_S, RECENT_EVENT_S = 3.0, 5.0
 
 
 def concurrent_disturbances(trace: Trace, tick: int, known: Set[str] = frozenset()) -> list[str]:
-    """Yield faults, then events, in the order of their start, without those that are `known`."""
+    """Return sentences on faults, then events, in the order of their start, without those that are `known`."""
     return [text for name, text in (*_faults(trace, tick), *_events(trace, tick)) if name not in known]
 
 
 def _faults(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
-    felt = [event for event in trace.of_kind(EventKind.FAULT_TOOK_EFFECT) if event.tick <= tick]
+    effects = [event for event in trace.of_kind(EventKind.FAULT_TOOK_EFFECT) if event.tick <= tick]
     for start in trace.of_kind(EventKind.FAULT_STARTED):
-        end = _end(trace, start)
-        if start.tick > tick or not any(_same(start, event) and event.tick >= start.tick for event in felt):
+        end = _end_tick(trace, start)
+        if start.tick > tick or not any(_is_same_entry(start, event) and event.tick >= start.tick for event in effects):
             continue
         if end is None or end > tick:
             since = f"since t = {trace.seconds(start.tick):.2f} s" if start.tick else "since the start"
-            yield start.name, f"{start.name} was at work {since}, for {trace.seconds(tick - start.tick):.2f} s"
+            yield start.name, f"{start.name} was active {since}, for {trace.seconds(tick - start.tick):.2f} s"
         elif trace.seconds(tick - end) <= RECENT_FAULT_S:
             after = f"after {trace.seconds(end - start.tick):.2f} s"
             yield start.name, f"{start.name} had ended {trace.seconds(tick - end):.2f} s before, {after}"
 
 
-def _end(trace: Trace, start: Event) -> int | None:
-    ends = [event.tick for event in trace.of_kind(EventKind.FAULT_ENDED) if _same(event, start)]
+def _end_tick(trace: Trace, start: Event) -> int | None:
+    ends = [event.tick for event in trace.of_kind(EventKind.FAULT_ENDED) if _is_same_entry(event, start)]
     return next((end for end in ends if end > start.tick), None)
 
 
-def _same(one: Event, other: Event) -> bool:
+def _is_same_entry(one: Event, other: Event) -> bool:
     return (one.name, one.data.get("entry")) == (other.name, other.data.get("entry"))
 
 
@@ -97,9 +99,9 @@ def _events(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
         effects = event.data.get("effects")
         if not 0 <= ago <= RECENT_EVENT_S or not isinstance(effects, list):
             continue
-        told = [str(one["what"]) for one in effects if isinstance(one, dict) and one["happened"]]
-        if told:
-            yield event.name, f"event `{event.name}` came {ago:.2f} s before: {', '.join(told)}"
+        changes = [str(one["what"]) for one in effects if isinstance(one, dict) and one["happened"]]
+        if changes:
+            yield event.name, f"event `{event.name}` happened {ago:.2f} s before: {', '.join(changes)}"
 
 
 OBJECT_MOVING_SPEED_M_S = 0.0625
@@ -111,27 +113,30 @@ OBJECT_SPEED_WINDOW_S = 0.25
 def diagnose_collision(trace: Trace, tick: int) -> tuple[list[str], set[str]]:
     """Return a sentence for each movable object touched at `tick`, and the names of the events that placed it there."""
     hits = {hit.name: hit for hit in trace.of_kind(EventKind.COLLISION_STARTED) if hit.tick == tick}
-    touched = [thing for thing in movable_objects(trace, tick) if thing.name in hits]
-    told = [(thing, _told(trace, thing, hits[thing.name])) for thing in touched]
-    return [text for _, text in told if text], {thing.event for thing, text in told if text}
+    touched = [each for each in movable_objects(trace, tick) if each.name in hits]
+    described = [(each, _describe_hit(trace, each, hits[each.name])) for each in touched]
+    return [text for _, text in described if text], {each.event for each, text in described if text}
 
 
-def _told(trace: Trace, thing: MovableObject, hit: Event) -> str:
-    ago = f"{trace.seconds(hit.tick - thing.since):.2f} s before"
+def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
+    ago = f"{trace.seconds(hit.tick - touched.since):.2f} s before"
     parts = []
-    if thing.event:
-        did = "moved it" if thing.moved else f"put it {_away(trace, thing):.2f} m from the robot's middle"
-        parts.append(f"event `{thing.event}` had {did} {ago}")
-    if (speed := _speed(trace, thing.name, hit.tick)) >= OBJECT_MOVING_SPEED_M_S:
+    if touched.event:
+        if touched.moved:
+            change = "moved it"
+        else:
+            change = f"spawned it {_initial_distance(trace, touched):.2f} m from the robot's center"
+        parts.append(f"event `{touched.event}` had {change} {ago}")
+    if (speed := _speed(trace, touched.name, hit.tick)) >= OBJECT_MOVING_SPEED_M_S:
         parts.append(f"it moved at {speed:.2f} m/s")
     if hit.data.get("robot_caused") is False and parts:
         parts.append("and ran into the robot")
-    return f"{thing.name}: {', '.join(parts)}" if parts else ""
+    return f"{touched.name}: {', '.join(parts)}" if parts else ""
 
 
-def _away(trace: Trace, thing: MovableObject) -> float:
-    """Return the distance from the robot's center at which the object was placed, and has not moved since."""
-    return float(thing.distance(np.array([trace.place(thing.since)]))[0])
+def _initial_distance(trace: Trace, spawned: MovableObject) -> float:
+    """Return the distance in m from the robot's center at which the object was spawned."""
+    return float(spawned.distance(np.array([trace.place(spawned.since)]))[0])
 
 
 def _speed(trace: Trace, name: str, tick: int) -> float:
@@ -148,35 +153,35 @@ ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
 WHEELS, BELIEF = frozenset({"Odometry", "Wheels"}), "Belief"
 """Targets of these faults, and of faults between localizer and navigator."""
 LOST_DISTANCE_M = 0.5
-"""Distance in m between belief and truth of a lost robot: the diameter of a small robot."""
+"""Localization error in m above which a robot is lost: the diameter of a small robot."""
 
 
 def diagnose_localization(trace: Trace, tick: int, known: bool = False) -> tuple[list[str], set[str]]:
     """Return sentences on the localization error and its cause, and the names of the responsible events and faults."""
-    off = _off(trace, tick)
-    if not off >= LOST_DISTANCE_M:  # nan, too: not known
+    error = _position_error(trace, tick)
+    if not error >= LOST_DISTANCE_M:  # also for nan: unknown
         return [], set()
-    lines = [] if known else [f"it believed itself {off:.2f} m from where it was"]
+    lines = [] if known else [f"its believed position was {error:.2f} m from the true one"]
     named: set[str] = set()
-    doing = ""
+    current_event = ""
     for event in trace.events:
         if event.tick > tick:
             continue
         if event.kind == EventKind.EVENT_STARTED:
-            doing = event.name
+            current_event = event.name
         elif event.kind == EventKind.EVENT_ENDED:
-            doing = ""
+            current_event = ""
         elif event.kind == EventKind.ROBOT_PLACED:
             ago = trace.seconds(tick - event.tick)
-            lines.append(f"event `{doing}` had set it down elsewhere {ago:.2f} s before")
-            named.add(doing)
+            lines.append(f"event `{current_event}` had moved the robot elsewhere {ago:.2f} s before")
+            named.add(current_event)
         elif event.kind == EventKind.FAULT_TOOK_EFFECT and (what := _falsified(trace, event.name)):
             lines.append(f"{event.name} falsified {what} from t = {trace.seconds(event.tick):.2f} s on")
             named.add(event.name)
     return lines, named
 
 
-def _off(trace: Trace, tick: int) -> float:
+def _position_error(trace: Trace, tick: int) -> float:
     if not len(trace.belief) or not len(trace.truth):
         return math.nan
     bx, by = trace.belief.at(np.array([tick]))[0, :2].tolist()
@@ -189,7 +194,7 @@ def _falsified(trace: Trace, label: str) -> str:
     starts = [event.data for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == label]
     if not starts:
         return ""
-    affects = starts[0].get("affects", "Odometry")  # logs from before lidars had a bias do not say
+    affects = starts[0].get("affects", "Odometry")  # older logs lack it
     if affects == BELIEF:
         return "its belief"
     return "its odometry" if affects in WHEELS and starts[0].get("fault") in ODOMETRY_FAULTS else ""

@@ -14,7 +14,7 @@ class MovableObject:
     """Movable object at a tick.
 
     `outlines` (n, 2) are its outlines in the world. `since` is the tick at which the `event` (its name, or "") spawned
-    or last moved the object; `moved` says which of both.
+    the object or, if `moved`, last moved it.
     """
 
     name: str
@@ -23,8 +23,8 @@ class MovableObject:
     since: int
     moved: bool
 
-    def told(self, trace: Trace) -> str:
-        """Return its name and origin: "crate (spawned by event `crate falls` at t = 1.00 s)"."""
+    def describe(self, trace: Trace) -> str:
+        """Return name and origin, e.g. "crate (spawned by event `crate falls` at t = 1.00 s)"."""
         if not self.event:
             return self.name
         verb = "moved" if self.moved else "spawned"
@@ -40,22 +40,24 @@ def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
     """Return all movable objects at `tick`, in the order of their appearance."""
     spawned: dict[str, Event] = {}
     last: dict[str, tuple[str, Event]] = {}
-    doing = ""
+    current_event = ""
     for event in trace.events:
         if event.tick > tick:
             continue
         match event.kind:
             case EventKind.EVENT_STARTED:
-                doing = event.name
+                current_event = event.name
             case EventKind.EVENT_ENDED:
-                doing = ""
+                current_event = ""
             case EventKind.OBJECT_SPAWNED:
-                spawned[event.name], last[event.name] = event, (doing, event)
+                spawned[event.name], last[event.name] = event, (current_event, event)
             case EventKind.OBJECT_MOVED | EventKind.OBJECT_PLACED:
-                last[event.name] = (doing, event)
+                last[event.name] = (current_event, event)
             case EventKind.OBJECT_REMOVED:
                 spawned.pop(event.name, None)
-    return [_thing(trace, tick, event, *last[name]) for name, event in spawned.items() if event.data.get("parts")]
+    return [
+        _movable_object(trace, tick, event, *last[name]) for name, event in spawned.items() if event.data.get("parts")
+    ]
 
 
 def pose_at(trace: Trace, spawned: Event, tick: int) -> Pose2:
@@ -63,7 +65,7 @@ def pose_at(trace: Trace, spawned: Event, tick: int) -> Pose2:
     x, y, yaw = (spawned.data.get(key) for key in ("x", "y", "yaw"))
     samples = trace.objects.get(spawned.name)
     if samples is not None:
-        # The truth of its own tick was taken before it came, and may be that of another thing of its name.
+        # The sample at its own tick precedes the spawning and may be that of an earlier object of the same name.
         now = (samples.ticks > spawned.tick) & (samples.ticks <= tick)
         if now.any():
             x, y, yaw = samples.values[now][-1].tolist()
@@ -71,7 +73,7 @@ def pose_at(trace: Trace, spawned: Event, tick: int) -> Pose2:
     return Pose2(float(x), float(y), float(yaw))
 
 
-def _thing(trace: Trace, tick: int, spawned: Event, by: str, last: Event) -> MovableObject:
+def _movable_object(trace: Trace, tick: int, spawned: Event, by: str, last: Event) -> MovableObject:
     pose, parts = pose_at(trace, spawned, tick), spawned.data["parts"]
     assert isinstance(parts, list)
     outlines = tuple(pose.apply(np.array(part, dtype=np.float64)) for part in parts)

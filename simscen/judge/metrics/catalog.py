@@ -1,4 +1,4 @@
-"""The metrics of every run: names, units and definitions, as `simscen explain metrics` and the reference show them."""
+"""Metrics of every run: names, units, and definitions, as shown by `simscen explain metrics` and the reference."""
 
 from collections.abc import Set
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from simscen.core.records.verdict import POSITION, Evidence
 
 @dataclass(frozen=True)
 class Metric:
-    """Definition of a metric: its SI unit ("" for none), its text, its source, and the evidence a log must hold."""
+    """Definition of a metric: SI unit ("" for none), text, source, and the evidence that a log must contain."""
 
     unit: str
     text: str
@@ -28,15 +28,15 @@ _ERRORS = {
     "rmse": "root mean square",
     "mean": "mean",
     "median": "median",
-    "max": "greatest",
+    "max": "largest",
 }
 
 METRICS: dict[str, Metric] = {
     "success": Metric(
-        "", "1 when every goal was truly reached and nothing was touched, else 0.", "BARN, run.py", evidence=_SUCCESS
+        "", "1 if every goal was truly reached and nothing was touched, otherwise 0.", "BARN, run.py", evidence=_SUCCESS
     ),
     "time_to_goal": Metric(
-        "s", "From the first goal's acceptance to the report that the last one is reached.", evidence=_GOALS
+        "s", "Time from the acceptance of the first goal to the report that the last one is reached.", evidence=_GOALS
     ),
     "barn_score": Metric(
         "",
@@ -46,21 +46,21 @@ METRICS: dict[str, Metric] = {
         evidence=_SUCCESS,
     ),
     "path_length": Metric(
-        "m", "The true way in the plane, in moves of at least 1 cm.", "HuNavSim, bench-mr", evidence=_PATH
+        "m", "Length of the true path in the plane, in moves of at least 1 cm.", "HuNavSim, bench-mr", evidence=_PATH
     ),
-    "shortest_length": Metric("m", "The shortest way from the start through all goals."),
+    "shortest_length": Metric("m", "Length of the shortest path from the start through all goals."),
     "path_length_ratio": Metric("", "path_length / shortest_length.", "SEAN", evidence=_PATH),
     "spl": Metric(
         "", "success x l / max(l, p), l = shortest_length, p = path_length.", "Anderson et al. 2018", evidence=_SUCCESS
     ),
     "soft_spl": Metric(
         "",
-        "max(0, 1 - d / l) x l / max(l, p), d = what is left to the last goal at the end.",
+        "max(0, 1 - d / l) x l / max(l, p), d = final distance from the last goal.",
         "Habitat",
         evidence=POSITION | _GOALS,
     ),
     "heading_change": Metric(
-        "rad", "Sum of all changes of the true heading, wrapped, either way.", "HuNavSim", evidence=_PATH
+        "rad", "Sum of the absolute changes of the true heading, wrapped.", "HuNavSim", evidence=_PATH
     ),
     "path_irregularity": Metric(
         "rad",
@@ -69,44 +69,49 @@ METRICS: dict[str, Metric] = {
         evidence=_PATH | _GOALS | {Evidence.PLANNING},
     ),
     "aol": Metric(
-        "rad/m", "Angle over length: changes of the driven way's slope by path_length.", "bench-mr", evidence=_PATH
-    ),
-    "norm_curvature": Metric(
-        "rad",
-        "Sum of k (s1 + s2) over the driven way resampled to steps s of at least 0.3 m, k = 1 / radius of the circle "
-        "through three of its points.",
+        "rad/m",
+        "Angle over length: sum of the changes of direction of the driven path divided by path_length.",
         "bench-mr",
         evidence=_PATH,
     ),
-    "max_curvature": Metric("1/m", "The greatest k.", "bench-mr", evidence=_PATH),
-    "max_speed": Metric("m/s", "Greatest true speed over ground.", evidence=_MOTION),
+    "norm_curvature": Metric(
+        "rad",
+        "Sum of k (s1 + s2) over the driven path resampled to steps s of at least 0.3 m, k = 1 / radius of the circle "
+        "through three consecutive points.",
+        "bench-mr",
+        evidence=_PATH,
+    ),
+    "max_curvature": Metric("1/m", "Largest k of norm_curvature.", "bench-mr", evidence=_PATH),
+    "max_speed": Metric("m/s", "Largest true speed over ground.", evidence=_MOTION),
     "time_not_moving": Metric(
         "s",
-        "While the speed is below 0.01 m/s and the turn rate, either way, below 0.02 rad/s.",
+        "Time with a speed below 0.01 m/s and an absolute turn rate below 0.02 rad/s.",
         "HuNavSim",
         evidence=_MOTION,
     ),
     "mean_jerk": Metric(
         "m/s^3", "Mean of |v[k+1] - 2 v[k] + v[k-1]| / dt^2, v = true speed over ground.", evidence=_MOTION
     ),
-    "max_jerk": Metric("m/s^3", "The greatest of them.", evidence=_MOTION),
+    "max_jerk": Metric("m/s^3", "Largest value of the jerk in mean_jerk.", evidence=_MOTION),
     "sparc": Metric(
         "", "Spectral arc length of the speed over ground; 0 = smooth.", "Balasubramanian et al. 2015", evidence=_MOTION
     ),
     "ldlj": Metric(
         "",
-        "Log dimensionless jerk of the speed over ground; greater = smoother.",
+        "Log dimensionless jerk of the speed over ground; larger = smoother.",
         "Balasubramanian et al. 2015",
         evidence=_MOTION,
     ),
     "min_clearance": Metric(
-        "m", "Least true distance of the hull to anything; 2 m where nothing is nearer.", evidence={Evidence.CLEARANCE}
+        "m",
+        "Smallest true distance from the hull to anything; 2 m if nothing is nearer.",
+        evidence={Evidence.CLEARANCE},
     ),
     "mean_clearance": Metric(
-        "m", "Its mean, more than 2 m counting as 2 m.", "bench-mr", evidence={Evidence.CLEARANCE}
+        "m", "Mean true clearance; values above 2 m count as 2 m.", "bench-mr", evidence={Evidence.CLEARANCE}
     ),
     "min_person_distance": Metric(
-        "m", "Least true gap between the robot's footprint and a pedestrian's body.", "HuNavSim", evidence=_PEOPLE
+        "m", "Smallest true gap between the robot's footprint and a pedestrian's body.", "HuNavSim", evidence=_PEOPLE
     ),
     "intrusion_intimate": Metric(
         "",
@@ -116,23 +121,23 @@ METRICS: dict[str, Metric] = {
     ),
     "intrusion_personal": Metric("", "The same from 0.45 m to below 1.2 m.", "Hall 1966, HuNavSim", evidence=_PEOPLE),
     "intrusion_social": Metric("", "The same from 1.2 m to below 3.6 m.", "Hall 1966, HuNavSim", evidence=_PEOPLE),
-    "collisions": Metric("", "Contacts that began.", "Arena", evidence={Evidence.CONTACTS}),
-    "contact_time": Metric("s", "While there was at least one contact.", evidence={Evidence.CONTACTS}),
-    "replans": Metric("", "Plans made for another reason than a new goal.", evidence={Evidence.PLANNING}),
-    "recoveries": Metric("", "Recoveries begun.", evidence={Evidence.RECOVERIES}),
+    "collisions": Metric("", "Number of contacts that began.", "Arena", evidence={Evidence.CONTACTS}),
+    "contact_time": Metric("s", "Time with at least one contact.", evidence={Evidence.CONTACTS}),
+    "replans": Metric("", "Number of plans made for another reason than a new goal.", evidence={Evidence.PLANNING}),
+    "recoveries": Metric("", "Number of recoveries that started.", evidence={Evidence.RECOVERIES}),
     **{
         f"ape_trans_{name}": Metric(
             "m",
-            f"Absolute pose error, position: {text} distance of belief and truth, not aligned.",
+            f"Absolute pose error, position: {text} distance between belief and truth, not aligned.",
             "evo",
             evidence=_BELIEF,
         )
         for name, text in _ERRORS.items()
     },
-    "ape_trans_final": Metric("m", "The last of them.", evidence=_BELIEF),
+    "ape_trans_final": Metric("m", "Final distance between belief and truth.", evidence=_BELIEF),
     **{
         f"ape_rot_{name}": Metric(
-            "rad", f"Absolute pose error, heading: {text} angle of belief and truth.", "evo", evidence=_BELIEF
+            "rad", f"Absolute pose error, heading: {text} angle between belief and truth.", "evo", evidence=_BELIEF
         )
         for name, text in _ERRORS.items()
     },
@@ -156,8 +161,8 @@ METRICS: dict[str, Metric] = {
     },
     "nees": Metric(
         "",
-        "Squared pose error measured by the believed covariance, mean over the run; 3 when the belief is as sure as it "
-        "may be.",
+        "Normalized estimation error squared: squared pose error weighted by the inverse of the believed covariance, "
+        "mean over the run; 3 for a correct covariance.",
         "filterpy; Bar-Shalom et al. 2001",
         evidence=_BELIEF | {Evidence.COVARIANCE},
     ),
@@ -165,4 +170,4 @@ METRICS: dict[str, Metric] = {
 """Metrics by name, in the order of the reference."""
 
 ADDRESSES = dict.fromkeys(METRICS, "simscen.judge.metrics.compute:compute_metrics")
-"""Names of the shipped metrics for the registry, which packages must not reuse."""
+"""Names of the shipped metrics for the registry; plugins must not use them."""

@@ -33,7 +33,7 @@ COMPARED_METRICS = (
 )
 """Compared metrics, in the order of the table."""
 HIGHER_IS_BETTER = frozenset({"min_clearance"})
-"""Compared metrics of which a lower value is worse; of the others, a higher one is."""
+"""Compared metrics for which a higher value is better; for the others, a lower value is."""
 OUTCOME_INDEPENDENT = frozenset({"collisions"})
 """Metrics that are comparable if a run fails. The others favor stacks that give up early."""
 ALL_SCENARIOS = "all scenarios"
@@ -50,8 +50,8 @@ def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Compa
     """
     if len(stacks) < 2:
         return None
-    given = {name: value for name, _, value in (text.partition("=") for text in stacks)}
-    return _compare(results, given, Significance())
+    values = {name: value for name, _, value in (text.partition("=") for text in stacks)}
+    return _compare(results, values, Significance())
 
 
 def compare_sessions(
@@ -73,13 +73,13 @@ def labeled_key(key: RunKey, session: str) -> RunKey:
     return replace(key, scenario=scenario, stack_name=session)
 
 
-def _compare(results: Iterable[RunResult], given: Mapping[str, str], significance: Significance) -> Comparison:
+def _compare(results: Iterable[RunResult], stacks: Mapping[str, str], significance: Significance) -> Comparison:
     runs = {one.key: one for one in results if not one.key.repeats and one.outcome is not Outcome.SKIPPED}
-    baseline, *others = given
+    baseline, *others = stacks
     return Comparison(
-        given,
-        {test: _row(test, given, runs) for test in sorted({key.test for key in runs})},
-        tuple(_against(runs, baseline, other, significance) for other in others),
+        stacks,
+        {test: _row(test, stacks, runs) for test in sorted({key.test for key in runs})},
+        tuple(_compare_with_baseline(runs, baseline, other, significance) for other in others),
     )
 
 
@@ -88,21 +88,21 @@ def _row(test: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> 
     return {name: _outcomes(run for run in own if run.key.stack_name == name) for name in stacks}
 
 
-def _came_out(run: RunResult) -> Outcome:
+def _own_outcome(run: RunResult) -> Outcome:
     """Return the outcome of the run without its expectation."""
     if run.outcome is Outcome.ERROR:
         return Outcome.ERROR
     decisive = [verdict for verdict in run.verdicts if verdict.severity == "fail" and verdict.criterion != EXPECTED]
-    held = bool(run.reason) and all(verdict.status is Status.PASS for verdict in decisive)
-    return Outcome.PASSED if held or run.outcome is Outcome.PASSED else Outcome.FAILED
+    has_passed = bool(run.reason) and all(verdict.status is Status.PASS for verdict in decisive)
+    return Outcome.PASSED if has_passed or run.outcome is Outcome.PASSED else Outcome.FAILED
 
 
 def _outcomes(runs: Iterable[RunResult]) -> OutcomeCounts:
-    count = Counter(_came_out(run) for run in runs)
+    count = Counter(_own_outcome(run) for run in runs)
     return OutcomeCounts(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
 
 
-def _against(
+def _compare_with_baseline(
     runs: Mapping[RunKey, RunResult], baseline: str, other: str, significance: Significance
 ) -> BaselineComparison:
     first, second = (
@@ -110,23 +110,25 @@ def _against(
         for name in (baseline, other)
     )
     pairs = [(first[case], second[case]) for case in first if case in second]
-    whole = [pair for pair in pairs if all(run.outcome is not Outcome.ERROR for run in pair)]
-    alike = [(one, two) for one, two in whole if _arrived(one) == _arrived(two)]
-    flips = tuple(flip for pair in whole if (flip := _flip(pair)))
+    completed = [pair for pair in pairs if all(run.outcome is not Outcome.ERROR for run in pair)]
+    same_arrival = [(one, two) for one, two in completed if _arrived(one) == _arrived(two)]
+    flips = tuple(flip for pair in completed if (flip := _flip(pair)))
     won = sum(flip.passed == other for flip in flips)
-    names = (*_chosen(whole), *_added(whole))
+    names = (*_compared_names(completed), *_plugin_names(completed))
     return BaselineComparison(
         stack=other,
-        pairs=len(whole),
-        broken=len(pairs) - len(whole),
+        pairs=len(completed),
+        broken=len(pairs) - len(completed),
         alone=len(first.keys() ^ second.keys()),
-        parted=len(whole) - len(alike),
+        parted=len(completed) - len(same_arrival),
         flips=flips,
         p=sign_test(won, len(flips) - won),
         differences=tuple(
-            found for name in names if (found := _difference(name, _comparable(name, whole, alike))) is not None
+            found
+            for name in names
+            if (found := _difference(name, _comparable(name, completed, same_arrival))) is not None
         ),
-        changes=significant_changes(_samples(whole, alike, names), significance),
+        changes=significant_changes(_samples(completed, same_arrival, names), significance),
     )
 
 
@@ -137,27 +139,27 @@ def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
     return found
 
 
-def _samples(whole: Sequence[Pair], alike: Sequence[Pair], names: Iterable[str]) -> Iterator[PairedSample]:
-    """Yield what is tested: the pass rate of all runs, and the pass rate and each metric of each scenario."""
-    scenarios = _by_scenario(whole)
+def _samples(completed: Sequence[Pair], same_arrival: Sequence[Pair], names: Iterable[str]) -> Iterator[PairedSample]:
+    """Yield the samples to test: the pass rate of all runs, and the pass rate and each metric of each scenario."""
+    scenarios = _by_scenario(completed)
     if len(scenarios) > 1:
-        scenarios = {ALL_SCENARIOS: list(whole), **scenarios}
+        scenarios = {ALL_SCENARIOS: list(completed), **scenarios}
     for scenario, own in scenarios.items():
         passed = [(_passed(one), _passed(two)) for one, two in own]
         yield PairedSample(scenario, PASS_RATE, "", passed, higher_is_better=True)
     for name in names:
         direction = _kind(name) in HIGHER_IS_BETTER if _kind(name) in COMPARED_METRICS else None
-        for scenario, own in _by_scenario(_comparable(name, whole, alike)).items():
+        for scenario, own in _by_scenario(_comparable(name, completed, same_arrival)).items():
             yield PairedSample(scenario, name, _unit(name), _values(name, own), direction)
 
 
 def _passed(run: RunResult) -> float:
-    return float(_came_out(run) is Outcome.PASSED)
+    return float(_own_outcome(run) is Outcome.PASSED)
 
 
-def _comparable(name: str, whole: Sequence[Pair], alike: Sequence[Pair]) -> Sequence[Pair]:
-    """Return the pairs in which a metric can be compared: all, or those in which both or no run arrived."""
-    return whole if _kind(name) in OUTCOME_INDEPENDENT else alike
+def _comparable(name: str, completed: Sequence[Pair], same_arrival: Sequence[Pair]) -> Sequence[Pair]:
+    """Return the pairs in which a metric can be compared: all, or those in which both runs or none arrived."""
+    return completed if _kind(name) in OUTCOME_INDEPENDENT else same_arrival
 
 
 def _values(name: str, pairs: Sequence[Pair]) -> list[tuple[float, float]]:
@@ -175,13 +177,13 @@ def _unit(name: str) -> str:
     return METRICS[_kind(name)].unit if _kind(name) in METRICS else ""
 
 
-def _chosen(pairs: Sequence[Pair]) -> list[str]:
-    """Return the names of the COMPARED metrics, grouped over robots."""
+def _compared_names(pairs: Sequence[Pair]) -> list[str]:
+    """Return the names of the COMPARED_METRICS that the runs have, grouped by robot."""
     names = {name for pair in pairs for run in pair for name in run.metrics if _kind(name) in COMPARED_METRICS}
     return sorted(names, key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_kind(name))))
 
 
-def _added(pairs: Sequence[Pair]) -> list[str]:
+def _plugin_names(pairs: Sequence[Pair]) -> list[str]:
     """Return the names of metrics from installed packages."""
     return sorted({name for pair in pairs for run in pair for name in run.metrics if _kind(name) not in METRICS})
 
@@ -194,22 +196,21 @@ def _arrived(run: RunResult) -> set[str]:
 
 def _flip(pair: Pair) -> Flip | None:
     one, two = pair
-    if _came_out(one) is _came_out(two):
+    if _own_outcome(one) is _own_outcome(two):
         return None
-    good, bad = (one, two) if _came_out(one) is Outcome.PASSED else (two, one)
-    return Flip(one.key.test, one.key.seed, good.key.stack_name, bad.key.stack_name, _why(bad))
+    good, bad = (one, two) if _own_outcome(one) is Outcome.PASSED else (two, one)
+    return Flip(one.key.test, one.key.seed, good.key.stack_name, bad.key.stack_name, _first_violation(bad))
 
 
-def _why(run: RunResult) -> str:
-    """Return the first violation."""
-    told = [
+def _first_violation(run: RunResult) -> str:
+    sentences = [
         sentence(verdict, finding, run.tick_rate)
         for verdict in run.verdicts
         if verdict.severity != "warn"
         for finding in violations(verdict)
     ]
-    more = f" (and {len(told) - 1} more)" if len(told) > 1 else ""
-    return f"{told[0]}{more}" if told else run.ended
+    more = f" (and {len(sentences) - 1} more)" if len(sentences) > 1 else ""
+    return f"{sentences[0]}{more}" if sentences else run.ended
 
 
 def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
@@ -235,7 +236,7 @@ def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
 
 
 def comparison_data(comparison: Comparison) -> dict[str, Any]:
-    """Return plain data with stacks and scenarios as ordered lists."""
+    """Return the comparison as plain data, with stacks and scenarios as ordered lists."""
     return {
         "baseline": comparison.baseline,
         "stacks": [
@@ -246,11 +247,11 @@ def comparison_data(comparison: Comparison) -> dict[str, Any]:
             {"scenario": scenario, "stacks": {name: asdict(one) for name, one in row.items()}}
             for scenario, row in comparison.outcomes.items()
         ],
-        "against": [_against_data(one) for one in comparison.against],
+        "against": [_baseline_data(one) for one in comparison.against],
     }
 
 
-def _against_data(against: BaselineComparison) -> dict[str, Any]:
+def _baseline_data(against: BaselineComparison) -> dict[str, Any]:
     return {
         "stack": against.stack,
         "pairs": against.pairs,

@@ -14,7 +14,7 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import COMPLETE_COVERAGE, Evidence, LogCoverage, Status
 from simscen.criteria.base import AnyMeasure
-from simscen.criteria.efficiency import shortest_way
+from simscen.criteria.efficiency import shortest_path_length
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
 from simscen.criteria.goal_outcomes import goal_outcomes
 from simscen.criteria.goals_reached import GoalsReached
@@ -31,14 +31,14 @@ STANDING_SPEED_M_S, STANDING_TURN_RATE_RAD_S = 0.01, 0.02
 """Minimum speeds of a moving robot, as in HuNavSim, which uses the signed turn rate."""
 
 BARN_OPTIMAL_SPEED_M_S = 2.0
-"""Speed of the optimal time of BARN on the reference path."""
+"""Speed from which BARN computes the optimal time on the reference path."""
 
 ZONES = {
     "intimate": (0.0, INTIMATE_SPACE_M),
     "personal": (INTIMATE_SPACE_M, PERSONAL_SPACE_M),
     "social": (PERSONAL_SPACE_M, SOCIAL_SPACE_M),
 }
-"""Zones around a person by Hall: from and to in m."""
+"""Hall's zones around a person: range of distances in m."""
 
 _SHORTEST = ("barn_score", "shortest_length", "path_length_ratio", "spl", "soft_spl")
 _NAVIGATION = ("success", "path_length", "time_to_goal", *_SHORTEST)
@@ -60,8 +60,8 @@ class MetricValues:
 def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_COVERAGE) -> MetricValues:
     """Return all metrics of the catalog.
 
-    A metric is undefined, with the reason, if the log lacks its evidence for all or part of the run, or if a signal
-    that it is made of is not finite or not known. No metric fails a run: a criterion that needs the signal does.
+    A metric is undefined, with the reason, if the log lacks its evidence for all or part of the run, or if one of its
+    signals is not finite or unknown. This does not fail a run; only a criterion that needs the signal does.
     """
     path = cache(lambda: drive(trace))
     groups: tuple[tuple[tuple[str, ...], Callable[[], Values]], ...] = (
@@ -76,7 +76,7 @@ def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_C
     found: Values = {}
     for names, compute in groups:
         found |= _or_reason(names, compute)
-    found |= {name: reason for name in METRICS if (reason := _lacking(name, coverage))}
+    found |= {name: reason for name in METRICS if (reason := _missing_evidence(name, coverage))}
     return MetricValues(
         {name: None if isinstance(found[name], str) else found[name] for name in METRICS},  # type: ignore[misc]
         {name: value for name in METRICS if isinstance(value := found[name], str)},
@@ -91,32 +91,32 @@ def _or_reason(names: Sequence[str], compute: Callable[[], Values]) -> Values:
         return dict.fromkeys(names, str(reason))
 
 
-def _lacking(name: str, coverage: LogCoverage) -> str:
+def _missing_evidence(name: str, coverage: LogCoverage) -> str:
     """Return which evidence of a metric the log lacks, in words; "" if it has all of it."""
-    wanted = METRICS[name].evidence
-    if lacking := coverage.lacking(wanted):
-        return f"the log lacks {' and '.join(evidence.value for evidence in lacking)}"
-    return "; ".join(dict.fromkeys(reason for evidence, reason in coverage.partial.items() if evidence in wanted))
+    required = METRICS[name].evidence
+    if missing := coverage.lacking(required):
+        return f"the log does not say {' nor '.join(evidence.value for evidence in missing)}"
+    return "; ".join(dict.fromkeys(reason for evidence, reason in coverage.partial.items() if evidence in required))
 
 
 def barn_score(success: bool, seconds: float, reference_length: float) -> float:
     """Return the BARN score: 0, or 0.125 (8 times the optimal time and slower) … 0.5 (twice and faster).
 
-    BARN's own code for moving obstacles takes the reference length as a difference of coordinates. That is negative,
-    so every success scores 0.125 there. Raises ValueError unless the reference length is positive.
+    BARN's own code for moving obstacles computes the reference length as a difference of coordinates, which is
+    negative, so that every success scores 0.125 there. Raises ValueError unless the reference length is positive.
     """
     if not reference_length > 0:
-        raise ValueError(f"a reference path of {reference_length:g} m")
+        raise ValueError(f"the length of the reference path must be positive, but is {reference_length:g} m")
     optimal = reference_length / BARN_OPTIMAL_SPEED_M_S
     return optimal / min(max(seconds, 2 * optimal), 8 * optimal) if success else 0.0
 
 
 def _navigation(trace: Trace, case: Case, length: float) -> Values:
-    shortest, unknown = shortest_way(trace, case)
+    shortest, unknown_reason = shortest_path_length(trace, case)
     success, seconds = _success(trace, case), _time_to_goal(trace, case)
     found: Values = {"success": float(success), "path_length": length, "time_to_goal": seconds}
-    if unknown:
-        return {**found, **dict.fromkeys(_SHORTEST, unknown)}
+    if unknown_reason:
+        return {**found, **dict.fromkeys(_SHORTEST, unknown_reason)}
     return {
         **found,
         "barn_score": _barn_score(case, success, seconds, shortest),
@@ -153,20 +153,20 @@ def _soft_spl(trace: Trace, case: Case, shortest: float, length: float) -> float
         return "the true pose was not recorded"
     goal = case.goals[-1].pose
     x, y, _ = poses.values[-1]
-    left = math.hypot(x - goal.x, y - goal.y)
-    return max(0.0, 1 - left / shortest) * shortest / max(shortest, length)
+    remaining = math.hypot(x - goal.x, y - goal.y)
+    return max(0.0, 1 - remaining / shortest) * shortest / max(shortest, length)
 
 
 def _motion(trace: Trace, case: Case) -> Values:
-    fast, turning = speed(trace), turn_rate(trace)
-    if not len(fast):
+    linear, turning = speed(trace), turn_rate(trace)
+    if not len(linear):
         return dict.fromkeys(_MOTION, "the true velocity was not recorded")
-    speeds = fast.values[:, 0]
-    standing = (speeds < STANDING_SPEED_M_S) & (turning.values[:, 0] < STANDING_TURN_RATE_RAD_S)
-    lasts = np.diff(np.append(fast.ticks, trace.end)) / trace.tick_rate
+    speeds = linear.values[:, 0]
+    is_standing = (speeds < STANDING_SPEED_M_S) & (turning.values[:, 0] < STANDING_TURN_RATE_RAD_S)
+    durations = np.diff(np.append(linear.ticks, trace.end)) / trace.tick_rate
     return {
         "max_speed": float(speeds.max()),
-        "time_not_moving": float(lasts[standing].sum()),
+        "time_not_moving": float(durations[is_standing].sum()),
         **_or_reason(("mean_jerk", "max_jerk"), lambda: _jerk(trace, case)),
         **_or_reason(_SMOOTHNESS, lambda: _smoothness(trace, speeds)),
     }
@@ -180,54 +180,54 @@ def _jerk(trace: Trace, case: Case) -> Values:
 def _smoothness(trace: Trace, speeds: Array) -> Values:
     if speeds.max() < MOVED_SPEED_M_S:
         return dict.fromkeys(_SMOOTHNESS, "the robot never moved")
-    even, rate = evenly_sampled_speed(trace)
-    spectral, jerky = sparc(even, rate), ldlj(even, rate)
+    even_speeds, rate = evenly_sampled_speed(trace)
+    spectral, jerk = sparc(even_speeds, rate), ldlj(even_speeds, rate)
     return {
         "sparc": "the run is too short" if spectral is None else spectral,
-        "ldlj": "the speed never changed" if jerky is None else jerky,
+        "ldlj": "the speed never changed" if jerk is None else jerk,
     }
 
 
 def _clearance(trace: Trace) -> Values:
-    near = np.minimum(clearance(trace).values[:, 0], CLEARANCE_RANGE)
-    if not len(near):
-        return dict.fromkeys(_CLEARANCE, "it was not recorded")
-    return {"min_clearance": float(near.min()), "mean_clearance": float(near.mean())}
+    distances = np.minimum(clearance(trace).values[:, 0], CLEARANCE_RANGE)
+    if not len(distances):
+        return dict.fromkeys(_CLEARANCE, "the clearance was not recorded")
+    return {"min_clearance": float(distances.min()), "mean_clearance": float(distances.mean())}
 
 
 def _events(trace: Trace) -> Values:
     """Return the counts of events, and the time during which at least one contact lasts."""
     events = trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED)
     steps = [1 if event.kind == EventKind.COLLISION_STARTED else -1 for event in events]
-    # The end of a contact that began before the log did must not cancel a known one.
-    touching = np.array(list(accumulate(steps, lambda number, step: max(number, 0) + step)))
-    lasts = np.diff([*(event.tick for event in events), trace.end])
+    # The end of a contact that began before the log must not cancel another one.
+    contact_counts = np.array(list(accumulate(steps, lambda number, step: max(number, 0) + step)))
+    durations = np.diff([*(event.tick for event in events), trace.end])
     plans = trace.of_kind(EventKind.PLAN_MADE)
     return {
         "collisions": float(steps.count(1)),
-        "contact_time": trace.seconds(int(lasts[touching > 0].sum())),
+        "contact_time": trace.seconds(int(durations[contact_counts > 0].sum())),
         "replans": float(sum(plan.data.get("reason", "goal") != "goal" for plan in plans)),
         "recoveries": float(len(trace.of_kind(EventKind.RECOVERY_STARTED))),
     }
 
 
 def person_metrics(trace: Trace, case: Case) -> Values:
-    """Return the least gap to a pedestrian, and the share of the run in each of Hall's zones."""
+    """Return the smallest gap to a pedestrian, and the share of the run in each of Hall's zones."""
     gaps = pedestrian_gap(trace, case)
-    lasts = np.diff(np.append(trace.truth.ticks, trace.end))
-    whole = max(int(lasts.sum()), 1)
-    shares = [float(lasts[(low <= gaps) & (gaps < high)].sum()) / whole for low, high in ZONES.values()]
+    durations = np.diff(np.append(trace.truth.ticks, trace.end))
+    total = max(int(durations.sum()), 1)
+    shares = [float(durations[(low <= gaps) & (gaps < high)].sum()) / total for low, high in ZONES.values()]
     nearest = float(gaps.min())
-    least: float | str = nearest if np.isfinite(nearest) else "no pedestrian was there at a sample of the truth"
+    least: float | str = nearest if np.isfinite(nearest) else "no pedestrian was present at any sample of the truth"
     return dict(zip(_PEOPLE, (least, *shares), strict=True))
 
 
 def add_plugin_metrics(
     computed: MetricValues, metrics: Sequence[AnyMeasure], trace: Trace, case: Case, coverage: LogCoverage
 ) -> MetricValues:
-    """Return the metrics with those that a scenario asks for added.
+    """Return the metrics together with the plugin metrics that a scenario requests.
 
-    Raises InvalidTrace if one fails or is not a finite number: the scenario asked for it, and studies compare it.
+    Raises InvalidTrace if one fails or is not a finite number, because the scenario needs it.
     """
     values, undefined = dict(computed.values), dict(computed.undefined)
     for entry in metrics:
@@ -240,18 +240,18 @@ def add_plugin_metrics(
 
 def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -> float | str:
     """Return the value, or why there is none."""
-    wanted = entry.measure.evidence
-    lacking = coverage.lacking(frozenset(Evidence) if wanted is None else wanted)
+    required = entry.measure.evidence
+    lacking = coverage.lacking(frozenset(Evidence) if required is None else required)
     if lacking:
         return f"the log lacks {' and '.join(one.value for one in lacking)}"
     try:
         found = entry.measure.measure(trace, case)
     except MissingEvidence as missing:
         return str(missing)
-    except Exception as error:  # the boundary to plug-ins, which can raise anything
+    except Exception as error:  # a plugin can raise anything
         raise InvalidTrace(f"metric {entry.kind}: {type(error).__name__}: {error}{entry.added_by}") from error
     if isinstance(found, str) and found:
         return found
     if isinstance(found, bool) or not isinstance(found, int | float) or not math.isfinite(found):
-        raise InvalidTrace(f"metric {entry.kind} is no number: {found!r}{entry.added_by}")
+        raise InvalidTrace(f"metric {entry.kind} is not a finite number: {found!r}{entry.added_by}")
     return float(found)

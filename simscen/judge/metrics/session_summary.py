@@ -1,4 +1,4 @@
-"""Statistics of a session that navigation benchmarks publish, each with its number of runs."""
+"""Statistics of a session as in publications of navigation benchmarks, each with its number of runs."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -40,7 +40,7 @@ class SessionSummary:
 
 
 class SessionFigures:
-    """Collects the figures of a session's runs, of which only a few numbers are kept."""
+    """Collects the numbers of each run that the statistics of a session need."""
 
     def __init__(self) -> None:
         self._runs: list[tuple[tuple[str, str, int, str], RunFigures | None]] = []
@@ -74,7 +74,7 @@ class SessionFigures:
 
 
 class RunFigures(NamedTuple):
-    """What the statistics need of a run; tuples have one value for each robot."""
+    """Numbers of a run for the statistics; tuples have one value for each robot."""
 
     success: bool
     spl: tuple[float, ...]
@@ -127,8 +127,8 @@ def session_summary_line(figures: SessionSummary) -> str:
         parts.append(f"SPL {figures.spl:.2f} of {_runs(figures.spl_runs)}")
     per_km, per_hour = figures.collisions_per_km, figures.collisions_per_hour
     if per_km is not None and per_hour is not None:
-        way = f"{figures.kilometers:.2f} km, {figures.hours:.2f} h of {_runs(figures.measured_runs)}"
-        parts.append(f"{per_km:.1f} collisions/km, {per_hour:.1f}/h in {way}")
+        total = f"{figures.kilometers:.2f} km, {figures.hours:.2f} h of {_runs(figures.measured_runs)}"
+        parts.append(f"{per_km:.1f} collisions/km, {per_hour:.1f}/h in {total}")
     return " · ".join(parts)
 
 

@@ -12,7 +12,7 @@ PASS_RATE = "pass rate"
 
 @dataclass(frozen=True)
 class Significance:
-    """When a change is significant.
+    """Conditions under which a change is significant.
 
     alpha:       largest p-value, after Holm's correction for the number of tests
     min_effect:  smallest change of a mean, relative to that of the baseline; smaller ones do not matter
@@ -67,6 +67,6 @@ def signed_rank_test(differences: Sequence[float]) -> float:
     """
     if not any(differences):
         return 1.0
-    from scipy.stats import wilcoxon
+    from scipy.stats import wilcoxon  # the import takes half a second
 
     return float(wilcoxon(differences).pvalue)

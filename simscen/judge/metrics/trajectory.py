@@ -17,23 +17,25 @@ _CURVATURE = ("norm_curvature", "max_curvature")
 PATH_METRICS = ("heading_change", "path_irregularity", "aol", *_CURVATURE)
 
 
-def path_metrics(trace: Trace, way: Drive) -> Values:
+def path_metrics(trace: Trace, path: Drive) -> Values:
     """Return turns and curvature of the driven path, without teleportation."""
-    legs = path_segments(trace, way)
-    turned = heading_change(trace)
+    segments = path_segments(trace, path)
+    total_turn = heading_change(trace)
     return {
-        "heading_change": turned,
-        "path_irregularity": _irregularity(trace, turned),
-        "aol": sum(_turned(leg) for leg in legs) / way.length if way.length > 0 else "the robot never drove",
-        **_curvature(legs),
+        "heading_change": total_turn,
+        "path_irregularity": _irregularity(trace, total_turn),
+        "aol": sum(_slope_changes(each) for each in segments) / path.length
+        if path.length > 0
+        else "the robot never drove",
+        **_curvature(segments),
     }
 
 
-def path_segments(trace: Trace, way: Drive) -> list[Array]:
+def path_segments(trace: Trace, path: Drive) -> list[Array]:
     """Return the points (n, 2) of each part of the driven path between teleportations."""
-    corners = truth(trace).at(way.ticks)[:, :2]
-    breaks = np.flatnonzero(np.diff(way.travelled) == 0.0) + 1
-    return [leg for leg in np.split(corners, breaks) if len(leg)]
+    corners = truth(trace).at(path.ticks)[:, :2]
+    breaks = np.flatnonzero(np.diff(path.travelled) == 0.0) + 1
+    return [segment for segment in np.split(corners, breaks) if len(segment)]
 
 
 def heading_change(trace: Trace) -> float:
@@ -43,73 +45,73 @@ def heading_change(trace: Trace) -> float:
     return float(changes.sum())
 
 
-def _irregularity(trace: Trace, turned: float) -> float | str:
+def _irregularity(trace: Trace, total_turn: float) -> float | str:
     """Return the rotation beyond that of the first plan to each goal (SEAN; a stub in HuNavSim)."""
     starts = [event.tick for event in trace.of_kind(EventKind.GOAL_ACCEPTED)]
     first = [next((plan for plan in trace.plans if plan.tick >= start), None) for start in starts]
     if not starts or None in first:
         return "there is no plan to each goal to compare with"
     headings = [plan.points[:, 2] for plan in first if plan is not None]
-    return max(0.0, turned - sum(float(np.abs(wrap_array(np.diff(yaw))).sum()) for yaw in headings))
+    return max(0.0, total_turn - sum(float(np.abs(wrap_array(np.diff(yaw))).sum()) for yaw in headings))
 
 
-def _turned(leg: Array) -> float:
-    steps = np.diff(leg, axis=0)
+def _slope_changes(segment: Array) -> float:
+    steps = np.diff(segment, axis=0)
     return float(np.abs(wrap_array(np.diff(np.arctan2(steps[:, 1], steps[:, 0])))).sum())
 
 
-def _curvature(legs: list[Array]) -> Values:
-    weighted, bends = 0.0, []
-    for leg in legs:
-        points = _resampled(leg)
+def _curvature(segments: list[Array]) -> Values:
+    weighted, curvatures = 0.0, []
+    for segment in segments:
+        points = _resample(segment)
         before, after = points[1:-1] - points[:-2], points[2:] - points[1:-1]
         a, b = np.hypot(*before.T), np.hypot(*after.T)
         across = np.hypot(*(points[2:] - points[:-2]).T)
         area = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / 2
-        # A way that turns back on itself has three points on a line: no circle, and bench-mr's radius of infinity.
-        bend = np.divide(4 * area, a * b * across, out=np.zeros_like(area), where=across > 0)
-        weighted += float((bend * (a + b)).sum())
-        bends.append(bend)
-    if not any(len(bend) for bend in bends):
-        short = f"the robot drove too short a way: fewer than three points {CURVATURE_SPACING_M:g} m apart"
+        # A path that reverses has three points on a line and an infinite radius, as in bench-mr.
+        curvature = np.divide(4 * area, a * b * across, out=np.zeros_like(area), where=across > 0)
+        weighted += float((curvature * (a + b)).sum())
+        curvatures.append(curvature)
+    if not any(len(each) for each in curvatures):
+        short = f"the path is too short: it has fewer than three points {CURVATURE_SPACING_M:g} m apart"
         return dict.fromkeys(_CURVATURE, short)
-    return {"norm_curvature": weighted, "max_curvature": float(np.concatenate(bends).max())}
+    return {"norm_curvature": weighted, "max_curvature": float(np.concatenate(curvatures).max())}
 
 
-def _resampled(leg: Array) -> Array:
-    """Return the points that are at least RESAMPLED from the previous one."""
-    kept = [0]
-    xs, ys = leg[:, 0].tolist(), leg[:, 1].tolist()
+def _resample(segment: Array) -> Array:
+    """Return the points that are at least CURVATURE_SPACING_M from the previous one."""
+    indices = [0]
+    xs, ys = segment[:, 0].tolist(), segment[:, 1].tolist()
     for k in range(1, len(xs)):
-        if (xs[k] - xs[kept[-1]]) ** 2 + (ys[k] - ys[kept[-1]]) ** 2 >= CURVATURE_SPACING_M**2:
-            kept.append(k)
-    chosen: Array = leg[kept]
-    return chosen
+        if (xs[k] - xs[indices[-1]]) ** 2 + (ys[k] - ys[indices[-1]]) ** 2 >= CURVATURE_SPACING_M**2:
+            indices.append(k)
+    points: Array = segment[indices]
+    return points
 
 
 RPE_DELTA_M = 1.0
 """Driven distance in m between the two poses of a relative error."""
 
-_SUMS = ("rmse", "mean", "median", "max")
-SILENT = "the robot never said where it believes to be"
+_STATISTICS = ("rmse", "mean", "median", "max")
+NO_BELIEF = "the robot never reported a believed pose"
 
 
 def pose_metrics(trace: Trace) -> Values:
-    """Return APE, RPE over DELTA m, and NEES."""
+    """Return APE, RPE over RPE_DELTA_M, and NEES."""
     error = pose_error(trace)
     if not len(error):
-        return dict.fromkeys(POSE_METRICS, SILENT)
-    off, turned = error.values.T
+        return dict.fromkeys(POSE_METRICS, NO_BELIEF)
+    distances, angles = error.values.T
     return {
-        **_summed("ape_trans", off),
-        "ape_trans_final": float(off[-1]),
-        **_summed("ape_rot", turned),
-        **_relative(trace),
+        **_statistics("ape_trans", distances),
+        "ape_trans_final": float(distances[-1]),
+        **_statistics("ape_rot", angles),
+        **_relative_errors(trace),
         "nees": _nees(trace),
     }
 
 
-def _summed(name: str, errors: Array) -> Values:
+def _statistics(name: str, errors: Array) -> Values:
     return {
         f"{name}_rmse": float(np.sqrt(np.mean(errors**2))),
         f"{name}_mean": float(np.mean(errors)),
@@ -118,22 +120,26 @@ def _summed(name: str, errors: Array) -> Values:
     }
 
 
-def _relative(trace: Trace) -> Values:
-    """Return (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) of truth Q and belief P for pairs i, j that are DELTA m of driving apart."""
+def _relative_errors(trace: Trace) -> Values:
+    """Return (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) of truth Q and belief P for pairs i, j RPE_DELTA_M of driving apart."""
     believed, true = trace.belief.values, _truth_at_beliefs(trace)
     i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))
     if not len(i):
-        return {f"rpe_{kind}_{one}": f"the robot drove less than {RPE_DELTA_M:g} m" for kind in _KINDS for one in _SUMS}
+        return {
+            f"rpe_{kind}_{one}": f"the robot drove less than {RPE_DELTA_M:g} m"
+            for kind in _KINDS
+            for one in _STATISTICS
+        }
     moved_true, moved_believed = _between(true[i], true[j]), _between(believed[i], believed[j])
     error = _between(moved_true, moved_believed)
     return {
-        **_summed("rpe_trans", np.hypot(error[:, 0], error[:, 1])),
-        **_summed("rpe_rot", np.abs(wrap_array(error[:, 2]))),
+        **_statistics("rpe_trans", np.hypot(error[:, 0], error[:, 1])),
+        **_statistics("rpe_rot", np.abs(wrap_array(error[:, 2]))),
     }
 
 
 def _pairs(steps: Array) -> tuple[list[int], list[int]]:
-    """Return consecutive samples between which the steps add up to DELTA (filter_pairs_by_path of evo)."""
+    """Return consecutive samples between which the steps add up to RPE_DELTA_M (filter_pairs_by_path of evo)."""
     ids, length = [0], 0.0
     for k, step in enumerate(steps.tolist(), start=1):
         length += step
@@ -166,7 +172,7 @@ def _nees(trace: Trace) -> float | str:
 
 _KINDS = ("trans", "rot")
 POSE_METRICS = (
-    *(f"{error}_{kind}_{one}" for error in ("ape", "rpe") for kind in _KINDS for one in _SUMS),
+    *(f"{error}_{kind}_{one}" for error in ("ape", "rpe") for kind in _KINDS for one in _STATISTICS),
     "ape_trans_final",
     "nees",
 )

@@ -14,7 +14,7 @@ from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Verdict
 from simscen.criteria.registry import verdict_names
 from simscen.judge.finding_text import DISTURBANCE, comparison, disturbance_times, subject
-from simscen.judge.run_result import OF_ALL
+from simscen.judge.run_result import WORLD_EVENT_PREFIXES
 from simscen.loading.scenario_text import parts_of_text
 from simscen.loading.yaml.tree import Key, MappingNode, key_position
 from simscen.model.scenario import ScenarioSpec
@@ -86,7 +86,7 @@ def timeline_entries(trace: Trace, lines: SourceLines, with_world: bool) -> list
 
 
 def _is_world_event(event: Event) -> bool:
-    return str(event.kind).startswith(OF_ALL) and event.kind != EventKind.RUN_ENDED
+    return str(event.kind).startswith(WORLD_EVENT_PREFIXES) and event.kind != EventKind.RUN_ENDED
 
 
 def _entry(event: Event, lines: SourceLines) -> TimelineEntry:

@@ -40,10 +40,10 @@ def test_reports_distinguish_expected_failures_and_skipped_runs(simscen, project
     lines = [" ".join(line.split()) for line in ended.out.splitlines()]
     assert any(line.startswith("~ a[known] (seed 1) 1.0 s simulated") and output in line for line in lines)
     assert "- a[skipped] (seed 1) skipped: no lift here, NAV-2" in lines
-    assert "expected: everything held; expected a failure: too fast, NAV-1" in ended.out
+    assert "expected: everything passed; expected a failure: too fast, NAV-1" in ended.out
     assert "0 passed, 2 failed, 2 failed as expected, 1 skipped" in ended.out
     assert f"::notice file=a.scenario.yaml,line=6,title=a[known] (seed 1)::{output}" in ended.out
-    assert "::error file=a.scenario.yaml,line=7,title=a[mended] (seed 1)::expected: everything held" in ended.out
+    assert "::error file=a.scenario.yaml,line=7,title=a[mended] (seed 1)::expected: everything passed" in ended.out
     document = json.loads((project / "out/results.json").read_text())
     assert {name: document[name] for name in ("passed", "failed", "error", "failed-as-expected", "skipped")} == {
         "passed": 0,

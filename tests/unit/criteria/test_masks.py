@@ -141,12 +141,15 @@ def test_a_mask_that_the_log_does_not_have_is_no_pass():
         ({"keepout": {}}, "expected either region or mask"),
         ({"keepout": {"region": "wet", "mask": "a.yaml"}}, "expected either region or mask"),
         ({"speed": {"mask": {"file": "a.yaml"}}}, "expected full_speed"),
-        ({"speed": {"mask": {"file": "a.yaml", "type": "absolute"}, "full_speed": 1.0}}, "full_speed is for a mask"),
-        ({"speed": {"max": 1.0, "full_speed": 1.0}}, "full_speed is for a mask"),
-        ({"speed": {"max": 1.0, "while_on": True}}, "while_on is for the zone of a region"),
+        (
+            {"speed": {"mask": {"file": "a.yaml", "type": "absolute"}, "full_speed": 1.0}},
+            "full_speed only applies to a mask",
+        ),
+        ({"speed": {"max": 1.0, "full_speed": 1.0}}, "full_speed only applies to a mask"),
+        ({"speed": {"max": 1.0, "while_on": True}}, "while_on only applies to the zone of a region"),
         (
             {"speed": {"mask": {"file": "a.yaml", "type": "absolute"}, "in": "wet", "while_on": True}},
-            "while_on is for the zone of a region",
+            "while_on only applies to the zone of a region",
         ),
     ],
 )

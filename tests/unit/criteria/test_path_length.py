@@ -57,9 +57,11 @@ def test_what_cannot_be_compared_is_told_in_order():
         "goals": [{"name": n, "pose": [4, 0]} for n in "gfedcbagfedcba"],
         "shortest": dict.fromkeys("abcdefg", 1.0),
     }
-    assert found({"max_ratio": 1.0}, case=twice).measured.startswith("several goals are called a, b, c, d, e, f, g:")
+    assert found({"max_ratio": 1.0}, case=twice).measured.startswith("several goals are called a, b, c, d, e, f, g,")
     sent = {**CASE, "sent": [{"name": n, "pose": [4, 0]} for n in "dcb"]}
     events = [[k, "goal.accepted", name] for k, name in enumerate("dcb")]
-    assert found({"max_ratio": 1.0}, case=sent, events=events).measured.startswith("b, c, d was sent on the way")
-    assert found({"max_ratio": 1.0}, case={**CASE, "shortest": {"a": 0.0}}).measured == "the shortest way has no length"
-    assert found({"max_ratio": 1.0}, case={**CASE, "shortest": {}}).measured == "no shortest way to a is known"
+    assert found({"max_ratio": 1.0}, case=sent, events=events).measured.startswith("b, c, d was sent by an event")
+    assert (
+        found({"max_ratio": 1.0}, case={**CASE, "shortest": {"a": 0.0}}).measured == "the shortest path has no length"
+    )
+    assert found({"max_ratio": 1.0}, case={**CASE, "shortest": {}}).measured == "no shortest path to a is known"

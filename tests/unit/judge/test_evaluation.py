@@ -60,10 +60,13 @@ def test_a_criterion_that_checked_nothing_is_an_error(monkeypatch):
 @pytest.mark.parametrize(
     ("finding", "defect"),
     [
-        (at_least("value", 0.3, -math.inf, "m"), "the margin of value is infinite, so its limit is none"),
-        (at_most("value", 0.3, math.inf, "m"), "the margin of value is infinite, so its limit is none"),
-        (at_least("value", 0.3, math.inf, "m"), "the margin of value is infinite, so its limit is none"),
-        (Finding(Status.PASS, "value", "", "", math.inf), "the margin of value is infinite, so its limit is none"),
+        (at_least("value", 0.3, -math.inf, "m"), "the margin of value is infinite, so its limit is not finite"),
+        (at_most("value", 0.3, math.inf, "m"), "the margin of value is infinite, so its limit is not finite"),
+        (at_least("value", 0.3, math.inf, "m"), "the margin of value is infinite, so its limit is not finite"),
+        (
+            Finding(Status.PASS, "value", "", "", math.inf),
+            "the margin of value is infinite, so its limit is not finite",
+        ),
         (at_least("value", math.inf, 0.3, "m"), ""),
         (at_most("value", -math.inf, 0.3, "m"), ""),
         (at_least("value", 0.3, 0.1, "m"), ""),
@@ -99,7 +102,7 @@ def test_nothing_passes_in_a_log_with_nothing_in_it_but_one_signal_or_event_is_s
     few = [criterion(recoveries={"max": 5})]
     (empty,) = judge(few, without_signals(TRACE), CASE)
     assert empty.status is Status.INCONCLUSIVE
-    assert empty.findings[0].measured == "0 recoveries in a log with nothing in it"
+    assert empty.findings[0].measured == "0 recoveries in an empty log"
     accepted = Event(5, EventKind.GOAL_ACCEPTED, "a")
     (spoken,) = judge(few, replace(without_signals(TRACE), events=(accepted, *TRACE.events)), CASE)
     assert spoken.status is Status.PASS
@@ -117,16 +120,16 @@ GOOD = Finding(Status.PASS, "value", "1 m", "≥ 0 m", 1.0, "m", 1.0)
         ([], "it checked nothing"),
         ({GOOD}, "it checked nothing"),
         ((GOOD for _ in range(1)), "it checked nothing"),
-        ([GOOD, "fine"], "its finding is str, which is none"),
-        ([replace(GOOD, status="pass?")], "its finding is Finding, which is none"),
-        ([replace(GOOD, what=1)], "its finding says something that is no text"),
-        ([replace(GOOD, measured=None)], "its finding says something that is no text"),
-        ([replace(GOOD, limit=2)], "its finding says something that is no text"),
-        ([replace(GOOD, unit=3)], "its finding says something that is no text"),
-        ([replace(GOOD, margin="1")], "the margin of value is no number: '1'"),
-        ([replace(GOOD, margin=math.nan)], "the margin of value is no number: nan"),
-        ([replace(GOOD, value=math.nan)], "the value of value is no number: nan"),
-        ([replace(GOOD, what="", value="x")], "the value of its finding is no number: 'x'"),
+        ([GOOD, "fine"], "it returned an invalid finding of type str"),
+        ([replace(GOOD, status="pass?")], "it returned an invalid finding of type Finding"),
+        ([replace(GOOD, what=1)], "a text of its finding is not a string"),
+        ([replace(GOOD, measured=None)], "a text of its finding is not a string"),
+        ([replace(GOOD, limit=2)], "a text of its finding is not a string"),
+        ([replace(GOOD, unit=3)], "a text of its finding is not a string"),
+        ([replace(GOOD, margin="1")], "the margin of value is not a number: '1'"),
+        ([replace(GOOD, margin=math.nan)], "the margin of value is not a number: nan"),
+        ([replace(GOOD, value=math.nan)], "the value of value is not a number: nan"),
+        ([replace(GOOD, what="", value="x")], "the value of its finding is not a number: 'x'"),
         ([GOOD, replace(GOOD, margin=None, value=None)], ""),
     ],
 )

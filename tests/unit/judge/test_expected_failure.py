@@ -30,14 +30,14 @@ SPEED = ExpectedFailure("NAV-1", ("speed",))
         (KNOWN, (FAIL, PASS), Outcome.FAILED_AS_EXPECTED, "speed failed"),
         (KNOWN, (FAIL, FAIL), Outcome.FAILED_AS_EXPECTED, "speed, clearance failed"),
         (KNOWN, (FAIL, UNCLEAR), Outcome.FAILED_AS_EXPECTED, "speed failed"),
-        (KNOWN, (PASS, PASS), Outcome.FAILED, "everything held"),
+        (KNOWN, (PASS, PASS), Outcome.FAILED, "everything passed"),
         (KNOWN, (PASS, UNCLEAR), Outcome.FAILED, "nothing failed, clearance undecided"),
         (KNOWN, (FAIL, ERROR), Outcome.ERROR, ""),
         (SPEED, (FAIL, PASS), Outcome.FAILED_AS_EXPECTED, "speed failed"),
         (SPEED, (FAIL, FAIL), Outcome.FAILED, "speed failed"),
         (SPEED, (FAIL, UNCLEAR), Outcome.FAILED, "speed failed"),
-        (SPEED, (PASS, FAIL), Outcome.FAILED, "speed held"),
-        (SPEED, (PASS, PASS), Outcome.FAILED, "speed held"),
+        (SPEED, (PASS, FAIL), Outcome.FAILED, "speed passed"),
+        (SPEED, (PASS, PASS), Outcome.FAILED, "speed passed"),
         (SPEED, (UNCLEAR, PASS), Outcome.FAILED, "nothing failed, speed undecided"),
         (None, (FAIL, PASS), Outcome.FAILED, ""),
         (None, (PASS, PASS), Outcome.PASSED, ""),
@@ -52,19 +52,19 @@ def test_only_what_was_expected_to_fail_may_and_must(
 
 def test_all_that_is_named_must_fail() -> None:
     both = ExpectedFailure("NAV-1", ("speed", "clearance"))
-    assert judged(both, verdict("speed", FAIL), verdict("clearance", PASS)) == (Outcome.FAILED, "clearance held")
+    assert judged(both, verdict("speed", FAIL), verdict("clearance", PASS)) == (Outcome.FAILED, "clearance passed")
 
 
 def test_a_disturbance_that_did_not_happen_is_expected_only_by_its_name() -> None:
     missing = verdict("door", FAIL, DISTURBANCE)
     assert judged(KNOWN, missing, verdict("speed", FAIL)) == (Outcome.FAILED, "speed failed")
-    assert judged(KNOWN, missing, verdict("speed", PASS)) == (Outcome.FAILED, "everything held")
+    assert judged(KNOWN, missing, verdict("speed", PASS)) == (Outcome.FAILED, "everything passed")
     assert judged(ExpectedFailure("NAV-1", ("door",)), missing)[0] is Outcome.FAILED_AS_EXPECTED
 
 
 def test_a_warning_is_no_failure_to_expect() -> None:
     verdicts = verdict("speed", FAIL, severity="warn"), verdict("clearance", PASS)
-    assert judged(KNOWN, *verdicts) == (Outcome.FAILED, "everything held")
+    assert judged(KNOWN, *verdicts) == (Outcome.FAILED, "everything passed")
 
 
 def test_a_log_that_was_cut_off_is_never_as_expected() -> None:

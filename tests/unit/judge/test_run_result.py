@@ -101,7 +101,7 @@ def test_an_error_says_which_criteria_broke_and_how(monkeypatch):
 
 
 def test_a_run_that_nothing_judged_is_an_error():
-    assert conclude(TRACE).error.message == "nothing judged this run"
+    assert conclude(TRACE).error.message == "no criterion judged this run"
     assert conclude(TRACE, {"collisions": {}}).error is None
 
 

@@ -87,7 +87,7 @@ def test_smoothness_is_not_judged_by_too_rare_samples():
     found = result(drive(times, wobble(times)), {"smoothness": {"min_sparc": -9}})
     (finding,) = found.verdicts[0].findings
     assert finding.status is Status.INCONCLUSIVE
-    assert finding.measured == "the truth has 10.0 samples a second, too few to see changes up to 10 Hz"
+    assert finding.measured == "the truth has 10.0 samples a second, too few for changes up to 10 Hz"
 
 
 @pytest.mark.parametrize("name", ["speed", "always", "eventually", "until", "whenever"])
@@ -180,6 +180,6 @@ def test_a_log_of_simscen_whose_samples_do_not_rise_is_an_error(signal, order):
     check_recorded_signals(trace)
     samples = getattr(trace, signal)
     broken = replace(trace, **{signal: Samples(samples.ticks[order], samples.values[order])})
-    with pytest.raises(InvalidTrace, match=f"the samples of the {signal} are not in the order of time after t = "):
+    with pytest.raises(InvalidTrace, match=f"the samples of the {signal} are not in chronological order after t = "):
         check_recorded_signals(broken)
     assert result(broken, {"collisions": {}}, coverage=COMPLETE_COVERAGE).outcome is Outcome.ERROR

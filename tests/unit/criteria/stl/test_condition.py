@@ -51,9 +51,9 @@ def refused(words):
         ({"signal": "speed", "value": 1}, "`speed` needs `op` and `value`"),
         ({**FAST, "scale": 0}, "`scale` must be greater than 0"),
         ({**FAST, "scale": -0.5}, "`scale` must be greater than 0"),
-        ({**FAST, "op": "=="}, "`==` never holds for long for what is measured; use `<=` and `>=` around it"),
-        ({**FAST, "op": "="}, "`=` never holds for long for what is measured; use `<=` and `>=` around it"),
-        ({**FAST, "op": "!="}, "`!=` never holds for long for what is measured; use `<=` and `>=` around it"),
+        ({**FAST, "op": "=="}, "`==` is unsuitable for measured values; use `<=` and `>=` around the value"),
+        ({**FAST, "op": "="}, "`=` is unsuitable for measured values; use `<=` and `>=` around the value"),
+        ({**FAST, "op": "!="}, "`!=` is unsuitable for measured values; use `<=` and `>=` around the value"),
         (
             {**FAST, "value": "1 rad/s"},
             "`rad/s` is a unit of angular speed, but this is a speed; units: ",
@@ -67,15 +67,15 @@ def test_what_cannot_be_meant_is_refused(words, why):
 @pytest.mark.parametrize(
     ("signal", "op", "value", "why"),
     [
-        ("speed", ">=", 0, "never below 0 m/s, so `>= 0 m/s` always holds"),
-        ("speed", ">", -1, "never below 0 m/s, so `> -1 m/s` always holds"),
-        ("speed", "<", 0, "never below 0 m/s, so `< 0 m/s` never holds"),
-        ("speed", "<=", -1, "never below 0 m/s, so `<= -1 m/s` never holds"),
-        ("goal_heading_error", "<=", math.pi, "never above 3.14159 rad, so `<= 3.14159 rad` always holds"),
-        ("goal_heading_error", "<", 4, "never above 3.14159 rad, so `< 4 rad` always holds"),
-        ("goal_heading_error", ">", math.pi, "never above 3.14159 rad, so `> 3.14159 rad` never holds"),
-        ("goal_heading_error", ">=", 4, "never above 3.14159 rad, so `>= 4 rad` never holds"),
-        ("collision_count", ">=", 0, "never below 0, so `>= 0` always holds"),
+        ("speed", ">=", 0, "never below 0 m/s, so `>= 0 m/s` is always true"),
+        ("speed", ">", -1, "never below 0 m/s, so `> -1 m/s` is always true"),
+        ("speed", "<", 0, "never below 0 m/s, so `< 0 m/s` is never true"),
+        ("speed", "<=", -1, "never below 0 m/s, so `<= -1 m/s` is never true"),
+        ("goal_heading_error", "<=", math.pi, "never above 3.14159 rad, so `<= 3.14159 rad` is always true"),
+        ("goal_heading_error", "<", 4, "never above 3.14159 rad, so `< 4 rad` is always true"),
+        ("goal_heading_error", ">", math.pi, "never above 3.14159 rad, so `> 3.14159 rad` is never true"),
+        ("goal_heading_error", ">=", 4, "never above 3.14159 rad, so `>= 4 rad` is never true"),
+        ("collision_count", ">=", 0, "never below 0, so `>= 0` is always true"),
     ],
 )
 def test_what_every_run_or_none_fulfils_is_no_condition(signal, op, value, why):

@@ -107,7 +107,7 @@ def test_a_finding_tells_the_deciding_moment_its_place_and_its_signal():
     finding = found({"eventually": {"signal": "goal_distance", "op": "<", "value": 1.0}}, WAY, GOAL)
     assert (finding.what, finding.status, finding.value, finding.tick) == ("goal_distance", Status.PASS, 0.5, 960)
     assert finding.place == pytest.approx((2.0, 0.0))
-    assert finding.detail == ("asked: eventually goal_distance < 1 m",)
+    assert finding.detail == ("condition: eventually goal_distance < 1 m",)
 
 
 GOAL = {"goals": [{"name": "a", "pose": [2.5, 0, 0]}]}
@@ -135,7 +135,7 @@ def test_when_each_note_was_is_told():
     trace = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": [[0, 9], [2, 9], [2.025, 1], [4, 1]]}
     finding = found(answer, trace)
     assert finding.status is Status.FAIL
-    assert finding.detail[1:] == ("the answer was due at t = 2.02 s",)
+    assert finding.detail[1:] == ("the response was due at t = 2.02 s",)
 
 
 WHENEVER = {"whenever": HURT, "then": FAR}

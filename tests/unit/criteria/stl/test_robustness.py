@@ -102,7 +102,7 @@ def test_uneven_samples_are_judged_at_their_own_times(late):
 
 def test_a_window_without_a_sample_is_refused():
     scene = EvaluationContext(run([1.0] * 5, [0.0] * 5), CASE, over=True)
-    with pytest.raises(InvalidTrace, match=r"the window up to 1.9 s ahead holds no sample: they are 1 s apart"):
+    with pytest.raises(InvalidTrace, match=r"the window up to 1.9 s ahead contains no sample: samples are 1 s apart"):
         scene.window(Window(between=[1.1, 1.9]))
     window = scene.window(Window(between=[1.1, 2.0]))
     assert (window.first[0], window.last[0]) == (2, 2)

@@ -291,7 +291,7 @@ def test_distances_to_what_does_not_move():
     assert signal("distance_to", words, case, goal="shelf")[0] == 5.0
     assert signal("distance_to", words, case, point=[7, 6])[0] == 10.0
     assert signal("distance_to", words, case, object="box")[0] == 2.0
-    with pytest.raises(SignalUnavailable, match="`cart` never was there"):
+    with pytest.raises(SignalUnavailable, match="`cart` never existed"):
         signal("distance_to", words, case, object="cart")
     with pytest.raises(SignalUnavailable, match="no goal `self`"):
         signal("distance_to", words, case, goal="self")

@@ -88,7 +88,7 @@ def test_samples_one_tick_apart_are_in_order() -> None:
     [((0, 120, 120, 480), "0.50"), ((0, 1, 240, 120, 480), "1.00"), ((0, 120, 60, 480, 30), "0.50")],
 )
 def test_samples_out_of_order_are_refused_with_the_first_place(ticks: tuple[int, ...], seconds: str) -> None:
-    with pytest.raises(InvalidTrace, match=f"not in the order of time after t = {seconds} s"):
+    with pytest.raises(InvalidTrace, match=f"not in chronological order after t = {seconds} s"):
         check_recorded_signals(with_truth_at(*ticks))
 
 
@@ -99,5 +99,5 @@ def test_smoothness_needs_18_samples_a_second(period: int, is_enough: bool) -> N
     if is_enough:
         assert evenly_sampled_speed(with_truth_at(*ticks))[1] == pytest.approx(RATE / period)
     else:
-        with pytest.raises(SignalUnavailable, match="too few to see changes up to 10 Hz"):
+        with pytest.raises(SignalUnavailable, match="too few for changes up to 10 Hz"):
             evenly_sampled_speed(with_truth_at(*ticks))

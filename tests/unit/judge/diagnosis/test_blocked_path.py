@@ -12,7 +12,7 @@ from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 CLOSES = (
     "why: crate (spawned by event `crate falls` at t = 1.00 s) closes the passage of 1.00 m between `west wall` and "
-    "`east wall` at (5.00, 0.00) on the shortest way: {}, the robot is 0.40 m wide"
+    "`east wall` at (5.00, 0.00) on the shortest path: {}, the robot is 0.40 m wide"
 )
 
 
@@ -166,8 +166,8 @@ def test_a_robot_that_just_fits_is_not_shut_in_and_one_that_can_just_turn_not_ha
 
 
 def test_two_centimeters_that_are_left_are_told_and_less_is_nothing():
-    assert "the shortest way: 0.02 m are left" in told(("fog", 0.01))
-    assert "the shortest way: nothing is left" in told(("fog", 0.0099))
+    assert "the shortest path: 0.02 m are left" in told(("fog", 0.01))
+    assert "the shortest path: nothing is left" in told(("fog", 0.0099))
 
 
 def test_two_centimeters_less_than_the_passage_has_are_no_change():

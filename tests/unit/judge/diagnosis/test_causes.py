@@ -13,7 +13,7 @@ def test_only_failures_are_explained_and_before_their_own_details():
     findings = (failed, Finding(Status.PASS, "speed", "0", "≤ 1", tick=2400), Finding(Status.FAIL, "speed", "2", "≤ 1"))
     (verdict,) = explain_failures([Verdict("speed", "speed", "fail", findings)], trace, synthetic_case({}))
     assert [finding.detail for finding in verdict.findings] == [
-        ("meanwhile: event `gust` came 1.00 s before: something", "own"),
+        ("meanwhile: event `gust` happened 1.00 s before: something", "own"),
         (),
         (),
     ]
@@ -21,4 +21,4 @@ def test_only_failures_are_explained_and_before_their_own_details():
 
 def test_of_many_causes_the_first_six_are_told():
     lines = why("speed", [event for k in range(9) for event in by(f"gust {k}", 9)], case={})
-    assert lines == [f"meanwhile: event `gust {k}` came 1.00 s before: something" for k in range(6)]
+    assert lines == [f"meanwhile: event `gust {k}` happened 1.00 s before: something" for k in range(6)]

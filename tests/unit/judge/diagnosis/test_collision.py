@@ -7,7 +7,7 @@ HIT = [2, "collision.started", "crate", {"robot_caused": True}]
 
 def test_what_was_put_before_the_robot_and_struck_is_named_with_its_distance():
     lines = why("collisions", [*box(1.5, "crate", 2, 0, 0.4, 0.4, "crate falls"), HIT], at=2)
-    assert lines == ["why: crate: event `crate falls` had put it 0.30 m from the robot's middle 0.50 s before"]
+    assert lines == ["why: crate: event `crate falls` had spawned it 0.30 m from the robot's center 0.50 s before"]
 
 
 def test_what_ran_into_the_robot_is_told_with_its_speed():

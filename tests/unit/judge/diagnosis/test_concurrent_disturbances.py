@@ -7,26 +7,26 @@ from diagnosis_cases import by, slip, why
 @pytest.mark.parametrize(
     ("events", "told"),
     [
-        (slip(2, 2, name="lidar.off", kind="off"), ["lidar.off was at work since t = 2.00 s, for 8.00 s"]),
-        (slip(0, 0, name="lidar.off", kind="off"), ["lidar.off was at work since the start, for 10.00 s"]),
+        (slip(2, 2, name="lidar.off", kind="off"), ["lidar.off was active since t = 2.00 s, for 8.00 s"]),
+        (slip(0, 0, name="lidar.off", kind="off"), ["lidar.off was active since the start, for 10.00 s"]),
         (slip(2, 2, 8, "lidar.off", "off"), ["lidar.off had ended 2.00 s before, after 6.00 s"]),
         (slip(2, 2, 6.5, "lidar.off", "off"), []),
         ([[2, "fault.started", "lidar.off", {"entry": 0}]], []),
         (slip(2, 2, 7, "lidar.off", "off"), ["lidar.off had ended 3.00 s before, after 5.00 s"]),
         (slip(5, 5, 10, "lidar.off", "off"), ["lidar.off had ended 0.00 s before, after 5.00 s"]),
-        (slip(10, 10, None, "lidar.off", "off"), ["lidar.off was at work since t = 10.00 s, for 0.00 s"]),
+        (slip(10, 10, None, "lidar.off", "off"), ["lidar.off was active since t = 10.00 s, for 0.00 s"]),
         (
             [*slip(2, 2, 5, "lidar.off", "off"), *slip(5, 5, 8, "lidar.off", "off")],
             ["lidar.off had ended 2.00 s before, after 3.00 s"],
         ),
         (
             [[2, "fault.started", "imu.off", {"entry": 1}], *slip(2, 2, name="lidar.off", kind="off")],
-            ["lidar.off was at work since t = 2.00 s, for 8.00 s"],
+            ["lidar.off was active since t = 2.00 s, for 8.00 s"],
         ),
-        (by("gust", 5), ["event `gust` came 5.00 s before: something"]),
-        (by("gust", 10), ["event `gust` came 0.00 s before: something"]),
+        (by("gust", 5), ["event `gust` happened 5.00 s before: something"]),
+        (by("gust", 10), ["event `gust` happened 0.00 s before: something"]),
         ([[8, "event.ended", "gust", {"effects": [{"happened": False, "what": "nothing"}]}]], []),
-        (by("gust", 6), ["event `gust` came 4.00 s before: something"]),
+        (by("gust", 6), ["event `gust` happened 4.00 s before: something"]),
         (by("gust", 4), []),
     ],
 )

@@ -12,12 +12,12 @@ def test_a_thing_on_the_goal_is_named_once():
         "why: pallet (spawned by event `pallet falls` at t = 1.00 s) stands on goal study"
     ]
     (line,) = why("goals_reached", box(1, "pallet", 8, 0.6, 1, 1, "pallet falls"))
-    assert "stands 0.10 m from the middle of goal study" in line
+    assert "stands 0.10 m from the center of goal study" in line
 
 
 def test_a_world_without_a_way_is_named():
     assert why("result", [], case={**CASE, "shortest": {"study": float("inf")}}) == [
-        "why: the world itself leaves a robot of 0.40 m no way to goal study"
+        "why: the world has no path to goal study for a robot 0.40 m wide"
     ]
 
 
@@ -30,7 +30,7 @@ def test_the_gap_that_is_too_narrow_is_named_with_the_world_that_leaves_no_way()
     gap = ["study", [5, 0.15], [5, -0.15], "west wall", "east wall"]
     (line,) = why("result", [], case={**CASE, "shortest": {"study": float("inf")}, "passages": [gap]})
     assert line.endswith(
-        "no way to goal study: the widest is the passage of 0.30 m between `west wall` and `east wall` at (5.00, 0.00)"
+        "a robot 0.40 m wide; too narrow is the passage of 0.30 m between `west wall` and `east wall` at (5.00, 0.00)"
     )
 
 
@@ -106,7 +106,7 @@ def test_what_stands_where_the_goal_before_was_does_not_keep_it_from_the_next():
 def test_a_passage_as_wide_as_the_robot_is_not_what_leaves_no_way():
     gap = ["study", [5, 0.2], [5, -0.2], "west wall", "east wall"]
     (line,) = why("result", [], case={**CASE, "shortest": {"study": float("inf")}, "passages": [gap]})
-    assert line.endswith("no way to goal study")
+    assert line.endswith("path to goal study for a robot 0.40 m wide")
 
 
 def test_what_it_begins_to_touch_at_that_very_tick_is_named_and_what_it_lets_go_of_then_is_not():
@@ -127,7 +127,9 @@ def test_what_is_thirty_centimeters_away_may_hold_the_robot():
 def test_what_its_own_stack_waits_for_is_named_while_it_does():
     held = [2, "robot.held", "collision_monitor", {"message": "scans of lidar `lidar` come late"}]
     (line,) = why("goals_reached", [held])
-    assert line == "why: its collision monitor holds it, as it said at t = 2.00 s: scans of lidar `lidar` come late"
+    assert (
+        line == "why: its collision monitor has stopped it, as reported at t = 2.00 s: scans of lidar `lidar` come late"
+    )
     assert why("goals_reached", [held, [4, "robot.released", "collision_monitor"]]) == []
 
 
@@ -139,7 +141,7 @@ def test_where_nothing_else_is_known_its_stack_is_quoted_with_what_it_had_tried(
     def told(*things):
         return causes("result", 2400, synthetic_trace({**STANDS, "events": [*given_up, *things]}), synthetic_case(CASE))
 
-    assert told() == ["why: it gave up and said: no room to turn; spin, wait had not helped"]
+    assert told() == ["why: it gave up and reported: no room to turn; spin, wait had not helped"]
     assert "said" not in "".join(told(*box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")))
 
 
@@ -155,4 +157,4 @@ def test_recoveries_that_failed_are_told_with_their_codes_whatever_else_is_known
     ]
     (nearest, line) = why("stuck", [*tried, *box(0, "crate", 4.7, 0, 0.4, 0.4)], case={**CASE, "passages": []})
     assert nearest == "why: crate was 0.30 m from the robot"
-    assert line == "why: what it tried failed, too: backup with BACKUP_TIMEOUT 2 times, spin with SPIN_COLLISION_AHEAD"
+    assert line == "why: recoveries failed: backup with BACKUP_TIMEOUT 2 times, spin with SPIN_COLLISION_AHEAD"

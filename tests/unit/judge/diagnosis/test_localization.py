@@ -8,14 +8,14 @@ def test_a_robot_that_was_set_down_elsewhere_is_lost_for_that_reason():
     far = {"belief": {"offset": [2.0, 0, 0]}}
     case = {"goals": [GOAL]}
     assert why("goals_reached", events, case=case, **far) == [
-        "why: it believed itself 2.00 m from where it was",
-        "why: event `carried off` had set it down elsewhere 4.00 s before",
+        "why: its believed position was 2.00 m from the true one",
+        "why: event `carried off` had moved the robot elsewhere 4.00 s before",
     ]
     assert why("localization_error", events, case=case, **far) == [
-        "why: event `carried off` had set it down elsewhere 4.00 s before"
+        "why: event `carried off` had moved the robot elsewhere 4.00 s before"
     ]
     assert why("localization_error", events, case=case) == [
-        "meanwhile: event `carried off` came 4.00 s before: something"
+        "meanwhile: event `carried off` happened 4.00 s before: something"
     ]
 
 
@@ -40,9 +40,9 @@ def test_lost_is_half_a_meter_in_any_direction():
     case = {"goals": [GOAL]}
     at_one = {"seconds": 10, "truth": [[0, 0, 1]]}
     half = why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.5, 0, 0]})
-    assert half == ["why: it believed itself 0.50 m from where it was"]
+    assert half == ["why: its believed position was 0.50 m from the true one"]
     assert why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0, 0.8, 0]}) == [
-        "why: it believed itself 0.80 m from where it was"
+        "why: its believed position was 0.80 m from the true one"
     ]
     assert why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.49, 0, 0]}) == []
 
@@ -51,7 +51,7 @@ def test_what_happens_at_that_very_tick_counts_and_what_comes_later_does_not():
     lost = {"case": {"goals": [GOAL]}, "belief": {"offset": [2, 0, 0]}}
     events = by("carried off", 6, [6, "robot.placed", "", {}])
     assert why("localization_error", events, at=6, **lost) == [
-        "why: event `carried off` had set it down elsewhere 0.00 s before"
+        "why: event `carried off` had moved the robot elsewhere 0.00 s before"
     ]
     assert why("localization_error", events, at=5.9, **lost) == []
 

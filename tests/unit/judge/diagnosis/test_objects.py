@@ -67,11 +67,11 @@ def test_what_an_event_did_is_told_of_what_it_did_it_to():
         [2, "event.ended", "cart comes", {}],
     ]
     trace = synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]], "events": events})
-    assert [thing.told(trace) for thing in movable_objects(trace, 300)] == [
+    assert [thing.describe(trace) for thing in movable_objects(trace, 300)] == [
         "bin",
         "crate (spawned by event `crate falls` at t = 1.00 s)",
     ]
-    assert [thing.told(trace) for thing in movable_objects(trace, 480)][1:] == [
+    assert [thing.describe(trace) for thing in movable_objects(trace, 480)][1:] == [
         "crate (moved by event `cart comes` at t = 2.00 s)"
     ]
 

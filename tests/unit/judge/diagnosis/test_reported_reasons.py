@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.criteria.goal_outcomes import goal_outcomes
-from simscen.judge.diagnosis.goal_failure import _failed_recoveries, _given_up, _held
+from simscen.judge.diagnosis.goal_failure import _failed_recoveries, _gave_up, _stopped
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 SECOND = 240
@@ -31,7 +31,7 @@ HELD = [3, "robot.held", "collision_monitor", {"message": "scans are late"}]
 )
 def test_robot_is_held_from_the_report_until_after_its_release(events, at, is_held):
     trace, _ = recorded(*events)
-    assert bool(_held(trace, round(at * SECOND))) == is_held
+    assert bool(_stopped(trace, round(at * SECOND))) == is_held
 
 
 def test_the_report_of_a_goal_that_was_given_up_counts_from_its_own_tick_on():
@@ -42,8 +42,10 @@ def test_the_report_of_a_goal_that_was_given_up_counts_from_its_own_tick_on():
         [6, "goal.failed", "study", {"message": "no valid path", "error_name": "NO_VALID_PATH"}],
         [7, "recovery.started", "backup"],
     )
-    assert _given_up(trace, outcome, 6 * SECOND - 1) == []
-    assert _given_up(trace, outcome, 6 * SECOND) == ["it gave up and said: no valid path; clear, spin had not helped"]
+    assert _gave_up(trace, outcome, 6 * SECOND - 1) == []
+    assert _gave_up(trace, outcome, 6 * SECOND) == [
+        "it gave up and reported: no valid path; clear, spin had not helped"
+    ]
 
 
 def test_recoveries_that_failed_count_from_the_acceptance_of_the_goal_to_the_failure():
@@ -56,5 +58,5 @@ def test_recoveries_that_failed_count_from_the_acceptance_of_the_goal_to_the_fai
         [7, "recovery.ended", "retrace", failed],
     )
     assert _failed_recoveries(trace, outcome, 6 * SECOND) == [
-        "what it tried failed, too: spin with COLLISION_AHEAD, backup with COLLISION_AHEAD"
+        "recoveries failed: spin with COLLISION_AHEAD, backup with COLLISION_AHEAD"
     ]

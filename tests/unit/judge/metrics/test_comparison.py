@@ -147,7 +147,7 @@ def test_every_metric_that_is_compared_is_one() -> None:
 def test_stacks_are_compared_by_what_they_did_whatever_their_scenario_expects() -> None:
     """A stack that fails as expected is not better than one that holds what was expected to fail."""
     known = replace(run("ref", outcome=Outcome.FAILED), outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
-    broken = Finding(Status.FAIL, "expected", "everything held", "a failure: NAV-1")
+    broken = Finding(Status.FAIL, "expected", "everything passed", "a failure: NAV-1")
     mended = replace(
         run("mine", outcome=Outcome.FAILED),
         reason="NAV-1",

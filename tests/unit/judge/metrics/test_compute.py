@@ -52,7 +52,7 @@ def test_a_standing_robot_has_no_smoothness_and_says_why():
     measures = compute_metrics(synthetic_trace({"seconds": 10, "truth": [[0, 0, 0]]}), synthetic_case({}))
     assert measures.undefined["sparc"] == measures.undefined["ldlj"] == "the robot never moved"
     assert measures.undefined["aol"] == "the robot never drove"
-    assert "too short a way" in measures.undefined["max_curvature"]
+    assert "path is too short" in measures.undefined["max_curvature"]
     assert measures.values["time_not_moving"] == pytest.approx(10.0)
     assert measures.values["max_jerk"] == 0.0
 
@@ -102,7 +102,7 @@ def test_spl_is_left_out_when_no_shortest_way_is_known(shortest):
     )
     for name in ("spl", "soft_spl", "path_length_ratio", "barn_score", "shortest_length"):
         assert measures.values[name] is None
-        assert "shortest way" in measures.undefined[name]
+        assert "shortest path" in measures.undefined[name]
 
 
 def test_a_robot_that_is_carried_has_neither_driven_nor_turned():
@@ -371,7 +371,7 @@ def test_a_run_without_belief_has_no_localization():
         synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "belief": None}), synthetic_case({})
     )
     assert measures.values["ape_trans_rmse"] is measures.values["nees"] is None
-    assert measures.undefined["nees"] == "the robot never said where it believes to be"
+    assert measures.undefined["nees"] == "the robot never reported a believed pose"
 
 
 def test_a_signal_that_is_not_a_number_leaves_its_metrics_undefined_and_no_others():

@@ -70,7 +70,7 @@ def test_curvature_is_of_points_thirty_centimeters_from_the_one_before():
     assert (
         short["max_curvature"]
         == short["norm_curvature"]
-        == "the robot drove too short a way: fewer than three points 0.3 m apart"
+        == "the path is too short: it has fewer than three points 0.3 m apart"
     )
 
 
@@ -106,7 +106,7 @@ def test_without_a_true_pose_there_is_no_shape():
     metrics = path_metrics(trace, drive(trace))
     assert metrics["aol"] == "the robot never drove"
     assert metrics["heading_change"] == 0.0
-    assert "too short a way" in metrics["max_curvature"]
+    assert "path is too short" in metrics["max_curvature"]
 
 
 @pytest.mark.parametrize(("before", "turned"), [(1, 0.6), (2, 0.5), (3, 0.3), (4, 0.7)])

@@ -63,7 +63,7 @@ def test_a_reason_is_added_where_there_is_no_number(answer: object) -> None:
 
 @pytest.mark.parametrize("answer", [True, math.nan, math.inf, -math.inf, None, "", [1.0], 1j])
 def test_anything_else_makes_the_run_an_error(answer: object) -> None:
-    with pytest.raises(InvalidTrace, match=r"metric mine is no number: .*\(my-package 1\.0\)"):
+    with pytest.raises(InvalidTrace, match=r"metric mine is not a finite number: .*\(my-package 1\.0\)"):
         added(Measured(answer))
 
 
@@ -98,7 +98,9 @@ def test_a_zone_begins_with_its_first_distance_and_ends_before_its_last(monkeypa
 
 def test_touching_a_person_is_a_distance_of_zero_and_nobody_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert zones(monkeypatch, [0.0])["min_person_distance"] == 0.0
-    assert zones(monkeypatch, [math.inf])["min_person_distance"] == "no pedestrian was there at a sample of the truth"
+    assert (
+        zones(monkeypatch, [math.inf])["min_person_distance"] == "no pedestrian was present at any sample of the truth"
+    )
 
 
 def test_a_run_of_one_tick_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
