@@ -93,7 +93,7 @@ def perform_checked(action: Action, stage: Stage, origin: str) -> Effect:
     if not isinstance(effect, Effect) or not isinstance(effect.happened, bool) or not isinstance(effect.what, str):
         raise RunError(BROKEN_COMPONENT, f"an action returned {effect!r}, which is not an Effect{origin}")
     if effect.happened and not observed.changed:
-        raise RunError(BROKEN_COMPONENT, f"an action returned the effect `{effect.what}`, but did nothing{origin}")
+        raise RunError(BROKEN_COMPONENT, f"an action returned the effect `{effect.what}`, but changed nothing{origin}")
     return effect
 
 

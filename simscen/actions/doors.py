@@ -64,10 +64,10 @@ def _move_door(stage: Stage, name: str, target: Pose2, full_duration: float, sta
     closed, opened = stage.door(name)
     remaining = _travel_share(pose, target, closed, opened)
     if remaining < TRAVEL_TOLERANCE:
-        return Effect(False, f"{name} was {state} already")
+        return Effect(False, f"{name} was already {state}")
     motion, verb = stage.motion(name), "swings" if wrap(opened.yaw - closed.yaw) else "slides"
     if motion is not None and _travel_share(motion[0].poses[-1], target, closed, opened) < TRAVEL_TOLERANCE:
-        return Effect(False, f"{name} {verb} {state} already")
+        return Effect(False, f"{name} already {verb} {state}")
     duration = full_duration if remaining > 1 - TRAVEL_TOLERANCE else full_duration * remaining
     stage.move(name, panel_path(pose, target, duration))
     return Effect(True, f"{name} {verb} {state}")

@@ -61,7 +61,7 @@ class Spawn(Shaped, Action):
         pose = self._spawn_pose(stage)
         stage.spawn(Body(self.name, (self.solid(self.name),), Pose3.planar(pose), self.mass))
         what = f"spawned {self.name} at ({pose.x:.2f}, {pose.y:.2f})"
-        return Effect(is_as_requested, what if is_as_requested else f"{what} as the robot had no plan to put it on")
+        return Effect(is_as_requested, what if is_as_requested else f"{what}, because the robot had no plan")
 
     def _spawn_pose(self, stage: Stage) -> Pose2:
         if self.pose is not None:
@@ -79,7 +79,7 @@ def _has_plan(stage: Stage) -> bool:
 
 
 def pose_on_plan(plan: Path, robot: Pose2, distance: float) -> Pose2:
-    """Return the pose on `plan` that is `distance` meters further along than the point nearest to the robot."""
+    """Return the pose on `plan` that is `distance` meters beyond the point nearest to the robot, along the plan."""
     points = plan.points[:, :2]
     steps = np.hypot(*np.diff(points, axis=0).T)
     lengths = np.concatenate(([0.0], np.cumsum(steps)))
@@ -129,7 +129,7 @@ class Move(Motion, WorldAction):
             return Effect(False, f"there is nothing called {self.name}")
         path = self.path(pose)
         if len(path.poses) == 1 and self.keyframes is None:
-            return Effect(False, f"{self.name} stands at its waypoint already")
+            return Effect(False, f"{self.name} is already at its waypoint")
         stage.move(self.name, path)
         return Effect(True, f"moved {self.name}")
 
@@ -155,9 +155,9 @@ class Teleport(Spec, WorldAction):
             return Effect(False, f"there is nothing called {self.name}")
         distance, is_moving = current.distance(target), stage.motion(self.name) is not None
         if distance < POSE_TOLERANCE and abs(wrap(current.yaw - target.yaw)) < POSE_TOLERANCE and not is_moving:
-            return Effect(False, f"{self.name} stood there already")
+            return Effect(False, f"{self.name} was already there")
         stage.place(self.name, target)
-        return Effect(True, f"set {self.name} down {distance:.2f} m away, at ({target.x:.2f}, {target.y:.2f})")
+        return Effect(True, f"moved {self.name} by {distance:.2f} m to ({target.x:.2f}, {target.y:.2f})")
 
 
 class Stop(Spec, WorldAction):

@@ -123,11 +123,11 @@ class Pedestrian(_WalkSettings, WorldAction):
     def perform(self, stage: Stage) -> Effect:
         """Add the pedestrian; has no effect if there is no free space."""
         pose = self.pose.pose
-        if not stage.has_room((pose.x, pose.y), self.radius):
-            return Effect(False, f"there is no room for {self.name} at ({pose.x:.2f}, {pose.y:.2f})")
+        if not stage.room((pose.x, pose.y), self.radius):
+            return Effect(False, f"there is no free space for {self.name} at ({pose.x:.2f}, {pose.y:.2f})")
         goals = tuple((x, y) for x, y in self.goals)
-        stage.add_pedestrian(self.to_pedestrian(stage, self.name, pose, goals, self.group))
-        return Effect(True, f"{self.name} comes at ({pose.x:.2f}, {pose.y:.2f})")
+        stage.walk(self.to_pedestrian(stage, self.name, pose, goals, self.group))
+        return Effect(True, f"added {self.name} at ({pose.x:.2f}, {pose.y:.2f})")
 
 
 class Crowd(_WalkSettings, WorldAction):
@@ -166,8 +166,8 @@ class Crowd(_WalkSettings, WorldAction):
             added += 1
             group_start = group_start if is_follower else start
         if added < self.count:
-            return Effect(False, f"there was room in {self.start} for {added} of {self.count} only")
-        return Effect(True, f"{added} people come in {self.start}")
+            return Effect(False, f"there was free space in {self.start} for only {added} of {self.count}")
+        return Effect(True, f"added {added} people in {self.start}")
 
     def _draw_start(self, stage: Stage, index: int, group_start: Point | None) -> Point | None:
         """Return a free point of the start region, near the first of the group if given; None if none was found."""

@@ -34,9 +34,9 @@ class Kidnap(Spec, Action):
         current, target = stage.robot, self.pose.pose
         distance = current.distance(target)
         if distance < POSE_TOLERANCE and abs(wrap(current.yaw - target.yaw)) < POSE_TOLERANCE:
-            return Effect(False, "the robot stood there already")
+            return Effect(False, "the robot was already there")
         stage.place_robot(target)
-        return Effect(True, f"set the robot down {distance:.2f} m away, at ({target.x:.2f}, {target.y:.2f})")
+        return Effect(True, f"moved the robot by {distance:.2f} m to ({target.x:.2f}, {target.y:.2f})")
 
 
 class Push(Spec, Action):
@@ -75,7 +75,7 @@ class Push(Spec, Action):
         target, duration = self.name or "the robot", self.for_ or 0.0
         x, y = self.impulse or self.force or (0.0, 0.0)
         if not math.hypot(x, y):
-            return Effect(False, "a push of zero moves nothing")
+            return Effect(False, "a push of zero has no effect")
         if self.name is not None:
             if stage.object(self.name) is None:
                 return Effect(False, f"there is nothing called {self.name}")
@@ -122,6 +122,6 @@ class CancelGoal(Spec, Action):
         """Cancel the goal; has no effect if there is none."""
         goal = stage.goal
         if goal is None:
-            return Effect(False, "the robot was driving to no goal")
+            return Effect(False, "the robot had no goal")
         stage.cancel_goal()
         return Effect(True, f"canceled goal {goal.name}")

@@ -1,1 +1,1 @@
-"""What goes wrong with sensors and wheels: one file for each fault, its specification and its meaning together."""
+"""Faults of sensors, actuators, localizer, and map, each with its specification and implementation."""

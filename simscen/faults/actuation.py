@@ -172,20 +172,20 @@ class Saturation(Spec, Fault):
 class _LimitedCommands(Disturbance):
     def __init__(self, spec: Saturation, setting: FaultSetting) -> None:
         self._spec, self._setting = spec, setting
-        self._last: tuple[int, Twist] | None = None
+        self._previous: tuple[int, Twist] | None = None
 
     def command(self, command: Twist) -> Twist | None:
         limited = self._within_speeds(command)
-        if self._last is not None:
-            tick, before = self._last
-            limited = self._within_accelerations(before, limited, self._setting.seconds_since(tick))
-        self._last = self._setting.now(), limited
+        if self._previous is not None:
+            tick, previous = self._previous
+            limited = self._within_accelerations(previous, limited, self._setting.seconds_since(tick))
+        self._previous = self._setting.now(), limited
         return limited
 
-    def _within_speeds(self, wanted: Twist) -> Twist:
+    def _within_speeds(self, command: Twist) -> Twist:
         spec, separation = self._spec, self._setting.separation
-        vx, vy = _shorten((wanted.vx, wanted.vy), spec.linear)
-        (wz,) = _shorten((wanted.wz,), spec.angular)
+        vx, vy = _shorten((command.vx, command.vy), spec.linear)
+        (wz,) = _shorten((command.wz,), spec.angular)
         limited = Twist(vx, vy, wz)
         if not separation or (spec.left is None and spec.right is None):
             return limited
@@ -193,11 +193,11 @@ class _LimitedCommands(Disturbance):
         (left,), (right,) = _shorten((left,), spec.left), _shorten((right,), spec.right)
         return twist_from_sides(left, right, limited.vy, separation)
 
-    def _within_accelerations(self, before: Twist, wanted: Twist, seconds: float) -> Twist:
+    def _within_accelerations(self, previous: Twist, command: Twist, seconds: float) -> Twist:
         spec = self._spec
-        vx, vy = _shorten((wanted.vx - before.vx, wanted.vy - before.vy), spec.linear_acceleration, seconds)
-        (wz,) = _shorten((wanted.wz - before.wz,), spec.angular_acceleration, seconds)
-        return Twist(before.vx + vx, before.vy + vy, before.wz + wz)
+        vx, vy = _shorten((command.vx - previous.vx, command.vy - previous.vy), spec.linear_acceleration, seconds)
+        (wz,) = _shorten((command.wz - previous.wz,), spec.angular_acceleration, seconds)
+        return Twist(previous.vx + vx, previous.vy + vy, previous.wz + wz)
 
 
 def _shorten(vector: tuple[float, ...], limit: float | None, seconds: float = 1.0) -> tuple[float, ...]:

@@ -31,7 +31,7 @@ class Wheels:
 
 
 class Sight(Protocol):
-    """View of the simulation for faults: what a sensor would measure from another pose or without some objects."""
+    """Simulated measurements for faults: what a sensor would measure from another pose or without some objects."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
         """Return true distances (n,) in meters along the beams of the current scan; inf beyond its range.

@@ -78,7 +78,8 @@ class OdometryDistortion(Disturbance):
     """
 
     def __init__(self) -> None:
-        self._last: dict[str, tuple[Odometry, Pose2]] = {}
+        self._previous: dict[str, tuple[Odometry, Pose2]] = {}
+        """Last true reading and last reported pose by sensor."""
         self._ended = False
 
     @abstractmethod
@@ -93,12 +94,12 @@ class OdometryDistortion(Disturbance):
         """Return the odometry with distorted increments."""
         if not isinstance(reading, Odometry):
             return reading
-        before, pose = self._last.get(reading.sensor, (reading, reading.pose))
-        step, velocity = Twist(*before.pose.between(reading.pose)), reading.twist
+        previous, pose = self._previous.get(reading.sensor, (reading, reading.pose))
+        step, velocity = Twist(*previous.pose.between(reading.pose)), reading.twist
         if not self._ended:
-            step, velocity = self.reported(step, velocity, reading.tick - before.tick)
+            step, velocity = self.reported(step, velocity, reading.tick - previous.tick)
         pose = pose.compose(Pose2(*step))
-        self._last[reading.sensor] = reading, pose
+        self._previous[reading.sensor] = reading, pose
         return replace(reading, pose=pose, twist=velocity)
 
     def end(self) -> Disturbance | None:

@@ -30,13 +30,13 @@ class ImuSensor:
     def read(self, tick: int) -> Imu:
         """Return a reading in the frame of the sensor. A level one at rest measures +9.81 m/s² along z."""
         (i, j, k, w), linear, angular = self._sensor_motion()
-        ax, ay, az = self._velocity
+        px, py, pz = self._velocity
         if (placements := self._view.placements()) != self._placements:
-            self._placements, (ax, ay, az) = placements, linear
+            self._placements, (px, py, pz) = placements, linear
         self._velocity = vx, vy, vz = linear
         seconds, base_from_world = self._seconds, (-i, -j, -k, w)
         p, q, r = rotated(base_from_world, angular)
-        x, y, z = rotated(base_from_world, ((vx - ax) / seconds, (vy - ay) / seconds, (vz - az) / seconds + GRAVITY))
+        x, y, z = rotated(base_from_world, ((vx - px) / seconds, (vy - py) / seconds, (vz - pz) / seconds + GRAVITY))
         gyro, force, (bp, bq, br) = self._gyro_std, self._force_std, self._bias
         np, nq, nr, nx, ny, nz = self._normals.take(6)
         return Imu(

@@ -85,16 +85,16 @@ class AnyCondition(Choice):
     def parts(self) -> Iterator[AnyCondition]:
         """Yield this condition and, recursively, all conditions in it."""
         yield self
-        for test in self.inner:
-            yield from test.parts()
+        for condition in self.inner:
+            yield from condition.parts()
 
-    def seen(self, now: Situation) -> Situation:
+    def situation_of_robot(self, now: Situation) -> Situation:
         """Return the situation of the robot that the condition is for."""
         return now if self.robot is None else now.of(self.robot)
 
     def holds(self, now: Situation) -> bool:
         """Return whether the condition is true at this beat, regardless of `for`."""
-        now = self.seen(now)
+        now = self.situation_of_robot(now)
         if self.all is not None:
             return all_hold(self.all, now)
         if self.any is not None:
@@ -110,14 +110,14 @@ class AnyCondition(Choice):
 
 
 # `all` and `any` are fields of AnyCondition, so that its methods cannot call the built-in functions by these names.
-def all_hold(tests: list[AnyCondition], now: Situation) -> bool:
+def all_hold(conditions: list[AnyCondition], now: Situation) -> bool:
     """Return whether all conditions are true."""
-    return all(test.holds(now) for test in tests)
+    return all(condition.holds(now) for condition in conditions)
 
 
-def any_holds(tests: list[AnyCondition], now: Situation) -> bool:
+def any_holds(conditions: list[AnyCondition], now: Situation) -> bool:
     """Return whether at least one condition is true."""
-    return any(test.holds(now) for test in tests)
+    return any(condition.holds(now) for condition in conditions)
 
 
 class Trigger(AnyCondition):

@@ -1,4 +1,4 @@
-"""Conditions on the motion, the position and the clearance of the robot, and on its localization."""
+"""Conditions on the motion, position, clearance, and localization of the robot."""
 
 import math
 

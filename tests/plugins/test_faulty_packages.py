@@ -148,7 +148,7 @@ def test_a_metric_that_a_run_does_not_have_says_why(run) -> None:
             "action",
             "return Effect(True, 'done')",
             "broken-component",
-            "the effect `done`, but did nothing (action `mine`",
+            "the effect `done`, but changed nothing (action `mine`",
         ),
         ("action", "raise ValueError('no')", "crashed", "action `mine` of mines 0.3: ValueError: no (mine.py:"),
         (

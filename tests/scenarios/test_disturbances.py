@@ -73,10 +73,10 @@ def test_an_event_happened_when_every_action_of_it_changed_something(tmp_path):
     line = {name: next(k for k, text in enumerate(lines, 1) if f"name: {name}," in f"{text},") for name in told}
     assert complaints(result) == {name: line[name] for name in told if name not in {*happened, "second time"}}
     assert told["remove"] == "+ removed bin"
-    assert told["move to where it is"] == "- crate stands at its waypoint already"
-    assert told["open what is open"] == "- hatch was open already"
-    assert told["nothing to cancel"] == "- the robot was driving to no goal"
-    assert told["no plan to spawn on"].endswith("as the robot had no plan to put it on")
+    assert told["move to where it is"] == "- crate is already at its waypoint"
+    assert told["open what is open"] == "- hatch was already open"
+    assert told["nothing to cancel"] == "- the robot had no goal"
+    assert told["no plan to spawn on"].endswith("because the robot had no plan")
     assert told["far away"].startswith("- it never began; the run ended at t = ")
 
 

@@ -147,7 +147,7 @@ class ConditionState:
         """Return whether the condition holds at this beat. Evaluates all parts, since each tracks its own duration."""
         if not self._parts:
             return self._test.holds(now)
-        now = self._test.seen(now)
+        now = self._test.situation_of_robot(now)
         answers = [part.holds(now) for part in self._parts]
         if self._test.not_ is not None:
             return not answers[0]

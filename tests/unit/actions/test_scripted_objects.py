@@ -66,7 +66,7 @@ def test_nothing_comes_of_opening_what_is_open_or_on_its_way():
     opening = MotionPath((0.0, 1.0), (Pose2(0.0, 0.0, 0.0), WIDE_OPEN))
     stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.5)}, motions={"gate": (opening, 0.4)})
     effect = perform(stage, open={"name": "gate"})
-    assert (effect.happened, effect.what) == (False, "gate swings open already")
+    assert (effect.happened, effect.what) == (False, "gate already swings open")
     assert perform(stage, close={"name": "gate"}).happened
 
 
@@ -130,7 +130,7 @@ def test_what_is_no_push_is_refused(told, said):
 def test_teleport_sets_an_object_down_and_says_how_far():
     stage = FakeStage(objects={"bin": Pose2(1.0, 1.0, 0.0)})
     effect = perform(stage, teleport={"name": "bin", "pose": {"x": 4, "y": 5}})
-    assert effect.what == "set bin down 5.00 m away, at (4.00, 5.00)"
+    assert effect.what == "moved bin by 5.00 m to (4.00, 5.00)"
     assert stage.done == [("place", "bin", Pose2(4.0, 5.0, 0.0))]
     assert not perform(stage, teleport={"name": "bin", "pose": {"x": 1, "y": 1}}).happened
     assert not perform(FakeStage(objects={"bin": None}), teleport={"name": "bin", "pose": {"x": 1, "y": 1}}).happened
