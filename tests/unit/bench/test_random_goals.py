@@ -121,7 +121,7 @@ def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(t
 
 def test_the_reference_tells_of_every_fault() -> None:
     page = (Path(__file__).parents[3] / "docs/reference/navigation-benchmark.md").read_text(encoding="utf-8")
-    table = page[page.index("| fault | weak |") :].partition("\n\n")[0]
+    table = page[page.index("| Fault | Weak |") :].partition("\n\n")[0]
     rows = {row.split("`")[1]: row for row in table.splitlines() if row.startswith("| `")}
     assert set(FAULTS) <= set(rows)
     for fault, (_, values) in FAULTS.items():
