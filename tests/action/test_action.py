@@ -67,7 +67,7 @@ def action(clone: Path, tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_a_failure_is_annotated_summed_up_with_its_picture_and_kept(action, tmp_path: Path) -> None:
+def test_failure_gets_annotation_summary_picture_and_artifact(action, tmp_path: Path) -> None:
     ran = action(**{"pictures-branch": "pictures", "arguments": '-k "good or bad" -j 1'})
     assert ran.failed and ran.outcomes.pop("run") == "failure", ran.printed
     assert set(ran.outcomes.values()) == {"success"}, ran.printed
@@ -93,7 +93,7 @@ def test_a_failure_is_annotated_summed_up_with_its_picture_and_kept(action, tmp_
 
 
 @pytest.mark.slow
-def test_a_wrong_file_fails_the_job_without_reports(action, tmp_path: Path) -> None:
+def test_invalid_file_fails_the_job_without_reports(action, tmp_path: Path) -> None:
     (tmp_path / "work/scenarios/wrong.scenario.yaml").write_text(ROOM.replace("goals", "gaols"))
     ran = action(artifact="")
     assert ran.outputs["exit-code"] == "2"
@@ -102,7 +102,7 @@ def test_a_wrong_file_fails_the_job_without_reports(action, tmp_path: Path) -> N
     assert ran.outcomes["reports"] == "success"
 
 
-def test_the_workflows_the_action_and_what_the_guide_shows_are_right(tmp_path: Path) -> None:
+def test_actionlint_accepts_action_workflows_and_guide(tmp_path: Path) -> None:
     """As actionlint sees it, which knows the action's inputs."""
     (tmp_path / ".github/workflows").mkdir(parents=True)
     shutil.copy(ROOT / "action.yml", tmp_path)

@@ -68,7 +68,7 @@ def colors(opened: Opened, x: float, y: float, reach: float = 0.35) -> int:
     return int(opened.page.evaluate(COLORS, [x, y, reach]))
 
 
-def test_a_failed_run_opens_at_its_failing_moment_with_the_line_lit_that_asks_for_it(
+def test_replay_of_failed_run_opens_at_the_failure_with_its_line_highlighted(
     open_page: Opener, one: Path, logs: list[Path]
 ) -> None:
     result = from_json(read_run(logs[0]).result)
@@ -84,7 +84,7 @@ def test_a_failed_run_opens_at_its_failing_moment_with_the_line_lit_that_asks_fo
     opened.until("location.hash.startsWith('#t=')")
 
 
-def test_a_link_points_at_a_time_and_at_what_is_selected(open_page: Opener, one: Path) -> None:
+def test_link_contains_time_and_selection(open_page: Opener, one: Path) -> None:
     opened = ready(open_page(one, where="#t=3.5"))
     assert time(opened) == pytest.approx(3.5)
     opened.page.evaluate("location.hash = '#t=1.25'")
@@ -93,7 +93,7 @@ def test_a_link_points_at_a_time_and_at_what_is_selected(open_page: Opener, one:
     opened.until("document.querySelector('.card.lit .what')?.textContent === 'speed'")
 
 
-def test_what_lies_on_the_map_moves_with_the_time(open_page: Opener, one: Path, logs: list[Path]) -> None:
+def test_map_content_changes_with_the_displayed_time(open_page: Opener, one: Path, logs: list[Path]) -> None:
     trace = read_run(logs[0]).trace
     opened = ready(open_page(one, where="#t=0"))
     for seconds in (2.0, 6.0, 10.0):
@@ -108,7 +108,7 @@ def test_what_lies_on_the_map_moves_with_the_time(open_page: Opener, one: Path, 
     assert opened.page.evaluate("simscen.runs[0].thingsAt(10).map((thing) => thing.name)") == []
 
 
-def test_it_scrubs_by_mouse_and_plays(open_page: Opener, one: Path) -> None:
+def test_page_plays_and_seeks_by_mouse(open_page: Opener, one: Path) -> None:
     opened = ready(open_page(one, where="#t=0"))
     box = opened.page.locator(".strip canvas").first.bounding_box()
     opened.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + 20)
@@ -122,7 +122,7 @@ def test_it_scrubs_by_mouse_and_plays(open_page: Opener, one: Path) -> None:
     assert time(opened) == stopped
 
 
-def test_everything_is_done_by_keys_alone(open_page: Opener, one: Path) -> None:
+def test_all_functions_of_the_replay_work_by_keyboard(open_page: Opener, one: Path) -> None:
     opened = ready(open_page(one, where="#t=0"))
     press = opened.page.keyboard.press
     press("ArrowRight")
@@ -165,7 +165,7 @@ def test_axe_finds_nothing_serious(open_page: Opener, one: Path, axe: str, width
     assert opened.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-def test_two_runs_play_side_by_side_in_one_time(open_page: Opener, two: Path, logs: list[Path], axe: str) -> None:
+def test_two_runs_play_with_the_same_clock(open_page: Opener, two: Path, logs: list[Path], axe: str) -> None:
     opened = ready(open_page(two, where="#t=5"))
     traces = [read_run(log).trace for log in logs]
     assert opened.page.locator(".map canvas").count() == 2
@@ -193,7 +193,7 @@ def test_names_cannot_break_out(open_page: Opener, tmp_path: Path) -> None:
     assert EVIL.split("\u202e")[0] in opened.page.title()
 
 
-def test_its_policy_allows_nothing_but_its_own_parts(open_page: Opener, one: Path) -> None:
+def test_content_security_policy_allows_only_own_parts(open_page: Opener, one: Path) -> None:
     opened = ready(open_page(one))
     policy = opened.page.locator("meta[http-equiv=Content-Security-Policy]").get_attribute("content")
     assert policy.startswith("default-src 'none'; script-src 'sha256-") and "unsafe" not in policy
@@ -215,7 +215,7 @@ def test_it_opens_within_a_second(open_page: Opener, one: Path, record_property,
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
-def test_the_maths_of_its_modules() -> None:
+def test_javascript_modules_compute_correct_values() -> None:
     command = ["node", "--test", "--test-reporter=tap", str(ROOT / "tests/browser/replay.test.mjs")]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stdout
@@ -225,9 +225,7 @@ def test_equal_logs_make_equal_pages(one: Path, logs: list[Path], tmp_path: Path
     assert made(tmp_path / "again.html", logs[:1]).read_bytes() == one.read_bytes()
 
 
-def test_a_log_that_does_not_say_where_the_robot_was_shows_where_it_thought_to_be(
-    open_page: Opener, tmp_path: Path
-) -> None:
+def test_log_without_ground_truth_shows_the_estimated_pose(open_page: Opener, tmp_path: Path) -> None:
     log, result = hostile_log()
     nowhere = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     trace = replace(log.trace, truth=nowhere, velocity=nowhere, clearance=nowhere)

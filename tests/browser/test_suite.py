@@ -46,7 +46,7 @@ def shown(opened: Opened) -> list[str]:
     return found
 
 
-def test_what_failed_is_on_the_first_screen_with_its_reason_and_its_line(open_page: Opener, report: Path) -> None:
+def test_failures_are_on_the_first_screen_with_reason_and_line(open_page: Opener, report: Path) -> None:
     opened = open_page(report)
     assert "2 failed" in opened.page.locator("h1").inner_text()
     failed = opened.page.locator(f"[id='{SHUTS}']")
@@ -59,7 +59,7 @@ def test_what_failed_is_on_the_first_screen_with_its_reason_and_its_line(open_pa
     assert failed.locator("img").evaluate("image => image.decode().then(() => image.naturalWidth)") == 300
 
 
-def test_runs_are_found_by_words_themes_tags_and_variations(open_page: Opener, report: Path) -> None:
+def test_search_finds_runs_by_words_themes_tags_and_variations(open_page: Opener, report: Path) -> None:
     opened = open_page(report)
     for name, value, left in FOUND:
         field = opened.page.locator(f"[name={name}]")
@@ -72,7 +72,7 @@ def test_runs_are_found_by_words_themes_tags_and_variations(open_page: Opener, r
         opened.page.locator("#controls").evaluate("form => { form.reset(); form.dispatchEvent(new Event('input')); }")
 
 
-def test_outcomes_are_shown_and_hidden_and_what_changed_alone(open_page: Opener, report: Path) -> None:
+def test_filters_show_outcomes_and_changed_runs(open_page: Opener, report: Path) -> None:
     opened = open_page(report)
     opened.page.locator("[name=status][value=passed]").uncheck()
     assert len(shown(opened)) == 3
@@ -87,7 +87,7 @@ def test_outcomes_are_shown_and_hidden_and_what_changed_alone(open_page: Opener,
     assert len(shown(opened)) == 8
 
 
-def test_runs_are_put_in_order(open_page: Opener, report: Path) -> None:
+def test_runs_can_be_sorted(open_page: Opener, report: Path) -> None:
     opened = open_page(report)
     order = opened.page.locator("[name=order]")
     order.select_option("margin")
@@ -101,7 +101,7 @@ def test_runs_are_put_in_order(open_page: Opener, report: Path) -> None:
     assert shown(opened)[0].startswith("run-scenarios-evil")
 
 
-def test_all_of_it_is_done_with_keys_alone(open_page: Opener, report: Path) -> None:
+def test_all_functions_of_the_report_work_by_keyboard(open_page: Opener, report: Path) -> None:
     opened = open_page(report)
     keys, focused = opened.page.keyboard, "document.activeElement.closest('.run')?.id"
     keys.press("f")
@@ -130,7 +130,7 @@ def test_a_link_to_a_run_opens_it(open_page: Opener, report: Path) -> None:
 
 
 @pytest.mark.parametrize(("dark", "size"), [(False, (1280, 800)), (True, (1280, 800)), (False, (390, 840))])
-def test_it_can_be_read_by_everybody_and_fits(
+def test_report_is_accessible_and_fits_the_screen(
     open_page: Opener, report: Path, axe: str, dark: bool, size: tuple[int, int]
 ) -> None:
     opened = open_page(report, dark=dark, size=size)
@@ -139,16 +139,14 @@ def test_it_can_be_read_by_everybody_and_fits(
     assert opened.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-def test_names_of_others_stay_text(open_page: Opener, report: Path) -> None:
+def test_names_from_scenarios_are_escaped(open_page: Opener, report: Path) -> None:
     opened = open_page(report)
     assert opened.page.title().startswith("simscen: ")
     assert opened.page.locator("script").count() == 1
     assert "<script>document.title" in opened.page.locator("#runs").inner_text()
 
 
-def test_a_page_of_a_session_that_goes_on_comes_anew_until_it_is_over(
-    open_page: Opener, report: Path, tmp_path: Path
-) -> None:
+def test_page_of_a_running_session_reloads_until_it_ends(open_page: Opener, report: Path, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     answers = [run("a/first"), run("a/second", left=-0.1)]
     page.write_text(to_html(Session(answers[:1], live=RunningSession(2, (answers[1].key,)))), encoding="utf-8")
@@ -159,7 +157,7 @@ def test_a_page_of_a_session_that_goes_on_comes_anew_until_it_is_over(
     assert opened.page.locator("#live").count() == 0
 
 
-def test_it_is_read_without_its_script(browser: object, report: Path) -> None:
+def test_page_is_readable_without_javascript(browser: object, report: Path) -> None:
     context = browser.new_context(java_script_enabled=False)  # type: ignore[attr-defined]
     page = context.new_page()
     page.goto(report.as_uri())
@@ -168,7 +166,7 @@ def test_it_is_read_without_its_script(browser: object, report: Path) -> None:
     context.close()
 
 
-def test_two_thousand_runs_stay_usable(open_page: Opener, tmp_path: Path) -> None:
+def test_report_of_two_thousand_runs_is_usable(open_page: Opener, tmp_path: Path) -> None:
     answers = [run(f"many/{k // 20}", k % 20 + 1, 0.01 * (k % 97) - 0.02, k % 60) for k in range(2000)]
     page = tmp_path / "report.html"
     page.write_text(to_html(Session(answers)), encoding="utf-8")

@@ -16,7 +16,7 @@ def bench(*options: str) -> "subprocess.CompletedProcess[str]":
 
 
 @pytest.mark.slow
-def test_it_drives_an_experiment_and_prints_its_numbers_and_resumed_it_drives_no_run_again(tmp_path: Path) -> None:
+def test_experiment_prints_its_numbers_and_resume_repeats_no_run(tmp_path: Path) -> None:
     done = bench("--only", "narrow doorway", "--seeds", "1", "--out", str(tmp_path / "out"), "--format", "json")
     assert done.returncode == 0, done.stderr
     (row,) = json.loads(done.stdout)["experiments"]
@@ -28,7 +28,7 @@ def test_it_drives_an_experiment_and_prints_its_numbers_and_resumed_it_drives_no
     assert log.stat().st_mtime_ns == written
 
 
-def test_data_that_is_not_here_is_skipped_aloud_and_an_unknown_experiment_is_an_error(tmp_path: Path) -> None:
+def test_missing_data_is_reported_as_skipped_and_unknown_experiment_is_an_error(tmp_path: Path) -> None:
     named = ("nothing", "BARN", "sandbox")
     only = [word for name in named for word in ("--only", name)]
     done = bench(*only, "--barn", str(tmp_path / "none"), "--out", str(tmp_path / "out"))

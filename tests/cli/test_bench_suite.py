@@ -39,7 +39,7 @@ def test_a_suite_is_measured_and_its_results_are_compared(tmp_path: Path) -> Non
     assert "1.00" in compared.stdout
 
 
-def test_nothing_is_measured_when_there_is_nothing_to_compare_with(tmp_path: Path) -> None:
+def test_unreadable_comparison_file_is_an_error_before_measuring(tmp_path: Path) -> None:
     (tmp_path / "none.json").write_text("{}")
     done = bench("--compare", str(tmp_path / "none.json"))
     assert (done.returncode, done.stdout) == (2, "")

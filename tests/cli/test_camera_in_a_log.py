@@ -38,7 +38,7 @@ pass: [{collisions: {max: 10}}]
 
 
 @pytest.mark.slow
-def test_pictures_and_bumps_are_in_the_log_and_mean_what_was_there(tmp_path: Path) -> None:
+def test_log_contains_correct_images_and_bumper_readings(tmp_path: Path) -> None:
     (tmp_path / "looker.robot.yaml").write_text(ROBOT)
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     command = [sys.executable, "-m", "simscen.cli.main", "run", "a.scenario.yaml", "--out", "out"]

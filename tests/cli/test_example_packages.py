@@ -33,13 +33,13 @@ def call(tmp_path: Path, lay_out):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-def test_its_own_tests_pass(call, name: str) -> None:
+def test_tests_of_example_package_pass(call, name: str) -> None:
     pytest_ = ("-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", "--import-mode=importlib", "-o", "addopts=")
     done = call(*pytest_, "tests", folder=PLUGINS / name)
     assert done.returncode == 0, done.stdout
 
 
-def test_its_contract_is_asked_for_by_the_name_of_its_entry_point(call, tmp_path: Path) -> None:
+def test_contract_tests_accept_an_entry_point_name(call, tmp_path: Path) -> None:
     plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin")  # whether or not this simscen was installed anew
     asked = ("-k", "without and goal and zero", "--simscen-contract", "vfh_plus")
     pytest_ = ("-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", *plugin, *asked)
@@ -82,7 +82,7 @@ def test_its_keys_are_explained_and_in_the_schema(call) -> None:
     assert '"const": "vfh_plus"' in schema
 
 
-def test_a_scenario_that_uses_them_is_validated_without_importing_what_does_the_work(call, tmp_path: Path) -> None:
+def test_validation_does_not_import_component_implementations(call, tmp_path: Path) -> None:
     text = (ROOT / "scenarios/navigation/goal.scenario.yaml").read_text().replace("../../worlds", "../worlds")
     shutil.copytree(ROOT / "worlds", tmp_path / "worlds")
     (tmp_path / "scenarios").mkdir()
@@ -115,7 +115,7 @@ class Planner:
 
 
 @pytest.mark.slow
-def test_a_planner_that_breaks_is_an_error_of_its_own_run(call, lay, tmp_path: Path) -> None:
+def test_broken_planner_is_an_error_of_its_run_only(call, lay, tmp_path: Path) -> None:
     lay(tmp_path / "site", "nan-planner", "0.9", {"planner": {"nan": "nan_planner:Nan"}}, nan_planner=BROKEN)
     (tmp_path / "nan.stack.yaml").write_text("simscen: 1\nstack: {planner: {type: nan}}\n")
     stacks = ("--stack", f"nan={tmp_path}/nan.stack.yaml", "--stack", "reference=reference")

@@ -74,7 +74,7 @@ def with_urdf(folder: Path, with_scenario):
     return call
 
 
-def test_the_urdf_that_is_varied_here_is_valid(simscen, folder: Path) -> None:
+def test_base_urdf_is_valid(simscen, folder: Path) -> None:
     (folder / "cube.urdf").write_text(URDF)
     (folder / "cube.robot.yaml").write_text(URDF_ROBOT)
     assert simscen("validate", "a.scenario.yaml").out == "1 scenario is valid\n"
@@ -100,7 +100,7 @@ def test_the_urdf_that_is_varied_here_is_valid(simscen, folder: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("named", ["world", "robot"])
-def test_a_path_that_cannot_be_used(with_scenario, folder: Path, named: str, written: str, told: str) -> None:
+def test_unusable_path_is_an_error(with_scenario, folder: Path, named: str, written: str, told: str) -> None:
     (folder / "../secret.world.yaml").write_text("password: 1234\n")
     (folder / "away.yaml").symlink_to("../secret.world.yaml")
     (folder / "away").symlink_to("..")
@@ -116,7 +116,7 @@ def test_a_path_that_cannot_be_used(with_scenario, folder: Path, named: str, wri
 
 
 @pytest.mark.parametrize("key", ["extends", "map", "image", "sdf", "urdf"])
-def test_31_no_other_path_leads_out_either(with_scenario, folder: Path, key: str) -> None:
+def test_31_other_paths_outside_the_root_are_errors(with_scenario, folder: Path, key: str) -> None:
     (folder / "../secret.yaml").write_text("password: 1234\n")
     files = {
         "extends": ("a.scenario.yaml", None),
@@ -133,7 +133,7 @@ def test_31_no_other_path_leads_out_either(with_scenario, folder: Path, key: str
     assert "1234" not in problems
 
 
-def test_33_neither_a_scenario_nor_its_defaults_may_be_a_link_out(with_scenario, refused, folder: Path) -> None:
+def test_33_scenario_and_defaults_cannot_be_links_outside_the_root(with_scenario, refused, folder: Path) -> None:
     (folder / "../secret.yaml").write_text("password: 1234\n")
     (folder / "link.scenario.yaml").symlink_to("../secret.yaml")
     told = refused("link.scenario.yaml")
@@ -172,7 +172,7 @@ def test_36_an_argument_longer_than_names_can_be(refused, name: str) -> None:
         pytest.param("text.obj", "not a readable OBJ file", id="41 not a mesh"),
     ],
 )
-def test_a_mesh_that_a_urdf_names(with_urdf, folder: Path, mesh: str, told: str) -> None:
+def test_unusable_mesh_of_a_urdf_is_an_error(with_urdf, folder: Path, mesh: str, told: str) -> None:
     triangle = struct.pack("<12fH", *[0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0], 0)
     (folder / "lying.stl").write_bytes(bytes(80) + struct.pack("<I", 4_000_000_000) + triangle)
     (folder / "nan.stl").write_bytes(bytes(80) + struct.pack("<I", 1) + struct.pack("<12fH", *[float("nan")] * 12, 0))
@@ -194,7 +194,7 @@ def test_39_a_urdf_that_is_a_folder(with_scenario, folder: Path) -> None:
     assert "cube.robot.yaml:3:7: error[SC001] not a regular file: `cube.urdf`" in with_scenario(replace={})
 
 
-def test_a_robot_in_another_folder_that_would_drag_is_told_with_a_path_that_opens(with_scenario, folder: Path) -> None:
+def test_dragging_robot_in_another_folder_is_reported_with_a_valid_path(with_scenario, folder: Path) -> None:
     (folder / "robots").mkdir()
     text = (folder / "cube.robot.yaml").read_text()
     (folder / "robots/cube.robot.yaml").write_text(text.replace("z: 4 cm", "z: 0"))
@@ -223,7 +223,7 @@ def linked(count: int) -> str:
         pytest.param(URDF.replace('mass value="5"', 'mass value="nan"'), "7:15", "finite number", id="50 nan"),
     ],
 )  # fmt: skip
-def test_a_urdf_that_cannot_be_used(with_urdf, urdf: str, place: str, told: str) -> None:
+def test_unusable_urdf_is_an_error(with_urdf, urdf: str, place: str, told: str) -> None:
     head = with_urdf(urdf).splitlines()[0]
     assert head.startswith(f"cube.urdf:{place}")
     assert told in head
@@ -261,7 +261,7 @@ BOMB = png(13000, 13000, zlib.compress(bytes(13001) * 1000, 9))
         pytest.param("map.bmp", b"BM" + bytes(12) + struct.pack("<Iii", 40, 99999, 99999), "too large", id="47 BMP"),
     ],
 )  # fmt: skip
-def test_an_image_that_is_no_map(with_map, name: str, image: bytes, told: str) -> None:
+def test_invalid_map_image_is_an_error(with_map, name: str, image: bytes, told: str) -> None:
     head = with_map(image, name).splitlines()[0]
     assert head.startswith(f"{name}: error[SC320]")
     assert told in head
@@ -270,7 +270,7 @@ def test_an_image_that_is_no_map(with_map, name: str, image: bytes, told: str) -
 @pytest.mark.parametrize(
     ("name", "image"), [("map.pgm", b"P5 100000 100000 255\n"), ("map.png", BOMB)], ids=["45 PGM", "47 PNG"]
 )
-def test_a_map_that_would_be_too_large_costs_nothing(cost, is_cheap, folder: Path, name: str, image: bytes) -> None:
+def test_too_large_map_is_an_error_without_using_memory(cost, is_cheap, folder: Path, name: str, image: bytes) -> None:
     (folder / name).write_bytes(image)
     (folder / "room.world.yaml").write_text(MAP.replace("map.pgm", name))
     code, peak, cpu, told = cost("validate", "a.scenario.yaml")
@@ -299,13 +299,13 @@ def test_26_an_image_that_is_not_a_regular_file(with_world, folder: Path, kind: 
         ("negate: 2\n", "4:9", ""),
     ],
 )
-def test_a_map_whose_description_makes_no_sense(with_map, lines: str, place: str, told: str) -> None:
+def test_invalid_map_yaml_is_an_error(with_map, lines: str, place: str, told: str) -> None:
     head = with_map(b"P5 4 4 255\n" + bytes(16), lines=lines).splitlines()[0]
     assert head.startswith(f"map.yaml:{place}: error[SC0")
     assert told in head
 
 
-def test_a_map_whose_pixels_are_kilometers(with_world, folder: Path) -> None:
+def test_map_with_huge_resolution_is_an_error(with_world, folder: Path) -> None:
     (folder / "map.pgm").write_bytes(b"P5 40 40 255\n" + b"\xff" * 1600)
     told = with_world(MAP.replace("0.05", "1000"), "map.yaml")
     assert told.startswith("map.pgm: error[SC320] map too large: 40 x 40 pixels of 1000 m reach 40000 m")
@@ -322,7 +322,7 @@ def test_a_map_whose_pixels_are_kilometers(with_world, folder: Path) -> None:
         pytest.param("<box><size>1 -1 1</size></box>", "1 -1 1", id="50 size in SDF"),
     ],
 )  # fmt: skip
-def test_geometry_of_sdf_that_cannot_be_used(with_world, folder: Path, geometry: str, told: str) -> None:
+def test_unusable_sdf_geometry_is_an_error(with_world, folder: Path, geometry: str, told: str) -> None:
     (folder / "terrain.png").write_bytes(png(3000, 3000, b""))
     (folder / "lying.stl").write_bytes(bytes(80) + struct.pack("<I", 9))
     os.mkfifo(folder / "fifo.stl")
@@ -341,7 +341,7 @@ def test_50_a_quaternion_of_zeros(with_world) -> None:
     assert "quaternion" in head
 
 
-def test_a_problem_is_told_with_the_shorter_path_that_opens(refused, folder: Path, monkeypatch) -> None:
+def test_problem_has_the_shortest_valid_path(refused, folder: Path, monkeypatch) -> None:
     (folder / "bad.scenario.yaml").write_text("- a list\n")
     deep = folder.parent / "/".join("a deep folder" for _ in range(60))
     deep.mkdir(parents=True)
@@ -359,13 +359,13 @@ def test_a_problem_is_told_with_the_shorter_path_that_opens(refused, folder: Pat
         pytest.param(SDF.replace("<sdf", "<!DOCTYPE sdf>\n<sdf"), "2:1", "DOCTYPE", id="42 in SDF"),
     ],
 )
-def test_sdf_that_cannot_be_read(with_world, content: str, place: str, told: str) -> None:
+def test_unreadable_sdf_is_an_error(with_world, content: str, place: str, told: str) -> None:
     head = with_world(content, "bad.sdf").splitlines()[0]
     assert head.startswith(f"bad.sdf:{place}")
     assert told in head
 
 
-def test_a_problem_in_a_folder_of_the_world_path_can_be_opened(folder: Path, refused) -> None:
+def test_problem_in_a_world_path_folder_has_a_valid_path(folder: Path, refused) -> None:
     away = folder.parent / "away"
     away.mkdir()
     (away / "bad.sdf").write_text(SDF.format(geometry="<mesh><uri>gone.stl</uri></mesh>"))
@@ -395,7 +395,7 @@ def test_a_problem_in_a_folder_of_the_world_path_can_be_opened(folder: Path, ref
         pytest.param("{x: 1, y: 1}", "{x: -9, y: 2}", "4:39", "the robot's start (-9, 2) is", id="start outside"),
     ],
 )  # fmt: skip
-def test_49_a_start_or_goal_that_cannot_be(with_scenario, old: str, new: str, place: str, told: str) -> None:
+def test_49_impossible_start_or_goal_is_an_error(with_scenario, old: str, new: str, place: str, told: str) -> None:
     head = with_scenario(replace={old: new}).splitlines()[0]
     assert head.startswith(f"bad.scenario.yaml:{place}: error[SC301]")
     assert told in head
@@ -408,17 +408,17 @@ def test_49_a_start_or_goal_that_cannot_be(with_scenario, old: str, new: str, pl
         "doors: [{name: cart, points: [[0.5, 1], [1.5, 1]], closed: true}]",
     ],
 )
-def test_49_a_start_inside_of_what_can_move(with_world, thing: str) -> None:
+def test_49_start_inside_a_movable_object_is_an_error(with_world, thing: str) -> None:
     told = with_world(f"simscen: 1\nwalls: [{{points: [[0, 0], [6, 0], [6, 4]]}}]\n{thing}\n")
     assert told.startswith('bad.scenario.yaml:4:39: error[SC301] the robot\'s start (1, 1) is inside obstacle "cart"')
 
 
-def test_a_world_whose_map_would_be_too_large(with_world) -> None:
+def test_world_with_a_too_large_map_is_an_error(with_world) -> None:
     told = with_world("simscen: 1\nwalls: [{points: [[-9000, -9000], [9000, 9000]]}]\n")
     assert told.startswith("bad.scenario.yaml:3:8: error[SC330] map too large: 360042 x 360042 cells")
 
 
-def test_49_a_goal_off_the_map_that_the_robot_gets(with_scenario, folder: Path) -> None:
+def test_49_goal_outside_the_robots_map_is_an_error(with_scenario, folder: Path) -> None:
     (folder / "map.pgm").write_bytes(b"P5 40 40 255\n" + b"\xff" * 1600)
     (folder / "old.yaml").write_text(MAP)
     told = with_scenario(replace={"seed: 7": "map: old.yaml", "x: 1.5, y: 1": "x: 4, y: 3"})
@@ -427,7 +427,7 @@ def test_49_a_goal_off_the_map_that_the_robot_gets(with_scenario, folder: Path) 
     )
 
 
-def test_49_without_a_map_a_goal_may_lie_beyond_the_obstacles(simscen, folder: Path) -> None:
+def test_49_goal_without_a_map_can_be_beyond_the_obstacles(simscen, folder: Path) -> None:
     for name, old, new in (
         ("room.world.yaml", ", [0, 4], [0, 0]]", ", [0, 4]]"),  # open to the west
         ("a.scenario.yaml", "seed: 7", "map: none"),
@@ -437,7 +437,7 @@ def test_49_without_a_map_a_goal_may_lie_beyond_the_obstacles(simscen, folder: P
     assert simscen("validate", "a.scenario.yaml").out == "1 scenario is valid\n"
 
 
-def test_49_is_told_without_waiting(cost, is_cheap, folder: Path) -> None:
+def test_49_impossible_goal_is_reported_quickly(cost, is_cheap, folder: Path) -> None:
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "a.scenario.yaml").write_text(text.replace("x: 1.5, y: 1", "x: 3.2, y: 2.1"))
     code, _, cpu, _ = cost("validate", "a.scenario.yaml")
@@ -455,12 +455,12 @@ def test_49_is_told_without_waiting(cost, is_cheap, folder: Path) -> None:
         ("walls: [{points: [[0, 0]]}]", "2:18", "expected 2 or more values, got 1"),
     ],
 )
-def test_50_things_of_no_size(with_world, world: str, place: str, told: str) -> None:
+def test_50_objects_without_size_are_errors(with_world, world: str, place: str, told: str) -> None:
     head = with_world(f"simscen: 1\n{world}\n").splitlines()[0]
     assert head.startswith(f"bad.world.yaml:{place}: error[SC0")
     assert told in head
 
 
-def test_51_ids_that_differ_in_case_alone(refused, folder: Path) -> None:
+def test_51_ids_that_differ_only_in_case_are_errors(refused, folder: Path) -> None:
     (folder / "A.scenario.yaml").write_text((folder / "a.scenario.yaml").read_text())
     assert "has the same id as `A.scenario.yaml`, except for case or suffix" in refused(".")

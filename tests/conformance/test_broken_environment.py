@@ -42,7 +42,7 @@ def outcomes(out: Path) -> list[str]:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&- <&-"])
-def test_91_a_closed_descriptor_costs_nothing(folder: Path, closed: str) -> None:
+def test_91_closed_file_descriptor_has_no_effect_on_runs(folder: Path, closed: str) -> None:
     done = shell(f'"$simscen" run . --out out {closed}', folder)
     assert (done.returncode, done.stderr) == (0, "")
     assert outcomes(folder / "out") == ["passed"]
@@ -51,26 +51,26 @@ def test_91_a_closed_descriptor_costs_nothing(folder: Path, closed: str) -> None
 
 
 @pytest.mark.parametrize("words", ["validate .", "list .", "--help", "schema"])
-def test_91_nor_for_commands_that_only_print(folder: Path, words: str) -> None:
+def test_91_closed_file_descriptor_has_no_effect_on_printing_commands(folder: Path, words: str) -> None:
     done = shell(f'"$simscen" {words} >&-', folder)
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_92_a_step_summary_that_cannot_be_opened_is_told_before_anything_runs(folder: Path) -> None:
+def test_92_unusable_step_summary_is_an_error_before_any_run(folder: Path) -> None:
     done = shell('"$simscen" run . --format github --out out', folder, GITHUB_STEP_SUMMARY=str(folder))
     assert done.returncode == 2
     assert done.stderr == f"simscen: cannot write GITHUB_STEP_SUMMARY {folder}: Is a directory\n"
     assert not list(folder.rglob("run.mcap"))
 
 
-def test_92_and_is_no_matter_for_other_formats(folder: Path) -> None:
+def test_92_step_summary_is_ignored_with_other_formats(folder: Path) -> None:
     assert shell('"$simscen" run . --out out', folder, GITHUB_STEP_SUMMARY=str(folder)).returncode == 0
 
 
 @pytest.mark.sample(2)
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 @pytest.mark.parametrize("words", ["validate .", "list .", "--help", "schema", "judge out/runs/a/seed-7/run.mcap"])
-def test_77_a_full_stdout_is_told_by_commands_that_only_print(folder: Path, words: str) -> None:
+def test_77_full_stdout_is_an_error_of_printing_commands(folder: Path, words: str) -> None:
     if words.startswith("judge"):
         assert shell('"$simscen" run . --out out', folder).returncode == 0
     done = shell(f'"$simscen" {words} >/dev/full', folder)
@@ -78,12 +78,12 @@ def test_77_a_full_stdout_is_told_by_commands_that_only_print(folder: Path, word
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_77_a_full_stderr_does_not_hide_what_was_wrong(folder: Path) -> None:
+def test_77_full_stderr_keeps_the_exit_code(folder: Path) -> None:
     assert shell('"$simscen" run nowhere --out out 2>/dev/full', folder).returncode == 3
 
 
 @pytest.mark.parametrize("words", ["run {a}", "validate {a}", "list {a}", "new x", "report out", "doctor"])
-def test_93_a_working_folder_that_was_deleted_is_told(folder: Path, words: str) -> None:
+def test_93_deleted_working_folder_is_an_error(folder: Path, words: str) -> None:
     (folder / "gone").mkdir()
     command = words.format(a=shlex.quote(str(folder / "a.scenario.yaml")))
     done = shell(f'cd gone && rmdir ../gone && "$simscen" {command}', folder)
@@ -101,14 +101,14 @@ def test_93_a_working_folder_that_was_deleted_is_told(folder: Path, words: str) 
         "simscen.loading.scenario",
     ],
 )
-def test_94_ctrl_c_while_it_starts_ends_it_without_a_traceback(folder: Path, module: str) -> None:
+def test_94_ctrl_c_at_startup_prints_no_traceback(folder: Path, module: str) -> None:
     code = SIGINT_AT_IMPORT.format(module=module, arguments=["run", ".", "--out", "out"])
     done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
 @pytest.mark.parametrize("command", ["judge", "plot"])
-def test_95_a_log_without_truth_is_no_usable_log(simscen, folder: Path, command: str) -> None:
+def test_95_log_without_ground_truth_is_an_error(simscen, folder: Path, command: str) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
     (log,) = folder.rglob("run.mcap")
     with Recorder(folder / "empty.mcap", Clock(240), read_log(log).header) as recorder:
@@ -120,7 +120,7 @@ def test_95_a_log_without_truth_is_no_usable_log(simscen, folder: Path, command:
 
 @pytest.mark.parametrize("command", ["judge", "plot", "log recover"])
 @pytest.mark.parametrize("kind", ["fifo", "device", "folder"])
-def test_96_what_is_not_a_regular_file_is_no_log(simscen, folder: Path, command: str, kind: str) -> None:
+def test_96_log_must_be_a_regular_file(simscen, folder: Path, command: str, kind: str) -> None:
     odd = folder / "run.mcap"
     if kind == "fifo":
         os.mkfifo(odd)
@@ -147,7 +147,7 @@ def test_97_the_command_that_repeats_a_run_is_quoted_for_a_shell(simscen, folder
     assert not (folder / "marker").exists()
 
 
-def test_71_a_killed_log_is_made_whole_by_hand(simscen, folder: Path) -> None:
+def test_71_killed_log_can_be_recovered(simscen, folder: Path) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
     (log,) = folder.rglob("run.mcap")
     (folder / "run.partial.mcap").write_bytes(log.read_bytes()[:-20_000])

@@ -6,7 +6,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 
 
-def test_every_case_of_the_list_has_a_test_and_every_test_a_case() -> None:
+def test_cases_md_and_tests_agree() -> None:
     listed = [int(number) for number in re.findall(r"^(\d+)\. ", (HERE / "CASES.md").read_text(), re.MULTILINE)]
     assert listed == list(range(1, len(listed) + 1))
     source = "\n".join(path.read_text() for path in HERE.glob("test_*.py"))

@@ -63,7 +63,7 @@ def reference(once: Path) -> dict[str, tuple[bytes, str]]:
     return found
 
 
-def test_86_87_order_folder_hash_seed_neighbors_and_load_change_nothing(reference, once, pair: Path) -> None:
+def test_86_87_log_does_not_depend_on_order_folder_hash_seed_or_load(reference, once, pair: Path) -> None:
     elsewhere = pair.parent / "elsewhere"
     elsewhere.mkdir()
     busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(2)]
@@ -82,7 +82,7 @@ def test_86_87_order_folder_hash_seed_neighbors_and_load_change_nothing(referenc
     assert (elsewhere / "out/results.json").read_bytes() == (once / "results.json").read_bytes()
 
 
-def test_88_a_run_after_one_that_crashed_is_as_if_alone(reference, pair: Path, simscen, monkeypatch) -> None:
+def test_88_run_after_a_crash_has_the_same_log(reference, pair: Path, simscen, monkeypatch) -> None:
     monkeypatch.setattr("simscen.cli.session.backends.WARM_PROCESS", (TELLING,))
     text = (pair / "a.scenario.yaml").read_text()
     (pair / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [crash]"))
@@ -92,7 +92,7 @@ def test_88_a_run_after_one_that_crashed_is_as_if_alone(reference, pair: Path, s
     assert results(pair / "out")["runs/b/seed-7"] == reference["runs/b/seed-7"]
 
 
-def test_a_world_that_takes_forever_to_prepare_is_a_timeout_of_its_own_run(pair: Path, simscen, monkeypatch) -> None:
+def test_world_that_never_finishes_preparing_times_out_its_run_only(pair: Path, simscen, monkeypatch) -> None:
     monkeypatch.setattr("simscen.cli.session.backends.WARM_PROCESS", (TELLING,))
     text = (pair / "a.scenario.yaml").read_text()
     (pair / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [slow-to-prepare]"))
@@ -104,7 +104,7 @@ def test_a_world_that_takes_forever_to_prepare_is_a_timeout_of_its_own_run(pair:
     ]
 
 
-def test_89_another_seed_is_another_run_and_0_is_none(reference, pair: Path, simscen) -> None:
+def test_89_another_seed_gives_another_run_and_seed_0_is_an_error(reference, pair: Path, simscen) -> None:
     assert simscen("run", "b.scenario.yaml", "--seed", 8, "--out", "out").code == 0
     assert results(pair / "out")["runs/b/seed-8"][1] != reference["runs/b/seed-7"][1]
     ended = simscen("run", "b.scenario.yaml", "--seed", 0, "--out", "none")
@@ -113,7 +113,7 @@ def test_89_another_seed_is_another_run_and_0_is_none(reference, pair: Path, sim
 
 
 @pytest.mark.slow
-def test_90_without_fused_multiply_add_the_verdicts_are_the_same(reference, pair: Path, simscen, monkeypatch) -> None:
+def test_90_verdicts_are_equal_without_fused_multiply_add(reference, pair: Path, simscen, monkeypatch) -> None:
     plain = {
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F",
         "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX",
@@ -133,7 +133,7 @@ def test_90_without_fused_multiply_add_the_verdicts_are_the_same(reference, pair
 
 
 @pytest.mark.slow
-def test_a_run_that_another_session_has_otherwise_or_not_at_all_is_an_error(pair: Path, simscen) -> None:
+def test_run_that_differs_from_another_session_is_an_error(pair: Path, simscen) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
     assert simscen("run", "a.scenario.yaml", "--out", "same", "--check-against", "out").code == 0
     asked = ("run", "a.scenario.yaml", "--check-determinism", "out", "--out", "alike")

@@ -112,7 +112,7 @@ def session(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> 
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.number} {case.name}")
-def test_a_fault_is_answered_as_what_it_is(session: Session, case: Case) -> None:
+def test_fault_of_a_worker_is_reported_with_its_type(session: Session, case: Case) -> None:
     run = session.runs[f"{case.number}-{case.fault}"]
     if not case.kind:
         assert (run["outcome"], run["error"]) == ("passed", None)
@@ -121,12 +121,12 @@ def test_a_fault_is_answered_as_what_it_is(session: Session, case: Case) -> None
     assert re.search(case.words, run["error"]["message"])
 
 
-def test_63_no_way_to_the_goal_is_a_failure_and_no_error(session: Session) -> None:
+def test_63_unreachable_goal_is_a_failure_not_an_error(session: Session) -> None:
     run = session.runs["63-no-way"]
     assert (run["outcome"], run["error"]) == ("failed", None)
 
 
-def test_65_every_run_is_answered_once_and_the_exit_code_says_that_some_broke_off(session: Session) -> None:
+def test_65_every_run_has_one_result_and_aborted_runs_set_the_exit_code(session: Session) -> None:
     assert session.code == 3
     assert len(session.runs) == len(CASES) + 1
     cases = [case for suite in JUnitXml.fromfile(str(session.out / "junit.xml")) for case in suite]
@@ -134,23 +134,23 @@ def test_65_every_run_is_answered_once_and_the_exit_code_says_that_some_broke_of
     assert len({case.name + case.classname for case in cases}) == len(CASES) + 1
 
 
-def test_52_the_stack_of_a_crash_is_in_its_log_and_in_the_report(session: Session) -> None:
+def test_52_python_stack_of_a_crash_is_in_log_and_report(session: Session) -> None:
     assert "lockstep.py" in session.runs["52-segfault.at.0"]["error"]["tail"]
 
 
-def test_60_of_a_flood_the_log_keeps_little(session: Session) -> None:
+def test_60_worker_log_of_excessive_output_is_truncated(session: Session) -> None:
     (log,) = session.out.rglob("60-flood.at.0/*/worker.log")
     assert log.stat().st_size < 2 << 20
     assert log.read_bytes().startswith(b"the beginning\n")
 
 
-def test_59_nothing_is_left_behind(session: Session) -> None:
+def test_59_no_processes_or_files_are_left_behind(session: Session) -> None:
     told = [path.read_bytes() for path in Path("/proc").glob("[0-9]*/cmdline") if path.exists()]
     assert [line for line in told if b"61.5" in line.split(b"\0")] == []
 
 
 @pytest.mark.parametrize("fault", ["52-segfault.at.0", "53-sigkill.at.0", "54-exit-0.at.0", "61-exception.at.0"])
-def test_71_the_log_of_a_run_that_broke_off_opens_everywhere(session: Session, fault: str) -> None:
+def test_71_log_of_an_aborted_run_opens_in_all_readers(session: Session, fault: str) -> None:
     from mcap.reader import make_reader
 
     (log,) = session.out.rglob(f"{fault}/*/run.partial.mcap")
@@ -159,7 +159,7 @@ def test_71_the_log_of_a_run_that_broke_off_opens_everywhere(session: Session, f
     assert "its log until then is run.partial.mcap" in session.runs[fault]["error"]["message"]
 
 
-def test_66_the_neighbors_of_all_this_drove_as_if_alone(session: Session, simscen, folder: Path) -> None:
+def test_66_other_runs_have_the_same_logs_as_without_faults(session: Session, simscen, folder: Path) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "alone").code == 0
     (alone,) = (folder / "alone").rglob("run.mcap")
     for name in ("66-fine", "66-fine-too", "60-flood.at.0"):

@@ -12,7 +12,7 @@ SCENARIO = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 0, y: 0}}\npass: 
 LAUGHS = "\n".join(["a0: &a0 [x, x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12))])
 
 
-def test_1_a_path_that_is_not_there(refused) -> None:
+def test_1_missing_path_is_an_error(refused) -> None:
     assert "nowhere.scenario.yaml: error[SC001] no such file or directory" in refused("nowhere.scenario.yaml")
     assert "nowhere: error[SC001] no such file or directory" in refused("nowhere")
 
@@ -55,7 +55,7 @@ def test_2_a_folder_without_scenarios_is_not_a_success(simscen, folder: Path, co
         pytest.param("simscen: 1\nname: a\u202eb\n", "2:8", "control character U+202E", id="18 bidirectional"),
     ],
 )  # fmt: skip
-def test_a_text_that_is_not_one_yaml_mapping(with_scenario, folder: Path, text, place: str, told: str) -> None:
+def test_file_without_a_yaml_mapping_is_an_error(with_scenario, folder: Path, text, place: str, told: str) -> None:
     head = with_scenario(text).splitlines()[0]
     where = f"bad.scenario.yaml:{place}" if place else "bad.scenario.yaml"
     assert head.startswith(f"{where}: error[SC")
@@ -100,20 +100,18 @@ def test_a_text_that_is_not_one_yaml_mapping(with_scenario, folder: Path, text, 
                      id="limit of particles"),
     ],
 )  # fmt: skip
-def test_a_value_that_cannot_be_meant(with_scenario, old: str, new: str, place: str, told: str) -> None:
+def test_invalid_value_is_an_error(with_scenario, old: str, new: str, place: str, told: str) -> None:
     head = with_scenario(replace={old: new}).splitlines()[0]
     assert head.startswith(f"bad.scenario.yaml:{place}: error[SC")
     assert told in head
 
 
-def test_9_and_10_an_unknown_key_is_told_what_was_meant_or_what_there_is(with_scenario) -> None:
+def test_9_and_10_unknown_key_gets_a_suggestion_or_the_valid_keys(with_scenario) -> None:
     assert "= did you mean `time_limit`?" in with_scenario(replace={"time_limit": "tiem_limit"})
     assert "expected one of: simscen, name, description, tags, seed" in with_scenario(replace={"time_limit": "zzz"})
 
 
-def test_20_an_alias_bomb_is_defused_before_it_grows_while_ordinary_aliases_work(
-    cost, is_cheap, simscen, folder: Path
-) -> None:
+def test_20_alias_bomb_is_refused_and_ordinary_aliases_work(cost, is_cheap, simscen, folder: Path) -> None:
     (folder / "bomb.scenario.yaml").write_text(LAUGHS)
     code, peak, cpu, told = cost("validate", "bomb.scenario.yaml")
     assert code == 2
@@ -128,7 +126,7 @@ def test_20_an_alias_bomb_is_defused_before_it_grows_while_ordinary_aliases_work
     assert simscen("validate", "a.scenario.yaml").code == 0
 
 
-def test_22_a_file_of_100_mb_is_not_read(cost, is_cheap, refused, folder: Path) -> None:
+def test_22_file_of_100_mb_is_refused(cost, is_cheap, refused, folder: Path) -> None:
     with (folder / "huge.scenario.yaml").open("wb") as file:
         file.truncate(100 << 20)
     assert "huge.scenario.yaml: error[SC001] larger than 1 MiB" in refused("huge.scenario.yaml")
@@ -154,7 +152,7 @@ ODD = ["folder", "fifo", "device", "socket"]
 
 
 @pytest.mark.parametrize("kind", ODD[1:])
-def test_26_what_is_not_a_regular_file_is_not_read(refused, folder: Path, kind: str) -> None:
+def test_26_only_regular_files_are_read(refused, folder: Path, kind: str) -> None:
     odd(folder, kind, "odd.scenario.yaml")
     told = refused("odd.scenario.yaml")
     assert re.match(r"odd.scenario.yaml: error\[SC0(01|20)\] (not a regular file|the file is outside)", told)
@@ -169,7 +167,7 @@ def test_26_a_folder_with_the_name_of_a_scenario_is_an_error_with_its_name(simsc
 
 
 @pytest.mark.parametrize("kind", ODD[1:])
-def test_26_nor_when_a_search_finds_it(refused, folder: Path, kind: str) -> None:
+def test_26_search_reads_only_regular_files(refused, folder: Path, kind: str) -> None:
     odd(folder, kind, "odd.scenario.yaml")
     assert "odd.scenario.yaml: error[SC0" in refused(".")
 
@@ -178,7 +176,7 @@ def test_26_nor_when_a_search_finds_it(refused, folder: Path, kind: str) -> None
 @pytest.mark.parametrize(
     ("old", "place"), [("room.world.yaml", "3:8"), ("cube.robot.yaml", "4:16")], ids=["world", "robot"]
 )
-def test_26_nor_when_a_scenario_names_it(with_scenario, folder: Path, kind: str, old: str, place: str) -> None:
+def test_26_scenario_can_refer_to_plain_files(with_scenario, folder: Path, kind: str, old: str, place: str) -> None:
     odd(folder, kind, "odd.yaml")
     told = with_scenario(replace={old: "odd.yaml"})
     expected = "outside the scenario root" if kind == "device" else "not a regular file"
@@ -187,7 +185,7 @@ def test_26_nor_when_a_scenario_names_it(with_scenario, folder: Path, kind: str,
 
 
 @pytest.mark.parametrize("kind", ODD)
-def test_26_nor_as_defaults_or_as_a_base(with_scenario, folder: Path, kind: str) -> None:
+def test_26_defaults_and_bases_must_be_regular_files(with_scenario, folder: Path, kind: str) -> None:
     odd(folder, kind, "odd.yaml")
     assert "odd.yaml" in with_scenario("extends: odd.yaml\n")
     (folder / "odd.yaml").rename(folder / "defaults.yaml")
@@ -215,25 +213,25 @@ def everyman(refused, simscen):
             os.chdir(before)
 
 
-def test_27_a_file_that_may_not_be_read(refused, everyman: Path) -> None:
+def test_27_unreadable_file_is_an_error(refused, everyman: Path) -> None:
     (everyman / "locked.scenario.yaml").write_text("simscen: 1")
     (everyman / "locked.scenario.yaml").chmod(0)
     assert refused("locked.scenario.yaml") == "locked.scenario.yaml: error[SC001] permission denied\n"
 
 
-def test_27_a_folder_that_may_not_be_searched(refused, everyman: Path) -> None:
+def test_27_unsearchable_folder_is_an_error(refused, everyman: Path) -> None:
     (everyman / "locked").mkdir(mode=0)
     told = refused("locked/a.scenario.yaml")
     assert told == "locked/a.scenario.yaml: error[SC001] permission denied\n"
 
 
-def test_27_a_folder_that_a_search_may_not_enter_is_not_passed_over(refused, everyman: Path) -> None:
+def test_27_unsearchable_subfolder_is_an_error(refused, everyman: Path) -> None:
     (everyman / "a.scenario.yaml").write_text(SCENARIO)
     (everyman / "locked").mkdir(mode=0)
     assert refused(".") == "./locked: error[SC001] permission denied\n"
 
 
-def test_28_many_mistakes_are_all_told_and_a_flood_is_cut(with_scenario) -> None:
+def test_28_all_mistakes_are_reported_up_to_a_limit(with_scenario) -> None:
     few = with_scenario("simscen: 1\n" + "".join(f"k{i}: 1\n" for i in range(22)))
     assert all(f"bad.scenario.yaml:{line}:1: error[SC012]" in few for line in range(2, 24))
     many = with_scenario("simscen: 1\n" + "".join(f"k{i}: 1\n" for i in range(80)))
@@ -241,7 +239,7 @@ def test_28_many_mistakes_are_all_told_and_a_flood_is_cut(with_scenario) -> None
     assert "bad.scenario.yaml: … and 33 more\n" in many
 
 
-def test_29_with_one_bad_file_nothing_is_run_and_all_are_checked(refused, folder: Path) -> None:
+def test_29_one_invalid_file_prevents_all_runs(refused, folder: Path) -> None:
     good = (folder / "a.scenario.yaml").read_text()
     for name in "bcde":
         (folder / f"{name}.scenario.yaml").write_text(good.replace("seed: 7", "seed: x") if name in "bd" else good)
@@ -251,7 +249,7 @@ def test_29_with_one_bad_file_nothing_is_run_and_all_are_checked(refused, folder
     ]  # fmt: skip
 
 
-def test_a_search_goes_round_no_circle(simscen, folder: Path) -> None:
+def test_search_does_not_follow_link_cycles(simscen, folder: Path) -> None:
     (folder / "sub").mkdir()
     (folder / "sub/up").symlink_to("..")
     assert simscen("validate", ".").code == 0

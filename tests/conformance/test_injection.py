@@ -99,7 +99,7 @@ def check_reports(out: Path) -> str:
     return "\n".join(found.text or "" for kind in ("failure", "error") for found in junit.iter(kind))
 
 
-def test_81_on_the_console_and_in_the_reports(simscen, hostile: str, folder: Path) -> None:
+def test_81_text_is_escaped_on_the_console_and_in_reports(simscen, hostile: str, folder: Path) -> None:
     ended = simscen("run", hostile, "--out", "out")
     assert (ended.code, ended.err) == (1, "")
     assert not COMMAND.search(ended.out)
@@ -109,7 +109,7 @@ def test_81_on_the_console_and_in_the_reports(simscen, hostile: str, folder: Pat
 
 
 @pytest.mark.slow
-def test_81_on_github(simscen, hostile: str, folder: Path, monkeypatch) -> None:
+def test_81_text_is_escaped_for_github(simscen, hostile: str, folder: Path, monkeypatch) -> None:
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(folder / "summary.md"))
     ended = simscen("run", hostile, "--out", "out", "--format", "github")
     assert ended.code == 1
@@ -123,7 +123,7 @@ def test_81_on_github(simscen, hostile: str, folder: Path, monkeypatch) -> None:
 
 
 @pytest.mark.slow
-def test_81_as_json(simscen, hostile: str) -> None:
+def test_81_text_is_escaped_in_json(simscen, hostile: str) -> None:
     ended = simscen("run", hostile, "--out", "out", "--format", "json")
     assert ended.code == 1
     assert json.loads(ended.out)["failed"] == 1
@@ -131,7 +131,7 @@ def test_81_as_json(simscen, hostile: str) -> None:
 
 
 @pytest.mark.slow
-def test_81_on_a_terminal(hostile: str, folder: Path) -> None:
+def test_81_text_is_escaped_on_a_terminal(hostile: str, folder: Path) -> None:
     main, end = pty.openpty()
     command = [Path(sys.executable).with_name("simscen"), "run", hostile, "--out", "out"]
     child = subprocess.Popen(
@@ -154,7 +154,7 @@ def test_81_on_a_terminal(hostile: str, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["[red]a", "]]>", "&amp;", "=cmd()", "%0A::x", "-x", "機械", "a,b"])
-def test_81_names_of_files_are_shown(simscen, folder: Path, name: str) -> None:
+def test_81_file_names_are_escaped(simscen, folder: Path, name: str) -> None:
     (folder / "a.scenario.yaml").rename(folder / f"{name}.scenario.yaml")
     told, listed = simscen("validate", "."), simscen("list", ".")
     assert (told.code, listed.code) == (0, 0)
@@ -171,7 +171,7 @@ def test_81_names_of_files_are_shown(simscen, folder: Path, name: str) -> None:
         ("caf\udce9", "the file name is not valid UTF-8"),
     ],
 )
-def test_81_names_that_no_report_could_show_are_refused(refused, simscen, folder: Path, name: str, told: str) -> None:
+def test_81_unprintable_names_are_refused(refused, simscen, folder: Path, name: str, told: str) -> None:
     (folder / "a.scenario.yaml").rename(folder / f"{name}.scenario.yaml")
     problems = refused(".")
     assert told in problems
@@ -179,7 +179,7 @@ def test_81_names_that_no_report_could_show_are_refused(refused, simscen, folder
     assert json.loads(simscen("validate", ".", "--format", "json").out)["problems"][0]["message"] == told
 
 
-def test_82_what_a_worker_prints_is_quoted_where_it_died(simscen, folder: Path, monkeypatch) -> None:
+def test_82_output_of_a_crashed_worker_is_quoted(simscen, folder: Path, monkeypatch) -> None:
     monkeypatch.setattr("simscen.cli.session.backends.WARM_PROCESS", (TELLING,))
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [chatter]"))
@@ -205,7 +205,7 @@ def test_83_annotations_of_validate_escape_what_github_reads(simscen, folder: Pa
     assert "50 %25, a:b" in line
 
 
-def test_84_code_beside_scenarios_is_not_run(folder: Path) -> None:
+def test_84_code_next_to_scenarios_is_not_executed(folder: Path) -> None:
     for module in ("yaml", "simscen", "sitecustomize", "usercustomize", "numpy", "pybullet", "json", "ompl", "typer"):
         (folder / f"{module}.py").write_text(f"open('marker', 'a').write('{module} ')\n")
     command = [Path(sys.executable).with_name("simscen"), "run", ".", "--out", "out"]
@@ -214,7 +214,7 @@ def test_84_code_beside_scenarios_is_not_run(folder: Path) -> None:
     assert not list(folder.rglob("marker"))
 
 
-def test_85_a_secret_is_not_in_the_environment_of_a_worker(simscen, folder: Path, monkeypatch) -> None:
+def test_85_worker_environment_has_no_secrets(simscen, folder: Path, monkeypatch) -> None:
     monkeypatch.setattr("simscen.cli.session.backends.WARM_PROCESS", (TELLING,))
     for name in ("GITHUB_TOKEN", "AWS_SECRET_ACCESS_KEY", "LD_PRELOAD_SECRET", "PYTHONPATH_SECRET"):
         monkeypatch.setenv(name, "hunter2")

@@ -127,7 +127,7 @@ def two(folder, scenario):
 
 
 @pytest.mark.slow
-def test_69_and_76_and_79_a_killed_session_leaves_no_process_and_all_runs_and_can_go_on(start, three, scenario):
+def test_69_and_76_and_79_killed_session_leaves_no_process_and_can_be_resumed(start, three, scenario):
     run = start("run", ".", "--out", "out", "-j", "1")
     wait_for(lambda: begun(three, "finished") and under_way(three))
     below = descendants(run.pid)
@@ -163,7 +163,7 @@ def test_69_and_76_and_79_a_killed_session_leaves_no_process_and_all_runs_and_ca
         pytest.param(signal.SIGHUP, 129, id="68 SIGHUP"),
     ],
 )
-def test_70_an_interrupted_session_lists_all_and_leaves_no_process(start, three, number, code):
+def test_70_interrupted_session_lists_all_runs_and_leaves_no_process(start, three, number, code):
     run = start("run", ".", "--out", "out", "-j", "1")
     wait_for(lambda: begun(three, "finished") and under_way(three))
     below = descendants(run.pid)
@@ -189,7 +189,7 @@ def test_80_a_changed_scenario_is_run_again(start, two, scenario):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_77_a_full_stdout_costs_the_exit_code_but_no_report(start, two):
+def test_77_full_stdout_changes_the_exit_code_but_not_the_reports(start, two):
     with Path("/dev/full").open("w") as full:
         run = start("run", "quick.scenario.yaml", "--out", "out", stdout=full)
         err = run.communicate(timeout=PATIENCE)[1]
@@ -198,7 +198,7 @@ def test_77_a_full_stdout_costs_the_exit_code_but_no_report(start, two):
     assert outcomes(two / "out") == {"quick": "passed"}
 
 
-def test_77_a_closed_pipe_costs_nothing(start, two):
+def test_77_closed_pipe_has_no_effect(start, two):
     reading, writing = os.pipe()
     os.close(reading)
     run = start("run", "quick.scenario.yaml", "--out", "out", stdout=writing)

@@ -26,14 +26,14 @@ def hall(folder):
 
 @pytest.mark.parametrize("used", ["world: map.yaml", "world: room.world.yaml\nmap: map.yaml"])
 @pytest.mark.parametrize("more", [(), ("--fast",)])
-def test_keys_that_map_server_ignores_are_told_and_ignored(hall, simscen, used, more):
+def test_keys_unknown_to_map_server_cause_a_warning(hall, simscen, used, more):
     text = (hall / "a.scenario.yaml").read_text()
     (hall / "a.scenario.yaml").write_text(text.replace("world: room.world.yaml", used))
     ended = simscen("validate", "a.scenario.yaml", *more)
     assert (ended.code, ended.out) == (0, NOTES + "1 scenario is valid\n")
 
 
-def test_a_run_goes_on(hall, simscen):
+def test_run_with_unknown_map_keys_succeeds(hall, simscen):
     text = (hall / "a.scenario.yaml").read_text()
     (hall / "a.scenario.yaml").write_text(text.replace("world: room.world.yaml", "world: map.yaml"))
     ended = simscen("run", "a.scenario.yaml", "--out", "out")

@@ -49,21 +49,21 @@ def contents(folder: Path) -> dict[str, str]:
     return {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
-def test_72_a_read_only_disk_is_told_before_anything_runs(mounted: Mounted) -> None:
+def test_72_read_only_disk_is_an_error_before_any_run(mounted: Mounted) -> None:
     done = mounted("ro", '"$simscen" run . --out disk/out')
     told = "simscen: cannot use the output folder disk/out: Read-only file system\n"
     assert (done.returncode, done.stderr) == (2, told)
 
 
 @pytest.mark.parametrize("out", ["a.scenario.yaml/out", "/proc/out", "/dev/null/out"])
-def test_72_a_folder_that_cannot_be_made_is_told_before_anything_runs(simscen, folder: Path, out: str) -> None:
+def test_72_uncreatable_folder_is_an_error_before_any_run(simscen, folder: Path, out: str) -> None:
     ended = simscen("run", "a.scenario.yaml", "--out", out)
     assert ended.code == 2
     assert ended.err.startswith(f"simscen: cannot use the output folder {out}: ")
     assert not list(folder.rglob("*.mcap"))
 
 
-def test_73_a_disk_that_fills_up_is_an_error_that_says_so_of_every_run_it_hits(mounted: Mounted, folder: Path) -> None:
+def test_73_full_disk_is_an_error_of_each_affected_run(mounted: Mounted, folder: Path) -> None:
     text = (folder / "a.scenario.yaml").read_text()
     for name in "bc":
         (folder / f"{name}.scenario.yaml").write_text(text.replace("x: 1.5, y: 1", "x: 5, y: 3"))
@@ -81,7 +81,7 @@ def test_73_a_disk_that_fills_up_is_an_error_that_says_so_of_every_run_it_hits(m
 
 
 @pytest.mark.slow
-def test_74_a_full_disk_leaves_the_reports_that_were_there(mounted: Mounted, folder: Path) -> None:
+def test_74_full_disk_keeps_existing_reports(mounted: Mounted, folder: Path) -> None:
     script = (
         '"$simscen" run . --out disk/out > /dev/null; cp disk/out/junit.xml before.xml; head -c 9m /dev/zero > disk/x;'
         ' "$simscen" report disk/out; code=$?; cp disk/out/junit.xml after.xml; exit $code'
@@ -95,7 +95,7 @@ def test_74_a_full_disk_leaves_the_reports_that_were_there(mounted: Mounted, fol
 
 
 @pytest.mark.slow
-def test_92_a_full_step_summary_costs_the_exit_code_but_no_report(mounted: Mounted, folder: Path) -> None:
+def test_92_full_step_summary_changes_the_exit_code_but_not_the_reports(mounted: Mounted, folder: Path) -> None:
     script = (
         "touch disk/summary; head -c 2m /dev/zero > disk/x; export GITHUB_STEP_SUMMARY=disk/summary;"
         ' "$simscen" run . --format github --out out'
@@ -106,7 +106,7 @@ def test_92_a_full_step_summary_costs_the_exit_code_but_no_report(mounted: Mount
     assert json.loads((folder / "out/results.json").read_text())["passed"] == 1
 
 
-def test_75_a_folder_that_is_not_empty_stays_untouched(simscen, folder: Path) -> None:
+def test_75_nonempty_output_folder_is_refused(simscen, folder: Path) -> None:
     (folder / "out").mkdir()
     (folder / "out/mine.txt").write_text("keep me")
     before = contents(folder / "out")
@@ -116,7 +116,7 @@ def test_75_a_folder_that_is_not_empty_stays_untouched(simscen, folder: Path) ->
 
 
 @pytest.mark.parametrize("junit", ["a.scenario.yaml/junit.xml", "/proc/junit.xml", "."])
-def test_78_a_report_that_cannot_be_written_is_told_before_anything_runs(simscen, folder: Path, junit: str) -> None:
+def test_78_unwritable_report_is_an_error_before_any_run(simscen, folder: Path, junit: str) -> None:
     ended = simscen("run", "a.scenario.yaml", "--junit", junit, "--out", "out")
     assert ended.code == 2
     assert ended.err.startswith(f"simscen: cannot write {junit}: ")
@@ -124,7 +124,7 @@ def test_78_a_report_that_cannot_be_written_is_told_before_anything_runs(simscen
 
 
 @pytest.mark.slow
-def test_102_a_warm_process_that_is_stopped_is_noticed_and_replaced(folder: Path) -> None:
+def test_102_stopped_warm_process_is_replaced(folder: Path) -> None:
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [stop-preparer]"))
     (folder / "b.scenario.yaml").write_text(text)

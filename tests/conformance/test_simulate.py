@@ -22,7 +22,7 @@ def scenario(folder: Path) -> Path:
     return folder / "b.scenario.yaml"
 
 
-def test_a_run_is_the_same_from_python_and_from_the_command_line_and_again(scenario, folder, request):
+def test_run_from_python_equals_run_from_command_line(scenario, folder, request):
     first = simscen.simulate(scenario, log="first.mcap")
     other = simscen.simulate(scenario, seed=8)
     again = simscen.simulate(str(scenario), log=folder / "again.mcap")
@@ -36,7 +36,7 @@ def test_a_run_is_the_same_from_python_and_from_the_command_line_and_again(scena
     assert shown.read_bytes() == first.log.read_bytes()
 
 
-def test_the_log_of_a_run_holds_the_trace_that_was_judged(scenario):
+def test_log_contains_the_judged_trace(scenario):
     run = simscen.simulate(scenario, log="run.mcap")
     replayed = read_log(run.log)
     assert replayed.trace.events == run.trace.events
@@ -50,7 +50,7 @@ def test_verdicts_are_found_by_name(scenario):
         run.verdict("speed")
 
 
-def test_a_file_that_cannot_be_used_says_where_and_why(folder):
+def test_unusable_file_raises_position_and_reason(folder):
     (folder / "bad.scenario.yaml").write_text("simscen: 1\n")
     with pytest.raises(InvalidInput, match="missing key"):
         simscen.simulate("bad.scenario.yaml")

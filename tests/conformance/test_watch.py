@@ -55,7 +55,7 @@ def watch(tmp_path: Path) -> Iterator[Watch]:
     watch.process.communicate()
 
 
-def test_it_runs_what_a_saved_file_touches_and_what_keys_say_until_q(watch: Watch, tmp_path: Path) -> None:
+def test_watch_reruns_affected_scenarios_and_reacts_to_keys(watch: Watch, tmp_path: Path) -> None:
     assert "2 passed" in watch.until("q = quit")
     (tmp_path / "other.world.yaml").write_text(ROOM.replace("walls", "wals"))
     assert "unknown key `wals`" in watch.until("q = quit")

@@ -21,14 +21,14 @@ ROUND = {"round": round_robot()}
 
 @pytest.mark.sample(15)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_a_component_that_breaks_a_promise_is_caught(case: Case) -> None:
+def test_broken_component_fails_its_contract_test(case: Case) -> None:
     (promise,) = [each for each in promises_of(case.spec, robots=ROUND) if each.name.startswith(case.promise)]
     with pytest.raises(PromiseBroken) as broken:
         promise.check(limit=1.0 if case.name == "NeverGivesUp" else 60.0)
     assert case.seen in str(broken.value)
 
 
-def test_every_promise_has_a_component_that_breaks_it() -> None:
+def test_every_contract_test_has_a_broken_component() -> None:
     caught = {case.promise for case in CASES}
     specs = (
         planners.PLANNER,

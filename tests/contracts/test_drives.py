@@ -26,12 +26,12 @@ def robot(request):
     simulation.close()
 
 
-def test_all_kinds_of_drive_ship():
+def test_every_drive_type_has_a_shipped_robot():
     drives = {yaml.safe_load((ROBOTS / f"{name}.robot.yaml").read_text())["drive"]["type"] for name in NAMES}
     assert drives == {"differential", "skid_steer", "ackermann", "omnidirectional", "mecanum"}
 
 
-def test_given_any_command_then_neither_speeds_nor_accelerations_exceed_the_limits(robot):
+def test_drive_respects_speed_and_acceleration_limits(robot):
     spec, simulation = robot
     limits, rng = spec.limits, random.Random(5)
     lateral = limits.lateral or limits.linear if isinstance(spec.drive, Holonomic) else 0.0
@@ -51,7 +51,7 @@ def test_given_any_command_then_neither_speeds_nor_accelerations_exceed_the_limi
         before = now
 
 
-def test_given_no_obstacle_and_a_steady_command_then_the_base_drives_it(robot):
+def test_base_follows_a_constant_command(robot):
     _, simulation = robot
     simulation.drive(Twist(0.4, 0.0, 0.3))
     simulation.step(720)
@@ -60,7 +60,7 @@ def test_given_no_obstacle_and_a_steady_command_then_the_base_drives_it(robot):
     assert twist.wz == pytest.approx(0.3, rel=0.25)  # skid steering is only as good as its turning scale
 
 
-def test_given_that_the_robot_is_set_down_elsewhere_then_the_encoders_do_not_notice(robot):
+def test_encoders_do_not_detect_a_kidnapping(robot):
     _, simulation = robot
     simulation.drive(Twist(0.3, 0.0, 0.0))
     simulation.step(240)
@@ -72,7 +72,7 @@ def test_given_that_the_robot_is_set_down_elsewhere_then_the_encoders_do_not_not
     assert simulation.encoders() == pytest.approx(before, abs=0.01)
 
 
-def test_given_the_same_commands_then_the_same_motion(robot):
+def test_equal_commands_give_equal_motion(robot):
     spec, first = robot
     second = SingleRobotSimulation(merge_solids([]), [], build_robot_body(spec), Pose2(0.0, 0.0, 0.0), triangulate)
     for simulation in (first, second):

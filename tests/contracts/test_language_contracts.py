@@ -37,7 +37,7 @@ PROMISES = [
 
 
 @pytest.mark.parametrize("promise", PROMISES, ids=str)
-def test_it_keeps_its_promise(promise: Promise) -> None:
+def test_component_meets_its_contract(promise: Promise) -> None:
     promise.check()
 
 
@@ -45,7 +45,7 @@ SENSORS = {"lidar": Lidar(), "odometry": WheelOdometry(), "imu": InertialUnit(),
 
 
 @pytest.mark.parametrize("promise", [p for name, spec in SENSORS.items() for p in promises_of(spec, name)], ids=str)
-def test_a_sensor_keeps_its_promise(promise: Promise) -> None:
+def test_sensor_meets_its_contract(promise: Promise) -> None:
     promise.check()
 
 
@@ -53,6 +53,6 @@ NAMES = ['dwell={"region": "dock", "max": 5.0}', "crosstalk", 'turn_robot={"by":
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_a_package_adds_keeps_its_promises(yardwork, name: str) -> None:
+def test_types_of_a_package_meet_their_contracts(yardwork, name: str) -> None:
     for promise in promises_of_target(name):
         promise.check()

@@ -33,12 +33,12 @@ SPECS: dict[str, LocalizerSpec] = {
 
 @pytest.mark.sample(30)
 @pytest.mark.parametrize("promise", [p for name, spec in SPECS.items() for p in promises_of(spec, name)], ids=str)
-def test_it_keeps_its_promise(promise: Promise) -> None:
+def test_component_meets_its_contract(promise: Promise) -> None:
     promise.check()
 
 
 @pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
-def test_after_a_reset_the_belief_is_exactly_the_estimate(spec: LocalizerSpec) -> None:
+def test_belief_after_reset_equals_the_estimate(spec: LocalizerSpec) -> None:
     """More than the contract asks: a localizer that draws particles may be off by what they are off."""
     used = localizer(spec, Estimate(Pose2(3, 3, 3)), 1)
     run(used, Drive(short_drive().truth[:80], short_drive().steps[:80], short_drive().ranges[:20]), 1, imu=True)

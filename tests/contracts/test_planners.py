@@ -30,7 +30,7 @@ PROMISES = [each for name, (spec, robot) in SPECS.items() for each in PlannerCon
 
 @pytest.mark.sample(24)
 @pytest.mark.parametrize("promise", PROMISES, ids=str)
-def test_it_keeps_its_promise(promise: Promise) -> None:
+def test_component_meets_its_contract(promise: Promise) -> None:
     promise.check()
 
 

@@ -87,13 +87,13 @@ def equal(a, b):
 
 
 @pytest.mark.parametrize("name", ["turtlebot", "omni"])
-def test_given_the_same_world_and_generator_then_the_same_readings(rig, name):
+def test_equal_world_and_generator_give_equal_readings(rig, name):
     first, second = (rig(load(name)).drive(Twist(0.3, 0.0, 0.2), 96) for _ in range(2))
     assert len(first) == len(second) > 20
     assert all(equal(a, b) for a, b in zip(first, second, strict=True))
 
 
-def test_given_noise_then_no_two_scans_of_a_robot_at_rest_are_equal_and_without_it_all_are(rig):
+def test_scans_at_rest_differ_only_with_noise(rig):
     for spec, differ in ((load("turtlebot"), True), (without_noise(load("turtlebot")), False)):
         scene = rig(spec)
         scene.simulation.step(240)
@@ -106,7 +106,7 @@ def test_given_noise_then_no_two_scans_of_a_robot_at_rest_are_equal_and_without_
                 assert equal(first, second) is not differ
 
 
-def test_given_a_reading_then_nothing_changes_it_later(rig):
+def test_readings_do_not_change_later(rig):
     scene = rig(load("turtlebot"))
     readings = scene.drive(Twist(0.3, 0.0, 0.2), 48)
     copies = copy.deepcopy(readings)
@@ -144,7 +144,7 @@ def test_a_lidar_in_a_room_measures_its_walls_while_driving(rig):
     assert np.abs(hits.max(axis=1) - 4.0).max() < 0.0015
 
 
-def test_the_bumper_feels_the_wall(rig):
+def test_bumper_detects_contact_with_a_wall(rig):
     scene = rig(load("turtlebot"), pose=Pose2(3.5, 0.0, 0.0))
     pressed = [reading.pressed for reading in scene.drive(Twist(0.5, 0.0, 0.0), 480) if isinstance(reading, Bump)]
     assert pressed[0] is False

@@ -39,5 +39,5 @@ def test_it_reaches_a_goal_around_an_unmapped_obstacle_without_contact(spec: Sta
 
 
 @pytest.mark.parametrize("promise", [p for name, spec in SPECS.items() for p in promises_of(spec, name)], ids=str)
-def test_it_keeps_its_promise(promise: Promise) -> None:
+def test_component_meets_its_contract(promise: Promise) -> None:
     promise.check()

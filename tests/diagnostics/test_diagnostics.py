@@ -16,7 +16,7 @@ CASES = sorted(HERE.glob("*.scenario.yaml"))
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda path: path.name.split(".")[0])
-def test_says_exactly_what_is_wrong_and_where(case: Path) -> None:
+def test_message_states_the_problem_and_its_position(case: Path) -> None:
     problems = try_scenario(case, HERE)
     assert isinstance(problems, list), "the file is valid"
     expected = case.with_name(case.name.replace(".scenario.yaml", ".txt"))
@@ -26,5 +26,5 @@ def test_says_exactly_what_is_wrong_and_where(case: Path) -> None:
     assert told == expected.read_text(encoding="utf-8")
 
 
-def test_each_message_belongs_to_a_case() -> None:
+def test_every_message_file_has_a_case() -> None:
     assert {path.stem for path in HERE.glob("*.txt")} == {path.name.split(".")[0] for path in CASES}

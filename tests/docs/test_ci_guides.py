@@ -45,7 +45,7 @@ def pre_commit(folder: Path, *arguments: str) -> tuple[int, str]:
     return done.returncode, done.stdout + done.stderr
 
 
-def test_pre_commit_takes_the_hooks_and_they_find_mistakes(repository: Path) -> None:
+def test_pre_commit_hooks_find_mistakes(repository: Path) -> None:
     manifest = ROOT / ".pre-commit-hooks.yaml"
     assert pre_commit(repository, "validate-manifest", str(manifest)) == (0, "")
     hooks = [{**hook, "language": "system"} for hook in yaml.safe_load(manifest.read_text())]
@@ -59,7 +59,7 @@ def test_pre_commit_takes_the_hooks_and_they_find_mistakes(repository: Path) -> 
     assert "scenarios/room.world.yaml:2:1: error[SC012]" in told
 
 
-def test_the_configurations_for_pre_commit_that_are_shown_are_valid(tmp_path: Path) -> None:
+def test_pre_commit_configurations_in_the_guide_are_valid(tmp_path: Path) -> None:
     for number, block in enumerate(blocks("pre-commit.md", "yaml")):
         (tmp_path / f"{number}.yaml").write_text(block)
     files = sorted(map(str, tmp_path.iterdir()))
@@ -74,9 +74,7 @@ def test_the_configurations_for_pre_commit_that_are_shown_are_valid(tmp_path: Pa
     ("schema", "page", "count"),
     [("vendor.gitlab-ci", "gitlab.md", 2), ("vendor.github-workflows", "github-actions.md", 4)],
 )
-def test_pipelines_that_are_shown_fit_the_schemas_of_their_systems(
-    tmp_path: Path, schema: str, page: str, count: int
-) -> None:
+def test_pipelines_in_the_guides_match_their_schemas(tmp_path: Path, schema: str, page: str, count: int) -> None:
     for number, block in enumerate(blocks(page, "yaml")):
         (tmp_path / f"{number}.yml").write_text(block)
     files = sorted(tmp_path.iterdir())
@@ -94,7 +92,7 @@ def _fits(schema: str, *files: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_the_pipeline_for_jenkins_has_its_brackets() -> None:
+def test_jenkins_pipeline_has_balanced_brackets() -> None:
     (block,) = blocks("jenkins.md", "groovy")
     bare = re.sub(r"'[^']*'|\"[^\"]*\"", "", block)
     for opened, closed in ("{}", "()"):
@@ -102,7 +100,7 @@ def test_the_pipeline_for_jenkins_has_its_brackets() -> None:
     assert {"agent", "options", "environment", "stages", "post"} <= set(re.findall(r"^  (\w+) ", block, re.MULTILINE))
 
 
-def test_the_dockerfile_is_sound_and_copies_what_is_there() -> None:
+def test_dockerfile_is_valid_and_copies_existing_files() -> None:
     done = subprocess.run([BIN / "hadolint", ROOT / "Dockerfile"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "")
     kept = set(re.findall(r"^!(\S+)$", (ROOT / ".dockerignore").read_text(), re.MULTILINE))
@@ -115,7 +113,7 @@ def test_the_dockerfile_is_sound_and_copies_what_is_there() -> None:
     assert all((ROOT / name).exists() for name in copied)
 
 
-def test_nobody_is_told_to_get_simscen_from_an_index_that_does_not_have_it() -> None:
+def test_docs_do_not_install_simscen_from_pypi() -> None:
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "simscen").rglob("*.py")]
     told = re.compile(r"pip3? install (?:-\S+ )*['\"]?simscen\b(?!/)")
     assert [str(page) for page in pages if told.search(page.read_text(encoding="utf-8"))] == []

@@ -41,7 +41,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_its_files_and_its_configuration_are_valid(project: Path) -> None:
+def test_files_and_configuration_of_the_guide_are_valid(project: Path) -> None:
     assert set(FILES) == {"scenarios/room.scenario.yaml", "stacks/dwb.stack.yaml"}
     for name in FILES:
         assert check_file(name.split(".")[-2], project / name, project) == []
@@ -51,7 +51,7 @@ def test_its_files_and_its_configuration_are_valid(project: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_comparison_prints_what_it_shows(project: Path) -> None:
+def test_comparison_prints_the_output_of_the_guide(project: Path) -> None:
     """To the words and the outcomes; the last digits may differ between processors."""
     done = CliRunner().invoke(app, [*shlex.split(SHOWN), "--out", "out"])
     assert done.exit_code == 1
@@ -70,12 +70,12 @@ def words(text: str) -> list[list[str]]:
 
 
 @pytest.mark.parametrize("command", [line for line in LISTED if not line.startswith("run")])
-def test_a_command_that_it_lists_runs(project: Path, command: str) -> None:
+def test_listed_command_succeeds(project: Path, command: str) -> None:
     assert CliRunner().invoke(app, shlex.split(command)).exit_code == 0
 
 
 @pytest.mark.parametrize("command", [line for line in LISTED if line.startswith("run")])
-def test_what_it_runs_is_found(project: Path, command: str) -> None:
+def test_listed_stack_commands_are_valid(project: Path, command: str) -> None:
     """The stacks it names are a user's own; here it is enough that each is valid and would be started."""
     checked = ["validate", *shlex.split(command)[1:]]
     done = CliRunner().invoke(app, checked)

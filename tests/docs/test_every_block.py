@@ -105,7 +105,7 @@ def commands(block: Block) -> list[str]:
 
 
 @pytest.mark.parametrize("block", of("console", "sh", "indented"))
-def test_a_command_that_is_shown_can_be_typed(block: Block) -> None:
+def test_shown_command_is_valid(block: Block) -> None:
     typed = commands(block)
     assert typed or block.page in NO_COMMANDS or "= short test summary" in block.text
     for line in typed:
@@ -128,7 +128,7 @@ def understood(words: list[str]) -> None:
 
 
 @pytest.mark.parametrize("block", [each for each in of("yaml") if "simscen: 1" not in each.values[0].text])
-def test_a_part_of_a_file_is_one(block: Block, tmp_path: Path) -> None:
+def test_partial_yaml_block_is_valid(block: Block, tmp_path: Path) -> None:
     """Of a scenario, which a base may hold any part of; of a robot, a stack, or the user's configuration."""
     if block.page == "docs/guides/temporal-criteria.md":
         pytest.skip("test_temporal_guide.py")
@@ -146,7 +146,7 @@ def test_a_part_of_a_file_is_one(block: Block, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("block", of("python", "json", "toml"))
-def test_what_others_read_can_be_read(block: Block) -> None:
+def test_python_json_and_toml_blocks_can_be_parsed(block: Block) -> None:
     match block.language:
         case "python":
             compile(block.text, block.page, "exec")
@@ -156,7 +156,7 @@ def test_what_others_read_can_be_read(block: Block) -> None:
             tomllib.loads(block.text)
 
 
-def test_no_block_is_left_out_without_a_reason() -> None:
+def test_every_block_is_tested_or_has_a_reason() -> None:
     looked_at = {"console", "sh", "indented", "yaml", "python", "json", "toml"}
     assert {block.language for block in BLOCKS} - looked_at <= set(NOT_RUN)
     assert {page for page in OWN_TESTS if not (ROOT / page).is_file()} == set()

@@ -37,7 +37,7 @@ def project(tmp_path_factory):
 
 
 @pytest.mark.parametrize("block", blocks())
-def test_a_complete_example_is_valid(block, project):
+def test_complete_example_is_valid(block, project):
     told = {"\nextends:": "study", "\npass:": "scenario", "\ndrive:": "robot", "\nstack:": "stack"}
     kind = next((kind for key, kind in told.items() if key in block), "world")
     folder = "scenarios/theme" if "../../worlds" in block else "scenarios"

@@ -10,7 +10,7 @@ from simscen.loading.yaml.library import Library
 GUIDE = Path(__file__).parents[2] / "docs/guides/extends.md"
 
 
-def test_the_files_of_the_guide_become_one(tmp_path: Path) -> None:
+def test_files_of_the_guide_are_merged_as_documented(tmp_path: Path) -> None:
     shown = re.findall(r"^    # (\S+\.yaml)\n((?:    .*\n)+)", GUIDE.read_text(encoding="utf-8"), re.MULTILINE)
     assert [name for name, _ in shown] == ["defaults.yaml", "aisle.base.yaml", "slow.scenario.yaml"]
     for name, text in shown:

@@ -33,7 +33,7 @@ def called(*words: str) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
-def test_its_scenario_is_valid_and_passes(clone: Path) -> None:
+def test_scenario_of_the_tutorial_passes(clone: Path) -> None:
     assert called("new", "scenarios/my_first")[0] == 0
     (clone / "scenarios/my_first.scenario.yaml").write_text(FIRST, encoding="utf-8")
     assert called("validate", "scenarios/my_first.scenario.yaml") == (0, "1 scenario is valid\n")
@@ -41,7 +41,7 @@ def test_its_scenario_is_valid_and_passes(clone: Path) -> None:
     assert code == 0, told
 
 
-def test_the_harder_one_fails_by_the_tight_bound_alone_and_leaves_all_that_the_page_names(clone: Path) -> None:
+def test_harder_scenario_fails_only_by_the_tight_bound_and_writes_the_named_files(clone: Path) -> None:
     before, after = "stopped_within: {time: 1 s, after: lidar.off}", "stopped_within: {time: 0.1 s, after: lidar.off}"
     assert before in HARDER and after in PARTS["4"]
     file = clone / "scenarios/my_first.scenario.yaml"
@@ -63,7 +63,7 @@ def test_the_harder_one_fails_by_the_tight_bound_alone_and_leaves_all_that_the_p
 
 
 @pytest.mark.parametrize("page", ["python", pytest.param("several-robots", marks=pytest.mark.slow)])
-def test_the_example_in_python_runs(page: str, clone: Path) -> None:
+def test_python_example_runs(page: str, clone: Path) -> None:
     shutil.copytree(ROOT / "scenarios", "scenarios", dirs_exist_ok=True)
     text = (ROOT / f"docs/guides/{page}.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)

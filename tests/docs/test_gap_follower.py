@@ -30,7 +30,7 @@ def follower(tmp_path_factory: pytest.TempPathFactory) -> ExternalCommand:
 
 
 @pytest.mark.parametrize("name", ["navigation/goal", "robots/mecanum_errand"])
-def test_it_drives_a_shipped_scenario_and_is_judged_by_the_truth(follower: ExternalCommand, name: str) -> None:
+def test_gap_follower_drives_a_shipped_scenario(follower: ExternalCommand, name: str) -> None:
     prepared = prepare(load_scenario(ROOT / f"scenarios/{name}.scenario.yaml", ROOT))
     stack = ExternalStackSpec(external="gaps")
     run = simulate(replace(prepared, stack=stack, loaded=replace(prepared.loaded, external_command=follower)))
@@ -39,7 +39,7 @@ def test_it_drives_a_shipped_scenario_and_is_judged_by_the_truth(follower: Exter
     assert len(run.trace.belief) > 100
 
 
-def test_started_by_hand_it_says_who_starts_it(follower: ExternalCommand) -> None:
+def test_gap_follower_without_simscen_prints_a_hint(follower: ExternalCommand) -> None:
     ended = subprocess.run(follower.argv, env={}, capture_output=True, text=True, check=False)
     assert ended.returncode == 1
     assert ended.stderr == "gap_follower: SIMSCEN_STACK_FD is not set: simscen starts this program\n"

@@ -21,7 +21,7 @@ sys.path.insert(0, str(ROOT / "tests" / "unit" / "cli"))
 
 
 @pytest.mark.parametrize(("command", "shown"), SHOWN, ids=[command for command, _ in SHOWN])
-def test_a_command_prints_what_the_guide_shows(
+def test_command_prints_the_output_of_the_guide(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, shown: str
 ) -> None:
     from recorded_drives import write_carmen, write_map

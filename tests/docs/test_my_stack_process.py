@@ -34,18 +34,18 @@ def called(command: str, home: Path, **variables: str) -> subprocess.CompletedPr
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(("command", "says"), COMMANDS)
-def test_a_command_says_what_the_page_says(home: Path, command: str, says: str) -> None:
+def test_command_prints_the_output_of_the_tutorial(home: Path, command: str, says: str) -> None:
     ended = called(command, home)
     assert says in ended.stdout + ended.stderr
     assert ended.returncode == (0 if "passed" in says else 2 if "SC060" in says else 3)
 
 
 @pytest.mark.slow
-def test_the_configuration_says_what_the_name_runs(home: Path) -> None:
+def test_configuration_defines_the_command_of_the_stack_name(home: Path) -> None:
     ended = called("simscen run room.scenario.yaml", home, XDG_CONFIG_HOME=str(home / ".config"))
     assert (ended.returncode, ended.stderr) == (0, "")
 
 
-def test_the_page_has_all_its_parts() -> None:
+def test_tutorial_has_all_files_and_commands() -> None:
     assert len(FILES) == 3
     assert len(COMMANDS) == 6

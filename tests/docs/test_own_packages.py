@@ -21,7 +21,7 @@ PROGRAMS = {
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("page", ["own-criterion", "own-planner-and-stack"])
-def test_each_step_of_the_tutorial_does_what_it_shows(tmp_path: Path, page: str) -> None:
+def test_every_step_of_the_tutorial_works(tmp_path: Path, page: str) -> None:
     shown_text = (TUTORIALS / f"{page}.md").read_text(encoding="utf-8")
     site, work = tmp_path / "site", tmp_path / "work"
     work.mkdir()

@@ -25,7 +25,7 @@ def texts() -> list[tuple[Path, str]]:
     return [(path, path.read_text(encoding="utf-8", errors="ignore")) for path in FILES if path.name != own]
 
 
-def test_a_document_that_is_cited_is_in_the_repository() -> None:
+def test_cited_documents_exist() -> None:
     missing = []
     for path, text in texts():
         for name in DOCUMENT.findall(text):
@@ -36,7 +36,7 @@ def test_a_document_that_is_cited_is_in_the_repository() -> None:
     assert missing == []
 
 
-def test_no_ticket_and_no_place_of_one_machine_is_named() -> None:
+def test_no_issue_numbers_or_machine_paths_in_files() -> None:
     found = [
         f"{path.relative_to(ROOT)}: {match}"
         for path, text in texts()

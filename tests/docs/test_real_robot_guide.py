@@ -20,7 +20,7 @@ sys.path.insert(0, str(ROOT / "tests" / "unit" / "record"))
 
 
 @pytest.mark.parametrize(("command", "shown"), SHOWN, ids=[command.split(" --")[0] for command, _ in SHOWN])
-def test_a_command_prints_what_the_guide_shows(
+def test_command_prints_the_output_of_the_guide(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, shown: str
 ) -> None:
     from foreign_logs import drive, write_bag, write_mcap
@@ -35,6 +35,6 @@ def test_a_command_prints_what_the_guide_shows(
     assert CliRunner().invoke(app, shlex.split(command)).output == shown
 
 
-def test_the_guide_names_every_topic_as_it_is_called() -> None:
+def test_guide_lists_every_topic_name() -> None:
     for name, topic in TOPICS.items():
         assert f"`{name}`" in GUIDE and f"`{topic}`" in GUIDE

@@ -27,7 +27,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_each_page_is_built_and_asks_nobody_for_anything(site: Path) -> None:
+def test_pages_are_built_and_load_nothing_from_the_network(site: Path) -> None:
     for page in (ROOT / "docs").rglob("*.md"):
         place = site / page.relative_to(ROOT / "docs")
         html = place.parent / "index.html" if page.stem == "index" else place.with_suffix("") / "index.html"
@@ -36,19 +36,19 @@ def test_each_page_is_built_and_asks_nobody_for_anything(site: Path) -> None:
         assert 'data-md-component="source"' not in text, "the theme asks api.github.com for what it shows there"
 
 
-def test_what_lies_outside_the_docs_is_linked_in_the_repository(site: Path) -> None:
+def test_links_outside_the_docs_lead_to_the_repository(site: Path) -> None:
     page = (site / "reference/scenarios/index.html").read_text(encoding="utf-8")
     assert 'href="https://github.com/simscen/simscen/blob/main/scenarios/faults/lidar_off.scenario.yaml"' in page
     page = (site / "tutorials/own-planner-and-stack/index.html").read_text(encoding="utf-8")
     assert 'href="https://github.com/simscen/simscen/tree/main/tests/plugins/theta_star"' in page
 
 
-def test_a_search_finds_words_of_every_kind_of_page(site: Path) -> None:
+def test_search_index_contains_every_kind_of_page(site: Path) -> None:
     index = (site / "search/search_index.json").read_text(encoding="utf-8")
     assert all(f'"location":"{part}/' in index for part in ("guides/people", "reference/language", "design/lockstep"))
 
 
 @pytest.mark.parametrize("name", FRONT)
-def test_a_link_on_the_front_of_the_repository_leads_somewhere(name: str) -> None:
+def test_links_in_root_pages_exist(name: str) -> None:
     links = ["".join(match.groups("")) for match in LINK.finditer((ROOT / name).read_text(encoding="utf-8"))]
     assert [link for link in links if not (ROOT / link).exists()] == []

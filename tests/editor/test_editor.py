@@ -220,7 +220,7 @@ def _indent(before: str) -> str:
     return before.rpartition("\n")[2]
 
 
-def test_each_word_is_offered_where_it_may_stand(server: LanguageServer) -> None:
+def test_completion_offers_each_key_where_it_is_valid(server: LanguageServer) -> None:
     pages = []
     for group, room in ROOMS.items():
         text, (line,) = written(room, [("WORD", "")])
@@ -229,7 +229,7 @@ def test_each_word_is_offered_where_it_may_stand(server: LanguageServer) -> None
         assert set(room.choice.choices()) - page.offered(line) == set(), group
 
 
-def test_an_example_of_each_word_is_fine_and_the_word_is_explained_over_it(server: LanguageServer) -> None:
+def test_example_of_each_key_is_valid_and_has_a_hover_text(server: LanguageServer) -> None:
     for group, room in ROOMS.items():
         known = words(group)
         assert [topic.name for topic in known] == list(room.choice.choices())
@@ -240,7 +240,7 @@ def test_an_example_of_each_word_is_fine_and_the_word_is_explained_over_it(serve
             assert summary(topic.text) in page.shown(line, topic.name), topic.name
 
 
-def test_a_misspelled_word_a_wrong_type_and_a_strange_key_are_underlined_and_nothing_else(
+def test_editor_underlines_only_mistakes(
     server: LanguageServer,
 ) -> None:
     for group, room in ROOMS.items():
@@ -262,7 +262,7 @@ def test_a_misspelled_word_a_wrong_type_and_a_strange_key_are_underlined_and_not
 
 
 @pytest.mark.parametrize("group", ROOMS)
-def test_of_a_choice_one_word_is_needed_and_no_more(server: LanguageServer, group: str) -> None:
+def test_choice_requires_exactly_one_key(server: LanguageServer, group: str) -> None:
     room = ROOMS[group]
     first, second = words(group)[:2]
     text, (line,) = written(room, [("WORD", 0)])
@@ -283,7 +283,7 @@ def test_each_type_is_offered_behind_type(server: LanguageServer) -> None:
         assert names - page.offered(len(page.lines) - 1) == set(), group
 
 
-def test_each_key_of_each_mapping_is_offered_and_explained_and_its_mistakes_are_underlined(
+def test_every_key_has_completion_hover_text_and_error_checks(
     server: LanguageServer,
 ) -> None:
     pages = []
@@ -308,7 +308,7 @@ def test_each_key_of_each_mapping_is_offered_and_explained_and_its_mistakes_are_
         assert (STRANGE, f"Property {STRANGE} is not allowed.") in full.told(len(full.lines) - 1), topic.name
 
 
-def test_nothing_is_wrong_with_what_ships(server: LanguageServer) -> None:
+def test_shipped_files_have_no_editor_errors(server: LanguageServer) -> None:
     shipped = [*ROOT.glob("scenarios/**/*.yaml"), *ROOT.glob("worlds/*.world.yaml"), *PACKAGE.glob("data/**/*.yaml")]
     opened = []
     for path in sorted(shipped):

@@ -58,7 +58,7 @@ def test_a_plan_costs_little_more_than_the_optimum(
     assert max(ratios) < most
 
 
-def test_a_way_that_is_dear_here_and_there_and_else_straight_is_as_good(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_plan_around_expensive_spots_is_near_optimal(monkeypatch: pytest.MonkeyPatch) -> None:
     """As with people about: the way past what is dear is searched for, and joined with the straight one."""
     rng, everywhere, dear = np.random.default_rng(3), list[int](), 0
     monkeypatch.setattr(
@@ -78,7 +78,7 @@ def test_a_way_that_is_dear_here_and_there_and_else_straight_is_as_good(monkeypa
 
 
 @pytest.mark.parametrize(("kind", "number", "seed"), [("rooms", 4, 2), ("forest", 3, 2), ("forest", 5, 1)])
-def test_a_plan_takes_the_cheaper_one_of_two_ways_that_cost_nearly_the_same(kind: str, number: int, seed: int) -> None:
+def test_plan_takes_the_cheaper_of_two_similar_paths(kind: str, number: int, seed: int) -> None:
     """It took the other one: a gap of a cell or two was not sampled, or straight legs said little of what ways cost."""
     rng = np.random.default_rng((number, 77, len(kind)))
     view = view_of(*GROUNDS[kind](rng))
@@ -90,7 +90,7 @@ def test_a_plan_takes_the_cheaper_one_of_two_ways_that_cost_nearly_the_same(kind
     assert rates.along(points[:, :2]) < 1.045 * cheapest(rates, start, goal)
 
 
-def test_the_way_through_a_maze_of_fifty_meters_is_found() -> None:
+def test_path_through_a_50_m_maze_is_found() -> None:
     """There were too many samples for the iterations of one search: NO_VALID_PATH, where there was a way."""
     view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(2, 40, 27), RATE)).view
     path = medial_axis().plan(view, Pose2(0.7, 0.7), Pose2(53.3, 53.3), 1)
@@ -100,7 +100,7 @@ def test_the_way_through_a_maze_of_fifty_meters_is_found() -> None:
 
 
 @pytest.mark.parametrize("number", [2, 3])
-def test_in_a_maze_of_large_blocks_and_too_many_samples_the_first_search_finds_the_cheapest_way(
+def test_first_search_in_a_maze_of_large_blocks_finds_the_cheapest_path(
     number: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One of a hundred meters has them: places on the way over its blocks lay too far apart to be joined, and the
@@ -145,7 +145,7 @@ def test_cost_scaling_factor_and_inflation_radius_shape_the_path() -> None:
     assert least_room(plan(inflation_radius=0.3)) < 0.35
 
 
-def test_the_dearer_costs_are_taken_the_more_room_is_left() -> None:
+def test_higher_cost_multiplier_gives_more_clearance() -> None:
     view = view_of(corridor_with_a_corner(), 8, 8)
     ends = Pose2(1, 6.5), Pose2(6.5, 1)
     rooms_left = [
@@ -155,7 +155,7 @@ def test_the_dearer_costs_are_taken_the_more_room_is_left() -> None:
     assert rooms_left[0] + 0.1 < rooms_left[1] < rooms_left[2]
 
 
-def test_without_allow_unknown_a_plan_leads_round_what_is_not_known_and_with_it_across() -> None:
+def test_allow_unknown_controls_paths_through_unknown_space() -> None:
     view = view_of(Flatland().room(8, 8), 8, 8)
     view.costs[0:130, 80:120] = 255  # up to 2 m below the upper wall
     ends = Pose2(1, 2), Pose2(7, 2)
@@ -179,7 +179,7 @@ def test_without_simplify_the_path_is_as_the_planner_found_it() -> None:
 
 
 @pytest.mark.parametrize("resolution", [0.1, 0.25])
-def test_coarse_maps_are_planned_on_as_well(resolution: float) -> None:
+def test_plans_on_coarse_maps_are_found(resolution: float) -> None:
     world, width, height = rooms(np.random.default_rng(11))
     view = view_of(world, width, height, resolution=resolution)
     rates = TraversalCosts(view, ROBOT, 2.0, True)

@@ -48,7 +48,7 @@ def spec(kind: str, **options: object) -> Spec:
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("kind", [*KINDS, "not eased", "navfn", "smac_2d"])
-def test_nowhere_does_a_plan_lead_over_a_cell_where_the_robot_cannot_be(kind: str) -> None:
+def test_plan_never_crosses_a_blocked_cell(kind: str) -> None:
     """A corner was cut between two looks at a motion, where a search or its easing did not look."""
     planners = {name: ompl_planner(spec(name), setting(ROBOT)) for name in KINDS} | {
         "not eased": ompl_planner(Spec(simplify=False), setting(ROBOT)),
@@ -62,7 +62,7 @@ def test_nowhere_does_a_plan_lead_over_a_cell_where_the_robot_cannot_be(kind: st
 
 
 @pytest.mark.parametrize("kind", ["bit_star", "rrt_connect"])
-def test_nowhere_does_a_plan_lead_over_a_single_cell_that_is_not_known(kind: str) -> None:
+def test_plan_never_crosses_an_unknown_cell(kind: str) -> None:
     for ground, number in WAYS:
         view, *ends = way(ground, number)
         costs = np.where(np.random.default_rng(number).random(view.costs.shape) < 0.01, np.uint8(255), view.costs)
@@ -79,7 +79,7 @@ def test_nowhere_does_a_plan_lead_over_a_single_cell_that_is_not_known(kind: str
     ("space", "kind", "ground", "numbers"),
     [("reeds_shepp", "kpiece", "rooms", (506, 520)), ("dubins", "aorrtc", "forest", (501,))],
 )
-def test_nowhere_between_two_poses_does_a_cars_hull_touch_anything(
+def test_hull_of_a_car_is_collision_free_along_the_plan(
     space: str, kind: str, ground: str, numbers: tuple[int, ...]
 ) -> None:
     """Of thirty, those on which it did."""
@@ -94,7 +94,7 @@ def test_nowhere_between_two_poses_does_a_cars_hull_touch_anything(
 
 
 @pytest.mark.parametrize(("ground", "number"), [("forest", 601), ("forest", 604), ("rooms", 607), ("forest", 609)])
-def test_aorrtc_does_not_say_of_a_car_that_it_is_there_where_it_has_found_nothing(ground: str, number: int) -> None:
+def test_aorrtc_reports_failure_for_a_car_without_a_path(ground: str, number: int) -> None:
     """OMPL calls a path of the goal alone an exact solution."""
     view, start, goal = way(ground, number, CAR, 0.45)
     ends = turned(start, number), turned(goal, number + 1)

@@ -17,7 +17,7 @@ VALUES = {
 
 
 @pytest.mark.parametrize(("kind", "name"), VALUES)
-def test_what_the_package_adds_keeps_its_promises(yardwork, kind: str, name: str) -> None:
+def test_types_of_the_package_meet_their_contracts(yardwork, kind: str, name: str) -> None:
     entry = find(kind, name)
     assert entry is not None
     promises = promises_of(entry.load().model_validate(VALUES[kind, name]), name)

@@ -101,7 +101,7 @@ FINDING = "Finding(Status.{}, 'mine', '1', '2', {})"
         ("raise KeyError('gone')", "KeyError: 'gone' (criterion `mine` of mines 0.3)"),
     ],
 )
-def test_a_criterion_that_does_not_judge_makes_the_run_an_error(run, text: str, told: str) -> None:
+def test_criterion_without_findings_makes_the_run_an_error(run, text: str, told: str) -> None:
     result = run("criterion", text)
     assert result.outcome is Outcome.ERROR
     assert result.error is not None and told in result.error.message
@@ -120,13 +120,13 @@ def test_a_criterion_that_does_not_judge_makes_the_run_an_error(run, text: str, 
         ("return 1 / 0", "metric mine: ZeroDivisionError: division by zero (metric `mine` of mines 0.3)"),
     ],
 )
-def test_a_metric_that_is_no_number_makes_the_run_an_error(run, text: str, told: str) -> None:
+def test_nonnumeric_metric_makes_the_run_an_error(run, text: str, told: str) -> None:
     result = run("metric", text)
     assert result.outcome is Outcome.ERROR
     assert result.error is not None and told in result.error.message
 
 
-def test_a_metric_that_a_run_does_not_have_says_why(run) -> None:
+def test_undefined_metric_has_a_reason(run) -> None:
     result = run("metric", "return 'nobody came'")
     assert result.outcome is Outcome.PASSED
     assert (result.metrics["mine"], result.undefined["mine"]) == (None, "nobody came")
@@ -181,18 +181,15 @@ def test_a_metric_that_a_run_does_not_have_says_why(run) -> None:
         ("sensor", "return Scan('extra', tick, np.ones(3), np.nan, 1., 0., 9.)", "broken-component", "is not finite"),
     ],
 )
-def test_an_answer_that_is_none_ends_the_run_with_its_name(run, kind, text, error, told) -> None:
+def test_invalid_result_of_a_component_is_an_error_with_its_name(run, kind, text, error, told) -> None:
     with pytest.raises(RunError) as raised:
         run(kind, text)
     assert raised.value.kind == error
     assert told in str(raised.value)
 
 
-def test_a_command_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
-    with pytest.raises(
-        RunError,
-        match=r"returned Twist\(vx=nan.* for a command, which is not a finite Twist \(fault `mine` of mines 0.3\)",
-    ):
+def test_invalid_command_from_a_fault_is_an_error_with_its_name(run) -> None:
+    with pytest.raises(RunError, match=r"makes Twist\(vx=nan.* of a command \(fault `mine` of mines 0.3\)"):
         run("fault", "def command(self, command): return Twist(float('nan'), 0.0, 0.0)", sensor="cmd_vel")
 
 
@@ -211,13 +208,13 @@ def test_a_command_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
         ("cmd_vel", "def arriving_command(self): return 'go'", "returned 'go' for a command"),
     ],
 )
-def test_what_a_fault_of_any_instance_makes_is_looked_at(run, instance: str, text: str, why: str) -> None:
+def test_output_of_a_fault_is_validated_for_every_target(run, instance: str, text: str, why: str) -> None:
     with pytest.raises(RunError, match=rf"{why}.*\(fault `mine` of mines 0.3\)"):
         run("fault", text, sensor=instance)
 
 
-def test_a_map_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
-    with pytest.raises(RunError, match=r"returned an object of type str for a map \(fault `mine` of mines 0.3\)"):
+def test_invalid_map_from_a_fault_is_an_error_with_its_name(run) -> None:
+    with pytest.raises(RunError, match=r"makes str of a map \(fault `mine` of mines 0.3\)"):
         run(
             "fault",
             "def map(self, grid): return 'here be dragons'",
@@ -225,22 +222,22 @@ def test_a_map_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
         )
 
 
-def test_a_fault_that_changes_nothing_is_told_and_does_not_pass(run) -> None:
+def test_fault_without_effect_fails_the_run(run) -> None:
     result = run("fault", "pass")
     assert result.outcome is Outcome.FAILED
     assert [one.happened for one in result.disturbances] == [False]
 
 
-def test_an_action_that_did_nothing_is_told_and_does_not_pass(run) -> None:
+def test_action_without_effect_fails_the_run(run) -> None:
     result = run("action", "return Effect(False, 'it was there already')")
     assert result.outcome is Outcome.FAILED
 
 
-def test_an_event_whose_trigger_never_holds_is_told_and_does_not_pass(run) -> None:
+def test_event_that_never_triggers_fails_the_run(run) -> None:
     result = run("trigger", "return np.bool_(False)")
     assert result.outcome is Outcome.FAILED
 
 
-def test_a_component_that_is_not_there_ends_the_run_with_its_name(run, packages) -> None:
+def test_missing_component_is_an_error_with_its_name(run, packages) -> None:
     with pytest.raises(RunError, match=r"sensor `extra`.*ModuleNotFoundError"):
         run("sensor", "pass\n\nMine.component = 'nowhere:Device'")

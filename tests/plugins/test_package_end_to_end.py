@@ -93,7 +93,7 @@ def ran(yard, once) -> Path:
     return yard
 
 
-def test_a_run_uses_what_the_package_adds_and_every_report_knows_it(ran) -> None:
+def test_run_uses_types_of_the_package_and_reports_show_them(ran) -> None:
     yard = ran
     log = read_log(yard / "out/runs/door/seed-1/run.mcap")
     result = json.loads((yard / "out/runs/door/seed-1/result.json").read_text())
@@ -114,14 +114,14 @@ def test_a_run_uses_what_the_package_adds_and_every_report_knows_it(ran) -> None
 
 
 @pytest.mark.slow
-def test_its_criterion_can_fail_and_says_by_how_much(yard) -> None:
+def test_criterion_of_the_package_can_fail_with_a_margin(yard) -> None:
     (yard / "door.scenario.yaml").write_text(DRIVE.replace("max: 30 s", "max: 0.5 s"))
     assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 1
     (failure,) = ET.parse(yard / "out/junit.xml").getroot().iter("failure")
     assert re.search(r"dwell: doorway: \d\.\d\d s > 0\.50 s", failure.get("message", "")), failure.attrib
 
 
-def test_its_sensor_is_heard_by_the_log(once) -> None:
+def test_readings_of_the_package_sensor_are_in_the_log(once) -> None:
     from mcap.reader import make_reader
 
     with (once / "runs/door/seed-1/run.mcap").open("rb") as stream:
@@ -150,7 +150,7 @@ def test_its_sensor_is_heard_by_the_log(once) -> None:
         ("reversed_length:", "reversed_lenght:", "reversed_lenght", "unknown key", "did you mean `reversed_length`?"),
     ],
 )
-def test_a_mistake_is_told_at_its_place_with_what_was_meant(yard, old, new, wrong, told, hint) -> None:
+def test_mistake_is_reported_at_its_position_with_a_suggestion(yard, old, new, wrong, told, hint) -> None:
     text = DRIVE.replace(old, new)
     (yard / "door.scenario.yaml").write_text(text)
     done = simscen("validate", "door.scenario.yaml")
@@ -162,7 +162,7 @@ def test_a_mistake_is_told_at_its_place_with_what_was_meant(yard, old, new, wron
     assert told in done.stdout and hint in done.stdout
 
 
-def test_schema_and_explain_know_it_and_what_is_committed_does_not(yard) -> None:
+def test_schema_and_explain_include_the_package_but_committed_files_do_not(yard) -> None:
     schema = json.loads(simscen("schema", "scenario").stdout)
     jsonschema.Draft7Validator(schema).validate(yaml.safe_load(DRIVE))
     jsonschema.Draft7Validator(json.loads(simscen("schema", "robot").stdout)).validate(yaml.safe_load(ROBOT))
@@ -181,7 +181,7 @@ def test_schema_and_explain_know_it_and_what_is_committed_does_not(yard) -> None
 
 
 @pytest.mark.slow
-def test_resume_does_again_what_a_change_of_the_package_could_change(yard, yardwork) -> None:
+def test_resume_repeats_runs_that_use_a_changed_package(yard, yardwork) -> None:
     assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 0
     journal = yard / "out/events.jsonl"
     assert simscen("run", "door.scenario.yaml", "--resume", "out").returncode == 0
@@ -192,7 +192,7 @@ def test_resume_does_again_what_a_change_of_the_package_could_change(yard, yardw
     assert (kept, journal.read_text().count('"event": "started"')) == (1, 2)
 
 
-def test_without_the_package_a_file_that_uses_it_says_what_is_missing(ran, yardwork) -> None:
+def test_missing_package_is_reported_for_files_that_use_it(ran, yardwork) -> None:
     shutil.rmtree(yardwork)
     done = simscen("validate", "door.scenario.yaml")
     assert done.returncode == 2
@@ -206,7 +206,7 @@ def test_without_the_package_a_file_that_uses_it_says_what_is_missing(ran, yardw
     assert simscen("judge", "out/runs/door/seed-1/run.mcap", "--scenario", "mine.yaml").returncode == 0
 
 
-def test_another_version_of_the_package_does_not_judge_a_log_of_this_one(ran, yardwork) -> None:
+def test_log_is_not_judged_by_another_package_version(ran, yardwork) -> None:
     (yardwork / "yardwork-1.2.dist-info/METADATA").write_text("Metadata-Version: 2.1\nName: yardwork\nVersion: 2.0\n")
     judged = simscen("judge", "out/runs/door/seed-1/run.mcap")
     assert judged.returncode == 2
@@ -214,7 +214,7 @@ def test_another_version_of_the_package_does_not_judge_a_log_of_this_one(ran, ya
 
 
 @pytest.mark.slow
-def test_a_log_is_judged_without_what_only_its_run_needed(yard, yardwork) -> None:
+def test_log_is_judged_without_packages_needed_only_by_the_run(yard, yardwork) -> None:
     (yard / "door.scenario.yaml").write_text(
         DRIVE.replace("  - dwell: {region: doorway, max: 30 s}\n", "").partition("metrics:")[0]
     )

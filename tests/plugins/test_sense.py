@@ -40,7 +40,7 @@ def told(yardwork, tmp_path: Path, monkeypatch, capsys):
     return validate
 
 
-def test_a_shipped_action_that_changes_nothing_of_it_leaves_all_errors(told) -> None:
+def test_shipped_actions_do_not_hide_errors(told) -> None:
     code, text = told("{remove: {name: nothing}}")
     assert code == 2
     code, text = told("{push: {impulse: [0, 2]}}")
@@ -48,7 +48,7 @@ def test_a_shipped_action_that_changes_nothing_of_it_leaves_all_errors(told) -> 
     assert "no event cancels a goal" in text
 
 
-def test_with_an_action_of_a_package_only_what_is_sure_is_an_error(told) -> None:
+def test_package_actions_turn_uncertain_errors_into_warnings(told) -> None:
     code, text = told("{turn_robot: {by: 1}}")
     assert code == 0, text
     assert "error[" not in text

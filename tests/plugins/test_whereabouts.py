@@ -28,18 +28,18 @@ def isolated(told: str, folder: Path) -> str:
     return done.stdout.strip()
 
 
-def test_nothing_is_told_where_nothing_is_used() -> None:
+def test_no_package_folders_are_passed_without_package_types() -> None:
     assert plugin_path_arguments([]) == ()
 
 
-def test_a_package_on_the_path_is_found_behind_all_that_was_there(yardwork) -> None:
+def test_package_folders_are_appended_to_the_path(yardwork) -> None:
     (told,) = plugin_path_arguments(installed("criterion"))
     found, place = isolated(told, yardwork).rsplit(" ", 1)
     assert found == "[('1.2', 'yardwork.dwell')]"
     assert int(place) > 2
 
 
-def test_the_users_own_packages_are_found_with_those_that_a_pth_file_leads_to(tmp_path, packages) -> None:
+def test_user_site_packages_and_pth_files_are_found(tmp_path, packages) -> None:
     """As an editable installation in the user's site-packages lies there."""
     from_home, source = tmp_path / "home", tmp_path / "source"
     lay = packages.lay  # type: ignore[attr-defined]
@@ -54,7 +54,7 @@ def test_the_users_own_packages_are_found_with_those_that_a_pth_file_leads_to(tm
     assert isolated(told, from_home).startswith("[('3.0', 'mine')]")
 
 
-def test_of_two_versions_the_one_is_taken_that_was_validated(tmp_path, packages) -> None:
+def test_validated_version_of_a_package_is_used(tmp_path, packages) -> None:
     lay, old, new = packages.lay, tmp_path / "old", tmp_path / "new"  # type: ignore[attr-defined]
     for folder, version in ((old, "1.0"), (new, "2.0")):
         text = (ROOT / "tests/plugins/yardwork/yardwork/dwell.py").read_text()
@@ -63,7 +63,7 @@ def test_of_two_versions_the_one_is_taken_that_was_validated(tmp_path, packages)
     assert isolated(told, new) == "[('2.0', 'dwell')] 0"
 
 
-def test_the_folder_that_the_command_was_called_in_is_not_handed_over(yardwork, tmp_path, monkeypatch) -> None:
+def test_working_folder_is_not_on_the_worker_path(yardwork, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [str(tmp_path), "", *sys.path])
     (told,) = plugin_path_arguments(

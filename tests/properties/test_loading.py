@@ -78,13 +78,13 @@ def test_the_scenario_that_is_varied_is_valid(load: Any) -> None:
 
 @QUICK
 @given(st.binary(max_size=400))
-def test_any_bytes(load: Any, raw: bytes) -> None:
+def test_any_bytes_are_loaded_or_refused(load: Any, raw: bytes) -> None:
     load(raw)
 
 
 @QUICK
 @given(st.text(st.sampled_from("abc:-[]{}\"'#&*!|>%@`?, \n\t1.eE~<\\é机"), max_size=200))
-def test_any_text_of_yaml_signs(load: Any, text: str) -> None:
+def test_any_yaml_characters_are_loaded_or_refused(load: Any, text: str) -> None:
     load(text)
 
 
@@ -92,7 +92,7 @@ def test_any_text_of_yaml_signs(load: Any, text: str) -> None:
 @given(
     st.integers(0, len(SCENARIO)), st.integers(0, 40), st.text(st.sampled_from(":-[]{}\"'#&*!\n \tx1~\0é"), max_size=5)
 )
-def test_any_cut_or_insertion_in_a_valid_scenario(load: Any, at: int, cut: int, inserted: str) -> None:
+def test_scenario_with_any_edit_is_loaded_or_refused(load: Any, at: int, cut: int, inserted: str) -> None:
     load(SCENARIO[:at] + inserted + SCENARIO[at + cut :])
 
 
@@ -118,7 +118,7 @@ PLACES = _paths(PLAIN)[1:]
 
 @QUICK
 @given(st.sampled_from(PLACES), JSON)
-def test_any_value_anywhere_in_a_valid_scenario(load: Any, path: tuple[Any, ...], value: Any) -> None:
+def test_scenario_with_any_value_is_loaded_or_refused(load: Any, path: tuple[Any, ...], value: Any) -> None:
     varied = deepcopy(PLAIN)
     holder = varied
     for key in path[:-1]:
@@ -129,7 +129,7 @@ def test_any_value_anywhere_in_a_valid_scenario(load: Any, path: tuple[Any, ...]
 
 @QUICK
 @given(st.sampled_from(PLACES), st.text("abcdefghijklmnopqrstuvwxyz_", min_size=1, max_size=12))
-def test_a_key_that_nobody_knows_is_told_at_its_place(load: Any, path: tuple[Any, ...], key: str) -> None:
+def test_unknown_key_is_reported_at_its_position(load: Any, path: tuple[Any, ...], key: str) -> None:
     varied = deepcopy(PLAIN)
     holder = varied
     for part in path:

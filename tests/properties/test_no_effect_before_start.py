@@ -187,20 +187,20 @@ def assert_the_same_until(moments: list[Moment], other: list[Moment], tick: int)
 
 @pytest.mark.sample(12)
 @pytest.mark.parametrize(("name", "fault"), FAULTS, ids=[name for name, _ in FAULTS])
-def test_until_a_fault_begins_the_run_is_the_one_without_it(play, quiet, name: str, fault: str) -> None:
+def test_run_is_unchanged_until_a_fault_starts(play, quiet, name: str, fault: str) -> None:
     start = drawn(name)
     moments = play([fault.replace("WHEN", at(start))], [], start + 0.3)
     assert_the_same_until(moments, quiet[True], begun(moments, EventKind.FAULT_STARTED))
 
 
 @pytest.mark.parametrize(("name", "event"), EVENTS, ids=[name for name, _ in EVENTS])
-def test_until_an_event_begins_the_run_is_the_one_without_it(play, quiet, name: str, event: str) -> None:
+def test_run_is_unchanged_until_an_event_starts(play, quiet, name: str, event: str) -> None:
     start, shut = drawn(name), name != "close"
     moments = play([], [event.replace("WHEN", at(start))], start + 0.1, shut)
     assert_the_same_until(moments, quiet[shut], begun(moments, EventKind.EVENT_STARTED))
 
 
-def test_with_everything_that_never_begins_the_run_is_the_one_without_it_to_its_end(play, quiet) -> None:
+def test_entries_that_never_start_do_not_change_the_run(play, quiet) -> None:
     moments = play(
         [fault.replace("WHEN", NEVER) for _, fault in FAULTS],
         [event.replace("WHEN", NEVER) for _, event in EVENTS],
@@ -217,12 +217,12 @@ MAPS = [
 
 
 @pytest.mark.parametrize("word", MAPS)
-def test_a_fault_of_the_map_is_there_from_the_first_beat_on(play, quiet, word: str) -> None:
+def test_map_fault_applies_from_the_first_cycle(play, quiet, word: str) -> None:
     moments = play([f"{{sensor: map, {word}: {fault_example(word, MAP)}}}"], [], 0.2)
     assert begun(moments, EventKind.FAULT_STARTED) == begun(moments, EventKind.FAULT_TOOK_EFFECT) == 0
 
 
-def test_what_is_over_leaves_no_trace_of_its_own(play) -> None:
+def test_fault_without_messages_leaves_the_run_unchanged(play) -> None:
     """A delay at a time at which no message is due changes no bit of the rest."""
     fault = "{sensor: lidar, delay: {latency: 50 ms}, when: {time: 1.01 s}, for: 0.02 s, required: false}"
     plain, late = play([], [], 2.0), play([fault], [], 2.0)
@@ -232,7 +232,7 @@ def test_what_is_over_leaves_no_trace_of_its_own(play) -> None:
     assert all(map(same, told, plain))
 
 
-def test_every_fault_is_tried_on_each_instance_that_it_affects(play, tmp_path: Path) -> None:
+def test_every_fault_is_tested_on_each_target(play, tmp_path: Path) -> None:
     (tmp_path / "observer.robot.yaml").write_text(ROBOT)
     file = tmp_path / "own.scenario.yaml"
     file.write_text(SCENARIO % ("true", "1 s", " []", " []"))

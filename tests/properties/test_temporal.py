@@ -28,7 +28,7 @@ def as_rtamt(formula):
 
 @settings(max_examples=40, deadline=None)
 @given(FORMULAS, st.data())
-def test_the_robustness_is_that_of_rtamt_where_the_trace_is_long_enough(formula, data):
+def test_robustness_matches_rtamt_on_long_traces(formula, data):
     length = horizon(formula) + 2  # rtamt cannot read a trace of one sample
     p, q = (data.draw(st.lists(NUMBERS, min_size=length, max_size=length)) for _ in "pq")
     spec = rtamt.StlDiscreteTimeSpecification()

@@ -86,7 +86,7 @@ STATUS = {True: Status.PASS, False: Status.FAIL, UNKNOWN: Status.INCONCLUSIVE}
 
 @settings(deadline=None, max_examples=300)
 @given(RESPONSES, VALUES, st.data())
-def test_every_verdict_is_that_of_the_three_valued_oracle(formula, p, data):
+def test_verdicts_match_the_three_valued_oracle(formula, p, data):
     q = data.draw(st.lists(NUMBERS, min_size=len(p), max_size=len(p)))
     always = {"always": {"all": [formula], "between": [0, 1]}}
     (verdict,) = judge([AnyCriterion.model_validate(always)], run(p, q), CASE)
@@ -107,7 +107,7 @@ def test_whenever_passes_only_if_its_premise_was_known_to_hold(premise, answer, 
 
 @settings(deadline=None)
 @given(COMPARISONS, COMPARISONS, VALUES)
-def test_a_premise_that_need_not_hold_lets_an_untested_run_pass(premise, answer, p):
+def test_optional_premise_lets_an_untested_run_pass(premise, answer, p):
     written = {"whenever": {**premise, "required": False}, "then": answer}
     (verdict,) = judge([AnyCriterion.model_validate(written)], run(p, p), CASE)
     oracle = Oracle(p, p)

@@ -135,7 +135,7 @@ def test_the_sign_of_a_margin_is_the_verdict(run, criterion):
 
 @given(runs(), criteria(), st.data())
 @settings(deadline=None)
-def test_loosening_a_bound_never_turns_a_pass_into_anything_else(run, criterion, data):
+def test_looser_bound_keeps_a_pass(run, criterion, data):
     (kind, words), trace = criterion, synthetic_trace(run)
     raised, lowered = LIMITS.get(kind, ()), LOWERED.get(kind, ())
     assume(raised or lowered)
@@ -172,7 +172,7 @@ def shifted(trace: Trace, ticks: int) -> Trace:
 
 @given(runs(), criteria(), st.integers(1, 10_000))
 @settings(deadline=None)
-def test_a_run_that_is_moved_in_time_has_the_same_verdict_at_moved_ticks(run, criterion, ticks):
+def test_shifted_run_has_the_same_verdict_at_shifted_ticks(run, criterion, ticks):
     (kind, words), trace = criterion, synthetic_trace(run)
     assume(kind != "relocalized_within" or "after" in words)
     now, then = verdict(kind, words, trace), verdict(kind, words, shifted(trace, ticks))
@@ -184,7 +184,7 @@ def test_a_run_that_is_moved_in_time_has_the_same_verdict_at_moved_ticks(run, cr
 
 @given(runs(), criteria(), st.integers(1, 400))
 @settings(deadline=None)
-def test_what_was_not_decided_or_failed_when_a_log_was_cut_off_is_never_a_pass_there(run, criterion, cut):
+def test_truncated_log_never_turns_a_verdict_into_a_pass(run, criterion, cut):
     trace = synthetic_trace(run)
     end = trace.end - cut
     events = tuple(e for e in trace.events if e.tick <= end and e.kind is not EventKind.RUN_ENDED)
@@ -194,7 +194,7 @@ def test_what_was_not_decided_or_failed_when_a_log_was_cut_off_is_never_a_pass_t
 @pytest.mark.parametrize("column", [0, 1, 2])
 @given(criteria(), st.integers(0, 300), st.sampled_from([np.nan, np.inf, -np.inf]))
 @settings(deadline=None)
-def test_a_pose_that_is_no_number_never_lets_what_looks_at_it_pass(column, criterion, k, value):
+def test_nan_pose_never_passes_a_criterion_that_uses_it(column, criterion, k, value):
     trace = synthetic_trace({"seconds": SECONDS, "truth": [[0, 0, 0], [SECONDS, 4, 0]], "events": LOOKED_AT})
     trace.truth.values[k, column] = value
     kind, words = criterion

@@ -39,7 +39,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @given(data=st.dictionaries(KEYS, TREES, max_size=4))
 @settings(max_examples=300, deadline=None)
-def test_what_is_written_is_read_back_equal_and_of_the_same_types(file: Path, data: dict[str, Any]) -> None:
+def test_written_yaml_is_read_back_equal_with_types(file: Path, data: dict[str, Any]) -> None:
     """Also when it is written to a file, where the reader refuses control characters."""
     file.write_text(to_yaml(data), encoding="utf-8", newline="")
     text = read_text(file, "a")
@@ -50,7 +50,7 @@ def test_what_is_written_is_read_back_equal_and_of_the_same_types(file: Path, da
 
 
 @pytest.mark.parametrize("name", ["1e3", "on", "0o7", "1:30", "no", "017", "2026-11-21"])
-def test_a_name_that_looks_like_something_else_survives_in_a_merged_scenario(tmp_path: Path, name: str) -> None:
+def test_ambiguous_name_is_quoted_in_a_merged_scenario(tmp_path: Path, name: str) -> None:
     """A goal named so made the log unjudgeable: YAML 1.1 wrote it plain, YAML 1.2 read a number."""
     (tmp_path / "base.scenario.yaml").write_text(
         "simscen: 1\nworld: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}\n"
@@ -70,7 +70,7 @@ def test_a_world_that_is_written_is_read_back_with_its_names() -> None:
     assert tree is not None and WorldSpec.model_validate(tree.plain) == spec
 
 
-def test_people_still_read_it_easily() -> None:
+def test_yaml_is_quoted_only_if_necessary() -> None:
     """Only what must be quoted is."""
     data = {"name": "lidar dropout", "when": {"time": 10.5}, "goals": ["1e3", "on"], "yaw": "90 deg"}
     text = to_yaml(data)

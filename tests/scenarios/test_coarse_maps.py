@@ -20,7 +20,7 @@ pass:
 
 
 @pytest.mark.parametrize("cell", [0.15, 0.3, 0.4])
-def test_a_robot_arrives_where_it_says_it_does(cell, tmp_path):
+def test_robot_on_a_coarse_map_arrives_where_it_reports(cell, tmp_path):
     columns, rows = round(8 / cell), round(6 / cell)
     gray = np.full((rows, columns), 254, dtype=np.uint8)
     gray[[0, -1]] = gray[:, [0, -1]] = 0

@@ -52,6 +52,6 @@ def outcome(tmp_path: Path, thing: str, camera: bool) -> dict[str, str]:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("thing", [LOW_BOX, TABLE_TOP], ids=["low box", "table top"])
-def test_a_robot_that_collides_by_its_lidar_alone_does_not_with_a_depth_camera(tmp_path: Path, thing: str) -> None:
+def test_depth_camera_prevents_a_collision_that_the_lidar_misses(tmp_path: Path, thing: str) -> None:
     assert outcome(tmp_path, thing, camera=False)["collisions"] == "fail"
     assert outcome(tmp_path, thing, camera=True) == {"goals_reached": "pass", "collisions": "pass"}

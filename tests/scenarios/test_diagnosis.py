@@ -65,7 +65,7 @@ pass: [{goals_reached: {}}]
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_cause_stands_before_the_symptom_live_and_judged_again(name, tmp_path):
+def test_cause_is_reported_first_in_run_and_judge(name, tmp_path):
     text, criterion, expected = CASES[name]
     file, log = tmp_path / "own.scenario.yaml", tmp_path / "run.mcap"
     file.write_text(HEAD + text)

@@ -64,7 +64,7 @@ events:
 """
 
 
-def test_an_event_happened_when_every_action_of_it_changed_something(tmp_path):
+def test_event_happens_if_each_action_has_an_effect(tmp_path):
     result, told = run(ACTIONS, tmp_path)
     happened = {"remove", "spawn", "move", "open", "push", "kidnapped"}
     assert {name for name, effect in told.items() if effect.startswith("+")} == happened
@@ -94,7 +94,7 @@ faults:
 """
 
 
-def test_a_fault_happened_when_it_changed_a_message_or_a_command(tmp_path):
+def test_fault_happens_if_it_changes_a_message_or_command(tmp_path):
     result, told = run(FAULTS, tmp_path)
     assert {name for name, effect in told.items() if effect.startswith("+")} == {
         "one message", "odom.slip", "dead", "noise", "to the end",
@@ -107,7 +107,7 @@ def test_a_fault_happened_when_it_changed_a_message_or_a_command(tmp_path):
     assert "lidar.off" not in complaints(result), "it may stay away"
 
 
-def test_what_comes_with_the_last_beat_disturbs_nobody(tmp_path):
+def test_event_in_the_last_cycle_did_not_happen(tmp_path):
     text = """\
 events: [{name: too late, when: {time: 19.996 s}, do: {push: {impulse: [0, 1]}}}]
 faults: [{sensor: lidar, off: {}, when: {time: 19.996 s}}]
@@ -125,7 +125,7 @@ CHANCE = "events: [{{name: maybe, when: {{time: 1 s, probability: {}}}, do: {{pu
     ("probability", "required", "outcome"),
     [("1 %", "", Outcome.FAILED), ("1 %", ", required: false", Outcome.PASSED), ("99 %", "", Outcome.PASSED)],
 )
-def test_what_was_not_drawn_did_not_happen(probability, required, outcome, tmp_path):
+def test_event_excluded_by_probability_did_not_happen(probability, required, outcome, tmp_path):
     result, _ = run(CHANCE.format(probability, required), tmp_path)
     assert result.outcome is outcome
 
@@ -150,7 +150,7 @@ events:
 """
 
 
-def test_of_a_story_that_stops_the_step_that_was_waited_for_fails_the_run(tmp_path: Path) -> None:
+def test_stopped_sequence_fails_at_the_pending_step(tmp_path: Path) -> None:
     result, told = run(STORIES, tmp_path)
     assert complaints(result) == {"a story then 2": 18, "but this should": 27}
     since = "it was due from t = 1.50 s, after a story then 1; it never began"

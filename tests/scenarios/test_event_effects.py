@@ -60,7 +60,7 @@ def at(trace, name, seconds):
     return samples.values[np.searchsorted(samples.ticks, round(seconds * trace.tick_rate))]
 
 
-def test_everything_happened_but_what_could_not(run):
+def test_all_possible_events_happened(run):
     done, _ = run
     happened = {one.disturbance.name: one for one in done.result.disturbances}
     assert {name for name, one in happened.items() if not one.happened} == {"gone", "stood"}
@@ -69,7 +69,7 @@ def test_everything_happened_but_what_could_not(run):
     assert happened["hatch opens then 1"].effect == "hatch swings shut"
 
 
-def test_a_teleported_object_is_there_from_that_moment_on(run):
+def test_teleported_object_is_at_its_new_pose(run):
     _, trace = run
     assert at(trace, "crate", 1.0)[:2] == pytest.approx((6.5, 3.0)) or at(trace, "crate", 1.0)[0] == 5.5
     assert at(trace, "crate", 1.05) == pytest.approx((6.5, 3.0, math.pi / 4), abs=1e-6)
@@ -77,7 +77,7 @@ def test_a_teleported_object_is_there_from_that_moment_on(run):
     assert (placed.data["x"], placed.data["y"]) == (6.5, 3.0)
 
 
-def test_a_cart_that_waits_goes_on_where_it_was_and_one_that_is_stopped_stays(run):
+def test_paused_cart_continues_and_stopped_cart_stays(run):
     _, trace = run
     for seconds, x in ((0.5, 3.5), (1.5, 4.0), (2.5, 4.5), (3.5, 5.0), (5.0, 5.0)):
         assert at(trace, "cart", seconds)[0] == pytest.approx(x, abs=0.01)
@@ -100,7 +100,7 @@ def test_doors_reverse_and_slide(run):
     assert at(trace, "slider", 2.0)[:2] == pytest.approx((2.6, 2.5), abs=1e-6)
 
 
-def test_marks_are_in_the_log_and_are_waited_for_and_judged_after(run):
+def test_marks_are_logged_and_usable_in_triggers_and_criteria(run):
     done, trace = run
     marks = {event.name: trace.seconds(event.tick) for event in trace.of_kind(EventKind.MARK)}
     assert marks == pytest.approx({"now": 1.0, "later": 1.5}, abs=0.05)
@@ -109,7 +109,7 @@ def test_marks_are_in_the_log_and_are_waited_for_and_judged_after(run):
     ]
 
 
-def test_somebody_who_walks_can_be_stopped_at_any_beat(tmp_path):
+def test_pedestrian_can_be_stopped_in_any_cycle(tmp_path):
     anna = "{pedestrian: {name: anna, pose: {x: 2, y: 3}, goals: [[6, 3]]}}"
     file = tmp_path / "own.scenario.yaml"
     for when in (1.0, 1.0125):

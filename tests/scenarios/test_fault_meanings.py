@@ -75,14 +75,14 @@ time_limit: 1 s
 """
 
 
-def test_beams_through_glass_return_what_lies_behind(tmp_path):
+def test_beams_through_glass_measure_the_object_behind(tmp_path):
     _, moments = play("faults: [{sensor: lidar, glass: {of: [pane, crate]}}]\n", tmp_path, STANDING)
     for _, scan in scans(moments):
         off = scan.ranges - to_walls(2.0, 2.0, scan.angles() + 0.3)
         assert np.abs(off).max() < 0.06, "0.01 m of noise, nothing of the pane and the crate"
 
 
-def test_a_share_of_the_beams_goes_through_glass_and_the_rest_sees_it(tmp_path):
+def test_share_of_beams_passes_through_glass(tmp_path):
     _, moments = play("faults: [{sensor: lidar, glass: {of: [pane], probability: 70 %}}]\n", tmp_path, STANDING)
     through = []
     for _, scan in scans(moments):
@@ -92,7 +92,7 @@ def test_a_share_of_the_beams_goes_through_glass_and_the_rest_sees_it(tmp_path):
     assert np.mean(through) == pytest.approx(0.7, abs=0.06)
 
 
-def test_a_lidar_that_is_turned_in_its_mount_sees_everything_turned_back(tmp_path):
+def test_rotated_lidar_measures_a_rotated_scene(tmp_path):
     fault = (
         "faults: [{sensor: lidar, extrinsic: {yaw: 10 deg, x: 5 cm}}, {sensor: lidar, glass: {of: [pane, crate]}}]\n"
     )
@@ -113,7 +113,7 @@ def test_a_lidar_that_is_pitched_down_sees_the_floor_as_a_wall(tmp_path):
         assert ahead == pytest.approx(height / math.sin(math.radians(5)), abs=0.06)
 
 
-def test_late_scans_arrive_at_the_first_beat_that_is_due_and_carry_the_tick_of_when_they_were_taken(tmp_path):
+def test_delayed_scans_arrive_in_the_next_cycle_with_the_stamp_of_measurement(tmp_path):
     _, moments = play("faults: [{sensor: lidar, delay: {latency: 0.111 s}}]\ntime_limit: 3 s\n", tmp_path)
     beats = [moment.tick for moment in moments]
     got = scans(moments)
@@ -122,7 +122,7 @@ def test_late_scans_arrive_at_the_first_beat_that_is_due_and_carry_the_tick_of_w
         assert tick == min(beat for beat in beats if beat >= scan.tick + round(0.111 * 240))
 
 
-def test_a_base_whose_commands_are_lost_stops_after_its_timeout_and_goes_on_with_them(tmp_path):
+def test_base_stops_after_command_timeout_and_resumes(tmp_path):
     fault = "faults: [{sensor: cmd_vel, off: {}, when: {time: 3 s}, for: 2 s}]\ntime_limit: 8 s\n"
     run, moments = play(fault, tmp_path)
     speeds = {moment.tick / 240: moment.truth.twist.vx for moment in moments if moment.truth}
@@ -135,7 +135,7 @@ def test_a_base_whose_commands_are_lost_stops_after_its_timeout_and_goes_on_with
     assert run.result.disturbances[0].happened
 
 
-def test_a_late_command_makes_the_robot_do_later_what_the_stack_wants(tmp_path):
+def test_delayed_command_is_executed_later(tmp_path):
     fault = "faults: [{sensor: cmd_vel, delay: {latency: 300 ms}}]\ntime_limit: 4 s\n"
     _, moments = play(fault, tmp_path)
     wanted = next(moment.tick for moment in moments if moment.decision.command.vx > 0.02)
@@ -143,7 +143,7 @@ def test_a_late_command_makes_the_robot_do_later_what_the_stack_wants(tmp_path):
     assert 72 <= moved - wanted <= 72 + 18
 
 
-def test_wheels_whose_left_side_is_weak_pull_to_the_left_and_odometry_knows(tmp_path):
+def test_weak_left_wheels_turn_left_and_odometry_measures_it(tmp_path):
     fault = "faults: [{sensor: wheels, saturation: {left: 0.1 m/s}, when: {time: 2 s}, for: 0.6 s}]\ntime_limit: 4 s\n"
     _, moments = play(fault, tmp_path)
     turned = [moment.truth.twist.wz for moment in moments if moment.truth and 2.3 < moment.tick / 240 < 2.55]
@@ -153,7 +153,7 @@ def test_wheels_whose_left_side_is_weak_pull_to_the_left_and_odometry_knows(tmp_
     assert heard[0].pose.yaw == pytest.approx(truth.pose.plane.yaw, abs=0.05)
 
 
-def test_the_navigator_is_told_that_the_robot_jumped_while_the_fault_lasts(tmp_path):
+def test_localizer_jump_shifts_the_estimate_during_the_fault(tmp_path):
     fault = "faults: [{sensor: localizer, jump: {y: 0.5 m}, when: {time: 2 s}, for: 1 s}]\ntime_limit: 4 s\n"
     _, moments = play(fault, tmp_path)
     off = {}
@@ -165,7 +165,7 @@ def test_the_navigator_is_told_that_the_robot_jumped_while_the_fault_lasts(tmp_p
     assert max(value for at, value in off.items() if at > 3.1) < 0.2
 
 
-def test_a_shifted_map_is_the_one_that_the_stack_gets_and_the_log_shows(tmp_path):
+def test_shifted_map_is_sent_to_the_stack_and_logged(tmp_path):
     fault = "faults: [{sensor: map, shift: {x: 30 cm}}]\ntime_limit: 6 s\n"
     run, moments = play(fault, tmp_path)
     (one,) = run.result.disturbances
@@ -176,7 +176,7 @@ def test_a_shifted_map_is_the_one_that_the_stack_gets_and_the_log_shows(tmp_path
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("value", ["nan", "inf", "zero", "negative", "huge", "empty", "short", "anything"])
-def test_no_garbage_of_a_lidar_brings_the_stack_down(tmp_path, value):
+def test_stack_survives_lidar_garbage(tmp_path, value):
     faults = (
         f"faults: [{{sensor: lidar, garbage: {{value: {value}}}, when: {{time: 1 s}}, for: 2 s}}]\ntime_limit: 25 s\n"
     )
@@ -186,7 +186,7 @@ def test_no_garbage_of_a_lidar_brings_the_stack_down(tmp_path, value):
 
 
 @pytest.mark.parametrize("localizer", ["amcl", "ekf", "odometry"])
-def test_no_garbage_of_odometry_or_inertial_unit_brings_a_localizer_down(tmp_path, localizer):
+def test_localizers_survive_odometry_and_imu_garbage(tmp_path, localizer):
     values = ("nan", "inf", "negative", "huge")
     entries = [
         f"  - {{sensor: {sensor}, name: {sensor} {value}, garbage: {{value: {value}, probability: 50 %}}, "
@@ -207,7 +207,7 @@ BURSTS = "".join(
 
 
 @pytest.mark.parametrize("faults", [GARBAGE, BURSTS], ids=["garbage", "bursts"])
-def test_a_log_of_what_no_sensor_should_say_is_judged_again_as_it_was(tmp_path, faults):
+def test_log_with_invalid_readings_is_judged_with_the_same_result(tmp_path, faults):
     criteria = "pass: [{collisions: {max: 5}}, {path_length: {max: 9}}, {localization_error: {max: 3}}]\n"
     file = tmp_path / "own.scenario.yaml"
     file.write_text(f"{ROOM}time_limit: 4 s\nfaults:\n{faults}{criteria}")
@@ -242,7 +242,7 @@ time_limit: 5 s
 """
 
 
-def test_each_of_several_robots_has_faults_of_its_own(tmp_path):
+def test_faults_apply_to_one_of_several_robots(tmp_path):
     run, _ = play("", tmp_path, TWO)
     told = {one.disturbance.name: one.happened for one in run.result.disturbances}
     assert told == dict.fromkeys(("a/cmd_vel.delay", "b/map.shift", "b/lidar.glass", "b/localizer.jump"), True)

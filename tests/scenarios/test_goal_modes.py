@@ -131,7 +131,7 @@ def test_waypoints_are_waited_at_and_driven_to_again(tmp_path):
     ("expected", "passes"),
     [("failed", True), ("{error_code: GOAL_OCCUPIED}", True), ("{error_code: NO_VALID_PATH}", False)],
 )
-def test_a_failure_that_is_expected_is_a_pass_and_another_one_is_none(tmp_path, expected, passes):
+def test_only_the_expected_failure_passes(tmp_path, expected, passes):
     result = simulate(scenario(MISSED % expected, tmp_path)).result
     assert (result.outcome is Outcome.PASSED) is passes
     wrong = [f for verdict in result.verdicts for f in verdict.findings if f.status is not Status.PASS]
@@ -155,7 +155,7 @@ def test_a_stack_behind_the_protocol_takes_goals_in_the_same_way(tmp_path, text)
     assert there.trace.events == here.trace.events
 
 
-def test_preempted_poses_are_dropped_together_and_nobody_waits_for_them(tmp_path):
+def test_preemption_drops_all_poses_of_a_drive(tmp_path):
     text = THROUGH.split("events:", maxsplit=1)[0] + (
         "events: [{when: {goal: {status: passed}}, do: {new_goal: {name: now, pose: {x: 4.8, y: 2}}}}]\n"
         "pass: [{goals_reached: {}}, {result: {status: SUCCEEDED}}, {no_false_success: {}}]\n"

@@ -60,7 +60,7 @@ def by_hand(ticks, begins, phase, shift, spline):
 @pytest.mark.parametrize(
     ("name", "begins", "phase", "shift"), [("round", BEGINS, PHASE, (0, 0)), ("straight", 0.0, 0.0, (2, 1))]
 )
-def test_it_is_within_a_millimeter_of_its_keyframes_at_every_tick(run, read, name, begins, phase, shift):
+def test_object_is_within_a_millimeter_of_its_keyframes(run, read, name, begins, phase, shift):
     done, log = run
     trace = done.trace if read == "trace" else read_log(log).trace
     samples = trace.objects[name]
@@ -74,7 +74,7 @@ def test_it_is_within_a_millimeter_of_its_keyframes_at_every_tick(run, read, nam
     assert np.abs((off[:, 2] + np.pi) % (2 * np.pi) - np.pi).max() < 1e-3
 
 
-def test_the_log_says_what_it_needs_to_decode_the_motion(run):
+def test_log_contains_the_parameters_of_the_motion(run):
     _, log = run
     (moved,) = read_log(log).trace.of_kind(EventKind.OBJECT_MOVED)
     told = moved.data

@@ -113,7 +113,7 @@ def test_a_mask_outside_of_the_root_is_refused_at_its_line(tmp_path):
     assert (line, code) == (LINE, "SC020")
 
 
-def test_what_is_no_map_is_refused_as_a_mask(tmp_path):
+def test_invalid_map_is_refused_as_a_mask(tmp_path):
     (tmp_path / "zones.yaml").write_text("type: 1\nfilter_info_topic: /costmap_filter_info\nbase: 0.0\n")
     problems = told(scenario(tmp_path, "  keepout_mask: zones.yaml\n"))
     assert {path for path, *_ in problems} == {"zones.yaml"}
@@ -138,7 +138,7 @@ def test_an_unknown_key_of_a_mask_is_noted_and_ignored(tmp_path):
     assert "`kind` has no meaning in a ROS map" in text
 
 
-def test_a_goal_in_a_masked_cell_is_told_with_the_code_to_expect_and_the_stack_gives_that_code(tmp_path):
+def test_goal_in_a_masked_cell_is_reported_with_the_error_code_of_the_stack(tmp_path):
     gray = white()
     gray[:40, 60:] = 0
     mask(tmp_path, "right", gray)
@@ -153,7 +153,7 @@ def test_a_goal_in_a_masked_cell_is_told_with_the_code_to_expect_and_the_stack_g
     assert simscen.simulate(file).passed
 
 
-def test_a_start_in_a_masked_cell_is_warned_of_and_the_stack_gives_that_code(tmp_path):
+def test_start_in_a_masked_cell_causes_a_warning_with_the_error_code(tmp_path):
     gray = white()
     gray[:, :30] = 0
     mask(tmp_path, "left", gray)
@@ -167,7 +167,7 @@ def test_a_start_in_a_masked_cell_is_warned_of_and_the_stack_gives_that_code(tmp
     assert simscen.simulate(file).passed
 
 
-def test_masks_that_say_nothing_are_warned_of(tmp_path):
+def test_empty_masks_cause_a_warning(tmp_path):
     mask(tmp_path, "blank", white())
     stack = "  keepout_mask: blank.yaml\n  speed_mask: {file: blank.yaml, base: 100, multiplier: -1}\n"
     assert [(line, code, severity) for _, line, code, severity, _ in told(scenario(tmp_path, stack))] == [
@@ -177,7 +177,7 @@ def test_masks_that_say_nothing_are_warned_of(tmp_path):
 
 
 @pytest.mark.slow
-def test_without_a_map_a_keepout_mask_holds_all_the_same(tmp_path):
+def test_keepout_mask_applies_without_a_map(tmp_path):
     gray = white()
     gray[:40, 40:60] = 0
     mask(tmp_path, "strip", gray)
@@ -216,7 +216,7 @@ def findings(run, kind):
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_robot_that_is_told_of_a_mask_keeps_out_of_it_and_another_drives_through(turned, tmp_path):
+def test_only_the_robot_with_the_mask_avoids_it(turned, tmp_path):
     strip(tmp_path, turned=turned)
     told_of = simscen.simulate(scenario(tmp_path, "  keepout_mask: strip.yaml\n", STRIP))
     assert told_of.passed, told_of.result.verdicts
@@ -228,7 +228,7 @@ def test_a_robot_that_is_told_of_a_mask_keeps_out_of_it_and_another_drives_throu
     assert value < -0.2
 
 
-def test_a_robot_that_is_told_of_a_speed_mask_keeps_its_limits_and_another_is_found_too_fast(tmp_path):
+def test_only_the_robot_with_the_speed_mask_keeps_the_limit(tmp_path):
     slow(tmp_path)
     how = "{file: slow.yaml, type: absolute, multiplier: 0.01}"
     assert simscen.simulate(scenario(tmp_path, f"  speed_mask: {how}\n", CALM)).passed
@@ -329,7 +329,7 @@ def test_a_mask_lies_beside_the_file_that_names_it(tmp_path):
     assert status == "fail"
 
 
-def test_a_mask_of_noise_is_too_much_for_a_log(tmp_path):
+def test_noise_mask_is_too_large_for_a_log(tmp_path):
     gray = np.random.default_rng(1).integers(0, 2, (800, 800)).astype(np.uint8) * 255
     mask(tmp_path, "strip", gray)
     ((_, line, code, _, text),) = told(scenario(tmp_path, KNOWING, STRIP))

@@ -55,7 +55,7 @@ def messages(log, robot, seconds):
 @pytest.mark.parametrize(
     "order", ["{new_goal: {name: sent, pose: {x: 2, y: 3}}, robot: a}", "{cancel_goal: {}, robot: a}"]
 )
-def test_an_order_at_the_beat_of_another_robot_arrives_at_the_next_of_its_own(run, order):
+def test_command_from_an_event_takes_effect_in_the_robots_next_cycle(run, order):
     done = run(
         f"robots: {{a: {{{EAST}}}, b: {{{FAR}, model: jackal}}}}\n"
         f"events: [{{when: {{time: 330 ms}}, do: {order}}}]\npass: [{{collisions: {{max: 0}}}}]\n"
@@ -65,7 +65,7 @@ def test_an_order_at_the_beat_of_another_robot_arrives_at_the_next_of_its_own(ru
     assert (began.tick, told.tick) == (80, 84)
 
 
-def test_who_else_is_there_changes_nothing_for_a_robot_that_never_meets_them(run):
+def test_robots_that_never_meet_have_the_logs_of_single_runs(run):
     two = run(f"robots: {{b: {{{FAR}}}, a: {{{EAST}}}}}\n{PASS}", "two")
     three = run(
         f"robots: {{a: {{{EAST}}}, b: {{{FAR}, model: jackal}}, c: {{pose: {{x: 25, y: 1}}}}}}\n"
@@ -76,7 +76,7 @@ def test_who_else_is_there_changes_nothing_for_a_robot_that_never_meets_them(run
     assert messages(two.log, "a", 5) == messages(three.log, "a", 5)
 
 
-def test_verdicts_metrics_and_faults_are_each_robots_and_events_are_the_worlds(run):
+def test_verdicts_metrics_and_faults_are_per_robot_and_events_per_world(run):
     done = run(
         f"robots: {{a: {{{EAST}, faults: [{{sensor: lidar, off: {{}}, for: 1 s}}], pass: [{{replans: {{max: 50}}}}]}},"
         f" b: {{{FAR}}}}}\n"
@@ -99,7 +99,7 @@ def test_verdicts_metrics_and_faults_are_each_robots_and_events_are_the_worlds(r
     assert from_json(to_json(result)) == result
 
 
-def test_a_log_says_the_same_of_each_robot_as_the_run_did(run):
+def test_log_contains_the_trace_of_each_robot(run):
     done = run(f"robots: {{a: {{{EAST}}}, b: {{{AGAINST}}}}}\n{PASS.replace('{goals_reached: {}}, ', '')}")
     log = read_log(done.log)
     assert list(log.robots) == ["a", "b"]
@@ -119,7 +119,7 @@ def test_a_log_says_the_same_of_each_robot_as_the_run_did(run):
     assert json.loads(log.result)["verdicts"]
 
 
-def test_a_log_is_what_ros_2_tools_read_in_the_namespaces_of_its_robots(run):
+def test_ros_tools_read_the_log_in_robot_namespaces(run):
     done = run(f"robots: {{a: {{{EAST}}}, b: {{{FAR}}}}}\n{PASS}")
     with AnyReader([done.log], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
         topics = {connection.topic: connection.msgtype for connection in bag.connections}
@@ -136,7 +136,7 @@ def test_a_log_is_what_ros_2_tools_read_in_the_namespaces_of_its_robots(run):
         assert len(times) == len(set(times)), "one clock for all"
 
 
-def test_one_robot_that_fails_fails_the_run_and_says_which_it_was(run):
+def test_failing_robot_fails_the_run_with_its_name(run):
     done = run(f"robots: {{a: {{{EAST}, pass: [{{path_length: {{max: 0.1 m}}}}]}}, b: {{{FAR}}}}}\n{PASS}")
     assert done.result.outcome is Outcome.FAILED
     assert [v.id for v in done.result.verdicts if v.status is Status.FAIL] == ["a/path_length"]
@@ -155,7 +155,7 @@ def test_a_run_ends_when_all_robots_have_and_one_without_a_goal_is_not_waited_fo
     assert {robot.trace.end for robot in done.robots.values()} == {last + 120}
 
 
-def test_an_event_that_never_happens_is_told_once(run):
+def test_missing_event_is_reported_once(run):
     done = run(
         f"robots: {{a: {{{EAST}}}, b: {{{FAR}}}}}\n"
         "events: [{name: crash, when: {robot_within: {object: b, distance: 1 m}, robot: a}, "
@@ -164,7 +164,7 @@ def test_an_event_that_never_happens_is_told_once(run):
     assert [v.id for v in done.result.verdicts if v.status is Status.FAIL] == ["crash"]
 
 
-def test_what_an_action_did_says_to_which_robot(run):
+def test_effect_of_an_action_names_the_robot(run):
     done = run(
         f"robots: {{a: {{{EAST}}}, b: {{{FAR}}}}}\n"
         "events: [{when: {time: 0.5 s}, do: {push: {impulse: [1, 0]}, robot: b}}]\n" + PASS
@@ -174,7 +174,7 @@ def test_what_an_action_did_says_to_which_robot(run):
     assert pushed == [0, 1]
 
 
-def test_a_fault_that_never_began_is_told_with_its_robot(run):
+def test_missing_fault_is_reported_with_its_robot(run):
     far = "{sensor: lidar, off: {}, when: {travelled: 8 m}}"
     done = run(f"robots: {{a: {{{EAST}, faults: [{far}]}}, b: {{{FAR}}}}}\n{PASS}")
     (verdict,) = [one for one in done.result.verdicts if one.status is Status.FAIL]

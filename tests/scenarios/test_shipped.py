@@ -44,7 +44,7 @@ def test_all_shipped_scenarios_pass(together):
     assert results["passed"] == results["total"] >= 12
 
 
-def test_every_run_leaves_its_log_its_result_its_picture_and_its_scenario(together):
+def test_every_run_writes_log_result_picture_and_scenario(together):
     folder, _ = together
     for log in folder.rglob("run.mcap"):
         left = {file.name for file in log.parent.iterdir()}
@@ -53,9 +53,7 @@ def test_every_run_leaves_its_log_its_result_its_picture_and_its_scenario(togeth
 
 @pytest.mark.slow
 @pytest.mark.parametrize("every", [16, pytest.param(1, marks=pytest.mark.slow)], ids=["every sixteenth", "all"])
-def test_one_at_a_time_from_another_folder_every_log_and_every_result_is_the_same_to_the_byte(
-    together, tmp_path, every: int
-):
+def test_logs_and_results_are_equal_in_serial_and_from_another_folder(together, tmp_path, every: int):
     folder, _ = together
     files = sorted((ROOT / "scenarios").rglob("*.scenario.yaml"))[::every]
     done = simscen("run", *files, "-j", 1, "--out", tmp_path / "out", cwd=tmp_path)
@@ -67,7 +65,7 @@ def test_one_at_a_time_from_another_folder_every_log_and_every_result_is_the_sam
 
 
 @pytest.mark.parametrize("every", [6, pytest.param(1, marks=pytest.mark.slow)], ids=["every sixth", "all"])
-def test_verdicts_live_replayed_and_judged_again_are_the_same(together, every: int):
+def test_run_replay_and_judge_give_the_same_verdicts(together, every: int):
     folder, _ = together
     logs = sorted(folder.rglob("run.mcap"))[::every]
     assert logs

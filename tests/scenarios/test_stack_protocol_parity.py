@@ -97,14 +97,14 @@ SHIPPED = sorted(
 @pytest.mark.parametrize(
     "name", SHIPPED if os.environ.get("SIMSCEN_SERVED") == "all" else [f"{name}.scenario.yaml" for name in CHOSEN]
 )
-def test_a_shipped_scenario_gives_the_same_bits_through_the_socket(name: str, tmp_path: Path) -> None:
+def test_stack_protocol_gives_the_same_log_as_in_process(name: str, tmp_path: Path) -> None:
     here, there = logs(ROOT / "scenarios" / name, ROOT, tmp_path)
     assert sum(len(data) for _, _, data in here) > 20_000
     assert there == here
 
 
 @pytest.mark.slow
-def test_truth_cameras_several_lidars_preempted_late_and_canceled_goals_give_the_same_bits(tmp_path: Path) -> None:
+def test_stack_protocol_matches_for_all_message_and_goal_types(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(EVERYTHING)
     (tmp_path / "watcher.robot.yaml").write_text(ROBOT)
     here, there = logs(tmp_path / "a.scenario.yaml", tmp_path, tmp_path)
@@ -128,14 +128,14 @@ pass: [{collisions: {max: 0}}]
 
 
 @pytest.mark.slow
-def test_two_robots_each_with_a_process_of_its_own_give_the_same_bits(tmp_path: Path) -> None:
+def test_stack_protocol_matches_for_two_robots(tmp_path: Path) -> None:
     (tmp_path / "two.scenario.yaml").write_text(TWO)
     here, there = logs(tmp_path / "two.scenario.yaml", tmp_path, tmp_path)
     assert sum(len(data) for _, _, data in here) > 20_000
     assert there == here
 
 
-def test_another_stack_gives_other_bits(tmp_path: Path) -> None:
+def test_comparison_detects_another_stack(tmp_path: Path) -> None:
     """The comparison can fail."""
     prepared = prepare(load_scenario(ROOT / "scenarios/navigation/goal.scenario.yaml", ROOT))
     other = with_external_reference(prepared)

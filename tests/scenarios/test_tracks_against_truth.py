@@ -69,7 +69,7 @@ class Compared:
         pass
 
 
-def test_people_are_known_to_centimeters_and_furniture_does_not_walk(tmp_path: Path) -> None:
+def test_pedestrians_are_tracked_to_centimeters_without_false_tracks(tmp_path: Path) -> None:
     file = tmp_path / "walkers.scenario.yaml"
     file.write_text(HOUSE)
     heard: list[Compared] = []

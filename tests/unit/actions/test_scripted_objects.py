@@ -61,7 +61,7 @@ def test_a_door_ajar_is_open_by_a_share_of_its_travel():
     assert moved(stage).times[-1] == pytest.approx(0.3)
 
 
-def test_nothing_comes_of_opening_what_is_open_or_on_its_way():
+def test_opening_an_open_or_opening_door_has_no_effect():
     assert not perform(Swinging(objects={"gate": WIDE_OPEN}), open={"name": "gate"}).happened
     opening = MotionPath((0.0, 1.0), (Pose2(0.0, 0.0, 0.0), WIDE_OPEN))
     stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.5)}, motions={"gate": (opening, 0.4)})
@@ -70,7 +70,7 @@ def test_nothing_comes_of_opening_what_is_open_or_on_its_way():
     assert perform(stage, close={"name": "gate"}).happened
 
 
-def test_what_stops_for_a_while_goes_on_where_it_was():
+def test_paused_object_continues_from_its_position():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)), "back_and_forth", phase=1.0)
     stage = FakeStage(motions={"cart": (path, 1.5)})
     assert perform(stage, stop={"name": "cart", "for": "3 s"}).what == "stopped cart for 3 s"
@@ -78,14 +78,14 @@ def test_what_stops_for_a_while_goes_on_where_it_was():
     assert [pose_at(again, t).x for t in (0.0, 3.0, 4.0, 6.0)] == pytest.approx([2.5, 2.5, 3.5, 2.5])
 
 
-def test_what_waits_for_its_start_waits_the_longer():
+def test_pause_delays_a_scheduled_start():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)), start=2.0)
     stage = FakeStage(motions={"cart": (path, 1.5)})
     perform(stage, stop={"name": "cart", "for": 3.0})
     assert pose_at(moved(stage), 4.5) == Pose2(1.0, 0.0, 0.0)
 
 
-def test_what_stops_for_good_is_set_down_where_it_is():
+def test_stopped_object_stays_at_its_pose():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)))
     stage = FakeStage(motions={"cart": (path, 1.5)}, objects={"cart": Pose2(1.5, 0.0, 0.0)})
     assert perform(stage, stop={"name": "cart"}).happened
@@ -94,7 +94,7 @@ def test_what_stops_for_good_is_set_down_where_it_is():
     assert not perform(FakeStage(objects={"cart": None}), stop={"name": "cart"}).happened
 
 
-def test_a_force_is_the_impulse_that_it_adds_up_to_over_its_time():
+def test_force_over_time_gives_its_impulse():
     stage = FakeStage()
     assert (
         perform(stage, push={"force": ["0.01 kN", 0], "for": "1.5 s"}).what == "pushed the robot with 10.0 N for 1.5 s"
@@ -108,7 +108,7 @@ class Heavy(FakeStage):
         return 0.0
 
 
-def test_nothing_comes_of_a_push_on_nothing_or_on_what_cannot_be_pushed():
+def test_push_without_a_movable_object_has_no_effect():
     assert not perform(FakeStage(objects={"bin": None}), push={"impulse": [0, 5], "name": "bin"}).happened
     assert not perform(Heavy(), push={"impulse": [0, 5], "name": "bin"}).happened
     assert not perform(FakeStage(), push={"impulse": [0, 0]}).happened
@@ -122,12 +122,12 @@ def test_nothing_comes_of_a_push_on_nothing_or_on_what_cannot_be_pushed():
         "an impulse has no duration `for`": {"impulse": [0, 1], "for": 1.0},
     }.items(),
 )
-def test_what_is_no_push_is_refused(told, said):
+def test_invalid_push_is_refused(told, said):
     with pytest.raises(ValidationError, match=told):
         AnyAction.model_validate({"push": said})
 
 
-def test_teleport_sets_an_object_down_and_says_how_far():
+def test_teleport_moves_an_object_and_reports_the_distance():
     stage = FakeStage(objects={"bin": Pose2(1.0, 1.0, 0.0)})
     effect = perform(stage, teleport={"name": "bin", "pose": {"x": 4, "y": 5}})
     assert effect.what == "moved bin by 5.00 m to (4.00, 5.00)"
@@ -136,7 +136,7 @@ def test_teleport_sets_an_object_down_and_says_how_far():
     assert not perform(FakeStage(objects={"bin": None}), teleport={"name": "bin", "pose": {"x": 1, "y": 1}}).happened
 
 
-def test_a_mark_is_written_down():
+def test_mark_is_recorded():
     stage = FakeStage()
     perform(stage, mark={"name": "in the aisle", "note": "sees the rack"})
     assert stage.done == [("record_world_event", Event(0, EventKind.MARK, "in the aisle", {"note": "sees the rack"}))]

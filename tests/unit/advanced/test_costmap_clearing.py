@@ -25,18 +25,18 @@ def in_a_hall(seconds: float, *, entirely: bool = False) -> Drive:
 
 
 @pytest.mark.slow
-def test_a_wall_across_a_hall_whose_ends_are_never_in_sight_together_ends_with_no_valid_path_soon() -> None:
+def test_wall_across_a_hall_fails_with_no_valid_path() -> None:
     d = in_a_hall(60)
     assert [event.data["error_name"] for event in d.kinds("goal.failed")] == ["NO_VALID_PATH"]
     assert d.tick / 240 < 40
     assert d.min_clearance > 0.02
 
 
-def test_nav2s_tree_forgets_all_each_time() -> None:
+def test_nav2_profile_clears_the_whole_costmap_each_time() -> None:
     assert not in_a_hall(45, entirely=True).kinds("goal.failed")
 
 
-def test_a_door_that_was_seen_shut_and_has_opened_out_of_sight_is_driven_to() -> None:
+def test_reopened_door_out_of_sight_is_tried_again() -> None:
     """The way back is forgotten for the second time within ten seconds of the first, or a little later."""
     mapped = Flatland().room(8, 8)
     mapped.boxes += [(3.9, 0.0, 4.0, 1.0), (3.9, 2.0, 4.0, 6.0), (3.9, 7.0, 4.0, 8.0)]  # two doors
@@ -49,7 +49,7 @@ def test_a_door_that_was_seen_shut_and_has_opened_out_of_sight_is_driven_to() ->
     assert d.run(120).result == "SUCCEEDED"
 
 
-def test_all_is_forgotten_at_first_and_then_ever_more_rarely() -> None:
+def test_whole_costmap_is_cleared_with_growing_intervals() -> None:
     forgetting = ClearingBackoff()
     assert [t for t in range(100) if forgetting.entirely(float(t), 5.0)] == [0, 10, 30, 70]
     forgetting.reset()
@@ -57,7 +57,7 @@ def test_all_is_forgotten_at_first_and_then_ever_more_rarely() -> None:
 
 
 @pytest.mark.parametrize(("to_go", "again"), [(4.5, False), (3.9, True)])
-def test_who_has_come_a_meter_nearer_may_forget_at_once(to_go: float, again: bool) -> None:
+def test_progress_of_a_meter_allows_clearing_at_once(to_go: float, again: bool) -> None:
     forgetting = ClearingBackoff()
     assert forgetting.entirely(0.0, 5.0)
     assert forgetting.entirely(1.0, to_go) == again

@@ -84,7 +84,7 @@ def test_a_plan_is_made_once_and_each_has_its_own_seed() -> None:
     assert bench.script.seeds == [101, 102]
 
 
-def test_a_plan_that_is_blocked_is_replaced_or_the_failure_is_told() -> None:
+def test_blocked_plan_is_replaced_or_fails() -> None:
     bench = Bench()
     bench.steps(4)
     bench.see((2.5, 3.0, 0.2))
@@ -95,14 +95,14 @@ def test_a_plan_that_is_blocked_is_replaced_or_the_failure_is_told() -> None:
     assert bench.steps(4) == ["blocked"]
 
 
-def test_what_stands_beside_the_plan_is_no_reason() -> None:
+def test_obstacle_next_to_the_plan_does_not_cause_replanning() -> None:
     bench = Bench()
     bench.steps(4)
     bench.see((2.5, 4.5, 0.2))
     assert bench.steps(80) == []
 
 
-def test_an_obstacle_that_has_gone_gives_cause_to_look_and_a_clearly_shorter_plan_is_taken() -> None:
+def test_removed_obstacle_leads_to_a_clearly_shorter_plan() -> None:
     bench = Bench()
     bench.script.bulge = 2.5
     bench.see((2.5, 3.0, 0.4))
@@ -116,7 +116,7 @@ def test_an_obstacle_that_has_gone_gives_cause_to_look_and_a_clearly_shorter_pla
     assert bench.steps(60) == ["better"]
 
 
-def test_where_not_even_the_straight_way_is_clearly_shorter_nobody_looks_for_a_better_plan() -> None:
+def test_no_better_plan_is_searched_if_the_straight_line_is_not_clearly_shorter() -> None:
     """The planner would be busy with it, and a plan that is blocked would have to wait."""
     for bulge, looked in ((1.0, False), (2.5, True)):  # 6.4 m and 8.5 m instead of 6
         bench = Bench()
@@ -128,7 +128,7 @@ def test_where_not_even_the_straight_way_is_clearly_shorter_nobody_looks_for_a_b
         assert (len(bench.script.seeds) == 2) == looked
 
 
-def test_a_look_for_a_better_plan_that_fails_is_no_failure() -> None:
+def test_failed_search_for_a_better_plan_is_ignored() -> None:
     bench = Bench()
     bench.script.bulge = 2.5
     bench.see((2.5, 3.0, 0.4))
@@ -140,7 +140,7 @@ def test_a_look_for_a_better_plan_that_fails_is_no_failure() -> None:
     assert bench.keeper.plan is not None
 
 
-def test_at_a_rate_it_replans_whatever_happens() -> None:
+def test_replanning_at_a_rate_is_unconditional() -> None:
     bench = Bench(replanning="rate", replanning_rate=2.0)
     assert bench.steps(40) == ["goal", "rate", "rate", "rate"]
 
@@ -161,7 +161,7 @@ def test_a_plan_that_ends_too_far_from_the_goal_means_that_the_goal_is_occupied(
     assert failed.value.code == ErrorCode.GOAL_OCCUPIED
 
 
-def test_after_a_plan_that_could_not_be_followed_plans_keep_more_room_until_the_next_goal() -> None:
+def test_plans_keep_more_clearance_after_a_control_failure() -> None:
     bench = Bench()
     straight, asked = bench.script.plan, list[float]()
 
@@ -183,7 +183,7 @@ def test_after_a_plan_that_could_not_be_followed_plans_keep_more_room_until_the_
 
 
 @pytest.mark.parametrize(("bulge", "kept"), [(0.3, True), (2.5, False)])
-def test_still_more_room_is_kept_where_the_way_is_hardly_longer_for_it(bulge: float, kept: bool) -> None:
+def test_clearance_increases_if_the_path_is_hardly_longer(bulge: float, kept: bool) -> None:
     bench = Bench()
     bench.steps(2)
     bench.keeper.report_control_failure()
@@ -199,7 +199,7 @@ def test_still_more_room_is_kept_where_the_way_is_hardly_longer_for_it(bulge: fl
     assert (bench.keeper.plan.path.points[:, 1].max() > 3.2) == kept
 
 
-def test_where_there_is_no_roomier_way_the_tight_one_is_tried_again() -> None:
+def test_tight_path_is_retried_if_there_is_no_wider_one() -> None:
     bench = Bench()
     bench.steps(2)
     bench.keeper.report_control_failure()
@@ -223,7 +223,7 @@ def across(y: float, vy: float) -> MovingObstacles:
     return MovingObstacles(at, velocity, np.array([0.3]), np.diag((1e-4,) * 4)[None], 0.3)
 
 
-def test_a_plan_that_meets_what_moves_is_made_anew_twice_a_second_until_nothing_does() -> None:
+def test_plan_that_meets_a_moving_obstacle_is_renewed_twice_a_second() -> None:
     bench = Bench()
     assert bench.steps(20) == ["goal"]
     bench.costmap.moving = across(5.0, -1.0)  # at (2, 3) in 2 s, as the robot is
@@ -232,7 +232,7 @@ def test_a_plan_that_meets_what_moves_is_made_anew_twice_a_second_until_nothing_
     assert bench.steps(40) == ["moving"]  # straight again
 
 
-def test_a_plan_around_what_moves_that_is_not_taken_is_no_cause_for_more() -> None:
+def test_rejected_plan_around_a_moving_obstacle_causes_no_more_replanning() -> None:
     bench = Bench()
     bench.script.bulge = 2.5
     bench.see((2.5, 3.0, 0.4))
@@ -243,14 +243,14 @@ def test_a_plan_around_what_moves_that_is_not_taken_is_no_cause_for_more() -> No
     assert len(bench.script.seeds) == 2  # one look for a better one
 
 
-def test_who_walks_away_is_no_reason_for_another_plan() -> None:
+def test_departing_obstacle_does_not_cause_replanning() -> None:
     bench = Bench()
     assert bench.steps(20) == ["goal"]
     bench.costmap.moving = across(4.5, 1.0)
     assert bench.steps(40) == []
 
 
-def test_where_no_way_around_what_moves_is_found_the_plan_stays() -> None:
+def test_plan_is_kept_without_a_path_around_a_moving_obstacle() -> None:
     bench = Bench()
     assert bench.steps(20) == ["goal"]
     bench.costmap.moving, bench.script.broken = across(5.0, -1.0), True

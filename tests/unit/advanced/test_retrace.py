@@ -66,7 +66,7 @@ def run(behavior: Behavior, view: CostmapView, slip: float = 1.0, allowed: Allow
 
 
 @pytest.mark.parametrize("slip", [1.0, 0.7])
-def test_a_robot_askew_between_posts_that_can_neither_turn_nor_back_up_drives_out_the_way_it_came(slip: float) -> None:
+def test_retrace_frees_a_robot_wedged_between_posts(slip: float) -> None:
     world = Flatland(discs=list(POSTS))
     view = view_of(LONG, world)
     for stuck in (Spin(model.Spin(), setting(LONG)), BackUp(model.BackUp(backup_partial=False), setting(LONG))):
@@ -79,13 +79,13 @@ def test_a_robot_askew_between_posts_that_can_neither_turn_nor_back_up_drives_ou
     assert abs(poses[-1].yaw) > 0.3
 
 
-def test_it_turns_back_what_it_turned_on_the_spot() -> None:
+def test_retrace_reverses_turns_in_place() -> None:
     poses = run(behavior(LONG, IN), view_of(LONG, Flatland()))
     turned = next(pose for pose in poses if pose.yaw > 0.15)
     assert turned.distance(poses[0]) < 0.03
 
 
-def test_in_the_open_it_ends_after_the_distance_of_a_backup_and_in_a_corridor_after_its_own() -> None:
+def test_retrace_distance_depends_on_the_free_space() -> None:
     straight = driven((Twist(0.5, 0.0, 0.0), 6.0))
     corridor = Flatland([(-3.0, 0.27, 3.0, 0.4), (-3.0, -0.4, 3.0, -0.27)])
     assert run(behavior(LONG, straight), view_of(LONG, Flatland()))[-1].x == pytest.approx(-0.30, abs=0.03)
@@ -94,18 +94,18 @@ def test_in_the_open_it_ends_after_the_distance_of_a_backup_and_in_a_corridor_af
     assert run(shorter, view_of(LONG, corridor))[-1].x == pytest.approx(-0.5, abs=0.03)
 
 
-def test_where_nobody_knows_the_way_it_backs_up_straight() -> None:
+def test_retrace_without_a_trail_backs_up_straight() -> None:
     end = run(behavior(LONG, []), view_of(LONG, Flatland()))[-1]
     assert (end.x, end.y, end.yaw) == pytest.approx((-0.30, 0.0, 0.0), abs=0.03)
 
 
-def test_a_base_that_strafed_in_strafes_out() -> None:
+def test_retrace_of_a_lateral_motion_is_lateral() -> None:
     base = replace(LONG, max_lateral=0.5)
     end = run(behavior(base, driven((Twist(0.0, 0.3, 0.0), 3.0))), view_of(base, Flatland()))[-1]
     assert (end.x, end.y, end.yaw) == pytest.approx((0.0, -0.30, 0.0), abs=0.03)
 
 
-def test_what_has_come_to_stand_on_the_way_ends_it_there_or_fails_it_at_once() -> None:
+def test_obstacle_on_the_trail_ends_retrace() -> None:
     straight = driven((Twist(0.5, 0.0, 0.0), 6.0))
     end = run(behavior(LONG, straight), view_of(LONG, Flatland([(-0.6, -1.0, -0.4, 1.0)])))[-1]
     assert -0.19 < end.x < -0.05
@@ -114,7 +114,7 @@ def test_what_has_come_to_stand_on_the_way_ends_it_there_or_fails_it_at_once() -
     assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD
 
 
-def test_it_fails_with_the_codes_of_backing_up() -> None:
+def test_retrace_has_the_error_codes_of_backup() -> None:
     slow, view = behavior(LONG, IN), view_of(LONG, Flatland())
     slow.start(Pose2(0.0, 0.0))
     with pytest.raises(NavigationFailure) as failed:
@@ -125,7 +125,7 @@ def test_it_fails_with_the_codes_of_backing_up() -> None:
     assert failed.value.code == ErrorCode.BACKUP_INVALID_INPUT
 
 
-def test_what_the_collision_monitor_would_not_let_it_drive_is_not_what_it_does() -> None:
+def test_retrace_sends_only_commands_that_the_collision_monitor_allows() -> None:
     way = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0))
     ranges = np.full(5, 9.0)
     ranges[2] = math.hypot(0.02, 0.217)  # a post 7 mm beside the hull, towards which the way back turns
@@ -139,7 +139,7 @@ def test_what_the_collision_monitor_would_not_let_it_drive_is_not_what_it_does()
     assert math.hypot(end.x, end.y) > 0.29 and end.yaw > 0.3
 
 
-def test_who_has_gone_back_a_part_goes_on_from_there_though_it_stands_beside_the_way() -> None:
+def test_retrace_continues_from_a_pose_next_to_the_trail() -> None:
     corridor = Flatland([(-4.0, 0.27, 3.0, 0.4), (-4.0, -0.4, 3.0, -0.27)])
     way = driven((Twist(0.5, 0.0, 0.0), 6.0))
     twice, view = behavior(LONG, way), view_of(LONG, corridor)
@@ -151,7 +151,7 @@ def test_who_has_gone_back_a_part_goes_on_from_there_though_it_stands_beside_the
     assert command is not None and command.vx < 0.0
 
 
-def test_a_trail_goes_back_by_small_steps_without_what_was_to_and_fro() -> None:
+def test_trail_has_small_steps_without_oscillations() -> None:
     to_and_fro = driven((Twist(0.5, 0, 0), 2.0), (Twist(-0.2, 0, 0), 1.0), (STOP, 5.0), (Twist(0.2, 0, 0), 1.0))
     trail = Trail(to_and_fro, to_and_fro[-1], 0.3, 2.0)
     assert trail.driven[-1] == pytest.approx(trail.poses[0, 0] - trail.poses[-1, 0], abs=0.01)

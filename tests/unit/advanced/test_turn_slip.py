@@ -50,7 +50,7 @@ def slipping(**smoothed: bool) -> Drive:
     return d.run(15.0)
 
 
-def test_the_local_costmap_is_where_wheels_and_gyroscope_agree_and_not_where_the_wheels_turned_to() -> None:
+def test_local_costmap_uses_the_filtered_heading() -> None:
     d = slipping()
     view = d.stack.stack.inner._costmaps.local_costmap.view
     cells = np.argwhere(view.costs == 254)
@@ -59,7 +59,7 @@ def test_the_local_costmap_is_where_wheels_and_gyroscope_agree_and_not_where_the
     assert np.abs(ROOM.distance(seen)).max() < 0.15
 
 
-def test_a_robot_whose_wheels_slip_on_one_side_drives_on_its_plan_and_not_beside_it() -> None:
+def test_uneven_slip_is_compensated() -> None:
     assert beside(slipping()) < 0.06
     assert beside(slipping(counter_turn_slip=False)) > 0.1
 
@@ -70,7 +70,7 @@ def beside(d: Drive) -> float:
 
 
 @pytest.mark.parametrize("matched, off", [(False, 0.7), (True, 0.1)])
-def test_scans_tell_an_ekf_how_far_a_robot_came_whose_wheels_turn_in_vain(matched: bool, off: float) -> None:
+def test_scan_matching_corrects_the_distance_of_slipping_wheels(matched: bool, off: float) -> None:
     """Wheels that count a tenth too much, for 8 m."""
     spec = StackSpec(profile="advanced", localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5, match_scans=matched))
     world = Flatland().room(14, 6)
@@ -83,7 +83,7 @@ def test_scans_tell_an_ekf_how_far_a_robot_came_whose_wheels_turn_in_vain(matche
     assert abs(believed.distance(d.pose) - off) < 0.15
 
 
-def test_a_command_is_countered_by_as_much_as_was_seen_and_no_broken_sensor_makes_it_more() -> None:
+def test_slip_compensation_is_limited_for_broken_sensors() -> None:
     slip, wheels, fused = TurnSlipObserver(), Pose2(0.0, 0.0, 0.0), Pose2(5.0, 5.0, 2.0)
     assert slip.compensate(Twist(1.0, 0.0, 0.2)) == Twist(1.0, 0.0, 0.2)
     for _ in range(200):

@@ -22,9 +22,7 @@ def folders(tmp_path: Path) -> AllowedFolders:
 
 
 @pytest.mark.parametrize("scheme", ["package://", "model://"])
-def test_a_package_is_one_of_the_command_line_else_one_around_else_one_below(
-    folders: AllowedFolders, scheme: str
-) -> None:
+def test_packages_are_searched_in_the_documented_order(folders: AllowedFolders, scheme: str) -> None:
     root, models = folders.roots
     beside = root / "shop" / "worlds"
     found = []
@@ -66,9 +64,7 @@ def test_a_package_that_is_given_is_not_looked_for(folders: AllowedFolders, tmp_
 
 
 @pytest.mark.parametrize("written", ["base.stl", "file://base.stl", "./base.stl"])
-def test_a_path_means_what_is_beside_the_file_else_what_the_command_line_allows(
-    folders: AllowedFolders, written: str
-) -> None:
+def test_relative_path_is_searched_next_to_the_file_first(folders: AllowedFolders, written: str) -> None:
     root, models = folders.roots
     there = put(models / "base.stl")
     assert folders.find(written, root) == there
@@ -94,7 +90,7 @@ def test_a_path_means_what_is_beside_the_file_else_what_the_command_line_allows(
         ("round.stl", "symbolic link loop"),
     ],
 )
-def test_what_is_not_found_says_why_and_nothing_of_what_is_outside(
+def test_missing_file_message_reveals_nothing_outside(
     folders: AllowedFolders, tmp_path: Path, written: str, why: str
 ) -> None:
     root, _ = folders.roots
@@ -113,7 +109,7 @@ def test_an_absolute_path_is_read_inside_where_it_may_be_absolute(folders: Allow
         folders.find("/etc/passwd", folders.roots[1], absolute=True)
 
 
-def test_a_missing_file_is_told_with_what_lies_where_it_was_looked_for(folders: AllowedFolders) -> None:
+def test_missing_file_message_lists_similar_files(folders: AllowedFolders) -> None:
     root, models = folders.roots
     put(models / "cart" / "Base.stl")
     with pytest.raises(NoSuchFile) as caught:

@@ -23,7 +23,7 @@ BOMB = b'<?xml version="1.0"?>\n<!DOCTYPE a [<!ENTITY b "ha"><!ENTITY c "&b;&b;&
         (b"<?xml version='1.0' encoding='klingon'?><a/>", 1, 1, "cannot be read as XML: unknown encoding: klingon"),
     ],
 )
-def test_worlds_and_robots_refuse_alike(
+def test_worlds_and_robots_have_the_same_xml_errors(
     monkeypatch: pytest.MonkeyPatch, data: bytes, line: int, col: int, message: str
 ) -> None:
     if "elements" in message:
@@ -38,7 +38,7 @@ def test_worlds_and_robots_refuse_alike(
     assert (place.source, world.value.hint) == (problem.source, problem.hint)
 
 
-def test_elements_know_where_they_stand_and_their_text() -> None:
+def test_xml_elements_have_position_and_text() -> None:
     root = parse_sdf(b"<a>\n  x<b name='n'/>y\n</a>", "x.sdf", "")
     b = root.children[0]
     assert (b.line, b.col, b.name, b.parent, root.text) == (2, 4, "n", root, "xy")

@@ -69,14 +69,14 @@ def test_bounds_over_buildings_cover_a_consistent_filter_and_no_other(shared: fl
     assert kept(1.5**-2) < 0.03
 
 
-def test_bounds_of_independent_errors_are_too_narrow_for_logs_that_hang_together() -> None:
+def test_independent_bounds_are_too_narrow_for_correlated_logs() -> None:
     values = filtered(np.random.default_rng(3), 400, 8, 0.3)
     low, high = anees_bounds(8 * 25)
     means = values.mean(axis=(1, 2))
     assert np.mean((low < means) & (means < high)) < 0.85
 
 
-def test_of_two_buildings_nobody_knows_how_much_buildings_differ() -> None:
+def test_two_buildings_give_no_bounds() -> None:
     assert grouped_anees_bounds([2.0, 4.0]) is None
     assert grouped_anees_bounds([2.0, 4.0, float("inf")]) is None
 
@@ -86,5 +86,5 @@ def test_bounds_over_buildings_are_those_of_students_t_for_the_logarithm() -> No
     assert np.log((low / 3.0, high / 3.0)) == pytest.approx((-0.8281, 0.8281), abs=1e-3)  # 4.3027 / (3 √3)
 
 
-def test_what_lies_in_the_ellipsoid_is_counted() -> None:
+def test_poses_in_the_ellipsoid_are_counted() -> None:
     assert share_in_ellipsoid([7.8, 7.83, 1.0, 30.0]) == 0.5

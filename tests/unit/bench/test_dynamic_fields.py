@@ -19,7 +19,7 @@ def of(speed: float) -> list[DynamicField]:
     return [field for field in FIELDS if field.speed == speed]
 
 
-def test_a_number_and_a_speed_are_one_field() -> None:
+def test_number_and_speed_determine_the_field() -> None:
     for a, b in zip(dynamic_field(3, 1.23).movers, dynamic_field(3, 1.23).movers, strict=True):
         assert np.array_equal(a.points, b.points) and np.array_equal(a.times, b.times) and a.phase == b.phase
     assert dynamic_field(3, 1.23).movers[0].phase != dynamic_field(4, 1.23).movers[0].phase
@@ -51,7 +51,7 @@ def test_the_mean_speed_is_the_one_asked_for_and_no_piece_is_much_faster_or_slow
     assert np.mean(means) == pytest.approx(speed, abs=0.04)
 
 
-def test_ways_lead_along_both_axes() -> None:
+def test_cylinders_move_along_both_axes() -> None:
     spans = [np.ptp(mover.points, axis=0) for field in FIELDS for mover in field.movers]
     wide = sum(bool(span[0] > span[1]) for span in spans)
     assert 0.25 < wide / len(spans) < 0.75

@@ -41,8 +41,8 @@ def test_dynamic_fields_load_at_three_speeds(tmp_path: Path) -> None:
         loads(each)
 
 
-def test_localization_loads_and_misleads_in_another_direction_each_time(tmp_path: Path) -> None:
-    experiments = localization_experiments(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
+def test_localization_drives_have_different_wrong_estimates(tmp_path: Path) -> None:
+    experiments = localizations(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
     for experiment in experiments:
         loads(experiment)
     _, misled, unknown, _ = experiments
@@ -71,7 +71,7 @@ planner_server:
 """
 
 
-def test_every_experiment_can_be_driven_by_a_stack_of_other_parts_from_a_file_of_nav2(tmp_path: Path) -> None:
+def test_every_experiment_accepts_a_nav2_parameter_file(tmp_path: Path) -> None:
     (tmp_path / "nav2.yaml").write_text(NAV2)
     (tmp_path / "ours.stack.yaml").write_text("simscen: 1\nstack: {nav2_params: nav2.yaml}\n")
     experiments = [

@@ -53,7 +53,7 @@ def test_a_log_is_the_same_each_time_and_keeps_clear_of_walls_while_its_odometry
     assert 0.002 < abs(told / driven - 1) < 0.3
 
 
-def test_of_half_a_map_nothing_is_known_right_of_the_middle() -> None:
+def test_half_map_is_unknown_right_of_the_center() -> None:
     grid, whole = short("half").map, short("tracked").map
     column = int((generate_building(2001).middle - grid.origin.x) / grid.resolution)
     assert (grid.cells[:, column:] == UNKNOWN).all()

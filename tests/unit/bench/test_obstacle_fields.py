@@ -13,7 +13,7 @@ def test_the_same_number_gives_the_same_field_and_another_one_another() -> None:
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
-def test_a_disc_has_a_way_by_the_word_of_another_library(number: int) -> None:
+def test_disc_can_pass_according_to_an_independent_library(number: int) -> None:
     field = obstacle_field(number)
     lane = box(-30 * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
     # 2 mm less than the disc: shapely's circles are polygons, and a lattice finds ways to its resolution only.
@@ -32,13 +32,13 @@ def test_fields_are_as_dense_as_the_worlds_of_barn() -> None:
     assert 0.05 < np.mean(densities) < 0.22
 
 
-def test_lonely_cells_vanish_and_crowded_ones_fill() -> None:
+def test_cellular_automaton_removes_isolated_cells_and_fills_crowded_ones() -> None:
     alone = np.zeros((3, 3), np.bool_)
     alone[1, 1] = True
     assert obstacle_fields._count_neighbors(alone).tolist() == [[1, 1, 1], [1, 0, 1], [1, 1, 1]]
 
 
-def test_a_narrow_field_has_a_way_for_the_robot_and_none_for_a_wider_one_by_the_word_of_another_library() -> None:
+def test_narrow_field_width_matches_an_independent_library() -> None:
     gap, too_wide = 0.31, 0.36
     field = obstacle_field(2, gap, too_wide)
     lane = box(-30 * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)

@@ -36,8 +36,8 @@ def two_rooms() -> BuiltWorld:
     return build_world_and_map(World("rooms", tuple(solids), (thing,), bounds=(0.0, 0.0, 10.0, 6.0)), 0.2)
 
 
-def test_every_errand_can_be_driven_and_has_room_at_both_ends() -> None:
-    found = list(random_drives(two_rooms(), 0.22, range(1, 21), min_length=2.0))
+def test_every_drive_is_reachable_with_free_start_and_goal() -> None:
+    found = list(random_drives(two_rooms(), 0.22, range(1, 21), least=2.0))
     assert len(found) == 20
     for one in found:
         assert (one.start.x < 5.0) == (one.goal.x < 5.0)  # nothing leads through the wall
@@ -119,7 +119,7 @@ def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(t
     assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "amcl")
 
 
-def test_the_reference_tells_of_every_fault() -> None:
+def test_reference_page_lists_every_fault() -> None:
     page = (Path(__file__).parents[3] / "docs/reference/navigation-benchmark.md").read_text(encoding="utf-8")
     table = page[page.index("| Fault | Weak |") :].partition("\n\n")[0]
     rows = {row.split("`")[1]: row for row in table.splitlines() if row.startswith("| `")}

@@ -18,12 +18,12 @@ def test_the_interval_is_over_worlds_however_many_seeds_each_has() -> None:
     assert high == 1.0
 
 
-def test_worlds_that_all_say_the_same_leave_wilsons_doubt() -> None:
-    assert success_interval([Trial(ARRIVED, world=f"{n}") for n in range(10)]) == pytest.approx((0.722, 1.0), abs=1e-3)
+def test_equal_outcomes_give_the_wilson_interval() -> None:
+    assert over_worlds([Trial(ARRIVED, world=f"{n}") for n in range(10)]) == pytest.approx((0.722, 1.0), abs=1e-3)
 
 
-def test_worlds_in_which_every_second_drive_succeeds_leave_doubt_too() -> None:
-    low, high = success_interval([Trial(r, world=f"{n}") for n in range(6) for r in (ARRIVED, HIT)]) or (0.5, 0.5)
+def test_mixed_outcomes_give_a_nonempty_interval() -> None:
+    low, high = over_worlds([Trial(r, world=f"{n}") for n in range(6) for r in (ARRIVED, HIT)]) or (0.5, 0.5)
     assert (low, high) == pytest.approx(wilson_interval(3, 6))
 
 
@@ -36,7 +36,7 @@ def test_a_world_with_more_drives_counts_as_often_as_it_was_driven_in_rate_and_i
     assert row.success_interval == pytest.approx((3 / 48, 1.0))
 
 
-def test_one_world_says_nothing_of_others() -> None:
+def test_one_world_has_no_interval() -> None:
     assert summarize("doorway", [Trial(ARRIVED, world="w")] * 20).success_interval is None
 
 

@@ -19,8 +19,8 @@ from simscen.core.records.session_events import RunFinished
         (run(Outcome.ERROR), DriveOutcome.ERROR),
     ],
 )
-def test_a_run_has_exactly_one_fate(finished: RunFinished, drive_outcome: DriveOutcome) -> None:
-    assert Trial(finished).drive_outcome is drive_outcome
+def test_run_has_exactly_one_outcome(finished: RunFinished, fate: DriveOutcome) -> None:
+    assert Trial(finished).fate is fate
 
 
 def test_rates_are_of_all_runs_and_times_of_the_good_ones() -> None:
@@ -44,12 +44,12 @@ def test_success_is_weighted_by_how_long_the_shortest_way_takes_at_top_speed() -
     assert summarize("BARN", [Trial(ARRIVED, top_speed=1.0)]).sct == 1.0
 
 
-def test_where_nobody_is_to_arrive_no_time_weighs() -> None:
+def test_scenario_without_an_arrival_has_no_sct() -> None:
     refused = run(Outcome.PASSED, seconds=None)
     assert summarize("blocked", [Trial(refused, top_speed=1.0), Trial(GAVE_UP, top_speed=1.0)]).sct is None
 
 
-def test_of_several_robots_the_mean_counts() -> None:
+def test_times_of_several_robots_are_averaged() -> None:
     metrics = {"success": 1.0, "a/time_to_goal": 10.0, "b/time_to_goal": 14.0, "a/shortest_length": 6.0}
     both = replace(ARRIVED, result=replace(ARRIVED.result, metrics=metrics))
     assert Trial(both).metric("time_to_goal") == 12.0

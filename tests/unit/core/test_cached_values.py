@@ -10,7 +10,7 @@ class Thing:
     pass
 
 
-def test_each_thing_and_each_set_of_arguments_is_asked_about_once_and_forgotten_with_the_thing():
+def test_cached_value_is_computed_once_per_object_and_arguments():
     asked = []
 
     @cached_on_instance

@@ -18,7 +18,7 @@ def test_probabilities_are_those_of_scipy(value, freedom):
 
 
 @pytest.mark.parametrize(("probability", "freedom"), [(0.0, 3), (1.0, 3), (-0.1, 3), (0.5, 0)])
-def test_what_is_no_probability_is_refused(probability, freedom):
+def test_invalid_probability_is_refused(probability, freedom):
     with pytest.raises(ValueError, match="degrees of freedom"):
         chi2_quantile(probability, freedom)
 

@@ -15,7 +15,7 @@ class Told:
     things: dict[str, int] = field(default_factory=dict)
 
 
-def test_it_is_made_as_any_dataclass_is() -> None:
+def test_frozen_class_is_created_like_a_dataclass() -> None:
     told = Told("a", things={"b": 1})
     assert (told.name, told.number, told.things) == ("a", 3, {"b": 1})
     assert told == Told(name="a", things={"b": 1}) != Told("a")
@@ -27,10 +27,10 @@ def test_it_is_made_as_any_dataclass_is() -> None:
         Told()  # type: ignore[call-arg]
 
 
-def test_what_a_factory_makes_is_each_ones_own() -> None:
+def test_default_factory_creates_a_value_per_instance() -> None:
     assert Told("a").things is not Told("a").things
 
 
-def test_nobody_changes_it_afterwards() -> None:
+def test_instance_is_immutable() -> None:
     with pytest.raises(FrozenInstanceError):
         Told("a").number = 4  # type: ignore[misc]

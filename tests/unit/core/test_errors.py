@@ -25,6 +25,6 @@ def test_an_error_is_the_same_in_another_process(error: SimscenError) -> None:
     assert (str(there), there.exit, vars(there)) == (str(error), error.exit, vars(error))
 
 
-def test_every_error_on_purpose_is_tried_here() -> None:
+def test_every_error_class_is_tested() -> None:
     tried = {InvalidInput, UsageError, NothingSelected, RunError}
     assert set(SimscenError.__subclasses__()) == tried

@@ -27,7 +27,7 @@ def sparse(trace, seconds):
 
 
 @pytest.mark.parametrize(("stops", "status"), [(5.0, Status.FAIL), (3.0, Status.PASS)])
-def test_where_samples_are_rare_the_newest_one_before_a_contact_says_whose_fault_it_was(stops, status):
+def test_newest_sample_before_contact_determines_the_fault(stops, status):
     trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0], [stops, 2, 0], [8, 2, 0]], "events": HIT})
     assert verdict({"caused_by_robot": True}, sparse(trace, 1)).status is status
 
@@ -38,7 +38,7 @@ def test_a_contact_before_the_first_sample_is_judged_by_that():
     assert verdict({"caused_by_robot": True}, late).status is Status.FAIL
 
 
-def test_without_a_velocity_nobody_knows_whose_fault_it_was():
+def test_fault_of_a_collision_is_unknown_without_velocity():
     trace = replace(synthetic_trace({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT}), velocity=NOTHING)
     assert verdict({"caused_by_robot": True}, trace).status is Status.INCONCLUSIVE
     assert verdict({}, trace).status is Status.FAIL
@@ -52,7 +52,7 @@ def test_contacts_are_counted_without_a_truth_but_none_is_no_proof():
     assert verdict({}, replace(trace, events=trace.events[1:])).status is Status.INCONCLUSIVE
 
 
-def test_something_seen_at_half_a_place_is_not_placed():
+def test_object_without_complete_position_has_no_place():
     trace = synthetic_trace(
         {"seconds": 8, "truth": [[0, 0, 0]], "events": [[1, "collision.started", "cart", {"y": 1.0}]]}
     )
@@ -66,7 +66,7 @@ def test_up_to_a_tenth_of_a_meter_a_second_is_standing(speed, status):
     assert verdict({"caused_by_robot": True}, trace).status is status
 
 
-def test_what_it_did_later_says_nothing_of_a_contact_before_the_first_sample():
+def test_later_samples_do_not_decide_an_early_contact():
     trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0]], "events": [[0.01, *HIT[0][1:]]]})
     trace.velocity.values[41:, 0] = 1.0
     late = replace(trace, velocity=Samples(trace.velocity.ticks[40:], trace.velocity.values[40:]))

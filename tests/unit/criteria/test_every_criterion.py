@@ -49,7 +49,7 @@ def example(kind):
 
 
 @pytest.mark.parametrize("kind", CHOICES)
-def test_its_docstring_answers_the_four_questions_and_gives_an_example_that_loads(kind):
+def test_docstring_has_required_sections_and_a_valid_example(kind):
     doc = specification(kind).__doc__
     positions = [doc.find(heading) for heading in HEADINGS]
     assert -1 not in positions

@@ -61,7 +61,7 @@ def test_each_bound_can_stand_alone(kind, words):
         ("clearance", {"min": -1}),
     ],
 )
-def test_what_bounds_nothing_or_cannot_be_is_refused(kind, words):
+def test_criterion_without_a_valid_bound_is_refused(kind, words):
     with pytest.raises(ValidationError):
         spec(kind, words)
 
@@ -87,7 +87,7 @@ def test_what_bounds_nothing_or_cannot_be_is_refused(kind, words):
         ),
     ],
 )
-def test_what_is_not_said_means_what_the_reference_says(kind, words, meant):
+def test_defaults_match_the_reference(kind, words, meant):
     found = spec(kind, words)
     assert {key: getattr(found, key) for key in meant} == meant
 

@@ -54,7 +54,7 @@ def test_a_rest_that_ends_as_the_fault_begins_is_none():
     assert (first.status, first.value) == (Status.FAIL, 0.7)
 
 
-def test_it_stood_when_the_newest_sample_before_says_so():
+def test_newest_sample_determines_standstill_at_the_fault():
     assert found([*[MOVING] * 8, STILL, *[MOVING] * 13], (1.0, None))[0].status is Status.FAIL
     assert found([*[MOVING] * 9, STILL, *[MOVING] * 13], (1.0, None))[0].status is Status.INCONCLUSIVE
     assert found([STILL, *[MOVING] * 13], (0.0, None))[0].status is Status.INCONCLUSIVE

@@ -95,7 +95,7 @@ def test_clipped_samples_are_held_at_both_ends(first, last, expected):
     assert dict(zip(clipped.ticks.tolist(), clipped.values[:, 0].tolist(), strict=True)) == expected
 
 
-def test_what_did_start_is_listed_by_name():
+def test_started_entries_are_listed_by_name():
     events = [[k, "event.started", name] for k, name in enumerate("gfedcba")]
     trace = synthetic_trace({"seconds": 20, "truth": [[0, 0, 0]], "events": events})
     because, detail = never_started(trace, "gust")

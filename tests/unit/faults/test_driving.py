@@ -77,6 +77,6 @@ def test_a_battery_drains_evenly_and_the_robot_keeps_to_its_curve():
     assert work.command(Twist(0.05, 0.0, 1.0)) == Twist(0.05, 0.0, 1.0)
 
 
-def test_a_battery_that_charges_itself_is_none():
+def test_rising_battery_curve_is_refused():
     with pytest.raises(ValueError, match="a battery does not charge itself"):
         begun({"low_battery": {"start": 0.1, "end": 0.5}}, "Command")

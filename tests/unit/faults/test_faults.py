@@ -22,7 +22,7 @@ def straight(meters: float, steps: int = 100):
     return [Odometry("odom", k, Pose2(meters * k / steps, 0, 0), Twist(0.5, 0, 0)) for k in range(steps + 1)]
 
 
-def test_a_sensor_that_is_off_says_nothing():
+def test_sensor_that_is_off_publishes_nothing():
     assert begun({"off": {}}).reading(scan([1.0])) is None
 
 
@@ -74,7 +74,7 @@ def test_a_turn_for_each_meter_bends_the_reported_way_into_an_arc():
     assert (end.x, end.y) == pytest.approx((math.sin(1.0) / 0.5, (1 - math.cos(1.0)) / 0.5), abs=2e-3)
 
 
-def test_slip_takes_from_the_ground_what_the_wheels_count():
+def test_slip_reduces_the_true_distance():
     fault = begun({"slip": {"left": 0.25, "right": 0.25}})
     assert fault.command(Twist(0.4, 0, 0.8)) == pytest.approx((0.3, 0, 0.6))
     assert [fault.reading(odometry) for odometry in straight(3.0)][-1].pose.x == pytest.approx(4.0)

@@ -21,7 +21,7 @@ def value(grid: OccupancyGrid, x: float, y: float) -> int:
     return int(grid.values_at(np.array([[x, y]]))[0])
 
 
-def test_what_was_at_a_place_is_where_it_has_been_turned_and_shifted_to():
+def test_shifted_map_moves_every_point():
     moved = begun({"shift": {"x": 1.0, "y": -0.5, "yaw": "90 deg"}}, "Map").map(grid())
     place = Pose2(1.0, -0.5, math.pi / 2).apply(np.array([[2.25, 3.25]]))[0].tolist()
     assert place == pytest.approx([1.0 - 3.25, -0.5 + 2.25])

@@ -43,7 +43,7 @@ def test_messages_that_come_seldom_are_delayed_uniformly():
     assert np.quantile(late, [0.25, 0.5, 0.75]) == pytest.approx([0.35, 0.6, 0.85], abs=0.05)
 
 
-def test_what_is_under_way_when_a_delay_ends_still_arrives_before_all_that_comes_after():
+def test_delayed_messages_arrive_before_newer_ones():
     got = heard({"delay": {"latency": "0.5 s"}}, 400, until=60)
     assert got == [(120, 0), (144, 24), (168, 48), (168, 72), (168, 96), (168, 120), (168, 144), (168, 168)] + [
         (24 * k, 24 * k) for k in range(8, 17)
@@ -76,7 +76,7 @@ def test_slow_is_slower_than_the_sensor():
     assert unsuitable_key({"slow": {"rate": 9}}, "Scan", rate=10.0) is None
 
 
-def test_a_loose_contact_is_away_for_its_share_of_time_in_bursts_of_its_mean_length():
+def test_intermittent_fault_has_the_stated_share_and_burst_length():
     got = np.array([at for at, _ in heard({"intermittent": {"up": "1 s", "down": "0.5 s"}}, 240_000, period=6)])
     assert len(got) / 40_000 == pytest.approx(2 / 3, abs=0.03)
     gaps = np.diff(got)

@@ -47,7 +47,7 @@ def judged(events, *ordered, **changes):
         (FAULT, [*fault(1, None, 1.1), *fault(3, 3, 5, 20)], "disturbed lidar 20 times, first at t = 3.00 s"),
     ],
 )
-def test_what_changed_something_happened(ordered, events, effect):
+def test_entry_with_effect_happened(ordered, events, effect):
     result = judged(events, ordered)
     assert result.outcome is Outcome.PASSED
     (happened,) = result.disturbances
@@ -68,7 +68,7 @@ def test_what_changed_something_happened(ordered, events, effect):
         (FAULT, fault(3, 3, entry=1), "it never began; the run ended at t = 10.00 s (navigation ended)", None),
     ],
 )
-def test_what_changed_nothing_fails_the_run_at_its_own_line_before_the_criteria(ordered, events, why, tick):
+def test_entry_without_effect_fails_the_run_at_its_line(ordered, events, why, tick):
     result = judged(events, ordered)
     assert result.outcome is Outcome.FAILED
     verdict, collisions = result.verdicts
@@ -83,7 +83,7 @@ def test_what_changed_nothing_fails_the_run_at_its_own_line_before_the_criteria(
 
 
 @pytest.mark.parametrize("ordered", [EVENT, FAULT])
-def test_what_need_not_happen_is_told_and_fails_nothing(ordered):
+def test_optional_entry_that_did_not_happen_fails_nothing(ordered):
     result = judged([], {**ordered, "required": False})
     assert result.outcome is Outcome.PASSED
     assert [(one.happened, one.missing) for one in result.disturbances] == [(False, False)]

@@ -106,7 +106,7 @@ def test_a_run_that_nothing_judged_is_an_error():
 
 
 @pytest.mark.parametrize("text", ["{}", "[]", "3", '{"format": 99}', "nonsense"])
-def test_something_else_is_refused(text):
+def test_other_content_is_refused(text):
     with pytest.raises(ValueError, match=r"not a result|format 99|Expecting"):
         from_json(text)
 

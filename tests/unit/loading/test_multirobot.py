@@ -114,12 +114,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_is_wrong_is_told_where_it_is(load, case):
+def test_mistakes_are_reported_at_their_positions(load, case):
     text, expected = WRONG[case]
     assert expected in told(load(text))
 
 
-def test_a_robot_that_an_event_takes_for_a_thing_is_told_once(load):
+def test_robot_used_as_object_is_reported_once(load):
     text = f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: {{remove: {{name: b}}}}}}]\n"
     assert told(load(text + PASS)) == [(8, "SC035", "`b` is one of the robots, which cannot be moved or followed")]
 
@@ -131,14 +131,14 @@ def test_each_robot_may_be_sent_a_goal_of_the_same_name(load):
 
 
 @pytest.mark.parametrize("pose", ["{x: 1.2, y: 1.1}", "here", "{x: 1, y: 1, yaw: 90 deg}"])
-def test_robots_that_start_in_one_another_are_told(load, pose):
+def test_overlapping_start_poses_are_errors(load, pose):
     loaded = load(f"robots: {{{A}, b: {{pose: {pose}}}}}\n" + PASS)
     (problem,) = [problem for problem in check_in_world(loaded) if problem.severity == "error"]
     assert (problem.line, problem.code) == (7, "SC044")
     assert "robot `b` overlaps robot `a` at the start" in problem.message
 
 
-def test_what_is_said_for_all_holds_for_each_that_says_nothing_else(load):
+def test_shared_settings_apply_to_robots_without_their_own(load):
     loaded = load(
         f"robots:\n  {A}\n  b: {{pose: there, stack: {{controller: {{type: mppi}}}}, map: none, {PASS.strip()}}}\n"
         "stack: {controller_frequency: 10 Hz}\n" + PASS

@@ -71,7 +71,7 @@ def test_a_world_can_stand_on_a_ros_map(write: Write, scenario: str, tmp_path: P
     assert loaded.world.map.path == tmp_path / "maps/map.yaml"
 
 
-def test_mapless_driving_is_a_word(write: Write, scenario: str, tmp_path: Path) -> None:
+def test_map_none_means_no_map(write: Write, scenario: str, tmp_path: Path) -> None:
     assert _loaded(write("a.scenario.yaml", scenario + "map: none\n"), tmp_path).map == "none"
 
 

@@ -18,13 +18,13 @@ def gaps(track: np.ndarray, x: float = 0.0, y: float = 0.0) -> np.ndarray:
     return np.hypot(track[:, 0] - x, track[:, 1] - y)
 
 
-def test_the_regular_make_room_for_a_robot_as_for_a_person():
+def test_regular_pedestrians_treat_the_robot_as_a_person():
     one = walk(people(walker("anna", 6.0, 0.0, (-9.0, 0.0))), 8.0, robot(-6.0, 0.0, 0.0, 1.0))[0]["anna"]
     passing = int(np.argmin(np.abs(one[:, 0] - (-6.0 + np.arange(len(one)) * STEP))))
     assert one[passing, 1] > 0.25, "it is passed on the right"
 
 
-def test_the_impassive_take_a_robot_for_a_thing():
+def test_impassive_pedestrians_treat_the_robot_as_an_object():
     """They go on until they feel it as a wall, and do not turn aside before."""
     one = walk(people(walker("anna", 6.0, 0.1, (-9.0, 0.1), behavior="impassive")), 3.0, robot(0.0, 0.0))[0]["anna"]
     before = one[one[:, 0] > 1.2]
@@ -33,7 +33,7 @@ def test_the_impassive_take_a_robot_for_a_thing():
     assert gap.min() > 0.0
 
 
-def test_the_surprised_stop_and_look_until_they_have_seen_enough():
+def test_surprised_pedestrians_stop_and_look_for_a_limited_time():
     crowd = people(walker("anna", 8.0, 1.0, (-9.0, 1.0), **SURPRISED))
     tracks, deeds = walk(crowd, 45.0, robot(0.0, 0.0))
     assert [(deed.what, deed.about) for deed in deeds] == [("reacted", ""), ("calmed", ""), ("reached", "1")]
@@ -46,7 +46,7 @@ def test_the_surprised_stop_and_look_until_they_have_seen_enough():
     assert anna[begun + 100, 2] == pytest.approx(bearing, abs=1e-6)
 
 
-def test_the_curious_come_to_a_meter_and_a_half_and_lose_interest():
+def test_curious_pedestrians_approach_and_leave():
     crowd = people(walker("anna", 7.0, 3.0, (7.0, -9.0), yaw=math.pi, **CURIOUS))
     tracks, deeds = walk(crowd, 45.0, robot(0.0, 0.0))
     assert [deed.what for deed in deeds] == ["reacted", "calmed", "reached"]
@@ -55,21 +55,21 @@ def test_the_curious_come_to_a_meter_and_a_half_and_lose_interest():
     assert near[600] < 1.6 and gaps(tracks["anna"], 7.0, -9.0)[-1] < 0.4
 
 
-def test_the_scared_never_come_near_a_robot_that_stands():
+def test_scared_pedestrians_keep_away_from_a_standing_robot():
     """They would have to pass it; what is left is the way they need to stop."""
     crowd = people(walker("anna", 9.0, 0.0, (-9.0, 0.0), **SCARED))
     tracks, deeds = walk(crowd, 60.0, robot(0.0, 0.0))
     assert deeds[0].what == "reacted" and gaps(tracks["anna"]).min() > 2.2
 
 
-def test_the_scared_run_from_a_robot_that_comes_slowly():
+def test_scared_pedestrians_flee_from_a_slow_robot():
     crowd = people(walker("anna", 4.0, 0.0, (4.0, 0.0), yaw=math.pi, **SCARED))
     tracks, _ = walk(crowd, 20.0, robot(0.0, 0.0, 0.0, 0.4))
     away = tracks["anna"][:, 0] - np.arange(len(tracks["anna"])) * STEP * 0.4
     assert away.min() > 1.5 and tracks["anna"][-1, 0] > 9.0
 
 
-def test_the_threatening_stand_in_the_way_of_the_robot():
+def test_threatening_pedestrians_block_the_robot():
     crowd = people(walker("anna", 1.0, 3.0, (1.0, -9.0), **THREATENING))
     tracks, deeds = walk(crowd, 20.0, robot(0.0, 0.0, 0.0, 0.2))
     ahead = tracks["anna"][:, 0] - np.arange(len(tracks["anna"])) * STEP * 0.2
@@ -79,21 +79,21 @@ def test_the_threatening_stand_in_the_way_of_the_robot():
     assert np.abs(tracks["anna"][blocking, 1]).max() < 0.1
 
 
-def test_who_is_behind_a_wall_or_has_their_back_turned_does_not_react():
+def test_pedestrians_without_view_of_the_robot_do_not_react():
     hidden = people(walker("anna", 2.0, 0.0, yaw=math.pi, **SURPRISED), around=walls([[1.0, -3.0], [1.0, 3.0]]))
     assert not walk(hidden, 2.0, robot(0.0, 0.0))[1]
     turned = people(walker("anna", 2.0, 0.0, **SURPRISED))
     assert not walk(turned, 2.0, robot(0.0, 0.0))[1]
 
 
-def test_who_is_blind_to_robots_walks_on_as_if_there_were_none():
+def test_pedestrians_blind_to_robots_ignore_them():
     blind = frozenset({"robots"})
     crowd = people(walker("anna", 4.0, 0.0, (-9.0, 0.0), blind_to=blind, **SURPRISED))
     alone = people(walker("anna", 4.0, 0.0, (-9.0, 0.0)))
     assert (walk(crowd, 5.0, robot(0.0, 0.0))[0]["anna"] == walk(alone, 5.0)[0]["anna"]).all()
 
 
-def test_who_sees_a_robot_does_not_walk_into_it():
+def test_pedestrians_do_not_walk_into_a_visible_robot():
     """Pushed towards it by nothing but their wish, whatever they take it for."""
     for behavior in ("regular", "impassive"):
         crowd = people(walker("anna", 3.0, 0.0, (-9.0, 0.0), speed=2.0, behavior=behavior))
@@ -101,13 +101,13 @@ def test_who_sees_a_robot_does_not_walk_into_it():
         assert (np.hypot(*np.maximum(np.abs(track[:, :2]) - 0.4, 0.0).T) >= 0.25 - 1e-9).all(), behavior
 
 
-def test_of_two_robots_each_is_minded_but_the_nearer_is_reacted_to():
+def test_pedestrians_avoid_all_robots_and_react_to_the_nearest():
     crowd = people(walker("anna", 0.0, 0.0, (0.0, 0.0), **SURPRISED))
     _, deeds = walk(crowd, 1.0, robot(3.0, 0.5, name="far"), robot(2.0, 0.5, name="near"))
     assert [deed.about for deed in deeds if deed.what == "reacted"] == ["near"]
 
 
-def test_things_are_walked_around_and_not_into():
+def test_pedestrians_walk_around_objects():
     crowd = people(walker("anna", -4.0, 0.1, (9.0, 0.1)))
     crate = ObservedObject("crate", (np.array([(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)]),))
     track = []

@@ -10,7 +10,7 @@ from simscen.pedestrians import forces
 from tests.unit.pedestrians.rig import STEP, corridor, people, walk, walker, walls
 
 
-def test_who_sets_off_alone_comes_to_speed_as_helbing_and_molnar_say():
+def test_single_pedestrian_accelerates_as_in_helbing_and_molnar():
     """v(t) = v0 (1 - exp(-t/τ)), and the way is its integral."""
     tracks, _ = walk(people(walker("anna", 0.0, 0.0, (50.0, 0.0), speed=1.3)), 3.0)
     t, tau = np.arange(61) * STEP, forces.RELAXATION_TIME_S
@@ -18,7 +18,7 @@ def test_who_sets_off_alone_comes_to_speed_as_helbing_and_molnar_say():
     assert not tracks["anna"][:, 1:].any()
 
 
-def test_who_walks_against_a_wall_stands_where_its_force_is_that_of_their_wish():
+def test_pedestrian_stops_where_wall_force_equals_driving_force():
     """a exp(-gap/b) = v0/τ, so the gap is b ln(a τ / v0); the way on leads through the wall."""
     crowd = people(walker("anna", 0.0, 0.0, (50.0, 0.0), speed=1.3), around=walls([[5.0, -9.0], [5.0, 9.0]]))
     tracks, _ = walk(crowd, 20.0)
@@ -41,7 +41,7 @@ def test_one_step_of_the_interaction_is_that_of_the_paper():
     assert forces.social(place[None], motion[None], np.zeros(1))[0] == pytest.approx(f, rel=1e-12)
 
 
-def test_two_who_meet_head_on_in_the_corridor_of_the_experiment_pass_on_the_right():
+def test_head_on_pedestrians_pass_on_the_right():
     """Moussaïd et al. 2009: 1.75 m wide, most evade to the right. They have begun to before they are 2 m apart."""
     crowd = people(walker("anna", -5.0, 0.0, (9.0, 0.0)), walker("bert", 5.0, 0.0, (-9.0, 0.0)), around=corridor(1.75))
     tracks, _ = walk(crowd, 10.0)
@@ -96,7 +96,7 @@ def test_lanes_form_where_two_crowds_walk_through_each_other():
     assert found[:, 0].mean() > 2 * found[:, 1].mean(), found
 
 
-def test_those_of_a_group_keep_together_and_walk_side_by_side():
+def test_group_members_walk_side_by_side():
     """Within the (N - 1)/2 meters of their middle and its surroundings, where those who know nobody drift apart."""
 
     def spread(group: str | None) -> np.ndarray:
@@ -110,7 +110,7 @@ def test_those_of_a_group_keep_together_and_walk_side_by_side():
     assert spread(None).max() > 2.5
 
 
-def test_nobody_walks_through_a_wall_or_through_each_other():
+def test_pedestrians_do_not_walk_through_walls_or_each_other():
     """Fifty in a hurry who all want through one door."""
     rng = np.random.default_rng(5)
     box = [[[0, 0], [8, 0]], [[8, 0], [8, 8]], [[8, 8], [0, 8]], [[0, 8], [0, 0]]]
@@ -138,14 +138,14 @@ def test_goals_are_walked_to_in_turn_once_in_a_circle_or_back_and_forth():
     assert reached("back_and_forth")[:7] == ["1", "2", "3", "2", "1", "2", "3"]
 
 
-def test_who_is_at_their_last_goal_stays_there():
+def test_pedestrian_stays_at_the_last_goal():
     tracks, deeds = walk(people(walker("anna", 0.0, 0.0, (3.0, 0.0))), 12.0)
     assert [deed.what for deed in deeds] == ["reached"]
     assert tracks["anna"][-1, :2] == pytest.approx([3.0, 0.0], abs=0.06)
     assert tracks["anna"][-1, 0] == tracks["anna"][-20, 0]
 
 
-def test_the_same_people_walk_the_same_way_to_the_bit():
+def test_equal_pedestrians_walk_bit_identical_paths():
     def run() -> bytes:
         crowd = people(*(walker(f"p{k}", 2.0 * k, k % 3 - 1.0, (20.0 - 2 * k, 0.0)) for k in range(8)))
         return b"".join(track.tobytes() for track in walk(crowd, 10.0)[0].values())
@@ -154,7 +154,7 @@ def test_the_same_people_walk_the_same_way_to_the_bit():
 
 
 @pytest.mark.parametrize("name", ["a first", "m between", "z last"])
-def test_one_more_changes_nobody_before_they_meet(name):
+def test_additional_pedestrian_changes_others_only_after_meeting(name):
     def run(*more: WalkingPedestrian) -> np.ndarray:
         crowd = people(*(walker(f"m{k}", 1.1 * k, k % 3 - 1.0, (9.0 - k, 0.0), group="g" if k > 4 else None)
                          for k in range(8)), *more, around=corridor(8.0))  # fmt: skip

@@ -86,7 +86,7 @@ def pythons(version: str) -> list[str]:
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("version", VERSIONS)
-def test_it_speaks_the_protocol_on_this_python(version: str, tmp_path: Path) -> None:
+def test_peer_client_works_on_this_python(version: str, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(EVERYTHING)
     env = {"SIMSCEN_PEER_PATH": str(FOLDER / "standalone"), "HOME": os.environ.get("HOME", "/")}
     for python in pythons(version):

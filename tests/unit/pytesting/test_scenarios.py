@@ -71,7 +71,7 @@ def collected(told: str) -> list[str]:
     return [line for line in told.splitlines() if "::" in line]
 
 
-def test_a_foreign_project_is_not_surprised(run, project: Path) -> None:
+def test_without_configuration_nothing_is_collected(run, project: Path) -> None:
     code, told = run("--collect-only", "-q")
     assert (code, collected(told)) == (0, ["test_own.py::test_own"])
     assert not (project / "simscen-out").exists()

@@ -26,15 +26,15 @@ def moved(trace: Trace, column: int, by: float) -> Trace:
 
 
 @pytest.mark.parametrize(("column", "by"), [(0, 0.0), (0, 1e-12), (1, -9e-6), (2, 9e-6), (2, 2 * math.pi)])
-def test_last_bits_do_not_matter(trace: Trace, column: int, by: float) -> None:
+def test_runs_that_differ_in_last_bits_agree(trace: Trace, column: int, by: float) -> None:
     assert first_disagreement(trace, moved(trace, column, by)) is None
 
 
 @pytest.mark.parametrize(("column", "by"), [(0, 1.1e-5), (1, -1.0), (2, 1e-4), (0, math.nan)])
-def test_another_way_is_told_with_its_tick(trace: Trace, column: int, by: float) -> None:
+def test_different_path_is_reported_with_its_tick(trace: Trace, column: int, by: float) -> None:
     assert "tick 24 (t = 0.100 s): the true pose differs by" in str(first_disagreement(trace, moved(trace, column, by)))
 
 
-def test_another_end_is_another_run(trace: Trace) -> None:
+def test_different_end_is_a_difference(trace: Trace) -> None:
     assert first_disagreement(trace, dataclasses.replace(trace, end=241)) == "the runs end at ticks 240 and 241"
     assert "tick rate" in str(first_disagreement(trace, dataclasses.replace(trace, tick_rate=100)))

@@ -30,7 +30,7 @@ class Full:
 
 
 @pytest.mark.parametrize("ticks", [0, 1, 60, 10_000])
-def test_all_that_is_told_comes_once_and_in_its_order(ticks: int) -> None:
+def test_queued_messages_are_written_once_in_order(ticks: int) -> None:
     told: list[tuple[str, int]] = []
     backlog = MomentBuffer(ticks)
     robots = [backlog.sink(Heard(name, told)) for name in "ab"]
@@ -84,7 +84,7 @@ def test_each_log_of_a_robot_is_told_all() -> None:
         assert [tick for who, tick in told if who == name] == [moment.tick for moment in SOME]
 
 
-def test_what_waits_when_a_run_breaks_off_is_written() -> None:
+def test_queued_messages_are_written_when_a_run_aborts() -> None:
     told: list[tuple[str, int]] = []
     with pytest.raises(ZeroDivisionError), MomentBuffer(10_000) as backlog:
         log = backlog.sink(Heard("", told))
@@ -94,7 +94,7 @@ def test_what_waits_when_a_run_breaks_off_is_written() -> None:
     assert told[-1][1] == SOME[-1].tick
 
 
-def test_why_a_run_broke_off_is_told_although_its_log_has_no_room_for_the_rest() -> None:
+def test_abort_reason_is_reported_despite_a_full_disk() -> None:
     with pytest.raises(ZeroDivisionError), MomentBuffer(10_000) as backlog:
         backlog.next_flush_tick = 1
         backlog.sink(Full()).append(SOME[0])

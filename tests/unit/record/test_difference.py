@@ -30,7 +30,7 @@ def test_a_trace_does_not_differ_from_itself(trace: Trace) -> None:
     assert first_difference(trace, trace) is None
 
 
-def test_one_bit_is_found_with_its_tick_and_field(trace: Trace) -> None:
+def test_difference_of_one_bit_is_found_with_tick_and_field(trace: Trace) -> None:
     values = trace.truth.values.copy()
     values[4, 1] = np.nextafter(values[4, 1], 9)
     other = dataclasses.replace(trace, truth=Samples(trace.truth.ticks, values))
@@ -67,5 +67,5 @@ def test_nan_does_not_differ_from_nan(trace: Trace) -> None:
         ("tick_rate", 120, "tick rate: 240 against 120 Hz"),
     ],
 )
-def test_what_is_missing_or_else_is_told(trace: Trace, name: str, value: object, expected: str) -> None:
+def test_missing_values_are_reported_as_differences(trace: Trace, name: str, value: object, expected: str) -> None:
     assert first_difference(trace, dataclasses.replace(trace, **{name: value})) == expected

@@ -332,7 +332,7 @@ def test_topics_may_have_other_names(read: Callable[..., ForeignLog]) -> None:
     assert len(log.trace.belief) == 21 and len(log.trace.truth) == 201
 
 
-def test_an_action_says_what_became_of_goals(read: Callable[..., ForeignLog]) -> None:
+def test_action_status_gives_goal_results(read: Callable[..., ForeignLog]) -> None:
     topic = "/navigate_to_pose/_action/status"
     said = [
         *drive(),

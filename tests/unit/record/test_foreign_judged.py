@@ -231,7 +231,7 @@ def test_signals_are_judged_where_the_log_has_them(simscen, limits, tmp_path: Pa
     assert "the log lacks the collisions of the robot" in ended.out
 
 
-def test_what_is_odd_about_a_log_is_noted_and_a_cut_one_passes_nothing(simscen, limits, tmp_path: Path) -> None:
+def test_unusual_logs_are_noted_and_truncated_logs_pass_nothing(simscen, limits, tmp_path: Path) -> None:
     data = write_mcap(tmp_path / "drive.mcap", drive()).read_bytes()
     (tmp_path / "drive.mcap").write_bytes(data[: len(data) - 400])
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap")
@@ -259,7 +259,7 @@ def test_a_topic_that_cannot_be_understood_is_refused(simscen, limits, tmp_path:
 
 
 @pytest.mark.parametrize("truth", ["mocap", "", ":", "map:", "/amcl_pose"])
-def test_a_truth_that_is_none_is_refused(simscen, limits, tmp_path: Path, truth: str) -> None:
+def test_invalid_ground_truth_is_refused(simscen, limits, tmp_path: Path, truth: str) -> None:
     write_mcap(tmp_path / "drive.mcap", drive(1.0))
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", truth)
     assert ended.code == 2

@@ -68,7 +68,7 @@ def test_a_run_is_written_as_if_each_pose_had_been_looked_at(stays: dict[str, Po
         assert trace.objects[name].values.tolist() == samples.values.tolist()
 
 
-def test_what_is_foreseen_is_a_mapping_by_name_in_order() -> None:
+def test_precomputed_poses_are_a_mapping_in_name_order() -> None:
     table = np.arange(2 * 14.0).reshape(2, 2, 7)
     everything = {"a": Pose3(), "b": Pose3(9.0), "c": Pose3()}
     places = PredictedPoses(range(12, 24, 6), ("a", "c"), table, everything).at(18)

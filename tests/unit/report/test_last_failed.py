@@ -77,7 +77,7 @@ def test_a_journal_that_cannot_be_read_and_the_link_to_the_newest_are_passed_ove
     assert failed_in(tmp_path) == {"a"}
 
 
-def test_what_failed_as_expected_did_not_fail(session, tmp_path, failed):
+def test_expected_failure_is_not_a_failure(session, tmp_path, failed):
     journal = Journal(session(1, a="failed"), resume=True)
     journal.plan([PlannedRun(key("a"), "x")], "0.1.0", 1)
     journal(replace(failed, result=replace(failed.result, key=key("a"), outcome=Outcome.FAILED_AS_EXPECTED)))

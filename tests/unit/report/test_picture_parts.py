@@ -128,7 +128,7 @@ def test_a_belief_that_jumps_is_not_a_line_through_walls():
 
 
 @pytest.mark.parametrize(("goal", "fate"), [("shelf", "failed"), ("never", "not tried"), ("late", "reached")])
-def test_a_goal_says_what_came_of_it(goal, fate):
+def test_goal_shows_its_result(goal, fate):
     assert [name for name, _ in drawn_parts(everything()) if name.startswith(f"goal {goal}")] == [f"goal {goal} {fate}"]
 
 

@@ -35,12 +35,12 @@ def session(passed):
     return told
 
 
-def test_the_rest_takes_as_long_as_what_was(session):
+def test_remaining_time_is_extrapolated(session):
     assert session(done=4).remaining_s == 6.0
     assert session(done=4).text == "4 of 10, about 5 s left"
 
 
-def test_what_was_kept_from_an_earlier_session_took_no_time(session):
+def test_kept_runs_do_not_count_for_the_estimate(session):
     assert session(done=2, kept=5).remaining_s == 3.0
 
 

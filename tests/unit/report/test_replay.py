@@ -100,7 +100,7 @@ def test_numbers_come_back_to_within_half_a_step(step: float) -> None:
     assert np.abs(back[finite] - values[finite]).max() <= step / 2 + 1e-9
 
 
-def test_what_is_no_number_stays_none() -> None:
+def test_nonnumeric_values_stay_none() -> None:
     columns = PackedColumns()
     where = columns.add([1.0, math.nan, 2.0])
     read = Read.__new__(Read)
@@ -151,7 +151,7 @@ def test_a_bound_is_drawn_on_the_signal_that_it_bounds() -> None:
     assert "speed" in [strip["name"] for strip in run["robots"][0]["strips"]]
 
 
-def test_a_log_of_little_makes_a_page_of_little() -> None:
+def test_log_with_little_data_gives_a_small_page() -> None:
     log = log_of({"seconds": 1, "truth": [[0, 0, 0]], "belief": None, "scans": [], "ended": None})
     run = Read(replay_page([(replace(log, complete=False), result_of())])).runs[0]
     assert run["complete"] is False and run["robots"][0]["belief"] is None and run["robots"][0]["map"] is None

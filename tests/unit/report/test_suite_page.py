@@ -57,7 +57,7 @@ def runs_on(html):
     return [attributes for tag, attributes in parsed(html) if tag == "details" and "run" in attributes["class"].split()]
 
 
-def test_what_did_not_pass_comes_first_and_stands_open(passed, failed, crashed):
+def test_failures_come_first_and_are_expanded(passed, failed, crashed):
     html = to_html(Session([passed, failed, crashed]))
     assert ["open" in attributes for attributes in runs_on(html)] == [True, True, False]
     assert [attributes["data-status"] for attributes in runs_on(html)] == ["error", "failed", "passed"]

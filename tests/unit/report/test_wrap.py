@@ -23,14 +23,14 @@ def texts(line, columns):
     return [plain_text(part) for part in wrap_line(line, columns)]
 
 
-def test_what_stands_in_a_column_of_its_own_moves_as_a_whole():
+def test_column_is_wrapped_as_a_whole():
     assert texts(RUN, 80) == [
         "  ✓ navigation/goal   18.2 s simulated in 0.21 s",
         "    tightest: path_length +0.14 m, 1 % of its limit",
     ]
 
 
-def test_what_is_too_long_even_then_is_broken_between_words():
+def test_long_column_is_wrapped_between_words():
     assert texts(RUN, 40) == [
         "  ✓ navigation/goal",
         "    18.2 s simulated in 0.21 s",

@@ -45,7 +45,7 @@ faults:
 
 
 @pytest.mark.parametrize("carried", [(7, 5), (1.2, 1)])
-def test_being_kidnapped_is_no_drive(play, carried):
+def test_kidnapping_does_not_count_as_driven_distance(play, carried):
     x, y = carried
     extra = f"""\
 events:

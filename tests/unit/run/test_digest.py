@@ -160,7 +160,7 @@ def test_a_heightmap_changes_the_digest(project: Path, of: Digest) -> None:
     assert of() != before
 
 
-def test_a_file_that_nothing_reads_changes_nothing(project: Path, of: Digest) -> None:
+def test_unused_file_does_not_change_the_digest(project: Path, of: Digest) -> None:
     """Or --resume would never keep anything."""
     before = of()
     (project / "p/notes.txt").write_text("hello")
@@ -177,7 +177,7 @@ def test_the_order_of_the_world_path_matters_where_it_chooses_another_model(proj
     assert of("models", "mine") == of("models")
 
 
-def test_leniency_matters(of: Digest) -> None:
+def test_lenient_option_changes_the_digest(of: Digest) -> None:
     """It leaves out what cannot be used."""
     assert of(lenient=True) != of()
 
@@ -192,7 +192,7 @@ def test_every_scenario_in_a_world_knows_all_files_of_it(project: Path, of: Dige
 
 
 @pytest.mark.parametrize("what", ["software_versions", "cpu_flags", "arithmetic_fingerprints", "source_digest"])
-def test_software_and_processor_matter(of: Digest, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
+def test_software_and_processor_change_the_digest(of: Digest, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
     """Another release of Bullet, other vector instructions or another simscen may change last bits."""
     before = of()
     monkeypatch.setattr(module, what, lambda: {"pybullet": "0"})

@@ -68,7 +68,7 @@ def test_a_condition_that_lasts_counts_once_it_has_been_true_for_so_long():
     assert firings(LASTING, [0, 1, 1, 1, 1, 1]) == [0, 0, 0, 0, 1, 0]
 
 
-def test_a_break_makes_it_begin_anew():
+def test_interruption_resets_the_duration():
     assert firings(LASTING, [0, 1, 1, 1, 0, 1, 1, 1, 1]) == [0, 0, 0, 0, 0, 0, 0, 0, 1]
 
 

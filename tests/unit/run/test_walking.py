@@ -22,7 +22,7 @@ def told(trace, *kinds: EventKind) -> list[tuple[str, str]]:
     return [(event.kind.value, event.name) for event in trace.of_kind(*kinds)]
 
 
-def test_a_pedestrian_is_a_thing_that_moves_and_is_called_a_person(play):
+def test_pedestrian_is_a_moving_object_of_type_person(play):
     trace = play(events(f"{{when: {{time: 0}}, do: {ANNA}}}"), **STANDING)
     spawned = trace.of_kind(EventKind.OBJECT_SPAWNED)[-1]
     assert spawned.data["person"] and spawned.data["behavior"] == "regular" and spawned.data["size"] == [0.25, 1.7]
@@ -43,7 +43,7 @@ def test_people_walk_round_what_stands_and_what_lies_in_their_way(play):
         assert gap.min() >= 0.25 - 1e-6
 
 
-def test_who_reacts_to_the_robot_says_so(play):
+def test_reacting_pedestrian_emits_an_event(play):
     anna = "{pedestrian: {name: anna, pose: {x: 5, y: 1, yaw: 180 deg}, behavior: surprised, reacts_for: 2 s}}"
     trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **{**STANDING, "robot": "{pose: {x: 2, y: 1}}"})
     reacted = trace.of_kind(EventKind.PEDESTRIAN_REACTED, EventKind.PEDESTRIAN_CALMED)
@@ -65,7 +65,7 @@ def test_others_can_move_or_remove_a_pedestrian(play):
     assert anna.ticks.max() <= 5 * 240
 
 
-def test_nobody_comes_where_there_is_no_room(play):
+def test_pedestrians_are_not_spawned_without_free_space(play):
     lines = events(
         f"{{when: {{time: 0}}, do: {ANNA}}}",
         "{when: {time: 0}, do: {pedestrian: {name: bert, pose: {x: 3.3, y: 3}}}}",
@@ -106,7 +106,7 @@ def test_seeds_draw_other_speeds_and_a_speed_that_is_written_is_kept(play):
     assert abs(fastest(slow, 1) - 0.5) < 0.01 and abs(fastest(slow, 2) - 0.5) < 0.01
 
 
-def test_who_sees_the_robot_does_not_touch_it_and_who_is_blind_walks_into_it(play):
+def test_only_blind_pedestrians_touch_the_robot(play):
     def touched(more: str) -> list[tuple[str, str]]:
         anna = f"{{pedestrian: {{name: anna, pose: {{x: 4, y: 1}}, goals: [[0.5, 1]]{more}}}}}"
         trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **{**STANDING, "robot": "{pose: {x: 2, y: 1}}"})

@@ -63,7 +63,7 @@ def test_two_lidars_have_noise_of_their_own():
     assert not np.array_equal(back.ranges, front.ranges)
 
 
-def test_the_bumper_says_what_the_hull_feels():
+def test_bumper_reports_contacts_of_the_hull():
     view = Puppet()
     (bumper,) = build({"bumper": {"bumper": {}}}, view=view)
     assert not bumper.read(0).pressed

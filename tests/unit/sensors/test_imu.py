@@ -17,7 +17,7 @@ def imu(view, seed=1, **spec):
     return ImuSensor(InertialUnit(**spec), setting)
 
 
-def test_at_rest_and_level_it_feels_gravity_upwards():
+def test_level_imu_at_rest_measures_gravity():
     reading = imu(Puppet(), **EXACT).read(4)
     assert reading.linear_acceleration == (0.0, 0.0, 9.81)
     assert reading.angular_velocity == (0.0, 0.0, 0.0)
@@ -55,7 +55,7 @@ def test_noise_is_new_each_time_and_the_bias_stays():
 
 
 @pytest.mark.parametrize("pose", [Pose3.from_rpy(3, 1, 0, 0, 0, 2), Pose3.from_rpy(0.01, 0, 0, 0, 0, 2), Pose3()])
-def test_being_placed_elsewhere_is_no_acceleration(pose):
+def test_teleporting_causes_no_acceleration(pose):
     view = Puppet(linear=(0.4, 0.0, 0.0))
     sensor = imu(view, **EXACT)
     view.pose, view.linear, view.placed = pose, (0.0, 0.0, 0.0), 1

@@ -67,7 +67,7 @@ def test_the_mount_is_where_the_lidar_is_and_where_it_looks():
     assert np.abs(np.abs(scan.points()).max(axis=1) - 3.0).max() <= 0.0006
 
 
-def test_a_robot_that_leans_shines_into_the_air():
+def test_beams_of_a_tilted_robot_point_upward():
     seen = []
 
     class Watcher(RayCaster):

@@ -6,7 +6,7 @@ import pytest
 from simscen.sim.objects.broad_phase import HORIZON_S, NEAR_CONTACT_S, BoundingDiscs, find_candidates
 
 
-def test_nobody_meets_within_the_time_that_is_promised():
+def test_bodies_do_not_meet_within_the_guaranteed_time():
     rng = np.random.default_rng(5)
     for _ in range(300):
         scripted = BoundingDiscs(rng.uniform(-2, 2, (3, 2)), rng.uniform(0.1, 0.3, 3), rng.uniform(0, 2, 3))

@@ -20,7 +20,7 @@ def test_a_wall_straight_ahead_is_as_deep_everywhere_as_it_is_far(simulate):
     assert np.allclose(depth[: HEIGHT // 2], 2.0, atol=0.01)
 
 
-def test_nothing_is_infinitely_far(simulate):
+def test_depth_without_a_hit_is_infinite(simulate):
     _, depth = picture(simulate())
     assert np.isinf(depth[: HEIGHT // 2 - 2]).all()
 

@@ -28,7 +28,7 @@ def put(simulation, name, place):
         ((math.nan, 0.0, 0.3), "is not finite"),
     ],
 )
-def test_what_has_left_the_world_is_a_run_that_diverged(simulate, name, place, told):
+def test_body_outside_the_world_is_a_divergence(simulate, name, place, told):
     simulation = simulate(bodies=[Body("box", BOX, Pose3(2.0), 3.0)])
     simulation.step(18)
     simulation.truth()

@@ -29,7 +29,7 @@ def engine_pose(simulation, name):
     return pybullet.getBasePositionAndOrientation(number, physicsClientId=simulation._scene.client)[0]
 
 
-def test_what_rests_does_not_creep(simulate):
+def test_resting_object_does_not_creep(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 5.0)])
     run(simulation, LONG)
     before = simulation.object_pose("crate")
@@ -71,7 +71,7 @@ def test_what_rests_is_slow_at_every_look_and_not_faster_at_each(monkeypatch, sp
     assert settling.resting_ids() == ({7} if rests else set())
 
 
-def test_what_rolls_slowly_rolls_on(simulate):
+def test_slowly_rolling_object_keeps_rolling(simulate):
     """Bullet's own threshold would stop a ball of 0.1 m/s after two seconds."""
     simulation = simulate(bodies=[Body("ball", BALL, Pose3(2.0), 1.0)])
     run(simulation, LONG)
@@ -107,7 +107,7 @@ def test_what_is_told_is_what_the_engine_says_at_every_sample(simulate):
 
 
 @pytest.mark.parametrize("looked", [True, False])
-def test_what_lay_on_something_that_is_gone_falls(simulate, looked):
+def test_object_falls_when_its_support_is_removed(simulate, looked):
     upper = Body("upper", CRATE, Pose3(2.0, 0.0, 0.4), 2.0)
     simulation = simulate(bodies=[Body("lower", CRATE, Pose3(2.0), 5.0), upper])
     run(simulation, LONG)

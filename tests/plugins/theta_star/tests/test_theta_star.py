@@ -12,11 +12,11 @@ from simscen.testing.flatland import Flatland, round_robot, setting
 
 
 @pytest.mark.parametrize("promise", promises_of(ThetaStar()), ids=str)
-def test_it_keeps_its_promise(promise) -> None:
+def test_component_meets_its_contract(promise) -> None:
     promise.check()
 
 
-def test_in_the_open_its_path_is_the_straight_line() -> None:
+def test_path_in_free_space_is_straight() -> None:
     robot = round_robot()
     view = view_of(Flatland().room(8, 6), robot, (-0.5, -0.5, 8.5, 6.5))
     planner = ThetaStar.implementation()(ThetaStar(), setting(robot))
@@ -24,7 +24,7 @@ def test_in_the_open_its_path_is_the_straight_line() -> None:
     assert planner.plan(view, start, goal, 1).length() == pytest.approx(start.distance(goal), rel=0.02)
 
 
-def test_around_a_corner_its_path_is_taut() -> None:
+def test_path_around_a_corner_is_taut() -> None:
     robot = round_robot()
     world = Flatland().room(8, 6)
     world.boxes.append((3.9, 0.0, 4.1, 3.0))

@@ -45,7 +45,7 @@ def corrections(
 
 
 @pytest.mark.parametrize("lasting", [0.85, 0.94])
-def test_the_squared_error_is_about_what_it_is_said_to_be_although_the_particles_are_far_too_sure(
+def test_estimated_covariance_matches_the_error_despite_overconfident_particles(
     lasting: float,
 ) -> None:
     """3 is right; of AMCL's errors one and the next, 25 cm on, are correlated by 0.94."""
@@ -56,7 +56,7 @@ def test_the_squared_error_is_about_what_it_is_said_to_be_although_the_particles
     assert alone > 15
 
 
-def test_errors_that_all_poses_share_are_told_by_beams_that_are_off() -> None:
+def test_common_errors_of_all_poses_are_detected_by_beam_residuals() -> None:
     """What beams that are off mean was learned where poses scatter, and holds where they all err alike."""
 
     def doubt(misfit: ScanResiduals) -> float:
@@ -76,19 +76,19 @@ def test_errors_that_all_poses_share_are_told_by_beams_that_are_off() -> None:
     assert doubt(ScanResiduals(0.98, 1.0)) > 2.0 * doubt(AS_MAPPED)
 
 
-def test_fewer_beams_that_the_map_explains_are_worth_less() -> None:
+def test_fewer_explained_beams_have_less_weight() -> None:
     (_, most), (_, half) = (
         list(corrections(1, 0.9, ERROR, TOO_SURE, ScanResiduals(fits, 0.3 * fits)))[-1] for fits in (1.0, 0.5)
     )
     assert np.sqrt(np.diag(half)) == pytest.approx(2 * np.sqrt(np.diag(most)))
 
 
-def test_particles_that_are_less_sure_than_the_poses_scatter_are_believed_less() -> None:
+def test_pose_scatter_overrides_wide_particles() -> None:
     *_, (_, covariance) = corrections(1, 0.7, ERROR / 10, TOO_SURE * 25)
     assert 0 < np.trace(covariance) < np.trace(TOO_SURE * 25) / 2
 
 
-def test_what_matched_scans_drift_by_is_not_what_the_poses_are_off_by() -> None:
+def test_drift_of_matched_scans_is_not_a_pose_error() -> None:
     """Along a corridor without features nothing but wheels tells how far the robot went, and the map puts it right."""
     blind, stds = np.diag(np.square((0.05, 0.004, 0.0017))), []
     for doubt in (MATCHED, blind):
@@ -114,7 +114,7 @@ def test_the_first_correction_has_a_covariance_too() -> None:
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.3, -3.1])
-def test_it_is_the_same_wherever_the_frame_of_the_scans_lies(turn: float) -> None:
+def test_covariance_does_not_depend_on_the_scan_frame(turn: float) -> None:
     poses = [Pose2(0.3 * k, 0.1 * np.sin(k), 0.2 * k) for k in range(12)]
     frame, found = Pose2(5.0, -3.0, turn), []
     doubt = np.array(((4e-4, 1e-5, 0.0), (1e-5, 5e-5, 2e-6), (0.0, 2e-6, 9e-6)))
@@ -127,7 +127,7 @@ def test_it_is_the_same_wherever_the_frame_of_the_scans_lies(turn: float) -> Non
     assert np.allclose(*found)
 
 
-def test_between_corrections_it_grows_as_odometry_was_seen_to_err() -> None:
+def test_covariance_grows_with_the_observed_odometry_error() -> None:
     slipping, holding, turn = CovarianceEstimator(), CovarianceEstimator(), Pose2(0.0, 0.0, 0.3)
     for _ in range(200):
         slipping.compare(Pose2(0.2, 0.0, 0.0), Pose2(0.25, 0.0, 0.02))

@@ -18,8 +18,8 @@ def scanned(pose: Pose2) -> View:
 
 
 @pytest.mark.parametrize("pose", PLACES)
-def test_the_place_that_fits_best_is_where_the_scan_was_taken(pose: Pose2) -> None:
-    poses, fits = GlobalSearch(grid()).search(scanned(pose))
+def test_best_match_is_the_true_pose(pose: Pose2) -> None:
+    poses, fits = GlobalSearch(grid()).places(scanned(pose))
     off = pose.between(Pose2(*poses[0].tolist()))
     assert np.hypot(off.x, off.y) < 0.1
     assert abs(off.yaw) < 0.03
@@ -29,7 +29,7 @@ def test_the_place_that_fits_best_is_where_the_scan_was_taken(pose: Pose2) -> No
 
 
 @pytest.mark.parametrize("pose", PLACES)
-def test_a_robot_that_is_told_a_place_half_a_meter_off_is_found_nearby(pose: Pose2) -> None:
+def test_search_near_a_wrong_estimate_finds_the_pose(pose: Pose2) -> None:
     estimate = np.array(pose.compose(Pose2(0.4, -0.3, 0.2)))
     poses, fits = GlobalSearch(grid()).search_near(scanned(pose), estimate)
     off = pose.between(Pose2(*poses[0].tolist()))
@@ -45,20 +45,20 @@ def test_the_same_view_gives_the_same_places_bit_for_bit() -> None:
     assert np.array_equal(first[1], again[1])
 
 
-def test_nothing_seen_finds_nothing() -> None:
-    poses, fits = GlobalSearch(grid()).search(View(np.empty(0, dtype=np.complex128), np.empty(0, dtype=np.complex128)))
+def test_empty_scans_find_no_pose() -> None:
+    poses, fits = GlobalSearch(grid()).places(View(np.empty(0, dtype=np.complex128), np.empty(0, dtype=np.complex128)))
     assert poses.shape == (0, 3)
     assert fits.shape == (0,)
 
 
-def test_places_that_are_near_to_each_other_are_one() -> None:
+def test_nearby_matches_are_merged() -> None:
     poses = np.array([[0, 0, 0.0], [0.3, 0, 0.1], [0.3, 0, 1.0], [2, 0, 0], [0.1, 0, 2 * np.pi - 0.05]])
     kept, scores = distinct(poses, np.array([0.5, 0.9, 0.1, 0.2, 0.6]), 10)
     assert kept[:, 0].tolist() == [0.3, 2.0, 0.3]
     assert scores.tolist() == [0.9, 0.2, 0.1]
 
 
-def test_the_memory_holds_the_last_meters_about_where_the_base_is() -> None:
+def test_scan_memory_contains_the_last_meters() -> None:
     memory, view = ScanMemory(), scanned(PLACES[0])
     for meter in np.arange(0.0, 20.0, 0.5):
         memory.add(scan(np.full(8, 2.0)), Pose2(float(meter), 0.0, 0.0), 0.0, 100.0)

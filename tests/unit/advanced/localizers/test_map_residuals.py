@@ -41,13 +41,13 @@ def test_beams_count_for_what_they_are_off_by_as_far_as_the_map_explains_them(aw
     assert misfit(WALL - away) == pytest.approx((share, (share * away / SIGMA) ** 2), rel=1e-3)
 
 
-def test_a_person_far_from_any_wall_makes_nothing_wrong_but_is_not_explained() -> None:
+def test_person_far_from_walls_counts_as_unexplained() -> None:
     found = misfit(WALL, 2.0)
     assert found is not None
     assert found.explained == pytest.approx(explained(0.0) / 2)
     assert found.mean_square == pytest.approx(0.0, abs=1e-9)
 
 
-def test_of_what_the_map_says_nothing_nothing_is_told() -> None:
+def test_unknown_space_gives_no_residuals() -> None:
     assert misfit(WALL, beyond=True) is None
     assert misfit(10.0) is None

@@ -53,7 +53,7 @@ def test_a_scan_that_hardly_touches_the_map_counts_for_nothing_even_if_that_fits
     assert asked(poses, 2, 0, 30)[0] == 0.0
 
 
-def test_what_touches_the_map_with_some_of_its_beams_counts_in_part() -> None:
+def test_partly_mapped_scan_has_partial_weight() -> None:
     exponent, _ = asked(NEAR, 10, 0, 10)
     assert exponent == pytest.approx(4 / 7, abs=1e-9)
 
@@ -70,7 +70,7 @@ def test_beams_that_hit_nothing_stay_when_some_of_the_others_are_left_out() -> N
 
 
 @pytest.mark.parametrize("count", [500, 700])
-def test_of_many_particles_some_are_asked(count: int) -> None:
+def test_map_trust_uses_a_sample_of_many_particles(count: int) -> None:
     """Whether or not it is known where the beams end at all of them."""
     rng = np.random.default_rng(3)
     poses = rng.normal((0.0, 0.0, 0.0), (0.1, 0.1, 0.02), (count, 3))
@@ -80,7 +80,7 @@ def test_of_many_particles_some_are_asked(count: int) -> None:
     assert (worth.exponent, worth.fitting) == (alone.exponent, alone.fitting)
 
 
-def test_where_beams_end_is_told_of_the_poses_that_are_asked_for() -> None:
+def test_beam_ends_are_computed_for_the_requested_poses() -> None:
     grid = OccupancyGrid(np.full((80, 80), FREE, dtype=np.int8), 0.1, Pose2(-4.0, -4.0, 0.0))
     field, beams = obstacle_field(grid, 2.0), beams_to(np.array([1.0 + 1.0j, -2.0 + 0.3j]))
     here, there = np.zeros((1, 3)), np.array([[0.5, 0.0, 0.0]])

@@ -25,7 +25,7 @@ def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
     return subject.particles.poses
 
 
-def test_some_particles_move_as_odometry_says_where_scans_show_no_motion() -> None:
+def test_some_particles_follow_odometry_if_scans_show_no_motion() -> None:
     """People who walk beside a robot look like a room that moves with it."""
     poses = poses_after(Pose2(0.0, 0.0, 0.0), Pose2(1.0, 0.0, 0.0))
     by_odometry = np.hypot(poses[:, 0], poses[:, 1]) > 0.1

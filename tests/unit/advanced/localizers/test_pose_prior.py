@@ -24,13 +24,13 @@ def far(sure: PosePrior, base: Pose2, off: Array) -> float:
     return float(sure.negative_log_likelihood((sure.expected(base) + off)[None], base)[0])
 
 
-def test_it_is_expected_where_its_scans_say_that_it_went() -> None:
+def test_expected_pose_follows_matched_scans() -> None:
     assert SURE.expected(NOW) == pytest.approx([7.0, 6.0, 0.3])
     assert far(SURE, NOW, np.zeros(3)) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("off", [(0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.1), (0.2, -0.1, 0.05)])
-def test_errors_of_steps_add_up_as_they_do_for_many_robots_that_go_the_same_way(off: tuple[float, ...]) -> None:
+def test_step_errors_accumulate_as_in_simulation(off: tuple[float, ...]) -> None:
     rng, base, sure = (
         np.random.default_rng(1),
         THEN,
@@ -58,7 +58,7 @@ def test_errors_of_steps_add_up_as_they_do_for_many_robots_that_go_the_same_way(
     ],
     ids=["unseen", "torn", "a corridor without an end"],
 )
-def test_where_scans_do_not_tell_the_next_step_errs_as_the_last_one(
+def test_step_errors_are_correlated_without_scan_matches(
     axis: int, way: ObservedMotion, drift: tuple[float, float, float]
 ) -> None:
     """Twice as far leads twice as far astray; errors by chance lead √2 as far, and those of a step count besides."""
@@ -73,7 +73,7 @@ def test_where_scans_do_not_tell_the_next_step_errs_as_the_last_one(
     [(0.25, 0.0, False), (0.16, -0.09, False), (0.05, -0.2, True), (0.5, 0.25, True), (0.0, -0.08, False)],
     ids=["agreed", "wheels slip", "people walk along", "people come towards it", "hardly apply_step"],
 )
-def test_scans_that_differ_by_more_than_wheels_slip_show_what_goes_along(seen: float, torn: float, led: bool) -> None:
+def test_scan_difference_beyond_slip_indicates_moving_surroundings(seen: float, torn: float, led: bool) -> None:
     assert (
         ObservedMotion(
             disagreement=Pose2(torn, 0.0, 0.0), step=Step(Pose2(seen, 0.0, 0.0), np.zeros((3, 3)))
@@ -82,5 +82,5 @@ def test_scans_that_differ_by_more_than_wheels_slip_show_what_goes_along(seen: f
     )
 
 
-def test_wheels_alone_are_not_contradicted() -> None:
+def test_odometry_without_scans_is_accepted() -> None:
     assert not ObservedMotion(disagreement=Pose2(1.0, 0.0, 0.0)).is_scene_moving

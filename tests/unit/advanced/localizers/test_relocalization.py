@@ -53,26 +53,26 @@ def found(
     return places
 
 
-def test_a_robot_that_is_half_a_meter_off_is_put_where_its_last_meters_fit() -> None:
+def test_wrong_pose_is_corrected_by_recent_scans() -> None:
     (place,) = found(OFF)
     assert np.hypot(place[0], place[1]) < 0.1
     assert abs(place[2]) < 0.03
 
 
 @pytest.mark.parametrize("off", [Pose2(0, 0, 0), Pose2(0.05, -0.05, 0.02)])
-def test_a_robot_that_knows_its_place_is_left_there(off: Pose2) -> None:
+def test_certain_pose_is_not_corrected(off: Pose2) -> None:
     assert found(off) == []
 
 
 @pytest.mark.parametrize("apart", [0.25, 1.0], ids=["dense", "sparse"])
-def test_a_robot_that_believes_to_be_off_the_map_is_found_when_it_is_back(apart: float) -> None:
+def test_robot_returning_to_the_map_is_relocalized(apart: float) -> None:
     """The distance driven outside the map counts, not the number of scans."""
     place = found(Pose2(40.0, 3.0, 0.7), apart=apart, way=11.0, turn=0.5)[0]
     assert np.hypot(place[0], place[1]) < 0.1
     assert abs(place[2]) < 0.03
 
 
-def test_particles_that_settle_elsewhere_than_the_robot_was_told_are_put_back_if_what_it_saw_fits_there() -> None:
+def test_particles_return_to_the_initial_pose_if_scans_fit_there() -> None:
     """Until 1.5 m were driven nobody asked, and then only for a place that fits 0.82."""
     place = found(Pose2(0.9, -0.5, 0.1), way=0.3, settling=4.0)[0]
     assert np.hypot(place[0], place[1]) < 0.15
@@ -80,19 +80,17 @@ def test_particles_that_settle_elsewhere_than_the_robot_was_told_are_put_back_if
 
 
 @pytest.mark.parametrize(("off", "places"), [(Pose2(0.9, -0.5, 0.1), 1), (Pose2(0.3, 0.2, 0.05), 0)])
-def test_where_the_map_shows_little_particles_do_not_go_where_it_fits_less_than_where_it_was_told(
-    off: Pose2, places: int
-) -> None:
+def test_particles_stay_at_the_initial_pose_on_a_sparse_map(off: Pose2, places: int) -> None:
     """They were drawn 4.9 m off by the few beams that the map shows, of a robot that saw how it went."""
     put = found(off, way=0.3, settling=4.0, map_=corner_of_the_map())
     assert [np.abs(place).max() < 1e-9 for place in put[:1]] == [True] * places
 
 
-def test_what_was_told_counts_for_the_settling_distance_only() -> None:
+def test_initial_pose_counts_only_for_the_settling_distance() -> None:
     assert found(Pose2(0.9, -0.5, 0.1), way=0.3, settling=0.0) == []
 
 
-def test_a_robot_is_moved_far_only_when_searches_agree_over_two_meters() -> None:
+def test_large_correction_needs_agreeing_searches_over_two_meters() -> None:
     """Within 0.7 m, on a floor that was rebuilt, what was seen fitted a room 11 m away by chance."""
     away = Pose2(3.0, 2.0, 2.5)
     assert found(away, way=3.0) == []
@@ -101,7 +99,7 @@ def test_a_robot_is_moved_far_only_when_searches_agree_over_two_meters() -> None
 
 
 @pytest.mark.parametrize(("parted", "found_again"), [(True, True), (False, False)])
-def test_a_robot_that_saw_itself_carried_off_forgets_where_it_was(parted: bool, found_again: bool) -> None:
+def test_detected_kidnapping_clears_the_scan_memory(parted: bool, found_again: bool) -> None:
     """What it saw there would lie beside what it sees here: with that, here fits no better than elsewhere."""
     trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
     finder, there, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(3.9, -0.2, 2.17), []
@@ -118,7 +116,7 @@ def test_a_robot_that_saw_itself_carried_off_forgets_where_it_was(parted: bool, 
 
 
 @pytest.mark.parametrize("carried_off", [True, False])
-def test_who_was_carried_off_is_found_by_what_is_too_little_for_who_left_the_map(carried_off: bool) -> None:
+def test_kidnapped_robot_is_relocalized_with_weaker_evidence_than_off_map(carried_off: bool) -> None:
     """Rooms that nobody mapped look like mapped ones, and who went there is there; who was carried off is anywhere."""
     trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
     finder, away, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(40.0, 3.0, 0.7), []

@@ -24,7 +24,7 @@ def stepped(guess: Pose2, before: Scan, after: Scan) -> Step | None:
 
 
 @pytest.mark.parametrize("guess", [STEP, Pose2(0.4, 0.0, 0.2), Pose2(0.2, 0.0, 0.05)])
-def test_a_step_is_seen_to_a_centimeter_although_wheels_slip(guess: Pose2) -> None:
+def test_scan_matching_measures_a_step_to_a_centimeter_despite_slip(guess: Pose2) -> None:
     step = stepped(guess, view(START), view(START.compose(STEP)))
     assert step is not None
     off = STEP.between(step.delta)
@@ -32,7 +32,7 @@ def test_a_step_is_seen_to_a_centimeter_although_wheels_slip(guess: Pose2) -> No
     assert abs(off.yaw) < 0.006
 
 
-def test_along_a_corridor_without_an_end_odometry_has_its_way() -> None:
+def test_odometry_determines_motion_along_an_endless_corridor() -> None:
     walls = np.array([(-100.0, 1.0, 100.0, 1.1), (-100.0, -1.1, 100.0, -1.0)])
     step = stepped(Pose2(0.3, 0.1, 0.0), view(Pose2(0, 0, 0), walls), view(Pose2(0.25, 0, 0), walls))
     assert step is not None
@@ -42,7 +42,7 @@ def test_along_a_corridor_without_an_end_odometry_has_its_way() -> None:
 
 
 @pytest.mark.parametrize("wheels", [0.25, 0.21, 0.3])
-def test_who_walks_before_a_robot_along_a_corridor_does_not_hold_it_back(wheels: float) -> None:
+def test_person_ahead_in_a_corridor_does_not_bias_the_match(wheels: float) -> None:
     """Scans showed 0.03 m: the wall at the end was as far as the wheels say, and outvoted by whoever is nearer."""
     corridor = (-100.0, 1.0, 9.0, 1.1), (-100.0, -1.1, 9.0, -1.0), (9.0, -1.1, 9.1, 1.1)
     before, after = (np.array([*corridor, (2.0 + gone, -0.2, 2.3 + gone, 0.2)]) for gone in (0.0, 0.25))
@@ -52,7 +52,7 @@ def test_who_walks_before_a_robot_along_a_corridor_does_not_hold_it_back(wheels:
 
 
 @pytest.mark.parametrize("ranges", [np.full(BEAMS, np.inf), np.full(BEAMS, np.nan), np.full(40, 2.0), np.empty(0)])
-def test_scans_that_show_no_surface_say_nothing(ranges: np.ndarray) -> None:
+def test_scans_without_surfaces_give_no_match(ranges: np.ndarray) -> None:
     assert stepped(STEP, scan(ranges), scan(ranges)) is None
     assert stepped(STEP, view(START), scan(ranges)) is None
 
@@ -65,7 +65,7 @@ ELSEWHERE = Pose2(3.9, -0.2, 2.4)
     [(START.compose(STEP), False), (START.compose(Pose2(0.3, 0.02, 0.4)), False), (ELSEWHERE, True)],
     ids=["as the wheels say", "wheels that slip", "elsewhere"],
 )
-def test_a_robot_that_was_carried_elsewhere_sees_nothing_again(pose: Pose2, parted: bool) -> None:
+def test_kidnapped_robot_sees_no_known_surfaces(pose: Pose2, parted: bool) -> None:
     matcher = ScanMatcher()
     matcher.step(view(START), Pose2(0, 0, 0))
     assert matcher.was_carried is None
@@ -76,7 +76,7 @@ def test_a_robot_that_was_carried_elsewhere_sees_nothing_again(pose: Pose2, part
 
 
 @pytest.mark.parametrize("ranges", [np.full(BEAMS, np.inf), np.full(40, 2.0)], ids=["blind", "coarse"])
-def test_who_sees_nothing_cannot_say_whether_it_was_carried_elsewhere(ranges: np.ndarray) -> None:
+def test_empty_scan_does_not_indicate_a_kidnapping(ranges: np.ndarray) -> None:
     matcher = ScanMatcher()
     matcher.step(scan(ranges), Pose2(0, 0, 0))
     matcher.step(scan(ranges), STEP)

@@ -34,7 +34,7 @@ def feed(subject: Localizer, steps: int, step: Pose2, rate: float | None) -> Non
 
 
 @pytest.mark.parametrize("imu", [False, True])
-def test_without_noise_it_arrives_exactly_where_the_robot_does(imu: bool) -> None:
+def test_pose_without_noise_equals_the_truth(imu: bool) -> None:
     way = drive(30.0)
     subject = ekf(Estimate(Pose2(*way.truth[0]), (0.0, 0.0, 0.0)))
     assert np.abs(errors(run(subject, way, 1, SILENT, imu=imu), way.truth)).max() < 1e-6
@@ -73,7 +73,7 @@ def test_standing_still_reveals_the_bias_of_the_gyroscope() -> None:
     assert abs(subject.belief.pose.yaw) < 3 * subject.belief.covariance[2, 2] ** 0.5
 
 
-def test_a_turn_that_the_gyroscope_corrects_bends_the_way_too() -> None:
+def test_corrected_turn_also_corrects_the_path() -> None:
     """Chords of odometry's 1 rad/s arcs, driven at the gyroscope's 0: a straight line."""
     subject = localizer(
         SlipEkf(type="slip_ekf", rotation_noise=50.0, gyro_noise=1e-5), Estimate(Pose2(0, 0, 0), (0, 0, 0)), 1
@@ -84,7 +84,7 @@ def test_a_turn_that_the_gyroscope_corrects_bends_the_way_too() -> None:
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e9])
-def test_a_broken_gyroscope_is_not_listened_to(bad: float) -> None:
+def test_broken_gyroscope_is_ignored(bad: float) -> None:
     subject = ekf(Estimate(Pose2(0, 0, 0), (0.1, 0.1, 0.1)))
     feed(subject, 40, Pose2(0.01, 0, 0), bad)
     assert subject.belief.pose == pytest.approx((0.4, 0, 0))

@@ -45,7 +45,7 @@ def turning(seconds: float = 4.0) -> Array:
     return np.tile([0.4, 0.0, 1.0], (round(seconds * RATE), 1))
 
 
-def test_wheels_that_lock_in_a_turn_are_not_believed() -> None:
+def test_locked_wheels_in_a_turn_are_detected() -> None:
     """They stand for a second in which the robot slides on: its heading stays right, and it knows of the slide."""
     truth = turning()
     claimed = truth.copy()
@@ -58,7 +58,7 @@ def test_wheels_that_lock_in_a_turn_are_not_believed() -> None:
     assert np.sqrt(np.trace(belief.covariance[:2, :2])) > 0.2  # … and the filter says so
 
 
-def test_wheels_that_spin_on_the_spot_are_not_believed_to_turn_the_robot() -> None:
+def test_spinning_wheels_do_not_turn_the_estimate() -> None:
     claimed = turning()
     truth = np.zeros_like(claimed)
     belief, error = replayed(
@@ -68,7 +68,7 @@ def test_wheels_that_spin_on_the_spot_are_not_believed_to_turn_the_robot() -> No
     assert nees(belief, error) < stats.chi2.ppf(0.999, 3)
 
 
-def test_a_lock_does_not_pass_for_the_gyroscopes_bias() -> None:
+def test_locked_wheels_do_not_change_the_gyro_bias() -> None:
     """After it, wheels and gyroscope agree as before."""
     truth = turning(8.0)
     claimed = truth.copy()
@@ -79,7 +79,7 @@ def test_a_lock_does_not_pass_for_the_gyroscopes_bias() -> None:
     assert abs(error[2]) < 4 * math.sqrt(belief.covariance[2, 2])
 
 
-def test_what_no_wheel_sees_is_forgotten_when_the_wheels_hold_again() -> None:
+def test_position_variance_stops_growing_after_slip() -> None:
     """The variance of the place grows while they slip, and hardly afterwards."""
 
     def spread(seconds: float) -> float:
@@ -94,7 +94,7 @@ def test_what_no_wheel_sees_is_forgotten_when_the_wheels_hold_again() -> None:
     assert later < 1.5 * after
 
 
-def test_a_long_stand_leaves_some_doubt_about_the_bias() -> None:
+def test_gyro_bias_variance_has_a_floor() -> None:
     """Variance floor: after ten minutes at rest a bias that wanders off is still noticed."""
     n = 600 * RATE // 10  # at 4 Hz, to be quick
     subject = localizer(SlipEkf(type="slip_ekf"), Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)

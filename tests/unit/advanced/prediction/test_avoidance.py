@@ -69,7 +69,7 @@ def crossing(t: float) -> list[Disc]:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda spec: str(spec.type))
 @pytest.mark.parametrize("discs", [oncoming, crossing])
-def test_every_controller_of_ours_passes_what_comes_towards_it_or_across(
+def test_every_controller_avoids_oncoming_and_crossing_obstacles(
     controller: ControllerSpec, discs: Callable[[float], list[Disc]]
 ) -> None:
     d = among(start(FAR, controller=controller), discs, 30.0)
@@ -77,7 +77,7 @@ def test_every_controller_of_ours_passes_what_comes_towards_it_or_across(
     assert d.min_clearance > 0.1
 
 
-def test_without_prediction_it_would_have_been_met() -> None:
+def test_without_prediction_the_robot_collides() -> None:
     d = among(start(FAR, enabled=False), oncoming, 30.0)
     assert d.min_clearance < 0.1
 
@@ -103,7 +103,7 @@ def test_a_robot_that_has_arrived_steps_aside_and_comes_back() -> None:
     assert d.commands[-1] == STOP
 
 
-def test_a_robot_that_was_told_to_stop_stays_where_it_is() -> None:
+def test_canceled_robot_does_not_evade() -> None:
     d = among(start(FAR), lambda _: [], 1.0)
     d.stack.cancel(d.tick)
     told = len(d.commands)
@@ -111,12 +111,12 @@ def test_a_robot_that_was_told_to_stop_stays_where_it_is() -> None:
     assert set(d.commands[told:]) == {STOP}
 
 
-def test_what_passes_by_leaves_no_trace_on_the_costmap() -> None:
+def test_moving_obstacle_leaves_no_trail_in_the_costmap() -> None:
     d = among(start(FAR), lambda t: [(3.0 + 0.9 * t, -3.0 + 0.8 * t, 0.4)], 6.0)
     assert {event.data["reason"] for event in d.kinds("plan.made")} == {"goal"}  # never: blocked, nor led around it
 
 
-def test_where_nothing_moves_switching_it_off_changes_nothing() -> None:
+def test_prediction_has_no_effect_without_moving_obstacles() -> None:
     """But for the first moments, in which a fast robot cannot know yet."""
     world = Flatland(discs=[(2.0, 0.3, 0.3), (4.0, -0.3, 0.2), (2.5, 3.0, 0.05)])
     slow, near = RegulatedPurePursuit(desired_linear_vel=0.5), Goal("near", Pose2(3.5, 0.5), xy_tolerance=0.3)
@@ -126,9 +126,7 @@ def test_where_nothing_moves_switching_it_off_changes_nothing() -> None:
 
 
 @pytest.mark.parametrize("robot", [box_robot(), box_robot(length=1.0, width=0.4)], ids=["all but round", "long"])
-def test_what_looks_at_the_cheapest_ways_only_finds_the_way_that_is_cheapest_of_all(
-    robot: RobotModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pruned_search_finds_the_cheapest_candidate(robot: RobotModel, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(2)
     costmap = CostmapView(np.zeros((200, 200), np.uint8), np.full((200, 200), 2.0, np.float32), 0.05, (-5.0, -5.0))
     costmap.distance[:, 120:] = np.maximum(2.0 - 0.05 * np.arange(80), 0.0)

@@ -46,7 +46,7 @@ def least(heed: str, controller: str = "regulated_pure_pursuit") -> float:
     return nearest
 
 
-def test_where_nobody_heeds_what_is_predicted_it_is_met() -> None:
+def test_without_any_use_of_prediction_the_robot_collides() -> None:
     assert least("nobody") < 0.0
 
 
@@ -55,5 +55,5 @@ def test_the_collision_monitor_alone_brakes_for_it() -> None:
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
-def test_each_controller_alone_lets_it_pass(controller: str) -> None:
+def test_each_controller_alone_avoids_the_crossing_obstacle(controller: str) -> None:
     assert least("controller", controller) > 0.0

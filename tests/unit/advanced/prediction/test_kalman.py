@@ -8,7 +8,7 @@ from filterpy.kalman import KalmanFilter
 from simscen.advanced.prediction.tracks import ConstantVelocityFilter
 
 
-def test_it_is_filterpys_filter_of_either_axis() -> None:
+def test_point_filter_matches_filterpy_per_axis() -> None:
     rng = np.random.default_rng(3)
     seconds, acceleration = 0.1, 1.5
     state, covariance = rng.normal(size=4), np.kron([[0.1, 0.02], [0.02, 1.5]], np.eye(2))

@@ -29,7 +29,7 @@ def cost_at(view: CostmapView, x: float, y: float) -> int:
 
 
 @pytest.mark.parametrize("resolution", [0.05, 0.03, 0.25])
-def test_what_crosses_is_marked_where_it_will_be_when_the_robot_gets_there(resolution: float) -> None:
+def test_crossing_obstacle_is_marked_at_its_predicted_position(resolution: float) -> None:
     """It stands at (2, 2) and crosses the robot's way, 2 m ahead, in 2 s: the robot is there then."""
     view = add_predicted_costs(ground(crossing(2.0, 2.0, -1.0), resolution), ROBOT, SPEED, RADIUS)
     assert cost_at(view, 2.0, 0.0) > 50
@@ -39,7 +39,7 @@ def test_what_crosses_is_marked_where_it_will_be_when_the_robot_gets_there(resol
     assert view.costs.max() < 253  # dear, never shut
 
 
-def test_nothing_is_marked_where_nothing_moves_or_too_far_off_to_tell() -> None:
+def test_no_cost_is_added_for_static_or_distant_obstacles() -> None:
     still = ground(NO_MOVING_OBSTACLES)
     assert add_predicted_costs(still, ROBOT, SPEED, RADIUS) is still
     far = ground(crossing(5.0, 5.0, -1.0))
@@ -48,7 +48,7 @@ def test_nothing_is_marked_where_nothing_moves_or_too_far_off_to_tell() -> None:
     assert add_predicted_costs(beside, Pose2(40.0, 0.0), SPEED, RADIUS) is beside
 
 
-def test_a_plan_passes_behind_who_would_be_there_first() -> None:
+def test_plan_passes_behind_an_obstacle_that_arrives_first() -> None:
     for vy in (-1.0, 1.0):
         view = add_predicted_costs(ground(crossing(2.0, -1.6 * vy, vy)), ROBOT, SPEED, RADIUS)
         points = OmplPlanner(Spec(), round_robot(RADIUS)).plan(view, ROBOT, Pose2(4.5, 0.0), 1).points
@@ -57,7 +57,7 @@ def test_a_plan_passes_behind_who_would_be_there_first() -> None:
         assert np.abs(beside).min() > 0.3
 
 
-def test_a_way_meets_what_will_be_there_then_and_nothing_else() -> None:
+def test_path_meets_only_obstacles_at_their_predicted_time() -> None:
     way = [complex(x) for x in np.linspace(0.1, 4.5, 45)]
     assert meets_moving_obstacle(crossing(2.0, 2.0, -1.0), ROBOT, way, SPEED, RADIUS)
     assert not meets_moving_obstacle(crossing(2.0, 2.0, 1.0), ROBOT, way, SPEED, RADIUS)

@@ -20,13 +20,13 @@ def ended(*tracks: Track) -> list[bool]:
     return [going.has_ended(each, each.last_update_tick, list(tracks), lambda _: True) for each in tracks]
 
 
-def test_what_never_again_stands_where_it_was_free_is_a_wall_that_comes_into_view_and_followed_no_more() -> None:
-    slides, comes = [True] + [False] * MAX_NOT_APPEARED, [True] * 4 + [False] * (MAX_NOT_APPEARED - 1) + [True]
+def test_track_that_is_no_longer_in_free_space_ends() -> None:
+    slides, comes = [True] + [False] * UNCOME, [True] * 4 + [False] * (UNCOME - 1) + [True]
     assert ended(track(*slides)) == [True]
     assert ended(track(*comes)) == [False]
 
 
-def test_beside_something_that_moves_it_is_followed_on_for_that_may_have_hidden_the_place() -> None:
-    beside = track(*[True] * (MAX_NOT_APPEARED + 1))
-    beside.is_moving = True
-    assert ended(track(True, *[False] * MAX_NOT_APPEARED), beside) == [False, False]
+def test_track_next_to_a_moving_obstacle_continues() -> None:
+    beside = track(*[True] * (UNCOME + 1))
+    beside.moving = True
+    assert ended(track(True, *[False] * UNCOME), beside) == [False, False]

@@ -106,7 +106,7 @@ def test_the_covariance_covers_the_error() -> None:
     assert np.mean(values) < 3.0
 
 
-def test_what_goes_behind_a_pillar_comes_out_as_the_same_and_what_is_gone_is_forgotten() -> None:
+def test_occluded_track_is_kept_and_vanished_track_ends() -> None:
     pillar = Flatland(discs=[(2.0, 0.0, 0.35)])
     watch = Watch(crossing, walls=pillar).run(1.5)
     assert len(watch.tracker.moving) == 1
@@ -119,28 +119,28 @@ def test_what_goes_behind_a_pillar_comes_out_as_the_same_and_what_is_gone_is_for
     assert len(watch.tracker.moving) == 0
 
 
-def test_what_stops_is_a_thing_like_any_other_a_moment_later() -> None:
+def test_stopped_obstacle_becomes_static() -> None:
     watch = Watch(lambda t: [(4.0, -3.0 + 1.2 * min(t, 2.0), 0.5)]).run(1.8)
     assert len(watch.tracker.moving) == 1
     watch.run(3.0)
     assert len(watch.tracker.moving) == 0
 
 
-def test_what_comes_at_a_walk_is_told_before_it_is_a_meter_away() -> None:
+def test_approaching_obstacle_is_reported_before_one_meter() -> None:
     """At 0.45 m/s, head on, as another robot does; seen to move by its way of a second rather than by its speed now."""
     watch = Watch(lambda t: [(4.0 - 0.45 * t, 0.1, 0.22)], view=FULL, beams=360).run(2.5)
     assert len(watch.tracker.moving) == 1
     assert watch.tracker.moving.velocities[0] == pytest.approx([-0.45, 0.0], abs=0.15)
 
 
-def test_of_another_robot_only_the_mast_is_seen_and_its_body_is_kept_off() -> None:
+def test_reported_radius_covers_the_body_behind_a_visible_mast() -> None:
     """Three beams of a degree hit it, two meters away."""
     watch = Watch(lambda t: [(4.0 - 0.5 * t, 0.1, 0.06)], view=FULL, beams=360).run(5.0)
     assert len(watch.tracker.moving) == 1
     assert watch.tracker.moving.radii[0] >= 0.25
 
 
-def test_what_turns_round_is_told_though_it_comes_back_to_where_it_was_first_seen() -> None:
+def test_turning_obstacle_is_reported() -> None:
     """It creeps away, and so is not told at first, and then comes back faster."""
 
     def there_and_back(t: float) -> list[Disc]:
@@ -151,7 +151,7 @@ def test_what_turns_round_is_told_though_it_comes_back_to_where_it_was_first_see
     assert watch.tracker.moving.velocities[0, 1] < -0.5
 
 
-def test_what_is_only_ever_half_seen_at_the_edge_of_the_view_is_told_when_it_has_gone_far() -> None:
+def test_partly_visible_obstacle_is_reported_after_a_long_distance() -> None:
     """It goes beside the robot, as fast as that: no beam ever was where it came from."""
     base = lambda t: Pose2(1.5 * t, 0.0)  # noqa: E731
     edge = math.radians(135.0)
@@ -182,12 +182,12 @@ def tour(t: float) -> Pose2:
 
 
 @pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
-def test_nothing_moves_in_a_room_that_stands_while_the_robot_drives_and_turns(view: float, beams: int) -> None:
+def test_no_motion_is_reported_in_a_static_room(view: float, beams: int) -> None:
     assert claims(Watch(lambda _: [], tour, walls=room(), view=view, beams=beams), 12.0) == 0
 
 
 @pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
-def test_nothing_moves_while_odometry_drifts(view: float, beams: int) -> None:
+def test_no_motion_is_reported_with_odometry_drift(view: float, beams: int) -> None:
     """By 5 % of the way and 1 % of each turn, at 2 rad/s: more than wheels with a gyroscope do."""
 
     def drifted(t: float) -> Pose2:
@@ -197,7 +197,7 @@ def test_nothing_moves_while_odometry_drifts(view: float, beams: int) -> None:
     assert claims(Watch(lambda _: [], tour, drifted, walls=room(), view=view, beams=beams), 12.0) == 0
 
 
-def test_posts_beside_a_fast_way_do_not_move_while_wheels_slip_by_a_tenth() -> None:
+def test_no_motion_of_posts_is_reported_with_wheel_slip() -> None:
     """Where a post is, a beam went by before that by odometry went just where the post stands."""
     rng = np.random.default_rng(3)
     posts = Flatland()
@@ -214,14 +214,14 @@ def test_posts_beside_a_fast_way_do_not_move_while_wheels_slip_by_a_tenth() -> N
 
 
 @pytest.mark.parametrize("gap", [0.4, 0.55, 0.7])
-def test_what_is_put_down_before_a_row_of_posts_and_taken_away_again_does_not_hop_to_the_next(gap: float) -> None:
+def test_track_of_a_removed_object_does_not_jump_to_a_post(gap: float) -> None:
     """It has stood where it was free, and a post stands within reach of where a track without speed may be."""
     posts = Flatland(discs=[(3.0 + 0.05 * k, gap * k, 0.1) for k in range(1, 8)])
     watch = Watch(lambda t: [(3.0, 0.0, 0.1)] if 1.0 <= t < 2.0 else [], walls=posts)
     assert claims(watch, 4.0) == 0
 
 
-def test_posts_do_not_move_when_the_robot_skids_aside_and_its_wheels_do_not_know() -> None:
+def test_no_motion_of_posts_is_reported_when_the_robot_skids() -> None:
     """By 0.12 m within half a second, there and back, while it swings: nearly all of them stand where it was free."""
     rng = np.random.default_rng(39)
     posts = Flatland()
@@ -238,7 +238,7 @@ def test_posts_do_not_move_when_the_robot_skids_aside_and_its_wheels_do_not_know
     assert claims(Watch(lambda _: [], swinging, skidding, walls=posts), 8.0) == 0
 
 
-def test_the_last_piece_of_a_scan_is_as_near_as_its_last_hit() -> None:
+def test_last_segment_of_a_scan_has_the_range_of_its_last_hit() -> None:
     ranges, step = np.array([50.0] * 10 + [2.0, 1.95, 1.9]), 0.01
     found = runs(valid_hits(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0))
     (piece,) = clusters(found, ranges, 0.0, step, 1.0)
@@ -247,7 +247,7 @@ def test_the_last_piece_of_a_scan_is_as_near_as_its_last_hit() -> None:
     assert abs(piece.center) == pytest.approx(1.9 + piece.radius)
 
 
-def test_hits_that_are_in_one_run_are_never_told_beforehand_to_be_in_several() -> None:
+def test_quick_check_never_separates_hits_of_one_segment() -> None:
     rng, step, told = np.random.default_rng(4), math.radians(1.0), list[tuple[bool, bool]]()
     for _ in range(400):
         ranges = np.repeat(rng.uniform(1.0, 6.0, 18), 4) + rng.normal(0.0, 0.04, 72)
@@ -261,7 +261,7 @@ def test_hits_that_are_in_one_run_are_never_told_beforehand_to_be_in_several() -
     assert min(told.count((True, True)), told.count((False, False))) > 50
 
 
-def test_who_looks_at_all_beams_at_once_tells_what_he_tells_who_looks_at_some_of_them_first() -> None:
+def test_sparse_and_full_beam_tests_give_the_same_tracks() -> None:
     """After a scan in which something had appeared all are looked at; wires appear at many scans."""
     rng = np.random.default_rng(2)
     wires = Flatland(discs=[(6 * rng.random() + 1, 2.2 * (-1) ** k * (0.5 + rng.random()), 0.002) for k in range(30)])
@@ -285,7 +285,7 @@ def test_who_looks_at_all_beams_at_once_tells_what_he_tells_who_looks_at_some_of
     assert 10 < sum(map(bool, found)) < 100
 
 
-def test_a_scan_that_is_garbage_moves_nothing_and_breaks_nothing() -> None:
+def test_garbage_scan_creates_no_tracks() -> None:
     tracker = Tracker(Prediction(), RATE)
     rng = np.random.default_rng(1)
     for k in range(20):
@@ -307,6 +307,6 @@ def test_a_circle_that_is_seen_in_part_is_found_from_half_its_radius_off(seen: f
 
 
 @pytest.mark.filterwarnings("error")
-def test_too_close_returns_say_nothing_about_moving_obstacles() -> None:
-    moving = [Watch(crossing, covered=value).run(3.0).tracker.moving.obstacles for value in (-np.inf, np.nan)]
+def test_too_close_returns_are_ignored() -> None:
+    moving = [Watch(crossing, covered=value).run(3.0).tracker.moving.things for value in (-np.inf, np.nan)]
     assert moving[0] == moving[1] != ()

@@ -27,5 +27,5 @@ def test_a_cell_limits_as_nav2s_speed_filter_says(value, how, limit):
     assert limits(value, **how).at(Pose2(1.0, 1.0), 0.5) == (None if limit is None else pytest.approx(limit))
 
 
-def test_nothing_is_limited_off_the_mask():
+def test_no_limit_outside_the_mask():
     assert limits(40).at(Pose2(3.0, 1.0), 0.5) is None

@@ -8,7 +8,7 @@ from simscen.core.geometry import Pose2
 @pytest.mark.parametrize(
     ("cell", "finest", "expected"), [(0.2, 0.05, 0.05), (0.18, 0.05, 0.045), (0.02, 0.05, 0.02), (0.4, 0.2, 0.2)]
 )
-def test_a_coarse_map_is_split_into_whole_parts_and_means_what_it_meant(cell, finest, expected):
+def test_coarse_map_is_split_into_equal_cells(cell, finest, expected):
     rng = np.random.default_rng(2)
     coarse = OccupancyGrid(rng.choice([0, 40, 100, -1], (12, 9)).astype(np.int8), cell, Pose2(1, 2, 0.3))
     fine = coarse.refined(finest)

@@ -22,7 +22,7 @@ def any_path(rng: np.random.Generator) -> MotionPath:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_each_is_where_it_is_when_it_is_asked_alone(seed: int) -> None:
+def test_batch_sampling_equals_single_sampling(seed: int) -> None:
     rng = np.random.default_rng(seed)
     each = [(any_path(rng), float(height)) for height in rng.uniform(0, 1, 30)]
     ticks = np.arange(0, 6 * 480, 6)[:, np.newaxis] - rng.integers(0, 240, len(each))

@@ -24,7 +24,7 @@ PLACES = ((1, 1), (1, -1), (-1, 1), (-1, -1))
     ],
     ids=["ahead", "to the left", "turning left", "diagonally"],
 )
-def test_the_wheels_turn_the_way_that_everyone_knows(motion, signs):
+def test_mecanum_wheels_have_the_usual_directions(motion, signs):
     assert tuple(round(math.copysign(1, w)) if abs(w) > 1e-9 else 0 for w in YOUBOT.speeds(motion)) == signs
 
 
@@ -53,6 +53,6 @@ def test_the_encoders_give_back_the_motion(vx, vy, wz, angle):
     assert wheels.motion(wheels.speeds(Twist(vx, vy, wz))) == pytest.approx((vx, vy, wz), abs=1e-9)
 
 
-def test_a_wheel_that_fights_the_others_moves_nothing():
+def test_inconsistent_wheel_speeds_give_no_motion():
     """One direction of the four speeds is no motion at all: the pseudo-inverse leaves it out."""
     assert YOUBOT.motion((1.0, 1.0, -1.0, -1.0)) == pytest.approx((0, 0, 0), abs=1e-12)

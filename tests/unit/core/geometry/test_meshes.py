@@ -29,7 +29,7 @@ def test_a_cube_is_convex_of_any_size_and_with_a_corner_drawn_out(scale):
     assert is_convex(Mesh(CORNERS * scale, np.vstack((FACES, [(0, 0, 1)])).astype(np.int32))), "a face without area"
 
 
-def test_what_is_pushed_in_or_turned_inside_out_is_not_convex():
+def test_dented_or_inverted_mesh_is_not_convex():
     assert not is_convex(Mesh(CORNERS, FACES[:, ::-1]))
     assert not is_convex(cube(out=-0.1))
     assert not is_convex(cube(corner=(1.5, 1.5, 1.5)))

@@ -131,7 +131,7 @@ def test_a_track_is_where_its_path_is_bit_for_bit(mode, ease):
 
 @pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
 @pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
-def test_nothing_strays_farther_from_its_ways_than_they_say(ease, mode):
+def test_motion_stays_within_the_stated_distance_of_its_path(ease, mode):
     rng = random.Random(5)
     strayed = []
     for _ in range(20):

@@ -26,7 +26,7 @@ L = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))
         (((0, 0), (1e-9, 0), (0, 1e-9)), "encloses no area"),
     ],
 )
-def test_what_is_wrong_with_a_ring_is_said(ring, expected):
+def test_invalid_ring_has_a_reason(ring, expected):
     assert polygon_defect(ring) == expected
 
 

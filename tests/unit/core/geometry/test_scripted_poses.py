@@ -10,7 +10,7 @@ from simscen.core.geometry.scripted_poses import PredictedPoses
 
 
 @pytest.mark.parametrize("distance", [0.5, 8.0, 20.0, math.inf])
-def test_those_are_far_that_are_so_at_each_of_the_ticks(distance: float) -> None:
+def test_object_is_far_only_if_far_at_every_tick(distance: float) -> None:
     rng, names = np.random.default_rng(5), tuple(f"cart {number}" for number in range(40))
     table = rng.normal(0, 3, (20, 40, 7)) + rng.normal(0, 12, (40, 7))
     predicted = PredictedPoses(range(20), names, table, {name: Pose3() for name in ("shelf", *names)})

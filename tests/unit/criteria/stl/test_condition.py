@@ -60,7 +60,7 @@ def refused(words):
         ),
     ],
 )
-def test_what_cannot_be_meant_is_refused(words, why):
+def test_invalid_condition_is_refused(words, why):
     assert refused(words).startswith(why)
 
 
@@ -78,7 +78,7 @@ def test_what_cannot_be_meant_is_refused(words, why):
         ("collision_count", ">=", 0, "never below 0, so `>= 0` is always true"),
     ],
 )
-def test_what_every_run_or_none_fulfils_is_no_condition(signal, op, value, why):
+def test_trivial_condition_is_refused(signal, op, value, why):
     assert refused({"signal": signal, "op": op, "value": value}) == f"`{signal}` is {why}"
 
 
@@ -93,7 +93,7 @@ def test_what_every_run_or_none_fulfils_is_no_condition(signal, op, value, why):
         ("yaw_rate", ">", -50),
     ],
 )
-def test_a_bound_at_the_edge_of_what_can_be_is_one(signal, op, value):
+def test_bound_at_the_limit_of_the_range_is_valid(signal, op, value):
     assert Condition.model_validate({"signal": signal, "op": op, "value": value}).value == value
 
 
@@ -121,7 +121,7 @@ def test_a_condition_knows_its_comparisons_in_the_order_they_are_written():
     assert [one.signal for one in Condition.model_validate({"eventually": NEAR}).comparisons()] == ["clearance"]
 
 
-def test_what_a_signal_is_about_goes_by_the_keys_of_the_language():
+def test_signal_arguments_use_the_keys_of_the_language():
     assert Condition.model_validate({"signal": "in_collision", "with": "box"}).arguments == {"with": "box"}
     assert Condition.model_validate({"signal": "in_region", "region": "dock"}).arguments == {"region": "dock"}
     assert Condition.model_validate({"signal": "in_collision"}).arguments == {}
@@ -137,7 +137,7 @@ def test_what_a_signal_is_about_goes_by_the_keys_of_the_language():
         ({"between": [1, 2]}, (1.0, 2.0)),
     ],
 )
-def test_a_window_is_a_stretch_ahead(words, stretch):
+def test_window_is_an_interval_ahead(words, stretch):
     assert Window.model_validate(words).interval == stretch
 
 

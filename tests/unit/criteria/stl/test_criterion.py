@@ -46,7 +46,7 @@ def test_the_clearance_is_searched_for_half_a_meter_beyond_the_largest_bound_on_
     assert criterion(words).clearance_range == meters
 
 
-def test_it_needs_what_its_signals_need_and_objects_only_for_what_is_about_one():
+def test_temporal_criterion_needs_the_evidence_of_its_signals():
     assert criterion({"always": SLOW}).evidence == {Evidence.TRUTH, Evidence.VELOCITY}
     both = criterion({"until": {"hold": SLOW, "release": HURT}})
     assert both.evidence == {Evidence.TRUTH, Evidence.VELOCITY, Evidence.CONTACTS}
@@ -113,7 +113,7 @@ def test_a_finding_tells_the_deciding_moment_its_place_and_its_signal():
 GOAL = {"goals": [{"name": "a", "pose": [2.5, 0, 0]}]}
 
 
-def test_an_answer_of_yes_or_no_has_no_value():
+def test_boolean_signal_has_no_value():
     finding = found({"always": {"not": HURT}}, STILL)
     assert (finding.measured, finding.limit, finding.value) == ("no", "no", None)
 
@@ -130,7 +130,7 @@ def test_a_signal_that_was_not_recorded_leaves_it_undecided():
     assert (finding.status, finding.measured) == (Status.INCONCLUSIVE, "no covariance was recorded")
 
 
-def test_when_each_note_was_is_told():
+def test_notes_have_times():
     answer = {"whenever": {**FAR, "op": "<"}, "then": HURT}
     trace = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": [[0, 9], [2, 9], [2.025, 1], [4, 1]]}
     finding = found(answer, trace)

@@ -35,7 +35,7 @@ LOST = {"not": {"signal": "localized"}}
         ({"whenever": NEAR, "then": LOST}, "whenever clearance < 0.5 m, then not localized"),
     ],
 )
-def test_a_condition_is_told_as_it_is_meant(condition, told):
+def test_condition_description_is_readable(condition, told):
     assert describe(Condition.model_validate(condition)) == told
 
 

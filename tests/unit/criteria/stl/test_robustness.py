@@ -20,7 +20,7 @@ from simscen.judge.evaluation import judge
 
 @settings(deadline=None)
 @given(FORMULAS, VALUES, st.data())
-def test_what_is_decided_stays_so_however_the_run_would_have_gone_on(formula, p, data):
+def test_decided_verdict_holds_for_every_continuation(formula, p, data):
     """The interval of a short run holds the value of every continuation of it."""
     q = data.draw(st.lists(NUMBERS, min_size=len(p), max_size=len(p)))
     more = horizon(formula) + 1

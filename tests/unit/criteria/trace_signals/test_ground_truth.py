@@ -79,7 +79,7 @@ def at_half_seconds(xy, placed=()):
     return replace(synthetic_trace({"seconds": len(xy) / 2, "truth": [[0, 0, 0]], "events": events}), truth=truth)
 
 
-def test_trembling_is_no_drive_and_small_moves_add_up_to_one():
+def test_small_motions_count_when_they_add_up():
     still = at_half_seconds([(0, 0), (0.0078125, 0), (0, 0), (0, 0.0078125), (0, 0)])
     assert drive(still).length == 0.0
     creeping = drive(at_half_seconds([(0.0078125 * k, 0) for k in range(9)]))
@@ -105,7 +105,7 @@ def test_the_way_until_a_moment_is_what_was_left_behind_by_then():
     assert [way.until(tick) for tick in (-1, 0, 119, 120, 239, 240, 9999)] == [0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0]
 
 
-def test_nothing_recorded_is_no_way():
+def test_empty_trace_has_no_distance():
     trace = at_half_seconds([(0, 0)])
     empty = replace(trace, truth=Samples(trace.truth.ticks[:0], trace.truth.values[:0]))
     way, error = drive(empty), pose_error(empty)

@@ -197,7 +197,7 @@ def test_a_goal_of_the_scenario_is_where_its_name_says_unless_its_acceptance_say
     assert set(signal("goal_distance", words, case)) == {5.0}
 
 
-def test_what_never_ended_lasts_to_the_last_sample():
+def test_unfinished_state_lasts_to_the_last_sample():
     words = {"seconds": 2, "truth": [[0, 0, 0]], "events": [[1, "goal.accepted", "a"], [1, "collision.started", "b"]]}
     for name in ("goal_active", "in_collision"):
         assert np.flatnonzero(signal(name, words)).tolist() == list(range(40, 81))
@@ -370,7 +370,7 @@ def test_a_fault_is_active_from_its_start_to_before_its_end_and_an_event_without
     assert np.flatnonzero(signal("started", words, fault="lidar.off")).tolist() == [40]
 
 
-def test_what_is_shorter_than_a_sample_counts_at_the_next_one():
+def test_short_state_counts_at_the_next_sample():
     events = [[1.01, "collision.started", "box"], [1.02, "collision.ended", "box"]]
     words = {"seconds": 3, "truth": [[0, 0, 0]], "events": events}
     assert np.flatnonzero(signal("in_collision", words)).tolist() == [41]

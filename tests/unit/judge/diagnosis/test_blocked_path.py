@@ -17,7 +17,7 @@ CLOSES = (
 
 
 @pytest.mark.parametrize("criterion", ["goals_reached", "result", "error_code", "time_to_goal", "stuck"])
-def test_a_thing_that_leaves_no_disc_room_closes_the_passage(criterion):
+def test_object_without_space_for_the_disc_closes_the_passage(criterion):
     assert why(criterion, box(1, "crate", 5, 0, 0.6, 0.9, "crate falls")) == [CLOSES.format("0.05 m are left")]
     assert why(criterion, box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")) == [CLOSES.format("nothing is left")]
 
@@ -26,7 +26,7 @@ def test_a_thing_beside_the_line_closes_it_too_when_nothing_fits_past():
     assert why("result", box(1, "crate", 5.2, 0, 0.2, 1.0, "crate falls")) == [CLOSES.format("0.20 m are left")]
 
 
-def test_what_leaves_room_for_the_robot_but_not_to_turn_narrows():
+def test_object_without_space_to_turn_narrows_the_passage():
     (line,) = why("result", box(1, "crate", 5, -0.5, 0.6, 1.1, "crate falls"))
     assert "narrows the passage of 1.00 m" in line
     assert "0.45 m are left" in line
@@ -47,7 +47,7 @@ def test_two_things_that_only_together_close_it_are_both_named():
         box(1, "crate", 2, 0, 0.6, 0.9, "crate falls"),
     ],
 )
-def test_nothing_is_said_of_what_is_not_in_the_way(events):
+def test_object_outside_the_passage_is_not_reported(events):
     assert why("goals_reached", events) == []
 
 
@@ -84,7 +84,7 @@ def test_of_several_closed_passages_the_tightest_is_told():
     assert "1.00 m between `west wall`" in line
 
 
-def test_three_centimeters_are_not_nothing():
+def test_three_centimeters_of_free_space_are_reported():
     (line,) = why("result", box(1, "crate", 5, 0, 0.6, 0.94, "crate falls"))
     assert "0.03 m are left" in line
 
@@ -175,13 +175,13 @@ def test_two_centimeters_less_than_the_passage_has_are_no_change():
     assert said(("fog", 0.48), footprint=[[0.6, 0.8]]) == "fog narrows"
 
 
-def test_of_what_closes_it_alone_the_last_is_named_and_not_what_leaves_room():
+def test_last_closing_object_is_named():
     assert said(("a", 0.1), ("b", 0.1), ("c", 0.1)) == "c closes"
     assert said(("a", 0.1), ("b", 0.2)) == "a closes"
     assert said(("a", 0.25), ("b", 0.4)) == "a narrows"
 
 
-def test_what_has_no_part_in_closing_it_is_not_named_with_what_has():
+def test_uninvolved_object_is_not_named():
     trace = synthetic_trace({**STANDS, "events": [*box(1, "a", 5, 0.4, 0.6, 0.4), *box(2, "b", 5, -0.4, 0.6, 0.4)]})
     fogs = [Fog("haze", (), "", 0, False, 0.49), Fog("mist", (), "", 0, False, 0.6)]
     (line,), _ = diagnose_blocked_path(

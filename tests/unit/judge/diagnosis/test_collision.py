@@ -5,12 +5,12 @@ from diagnosis_cases import box, by, why
 HIT = [2, "collision.started", "crate", {"robot_caused": True}]
 
 
-def test_what_was_put_before_the_robot_and_struck_is_named_with_its_distance():
+def test_spawned_object_is_reported_with_its_distance():
     lines = why("collisions", [*box(1.5, "crate", 2, 0, 0.4, 0.4, "crate falls"), HIT], at=2)
     assert lines == ["why: crate: event `crate falls` had spawned it 0.30 m from the robot's center 0.50 s before"]
 
 
-def test_what_ran_into_the_robot_is_told_with_its_speed():
+def test_object_that_hit_the_robot_is_reported_with_its_speed():
     moved = by("cart comes", 1, [1, "object.moved", "crate", {}])
     hit = [*HIT[:3], {"robot_caused": False}]
     way = {"crate": [[0, 2, 4], [1, 2, 4], [2, 2, 0.5], [10, 2, 0.5]]}

@@ -30,5 +30,5 @@ from diagnosis_cases import by, slip, why
         (by("gust", 4), []),
     ],
 )
-def test_what_was_under_way_or_just_over_is_told_of_any_criterion(events, told):
+def test_active_and_recent_disturbances_are_reported_for_any_criterion(events, told):
     assert why("speed", events, case={}) == [f"meanwhile: {text}" for text in told]

@@ -15,13 +15,13 @@ def test_a_thing_on_the_goal_is_named_once():
     assert "stands 0.10 m from the center of goal study" in line
 
 
-def test_a_world_without_a_way_is_named():
+def test_unreachable_goal_is_explained_by_the_world():
     assert why("result", [], case={**CASE, "shortest": {"study": float("inf")}}) == [
         "why: the world has no path to goal study for a robot 0.40 m wide"
     ]
 
 
-def test_what_the_robot_stands_at_is_named():
+def test_touched_object_is_named():
     (line,) = why("stuck", box(1, "crate", 4.6, 0, 0.4, 0.4, "crate falls"), case={**CASE, "passages": []})
     assert line == "why: crate (spawned by event `crate falls` at t = 1.00 s) was 0.20 m from the robot"
 
@@ -59,7 +59,7 @@ def test_after_the_goal_has_failed_it_is_still_the_one_that_was_kept():
     assert len(causes("result", 2400, built, synthetic_case(CASE))) == 1
 
 
-def test_what_closes_the_way_and_is_near_is_told_once_and_what_else_is_near_as_well():
+def test_closing_object_is_reported_once_with_other_near_objects():
     case = {**CASE, "passages": [["study", [4.6, 0.5], [4.6, -0.5], "a", "b"]]}
     crate = box(1, "crate", 4.6, 0, 0.4, 2.0, "crate falls")
     (line,) = why("result", crate, case=case)
@@ -74,7 +74,7 @@ def test_what_was_there_from_the_start_is_told_beside_what_else_was():
     assert [line.split()[1] for line in why("result", events, case=case)] == ["door", "bin"]
 
 
-def test_what_is_further_than_thirty_centimeters_holds_nobody():
+def test_object_beyond_thirty_centimeters_is_not_reported():
     assert why("stuck", box(1, "crate", 4.75, 0, 0.4, 0.4, "falls"), case={**CASE, "passages": []}) == []
 
 
@@ -96,7 +96,7 @@ def test_a_goal_is_wanted_from_when_it_was_accepted_until_it_was_reached_or_give
     assert bool(causes("stuck", round(at * 240), built, synthetic_case(CASE))) is wanted
 
 
-def test_what_stands_where_the_goal_before_was_does_not_keep_it_from_the_next():
+def test_object_on_an_earlier_goal_is_not_a_cause():
     goals = [{"name": "kitchen", "pose": [2, 3, 0]}, {"name": "study", "pose": [8, 0, 0]}]
     told = [[0, "goal.accepted", "kitchen"], [2, "goal.reached", "kitchen"], [2, "goal.accepted", "study"]]
     built = synthetic_trace({**STANDS, "events": [*told, *box(3, "crate", 2, 3, 1, 1)]})

@@ -36,7 +36,7 @@ def test_a_fault_that_came_between_localizer_and_navigator_leads_astray_and_a_li
     assert why("localization_error", scaled, **lost) == ["why: odom.scale falsified its odometry from t = 1.50 s on"]
 
 
-def test_lost_is_half_a_meter_in_any_direction():
+def test_error_of_half_a_meter_counts_as_lost():
     case = {"goals": [GOAL]}
     at_one = {"seconds": 10, "truth": [[0, 0, 1]]}
     half = why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.5, 0, 0]})
@@ -56,5 +56,5 @@ def test_what_happens_at_that_very_tick_counts_and_what_comes_later_does_not():
     assert why("localization_error", events, at=5.9, **lost) == []
 
 
-def test_a_robot_that_never_said_where_it_is_is_not_known_to_be_astray():
+def test_robot_without_estimate_is_not_reported_as_lost():
     assert why("goals_reached", [], case={"goals": [GOAL]}, belief=None) == []

@@ -76,7 +76,7 @@ def test_what_an_event_did_is_told_of_what_it_did_it_to():
     ]
 
 
-def test_what_has_no_outline_at_the_height_of_a_robot_is_in_nobodys_way():
+def test_object_above_the_robot_is_no_obstacle():
     assert there([spawned(0, "lamp", 0, 0, parts=[])], 1) == []
 
 

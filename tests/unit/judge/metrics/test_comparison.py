@@ -97,7 +97,7 @@ def test_a_flip_says_with_which_stack_it_failed_and_why() -> None:
     assert one.p == 1.0
 
 
-def test_who_gave_up_early_did_not_drive_a_shorter_way() -> None:
+def test_aborted_run_is_not_compared_by_path_length() -> None:
     gave_up = run("mine", 1, outcome=Outcome.FAILED, time_to_goal=None, path_length=1.0, collisions=2.0)
     one = against(run("ref", 1), gave_up, run("ref", 2), run("mine", 2, path_length=5.5))
     assert one.parted == 1
@@ -105,7 +105,7 @@ def test_who_gave_up_early_did_not_drive_a_shorter_way() -> None:
     assert (of(one, "collisions").pairs, of(one, "collisions").difference) == (2, 1.0)
 
 
-def test_second_runs_are_no_evidence() -> None:
+def test_determinism_runs_are_not_compared() -> None:
     one = against(run("ref"), run("ref.again"), run("mine"), run("mine.again"))
     assert one.pairs == 1
 
@@ -157,7 +157,7 @@ def test_stacks_are_compared_by_what_they_did_whatever_their_scenario_expects() 
     assert (flip.passed, flip.failed) == ("mine", "ref")
 
 
-def test_what_was_skipped_is_no_pair() -> None:
+def test_skipped_run_is_not_compared() -> None:
     skipped = [replace(run(name), outcome=Outcome.SKIPPED, verdicts=(), reason="NAV-1") for name in ("ref", "mine")]
     assert against(*skipped, run("ref", 2), run("mine", 2)).pairs == 1
 

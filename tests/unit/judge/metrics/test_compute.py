@@ -88,7 +88,7 @@ def test_a_robot_further_from_its_goal_than_at_the_start_has_no_soft_spl():
     assert measured({"seconds": 10, "truth": [[0, 0, 0], [8, -3, -4]]}, GOAL)["soft_spl"] == 0.0
 
 
-def test_who_touched_something_did_not_succeed():
+def test_run_with_collision_has_no_spl():
     touched = [*ARRIVED, [5, "collision.started", "wall"]]
     metrics = measured({"seconds": 10, "truth": [[0, 0, 0], [8, 3, 4]], "events": touched}, GOAL)
     assert metrics["success"] == metrics["spl"] == metrics["barn_score"] == 0.0

@@ -49,7 +49,7 @@ def test_one_goal_of_several_is_no_success():
     assert measures(TOLD[:4]).values["success"] == 0.0
 
 
-def test_nobody_waits_for_a_goal_that_another_one_preempted():
+def test_preempted_goal_is_not_required():
     case = {**GOALS, "sent": [{"name": "d", "pose": [3, 0, 0]}]}
     last = [[9, "goal.canceled", "c", {"preempted_by": "d"}], [9, "goal.accepted", "d"], [11, "goal.reached", "d"]]
     assert measures([*TOLD[:5], *last], case).values["time_to_goal"] == 10.0

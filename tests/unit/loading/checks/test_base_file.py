@@ -19,7 +19,7 @@ def told(write, text: str, name: str = "a.base.yaml") -> list[str]:
 
 
 @pytest.mark.parametrize("name", ["a.base.yaml", "a.base.yml", "defaults.yaml", "deep/defaults.yaml"])
-def test_a_base_may_leave_out_whatever_its_scenarios_say(write, name: str) -> None:
+def test_base_can_omit_required_keys(write, name: str) -> None:
     assert told(write, "tags: [smoke]\n", name) == []
 
 
@@ -41,7 +41,7 @@ def test_a_base_may_say_a_part_of_a_mapping(write) -> None:
         ("extends: b.base.yaml\n", "1:10 no such file or directory"),
     ],
 )
-def test_what_a_base_says_is_checked(write, text: str, problem: str) -> None:
+def test_content_of_a_base_is_checked(write, text: str, problem: str) -> None:
     found = told(write, text)
     assert [one for one in found if problem in one], found
 

@@ -42,7 +42,7 @@ def test_missing_paths_are_all_told(tmp_path: Path) -> None:
     ]
 
 
-def test_nothing_found_is_not_success(tmp_path: Path) -> None:
+def test_empty_selection_is_an_error(tmp_path: Path) -> None:
     _touch(tmp_path, "a.yaml")
     with pytest.raises(NothingSelected, match="no scenarios found"):
         discover([tmp_path], tmp_path)

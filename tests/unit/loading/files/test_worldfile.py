@@ -48,7 +48,7 @@ def test_sdf_and_ros_maps_are_told_by_what_they_are(tmp_path: Path) -> None:
         ("../outside.world.yaml", "outside the scenario root"),
     ],
 )
-def test_what_is_no_world_is_told(tmp_path: Path, name: str, told: str) -> None:
+def test_invalid_world_is_reported(tmp_path: Path, name: str, told: str) -> None:
     (tmp_path / "root").mkdir()
     (tmp_path / "outside.world.yaml").write_text("simscen: 1\n")
     (tmp_path / "root/bad.world.yaml").write_text("simscen: 1\nwals: []\n")

@@ -69,7 +69,7 @@ def loaded(folder: Path, stack: str, params: str = PARAMS, rest: str = "") -> Lo
     return load_scenario(file, folder)
 
 
-def test_what_is_here_too_is_taken_and_what_the_file_leaves_out_is_nav2s(tmp_path: Path) -> None:
+def test_nav2_file_overrides_nav2_defaults(tmp_path: Path) -> None:
     stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").spec.stack
     assert (stack.localizer.robot_model, stack.localizer.alpha1, stack.localizer.alpha2) == ("omni", 0.11, 0.2)
     assert stack.localizer.laser_model_type == "likelihood_field"
@@ -86,7 +86,7 @@ def test_what_is_here_too_is_taken_and_what_the_file_leaves_out_is_nav2s(tmp_pat
     assert stack.recovery.simulate_ahead_time == 1.5
 
 
-def test_what_the_scenario_says_wins(tmp_path: Path) -> None:
+def test_scenario_values_override_the_nav2_file(tmp_path: Path) -> None:
     said = (
         "stack: {nav2_params: nav2.yaml, profile: simscen, controller: {lookahead_dist: 0.5}, failure_tolerance: 1 s}"
     )
@@ -101,7 +101,7 @@ def test_what_the_scenario_says_wins(tmp_path: Path) -> None:
 NOT_OURS = "precise.path_length_tolerance (12), FollowPath.min_distance_to_obstacle (17)"
 
 
-def test_what_has_no_counterpart_is_named_where_it_stands(tmp_path: Path) -> None:
+def test_parameter_without_counterpart_is_reported_at_its_line(tmp_path: Path) -> None:
     notes = [str(note) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
     told = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
     assert all("SC341" in note for note in notes)

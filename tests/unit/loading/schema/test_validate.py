@@ -81,7 +81,7 @@ def test_a_member_of_a_plain_union_is_told_once() -> None:
     assert told[0][:2] == (4, 9)
 
 
-def test_nothing_is_ever_null() -> None:
+def test_null_values_are_refused() -> None:
     text = SCENARIO + "name: ~\nmap: null\ngoals:\nfaults: [{sensor: lidar, off: }]\ntags: [a, ~]\n"
     told = _problems(ScenarioSpec, text)
     assert [(p.line, p.code) for p in told] == [(5, "SC018"), (6, "SC018"), (7, "SC018"), (8, "SC018"), (9, "SC018")]

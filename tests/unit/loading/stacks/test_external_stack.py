@@ -25,7 +25,7 @@ def stack_of(loaded: LoadedScenario | list[Problem]) -> Any:
     return loaded.spec.stack
 
 
-def test_without_a_word_the_stack_is_simscens_own(load: Load) -> None:
+def test_default_stack_is_the_reference_stack(load: Load) -> None:
     assert isinstance(stack_of(load("")), StackSpec)
     assert isinstance(stack_of(load("stack: {type: reference}\n")), StackSpec)
 
@@ -52,7 +52,7 @@ def test_a_scenario_only_names_its_external_stack(load: Load) -> None:
         ("{external: mine, controller_frequency: 7}", "SC034", "stack.controller_frequency: 7 Hz does not divide"),
     ],
 )
-def test_what_a_scenario_may_not_say_of_it(load: Load, stack: str, code: str, message: str) -> None:
+def test_forbidden_keys_of_an_external_stack_are_errors(load: Load, stack: str, code: str, message: str) -> None:
     found = load(f"stack: {stack}\n")
     assert isinstance(found, list)
     assert [problem.code for problem in found] == [code], found
@@ -70,7 +70,7 @@ def test_what_is_said_of_an_external_stack_elsewhere_is_merged(load: Load, write
     assert (stack.external, stack.controller_frequency, stack.keepout) == ("mine", 10.0, ["hall"])
 
 
-def test_its_recoveries_and_its_localizer_are_its_own_affair(load: Load) -> None:
+def test_recovery_and_localization_triggers_are_valid_with_an_external_stack(load: Load) -> None:
     events = "events:\n  - {when: {recovery: {name: spin}}, do: {cancel_goal: {}}}\n"
     lost = "  - {when: {localization_error: 3}, do: {cancel_goal: {}}}\n"
     assert isinstance(stack_of(load(f"stack: {{external: mine}}\n{events}{lost}")), ExternalStackSpec)

@@ -129,7 +129,7 @@ def test_derived_names_are_readable_unique_and_safe_as_folders(variations: str, 
         ("  sampled: {count: 1001, values: {seed: {integer: [1, 2]}}}", "the scenario has 1001 variations"),
     ],
 )  # fmt: skip
-def test_what_is_said_wrongly_is_told_where_it_is(variations: str, told: str) -> None:
+def test_mistakes_in_variations_are_reported_at_their_positions(variations: str, told: str) -> None:
     assert any(told in found for found in wrong(variations)), wrong(variations)
 
 

@@ -85,6 +85,6 @@ def test_a_value_has_the_unit_of_its_range_and_is_in_si_where_there_are_several(
         ({"normal": {"mean": 0, "std": 1, "min": 20}}, "too many `std` away"),
     ],
 )
-def test_a_range_that_is_none_is_refused(draw: dict[str, Any], told: str) -> None:
+def test_invalid_range_is_refused(draw: dict[str, Any], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         sampled(draw)

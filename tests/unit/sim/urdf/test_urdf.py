@@ -141,7 +141,7 @@ def test_casters_that_stand_on_the_ground_are_left_to_the_bodys_own(load):
     assert len(body.casters) == 2
 
 
-def test_it_drives(load):
+def test_urdf_robot_drives(load):
     simulation = SingleRobotSimulation(merge_solids([]), [], load(robot()), Pose2(0, 0, 0), triangulate)
     simulation.drive(Twist(0.5, 0.0, 0.0))
     simulation.step(240)

@@ -23,7 +23,7 @@ PLAIN = {"use_velocity_scaled_lookahead_dist": False, "slow_down_ahead": False}
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
-def test_it_commands_what_the_formulas_say(case: dict[str, Any]) -> None:
+def test_commands_match_the_formulas(case: dict[str, Any]) -> None:
     robot = round_robot(**{"speed": 1.0, **case.get("robot", {})})
     controller = RegulatedPurePursuit(Spec(**{**PLAIN, **case.get("options", {})}), setting(robot))
     points = np.array(case["path"], dtype=np.float64)
