@@ -19,7 +19,7 @@ ROS := .venv-ros
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: $(STAMP)  ## Make the virtual environment in .venv (the other targets do it when needed)
+setup: $(STAMP)  ## Create the virtual environment .venv (other targets do this if necessary)
 
 $(STAMP): pyproject.toml
 	@test -n "$(PYTHON)" || { \
@@ -34,10 +34,10 @@ $(STAMP): pyproject.toml
 	@$(BIN)/python -m compileall -q simscen  # commands start faster, also where Python may not write bytecode
 	@touch $@
 
-run: setup  ## Run the scenarios that ship
+run: setup  ## Run the shipped scenarios
 	@$(BIN)/simscen run scenarios/
 
-test: setup  ## Run everything CI runs: checks, then the tests with the types beside them
+test: setup  ## Run what CI runs: checks, and tests with type checks in parallel
 	@$(BIN)/python tests/ros/rig.py $(ROS) & $(MAKE) --no-print-directory lint layers schemas; failed=$$?; wait; exit $$failed
 	@$(MAKE) --no-print-directory types > $(VENV)/types.log 2>&1 & types=$$!; \
 	$(BIN)/python -m pytest -m "not slow"; failed=$$?; \
@@ -64,16 +64,16 @@ test-lowest:  ## Test with the oldest packages that pyproject.toml allows, in .v
 	@$(LOWEST)/bin/python -m pytest -n 2 $(LOWEST_TESTS)
 	@$(LOWEST)/bin/simscen run scenarios/navigation scenarios/faults --out $$(mktemp -d)/out
 
-served: setup  ## Compare each shipped scenario with its stack behind the stack protocol to the same in the engine
+served: setup  ## Check that each shipped scenario gives the same log with the reference stack behind the stack protocol
 	@SIMSCEN_SERVED=all $(BIN)/python -m pytest tests/scenarios/test_stack_protocol_parity.py
 
-library: setup  ## Run each shipped scenario with twenty seeds, and write what came of it into the docs (minutes)
+library: setup  ## Run each shipped scenario with twenty seeds, and update the table in the docs (minutes)
 	@$(BIN)/python tests/scenarios/twenty_seeds.py
 
-planners: setup  ## Compare all planners on the same ways, and write the figures into the docs (minutes)
+planners: setup  ## Compare all planners on the same queries, and update the table in the docs (minutes)
 	@$(BIN)/python tests/planning/compare.py
 
-check: setup  ## Lint, types, layers, drift of schemas and docs
+check: setup  ## Check lint, spelling, types, layers, and generated files
 	@$(MAKE) --no-print-directory -j 2 -O lint types layers schemas
 
 lint: setup
@@ -86,33 +86,33 @@ types: setup
 layers: setup
 	@$(BIN)/lint-imports --no-cache 2>&1 | tail -n 4; test $${PIPESTATUS[0]} -eq 0 || { $(BIN)/lint-imports --no-cache; exit 1; }
 
-schemas: setup  ## Check that schemas/ and docs/reference/ are what the code says
+schemas: setup  ## Check that schemas/ and docs/reference/ are up to date
 	@$(BIN)/python -m simscen.cli.catalog.generate --check
 
-docs: setup  ## Write schemas/ and docs/reference/ anew
+docs: setup  ## Generate schemas/ and docs/reference/
 	@$(BIN)/python -m simscen.cli.catalog.generate
 
-site: setup  ## Build the documentation as a site into build/site: a dead link is an error
+site: setup  ## Build the documentation site in build/site; broken links are errors
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
-mutation: setup  ## Change what decides verdicts, a little at a time: some test must fail each time (long)
+mutation: setup  ## Mutate the code that decides verdicts, and check that tests fail (takes long)
 	@nice -n 10 $(BIN)/python tests/mutation/run.py --write
 
-screenshots: setup  ## Take the pictures of pages and runs for the docs (needs Chromium)
+screenshots: setup  ## Create the screenshots for the docs (needs Chromium)
 	@$(BIN)/python tests/browser/screenshots.py
 	@$(BIN)/python tests/browser/suite_screenshots.py
 
 bench: setup  ## Measure speed (simscen bench)
 	@$(BIN)/simscen bench
 
-campaign: setup  ## Run 500 scenarios, a tenth of which crash, hang or swell
+campaign: setup  ## Run 500 scenarios, of which a tenth crash, hang, or use too much memory
 	@$(BIN)/python tests/campaign/fault_batch.py
 
-fuzz: setup  ## Feed 20 000 damaged files to every loader
+fuzz: setup  ## Load 20 000 damaged files
 	@$(BIN)/python tests/fuzz/fuzz.py
 
 build: setup  ## Build the wheel into dist/
 	@$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
-clean:  ## Remove what make made
+clean:  ## Remove all generated files
 	rm -rf $(VENV) $(LOWEST) $(ROS) dist build simscen-out .mypy_cache .pytest_cache .ruff_cache

@@ -3,9 +3,9 @@
 //     g++ -std=c++17 -O2 -o gap_follower gap_follower.cpp
 //     simscen run scenarios/navigation --stack gaps=./gap_follower
 //
-// It steers for the free direction nearest to the goal (Borenstein and Koren's VFH, cut down to one scan), knows where it
-// is by odometry alone, and says that a goal is reached when it believes to be there. docs/reference/stack-protocol.md
-// says what goes over the socket.
+// It drives in the free direction nearest to the goal (Borenstein and Koren's VFH, reduced to one scan), localizes by
+// odometry only, and reports a goal as reached at its estimated pose. docs/reference/stack-protocol.md specifies the
+// protocol.
 
 #include <unistd.h>
 
@@ -32,7 +32,7 @@ struct Socket {
     void read_exactly(void* to, size_t size) {
         for (auto at = static_cast<uint8_t*>(to); size > 0;) {
             ssize_t got = ::read(fd, at, size);
-            if (got <= 0) throw std::runtime_error("simscen has hung up");
+            if (got <= 0) throw std::runtime_error("simscen closed the connection");
             at += got, size -= got;
         }
     }
@@ -40,7 +40,7 @@ struct Socket {
     void write_exactly(const void* from, size_t size) {
         for (auto at = static_cast<const uint8_t*>(from); size > 0;) {
             ssize_t put = ::write(fd, at, size);
-            if (put <= 0) throw std::runtime_error("simscen has hung up");
+            if (put <= 0) throw std::runtime_error("simscen closed the connection");
             at += put, size -= put;
         }
     }
@@ -65,7 +65,7 @@ struct Socket {
     void send(uint8_t kind, const std::string& json) { send(kind, Bytes(json.begin(), json.end())); }
 };
 
-// ---------------------------------------------------------------- just enough JSON to read HELLO, GOAL and PREEMPT
+// ---------------------------------------------------------------- JSON reader for HELLO, GOAL, and PREEMPT
 
 struct Json {
     std::map<std::string, Json> fields;
@@ -111,7 +111,7 @@ struct Parser {
     void space() { while (std::isspace(*at)) ++at; }
     void comma() { if (space(), *at == ',') ++at; space(); }
 
-    std::string string() {  // escapes are kept as they are: simscen sends names back and forth, nobody reads them here
+    std::string string() {  // escapes stay unchanged, because names are only sent back
         const char* begin = ++at;
         for (; *at && *at != '"'; ++at) if (*at == '\\') ++at;
         return std::string(begin, at++);
@@ -159,7 +159,7 @@ struct Writer {
     }
 };
 
-// ---------------------------------------------------------------- the navigator
+// ---------------------------------------------------------------- navigator
 
 struct Pose { double x, y, yaw; };
 struct Goal { std::string name; double x, y, yaw, xy_tolerance, yaw_tolerance; };
@@ -186,7 +186,7 @@ class GapFollower {
     double top_speed = 0.3, turn_rate = 1.0, radius = 0.25;
     Pose map_from_odom{0, 0, 0}, odom{0, 0, 0};
     std::vector<Goal> goals;
-    bool under_way = false;
+    bool active = false;
     double vx = 0, wz = 0;
     std::vector<std::string> events;
 
@@ -199,8 +199,8 @@ class GapFollower {
         float least = scan.take<float>(), most = scan.take<float>();
         ranges_.resize(scan.take<uint32_t>());
         for (double& range : ranges_) {
-            float said = scan.take<float>();
-            range = said >= least && said <= most ? said : std::isnan(said) || said < least ? 0.0 : most;
+            float value = scan.take<float>();
+            range = value >= least && value <= most ? value : std::isnan(value) || value < least ? 0.0 : most;
         }
     }
 
@@ -213,11 +213,11 @@ class GapFollower {
     }
 
     void drop(bool all) {
-        if (!goals.empty() && under_way) {
-            tell("goal.canceled", goals.front().name);
+        if (!goals.empty() && active) {
+            report("goal.canceled", goals.front().name);
             goals.erase(goals.begin());
         }
-        under_way = false;
+        active = false;
         if (all) goals.clear();
     }
 
@@ -225,41 +225,41 @@ class GapFollower {
         vx = wz = 0;
         if (goals.empty()) return;
         const Goal& goal = goals.front();
-        if (!under_way) tell("goal.accepted", goal.name);
-        under_way = true;
-        Pose me = map_from_odom * odom;
-        double dx = goal.x - me.x, dy = goal.y - me.y, distance = std::hypot(dx, dy);
+        if (!active) report("goal.accepted", goal.name);
+        active = true;
+        Pose pose = map_from_odom * odom;
+        double dx = goal.x - pose.x, dy = goal.y - pose.y, distance = std::hypot(dx, dy);
         if (distance < 0.6 * goal.xy_tolerance) {
-            double off = wrapped(goal.yaw - me.yaw);
+            double off = wrapped(goal.yaw - pose.yaw);
             if (std::abs(off) > 0.6 * goal.yaw_tolerance) {
                 wz = std::copysign(std::min(turn_rate, std::max(0.2, std::abs(off))), off);
                 return;
             }
-            tell("goal.reached", goal.name);
+            report("goal.reached", goal.name);
             goals.erase(goals.begin());
-            under_way = false;
+            active = false;
             return;
         }
-        steer(wrapped(std::atan2(dy, dx) - me.yaw), distance);
+        steer(wrapped(std::atan2(dy, dx) - pose.yaw), distance);
     }
 
   private:
     double first_ = 0, step_ = 0;
     std::vector<double> ranges_;
 
-    void tell(const std::string& kind, const std::string& name) {
+    void report(const std::string& kind, const std::string& name) {
         events.push_back("{\"kind\":\"" + kind + "\",\"name\":\"" + name + "\"}");
     }
 
-    // How far a robot of this width could drive in a direction.
-    double free_way(double direction, double most) const {
-        double way = most;
+    // Returns how far a robot of this width can drive in a direction, at most `limit`.
+    double free_distance(double direction, double limit) const {
+        double distance = limit;
         for (size_t k = 0; k < ranges_.size(); ++k) {
             double off = wrapped(first_ + step_ * k - direction), aside = std::abs(ranges_[k] * std::sin(off));
             if (std::abs(off) < M_PI / 2 && aside < radius + 0.08)
-                way = std::min(way, ranges_[k] * std::cos(off) - radius - 0.08);
+                distance = std::min(distance, ranges_[k] * std::cos(off) - radius - 0.08);
         }
-        return way;
+        return distance;
     }
 
     void steer(double bearing, double distance) {
@@ -267,29 +267,29 @@ class GapFollower {
         double best = bearing, best_cost = INFINITY, look = std::min(distance, 1.5);
         for (int k = -36; k <= 36; ++k) {
             double direction = k * M_PI / 36;
-            double blocked = look - std::max(0.0, free_way(direction, look));
+            double blocked = look - std::max(0.0, free_distance(direction, look));
             double cost = std::abs(wrapped(direction - bearing)) + 0.3 * std::abs(direction) + 8 * blocked;
             if (cost < best_cost) best = direction, best_cost = cost;
         }
-        if (free_way(bearing, look) >= look) best = bearing;
+        if (free_distance(bearing, look) >= look) best = bearing;
         wz = std::clamp(1.5 * best, -turn_rate, turn_rate);
-        double ahead = std::max(0.0, free_way(0.0, 1.5));
+        double ahead = std::max(0.0, free_distance(0.0, 1.5));
         vx = std::abs(best) > 0.8 ? 0.0 : std::min({top_speed, 0.5 * ahead, 0.5 * distance + 0.05});
     }
 };
 
 int main() try {
     const char* descriptor = std::getenv("SIMSCEN_STACK_FD");
-    if (!descriptor) throw std::runtime_error("SIMSCEN_STACK_FD is not set: simscen starts this program");
+    if (!descriptor) throw std::runtime_error("SIMSCEN_STACK_FD is not set: start this program with `simscen run --stack`");
     Socket simscen{std::atoi(descriptor)};
     Bytes body;
 
     simscen.receive(body);
     const Json hello = parsed(body);
-    std::map<uint32_t, std::string> heard;
-    std::map<std::string, uint32_t> spoken;
-    for (const Json& topic : hello["says"].items) heard[topic["number"].number] = topic["topic"].text;
-    for (const Json& topic : hello["hears"].items) spoken[topic["topic"].text] = topic["number"].number;
+    std::map<uint32_t, std::string> received_topics;
+    std::map<std::string, uint32_t> sent_topics;
+    for (const Json& topic : hello["says"].items) received_topics[topic["number"].number] = topic["topic"].text;
+    for (const Json& topic : hello["hears"].items) sent_topics[topic["topic"].text] = topic["number"].number;
     GapFollower navigator;
     navigator.top_speed = std::min(0.3, hello["robot"]["max_linear"].number);
     navigator.turn_rate = std::min(1.0, hello["robot"]["max_angular"].number);
@@ -329,8 +329,8 @@ int main() try {
                     std::memcpy(&number, &body[at], 4);
                     std::memcpy(&size, &body[at + 4], 4);
                     at += 8;
-                    if (heard[number] == "/scan") navigator.on_scan({&body[at]});
-                    if (heard[number] == "/odom") navigator.on_odometry({&body[at]});
+                    if (received_topics[number] == "/scan") navigator.on_scan({&body[at]});
+                    if (received_topics[number] == "/odom") navigator.on_odometry({&body[at]});
                 }
                 navigator.decide();
 
@@ -341,10 +341,10 @@ int main() try {
                 for (const std::string& event : navigator.events)
                     said.emplace_back("/simscen/events", Writer().string(event).bytes);
                 navigator.events.clear();
-                Pose me = navigator.map_from_odom * navigator.odom;
+                Pose pose = navigator.map_from_odom * navigator.odom;
                 Writer belief;
-                belief.put(sec).put(nanosec).string("map").put(me.x).put(me.y).put(0.0);
-                belief.put(0.0).put(0.0).put(std::sin(me.yaw / 2)).put(std::cos(me.yaw / 2));
+                belief.put(sec).put(nanosec).string("map").put(pose.x).put(pose.y).put(0.0);
+                belief.put(0.0).put(0.0).put(std::sin(pose.yaw / 2)).put(std::cos(pose.yaw / 2));
                 for (int k = 0; k < 36; ++k) belief.put(k % 7 == 0 ? 0.01 : 0.0);
                 said.emplace_back("/amcl_pose", belief.bytes);
 
@@ -355,7 +355,7 @@ int main() try {
                 answer.raw(&messages, 4);
                 for (const auto& [topic, data] : said) {
                     uint32_t length = data.size();
-                    answer.raw(&spoken.at(topic), 4);
+                    answer.raw(&sent_topics.at(topic), 4);
                     answer.raw(&length, 4);
                     answer.raw(data.data(), data.size());
                 }

@@ -42,4 +42,4 @@ def test_gap_follower_drives_a_shipped_scenario(follower: ExternalCommand, name:
 def test_gap_follower_without_simscen_prints_a_hint(follower: ExternalCommand) -> None:
     ended = subprocess.run(follower.argv, env={}, capture_output=True, text=True, check=False)
     assert ended.returncode == 1
-    assert ended.stderr == "gap_follower: SIMSCEN_STACK_FD is not set: simscen starts this program\n"
+    assert ended.stderr == "gap_follower: SIMSCEN_STACK_FD is not set: start this program with `simscen run --stack`\n"
