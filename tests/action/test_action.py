@@ -1,4 +1,4 @@
-"""action.yml as GitHub's runner would do it, from a copy of the repository, in another one's checkout."""
+"""Tests of action.yml: run its steps like the GitHub runner, in the checkout of another repository."""
 
 import os
 import re

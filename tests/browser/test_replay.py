@@ -1,4 +1,4 @@
-"""The replay page in a browser: what a person who was told "it failed" gets to see, and how they get about in it."""
+"""Tests of the replay page in a browser."""
 
 import shutil
 import subprocess
@@ -203,7 +203,7 @@ def test_content_security_policy_allows_only_own_parts(open_page: Opener, one: P
 
 
 def test_it_opens_within_a_second(open_page: Opener, one: Path, record_property, capsys) -> None:
-    """Measured and told, not asserted: a machine may be busy."""
+    """The time is printed but not checked, because the machine may be busy."""
     opened = ready(open_page(one))
     took = int(opened.page.evaluate("document.documentElement.dataset.ready"))
     size = one.stat().st_size

@@ -1,4 +1,4 @@
-"""The suite page in a browser: what failed is there at once, all else is found by searching, filtering and sorting."""
+"""Tests of the report page in a browser: failures first, search, filters, and order."""
 
 import sys
 from pathlib import Path

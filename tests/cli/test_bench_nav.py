@@ -1,4 +1,4 @@
-"""`simscen bench nav` as a user calls it, with the shortest of its experiments."""
+"""Tests of `simscen bench nav` with the shortest experiments."""
 
 import json
 import subprocess

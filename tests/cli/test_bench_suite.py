@@ -1,4 +1,4 @@
-"""`simscen bench suite` and `bench compare` as a user calls them, with the shortest of suites."""
+"""Tests of `simscen bench suite` and `bench compare` with a short suite."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""A robot with a camera and a bumper, run through the front door; its log is read by ROS's own reader."""
+"""Test of a run with camera and bumper, whose log is read by the ROS reader."""
 
 import math
 import subprocess

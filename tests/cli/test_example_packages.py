@@ -1,4 +1,4 @@
-"""Two packages as another maker would ship them, a planner and a whole stack: their contracts, and the front door."""
+"""Tests of two example packages, a planner and a stack: contract tests and runs on the command line."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Worlds and robots that others made, through `simscen run --world-path`: nothing about them is redrawn or copied."""
+"""Tests of third-party worlds and robots with `simscen run --world-path`."""
 
 import subprocess
 import sys

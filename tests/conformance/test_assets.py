@@ -1,4 +1,4 @@
-"""What a scenario names: paths that lead out, and worlds, maps, meshes and robots that are not what they claim."""
+"""Conformance tests of referenced files: paths outside the root, and invalid worlds, maps, meshes, and robots."""
 
 import os
 import struct

@@ -1,4 +1,4 @@
-"""Full disks, closed descriptors, and damaged logs: proper exit codes, whole reports, no traceback."""
+"""Conformance tests of broken environments: full disks, closed descriptors, damaged logs."""
 
 import json
 import os

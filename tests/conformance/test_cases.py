@@ -1,4 +1,4 @@
-"""The list of cases and the tests agree."""
+"""Test that CASES.md and the conformance tests agree."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A run is a function of scenario and seed: neither neighbors, load, order, folder nor environment show in it."""
+"""Conformance tests of determinism: a run depends only on scenario and seed."""
 
 import hashlib
 import json

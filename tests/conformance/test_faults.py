@@ -1,4 +1,4 @@
-"""Runs that crash, hang, swell and litter: one session with all of them, each answered as what it is."""
+"""Conformance tests of runs that crash, hang, use too much memory, or leave processes: one session with all of them."""
 
 import json
 import re

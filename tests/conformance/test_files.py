@@ -1,4 +1,4 @@
-"""Files that are no scenarios: `validate` and `run` refuse them with the same words, at the same place."""
+"""Conformance tests of invalid files: `validate` and `run` report them with the same message."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Text of users and workers is shown, never obeyed; code beside scenarios is not run; secrets stay outside."""
+"""Conformance tests of injection: text is escaped, code next to scenarios is not executed, secrets stay outside."""
 
 import json
 import os

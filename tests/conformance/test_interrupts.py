@@ -1,4 +1,4 @@
-"""A session through the front door: killed, interrupted, without room or listeners, gone on with."""
+"""Conformance tests of sessions that are killed, interrupted, or resumed, or that have a full disk or closed output."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""ROS maps as they are published: with keys of other tools in them."""
+"""Conformance tests of ROS maps with keys of other tools."""
 
 import pytest
 

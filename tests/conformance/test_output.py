@@ -1,4 +1,4 @@
-"""Where results go there is no room or no right: told before anything runs, or as an error of the run."""
+"""Conformance tests of output folders that are full or not writable."""
 
 import hashlib
 import json

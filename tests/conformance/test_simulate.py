@@ -1,4 +1,4 @@
-"""`simscen.simulate()`: the same run from Python as from the command line, as often as it is called."""
+"""Conformance tests of `simscen.simulate()`: runs are equal to those of the command line."""
 
 from pathlib import Path
 

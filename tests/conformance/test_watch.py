@@ -1,4 +1,4 @@
-"""`simscen run --watch` through the front door."""
+"""Test of `simscen run --watch` on the command line."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Every recovery behavior and goal checker keeps the promises of its protocol."""
+"""Contract tests of all recovery behaviors and goal checkers."""
 
 import pytest
 

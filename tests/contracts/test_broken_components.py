@@ -1,4 +1,4 @@
-"""For each promise of a contract, a component that breaks it is found."""
+"""Tests that each contract test detects a broken component."""
 
 import pytest
 

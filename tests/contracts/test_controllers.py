@@ -1,4 +1,4 @@
-"""Every controller keeps the promises of simscen.stack.protocols.Controller."""
+"""Contract tests of all controllers."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Every drive against the promises of simscen.sim.robots.drive_factory.Drive."""
+"""Contract tests of all drives."""
 
 import random
 from pathlib import Path

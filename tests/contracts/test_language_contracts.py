@@ -1,4 +1,4 @@
-"""Every shipped criterion, fault, trigger, and action keeps the promises of its base class."""
+"""Contract tests of all shipped criteria, faults, triggers, and actions."""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Every localizer keeps the promises of simscen.stack.protocols.Localizer."""
+"""Contract tests of all localizers."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Every planner keeps the promises of simscen.stack.protocols.Planner, in every space that fits a robot."""
+"""Contract tests of all planners, in every state space that fits a robot."""
 
 from typing import get_args
 

@@ -1,4 +1,4 @@
-"""Every sensor of every shipped robot against the promises of simscen.sensors.sensor.Sensor, in the real physics."""
+"""Contract tests of the sensors of all shipped robots, with simulated physics."""
 
 import copy
 from dataclasses import fields

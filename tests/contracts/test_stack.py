@@ -1,4 +1,4 @@
-"""A whole stack keeps the promises of simscen.stack.protocols.Stack, with every controller."""
+"""Contract tests of the reference stack with every controller."""
 
 import pytest
 

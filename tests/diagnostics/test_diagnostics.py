@@ -1,4 +1,4 @@
-"""Bad files beside their exact messages: `<name>.scenario.yaml` and `<name>.txt`.
+"""Tests of exact messages for invalid files: `<name>.scenario.yaml` and `<name>.txt`.
 
 `SIMSCEN_UPDATE=1 pytest tests/diagnostics` writes the messages anew; read the difference before you keep it.
 """

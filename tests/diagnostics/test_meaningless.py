@@ -1,4 +1,4 @@
-"""Files that are well-formed and mean nothing, each beside its exact message: `simscen validate` says so of all.
+"""Tests of exact messages of `simscen validate` for well-formed scenarios that make no sense.
 
 `SIMSCEN_UPDATE=1 pytest tests/diagnostics` writes the messages anew; read the difference before you keep it.
 """

@@ -1,4 +1,4 @@
-"""What other systems read (hooks, pipelines, the action, the Dockerfile) is what they understand."""
+"""Tests of hooks, pipelines, the action, and the Dockerfile against the schemas of their systems."""
 
 import os
 import re

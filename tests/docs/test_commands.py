@@ -1,4 +1,4 @@
-"""Every command that the documentation shows exists, with the options it is shown with."""
+"""Tests that all commands and options in the documentation exist."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The guide on comparing stacks: its files are valid, its commands run and print what it shows."""
+"""Tests of the guide to comparing stacks: files, commands, and output."""
 
 import re
 import shlex

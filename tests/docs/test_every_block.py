@@ -1,4 +1,4 @@
-"""No block of the documentation is left out: each is run, validated or parsed, or it is said here why it is not."""
+"""Tests of all code blocks in the documentation: each is run, validated, or parsed, or listed with a reason."""
 
 import json
 import re

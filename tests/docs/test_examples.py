@@ -1,4 +1,4 @@
-"""Every scenario and world that the documentation shows is valid."""
+"""Tests that all scenarios and worlds in the documentation are valid."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""The files of the guide on `extends` are what it says they become."""
+"""Tests of the guide to `extends`."""
 
 import re
 import textwrap

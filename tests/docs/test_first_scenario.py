@@ -1,4 +1,4 @@
-"""The first tutorial, and the examples in Python, done as a new user does them."""
+"""Tests of the first tutorial and of the Python examples."""
 
 import json
 import re

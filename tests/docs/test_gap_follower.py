@@ -1,4 +1,4 @@
-"""The C++ example of the stack protocol, built with g++, drives scenarios that ship."""
+"""Tests of the C++ example of the stack protocol."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""The examples of the guide on recorded drives do what it shows."""
+"""Tests of the guide to recorded drives."""
 
 import re
 import shlex

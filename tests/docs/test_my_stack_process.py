@@ -1,4 +1,4 @@
-"""The tutorial on a stack of one's own, done as a new user does it: an empty folder, its commands in order."""
+"""Tests of the tutorial on stack processes: its commands in order, in an empty folder."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""The tutorials on packages of one's own, done step by step as they say, in an empty folder."""
+"""Tests of the tutorials on packages: their steps in order, in an empty folder."""
 
 import os
 import re

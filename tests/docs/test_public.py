@@ -1,4 +1,4 @@
-"""Whoever has a clone and nothing else finds all that its files speak of."""
+"""Tests that files refer only to documents in the repository."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The examples of the guide on real robots do what it shows."""
+"""Tests of the guide to logs of real robots."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""docs/references.bib has an entry for everything that docstrings and docs cite, and for nothing else."""
+"""Tests that docs/references.bib contains exactly the cited sources."""
 
 import calendar
 import re

@@ -1,4 +1,4 @@
-"""The site of the documentation: links and anchors lead somewhere, pages are in the nav, nothing asks others."""
+"""Tests of the documentation site: links, anchors, navigation, and no network requests."""
 
 import os
 import re
@@ -18,7 +18,7 @@ FRONT = sorted(path.name for path in ROOT.glob("*.md"))
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Built as `make site` builds it: strictly. (With --quiet mkdocs counts no warnings, and strict means nothing.)"""
+    """Build the site as `make site` does. Without --quiet, because mkdocs then ignores warnings."""
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     env = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}

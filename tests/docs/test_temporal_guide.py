@@ -1,4 +1,4 @@
-"""The examples of the guide on temporal criteria do what it says."""
+"""Tests of the guide to temporal criteria."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""A slice of the fuzzing that `make fuzz` does: whatever a file holds, it is accepted or refused in words."""
+"""Short version of `make fuzz`: any file is accepted or refused with a message."""
 
 import subprocess
 import sys

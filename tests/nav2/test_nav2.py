@@ -1,4 +1,4 @@
-"""A real Nav2 with the parameters of nav2_bringup drives scenarios of the library, without a warm-up."""
+"""Tests of a real Nav2 with the parameters of nav2_bringup in shipped scenarios."""
 
 import os
 import shlex

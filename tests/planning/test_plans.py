@@ -1,4 +1,4 @@
-"""Plans over generated grounds against brute force, and what the costs of a costmap do to them."""
+"""Tests of plans on generated costmaps against brute force, and of the effect of costs."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""All of a plan against brute force, not its points alone: on no half millimeter does it lead through anything."""
+"""Tests of complete plans against brute force, every half millimeter."""
 
 from dataclasses import replace
 from typing import get_args

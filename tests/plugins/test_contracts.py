@@ -1,4 +1,4 @@
-"""The package keeps the promises of its kinds, and the kit takes values as they are written in files."""
+"""Contract tests of the example package."""
 
 import pytest
 

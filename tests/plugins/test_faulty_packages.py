@@ -1,4 +1,4 @@
-"""Components of an installed package that fail in a run: never a pass, and the message names them."""
+"""Tests of faulty components of packages: the run never passes, and the message names the component."""
 
 from textwrap import dedent
 

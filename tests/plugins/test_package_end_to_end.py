@@ -1,4 +1,4 @@
-"""An installed package end to end: files, schema, explain, runs, reports, and without it."""
+"""End-to-end tests of an installed package: files, schema, explain, runs, reports, and uninstallation."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What is refused before a run takes into account that an action of another maker may do anything."""
+"""Tests of semantic checks for scenarios with actions of packages."""
 
 from pathlib import Path
 

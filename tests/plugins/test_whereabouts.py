@@ -1,4 +1,4 @@
-"""The warm process, which is started in isolation, finds the packages that the command line found."""
+"""Tests that the isolated warm process finds the installed packages."""
 
 import json
 import os

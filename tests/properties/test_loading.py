@@ -1,4 +1,4 @@
-"""Whatever a file holds, loading it ends in a scenario or in problems that lie inside the file."""
+"""Property tests of loading: any file gives a scenario or problems with positions inside the file."""
 
 from contextlib import suppress
 from copy import deepcopy

@@ -1,4 +1,4 @@
-"""A fault or event has no effect before it starts: until then, the run is the same bit for bit."""
+"""Property tests: a run is bit-identical until a fault or event starts."""
 
 import random
 import re

@@ -1,4 +1,4 @@
-"""Temporal formulas against rtamt, where it can be asked: on traces longer than every window, without NaN."""
+"""Property tests of temporal formulas against rtamt, on long traces without NaN."""
 
 import pytest
 import rtamt

@@ -1,4 +1,4 @@
-"""Temporal verdicts against a three-valued oracle that looks at every sample of every window."""
+"""Property tests of temporal verdicts against a three-valued oracle."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st

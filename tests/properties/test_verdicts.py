@@ -1,4 +1,4 @@
-"""What holds for every verdict, on traces and criteria drawn at random."""
+"""Property tests of verdicts on random traces and criteria."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What simscen writes as YAML, simscen reads back as the same."""
+"""Property tests of YAML output: it is read back equal."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""The tutorial on a ROS 2 stack, done as by a new user: in a clean folder, with the files of the page."""
+"""Tests of the tutorial on ROS 2 stacks, with the files of the page."""
 
 import os
 import re

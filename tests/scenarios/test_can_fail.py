@@ -1,4 +1,4 @@
-"""Each shipped scenario can fail: break the stack, take its disturbance away or tighten its bound, and it does.
+"""Tests that each shipped scenario can fail: with a broken stack, without its disturbance, or with a tighter bound.
 
 How is in can_fail/, a file for each theme: under the criterion that must then fail, new values by path into the YAML.
 """

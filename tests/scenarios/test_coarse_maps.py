@@ -1,4 +1,4 @@
-"""Maps as coarse as a robot is wide are driven on as well as fine ones."""
+"""Tests of drives on coarse maps."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A lidar sees one plane: what is lower, or hangs higher, it drives into; with a depth camera it drives around."""
+"""Test of obstacles below and above the scan plane, with and without a depth camera."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The reasons of failed runs, end to end; judging the log again gives the same ones."""
+"""End-to-end tests of failure explanations, in runs and in `judge`."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What did not happen is not green: every event and fault of a scenario changes something, or the run fails."""
+"""Tests that a run fails if an event or fault has no effect."""
 
 from pathlib import Path
 

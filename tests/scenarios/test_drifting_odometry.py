@@ -1,4 +1,4 @@
-"""What was seen before odometry drifted lies beside what is seen now: no reason to swing between two ways."""
+"""Test of narrow fields with odometry drift."""
 
 from pathlib import Path
 

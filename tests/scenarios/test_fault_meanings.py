@@ -1,4 +1,4 @@
-"""Faults in whole runs: what reaches the stack and the wheels, against what an independent look at the world says."""
+"""Tests of faults in whole runs against independent computations."""
 
 import math
 from pathlib import Path

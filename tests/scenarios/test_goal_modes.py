@@ -1,4 +1,4 @@
-"""Goals as Nav2's actions take them: passed in one drive, waited at in loops, and failed where that is expected."""
+"""Tests of navigation modes, waits, loops, and expected failures of goals."""
 
 from pathlib import Path
 

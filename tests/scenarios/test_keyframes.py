@@ -1,4 +1,4 @@
-"""A cylinder on looped keyframes is where they say at every tick, in the simulation and in the log."""
+"""Tests of an object on looped keyframes, in the simulation and in the log."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Maps of hundreds of thousands of triangles, as SLAM makes them of halls, are driven on like any other."""
+"""Test of a drive on a large, noisy map."""
 
 import numpy as np
 

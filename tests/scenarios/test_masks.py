@@ -1,4 +1,4 @@
-"""Nav2's filter masks: what a keepout mask forbids is driven around, what a speed mask limits is driven slowly."""
+"""Tests of keepout and speed masks."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""A robot drives through a gap that its plan leads through, and does not turn back in it."""
+"""Test of drives through narrow gaps."""
 
 from pathlib import Path
 

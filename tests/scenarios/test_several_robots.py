@@ -1,4 +1,4 @@
-"""Scenarios of several robots, run: each is on its own, and one result, one log and one picture hold all of it."""
+"""Tests of runs with several robots: independence, result, log, and picture."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""The scenarios that ship, run through the front door: all pass, and repeat byte for byte whatever runs beside them."""
+"""Tests of all shipped scenarios on the command line: they pass and are reproducible."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""A robot with the geometry of Clearpath's Husky reaches its goals although its wheels skid in each turn."""
+"""Test of a skid-steer robot with the geometry of Clearpath's Husky."""
 
 from pathlib import Path
 

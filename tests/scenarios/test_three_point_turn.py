@@ -1,4 +1,4 @@
-"""The car's scenario is what it says it is: a plan that changes direction, driven forward and backward."""
+"""Test of the three-point turn of a car."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What motion prediction tells of people who walk through a furnished house, against the simulator's truth."""
+"""Test of motion prediction against the ground truth, with pedestrians in a furnished house."""
 
 import math
 from pathlib import Path

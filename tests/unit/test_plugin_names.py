@@ -1,4 +1,4 @@
-"""simscen.plugin: every name is there, says what it is, and costs nothing before it is asked for."""
+"""Tests of the names in simscen.plugin."""
 
 import inspect
 import subprocess

@@ -1,4 +1,4 @@
-"""The part of the style guide (CONTRIBUTING.md) that a machine can check."""
+"""Checks of the style guide (CONTRIBUTING.md)."""
 
 import re
 from collections import Counter

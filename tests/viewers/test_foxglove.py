@@ -1,4 +1,4 @@
-"""Logs and the layout for them, as the readers that Foxglove and Lichtblick are made of see them."""
+"""Tests of logs and layouts with the readers of Foxglove and Lichtblick."""
 
 import json
 import math

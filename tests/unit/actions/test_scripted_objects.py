@@ -1,4 +1,4 @@
-"""Doors that reverse, slide and stand ajar; things that stop; pushes: what each asks of the stage, to the number."""
+"""Tests of actions on doors, scripted objects, and pushes, with exact numbers."""
 
 import math
 

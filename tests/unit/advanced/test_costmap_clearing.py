@@ -1,4 +1,4 @@
-"""Clearing finds ways that have opened, and does not keep a robot from learning that there is none."""
+"""Tests of clearing the costmap: reopened paths are found, and missing paths are detected."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Who is wedged drives out the way it came."""
+"""Tests of the recovery behavior `retrace`."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Wheels of which one side slips turn the robot, and their odometry does not know it; its gyroscope does."""
+"""Tests of uneven wheel slip."""
 
 import math
 from dataclasses import replace

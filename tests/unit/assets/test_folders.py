@@ -1,4 +1,4 @@
-"""What worlds and robots name is found in one way, and never outside of what the user allowed."""
+"""Tests of the search for referenced files in the allowed folders."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""One reader for worlds and robots: what one refuses, the other does, in the same words and at the same place."""
+"""Tests of the XML reader that worlds and robots share."""
 
 import pytest
 

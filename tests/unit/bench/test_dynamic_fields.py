@@ -1,4 +1,4 @@
-"""What every generated field of moving cylinders must be, whatever its number."""
+"""Tests of generated fields of moving cylinders."""
 
 import numpy as np
 import pytest

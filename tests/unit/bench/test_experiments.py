@@ -1,4 +1,4 @@
-"""Every scenario that the benchmark generates is a scenario like any other."""
+"""Tests that all generated benchmark scenarios are valid."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Drives from anywhere to anywhere, and the worlds that are made for them."""
+"""Tests of drives between random poses, and of their generated worlds."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The stopwatch of `simscen bench` covers all parts of a run."""
+"""Test that `simscen bench` measures all parts of a run."""
 
 from simscen.bench.speed.measurement import Stopwatch
 from simscen.bench.speed.run_speed import PATROL, timed_run

@@ -1,4 +1,4 @@
-"""`simscen compare` on journals of known results: pairing, gates, refusals, and formats."""
+"""Tests of `simscen compare`: pairing, `--fail-on`, errors, and formats."""
 
 import json
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Values that are computed once in the life of an object."""
+"""Tests of cached values."""
 
 import gc
 import weakref

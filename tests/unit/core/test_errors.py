@@ -1,4 +1,4 @@
-"""Errors come whole out of another process: one that cannot be unpickled breaks the pool that it was raised in."""
+"""Tests that errors can be pickled between processes."""
 
 import pickle
 

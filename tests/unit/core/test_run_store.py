@@ -1,4 +1,4 @@
-"""Results of many runs in little memory."""
+"""Tests of the run store, which keeps many results in little memory."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Paired statistics, against scipy's, which are made otherwise."""
+"""Tests of paired statistics against scipy."""
 
 import numpy as np
 import pytest

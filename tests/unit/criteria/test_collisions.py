@@ -1,4 +1,4 @@
-"""Collisions in logs that hold less than a run of our own."""
+"""Tests of collisions in logs with incomplete data."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What holds for every criterion: its page in the reference, its margins, its honesty about broken traces."""
+"""Tests of properties that all criteria share."""
 
 import math
 import re

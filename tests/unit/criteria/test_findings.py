@@ -1,4 +1,4 @@
-"""What a bound says: digits that tell value and limit apart, and why only when it is violated."""
+"""Tests of the text of findings."""
 
 import math
 

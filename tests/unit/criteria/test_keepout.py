@@ -1,4 +1,4 @@
-"""Keepout distances against shapely: apart, touching, crossing, wholly inside, between two samples."""
+"""Tests of keepout distances against shapely."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Criteria that judge by filter masks against shapely and a cell at a time: random masks, random drives."""
+"""Tests of criteria with filter masks against shapely, on random masks and drives."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Lengths that floats hold exactly, so that a bound is met to the bit."""
+"""Tests of `path_length` with lengths that floats represent exactly."""
 
 from dataclasses import replace
 

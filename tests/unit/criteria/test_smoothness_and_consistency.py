@@ -1,4 +1,4 @@
-"""What golden cases cannot sketch: exactly constant speeds, singular covariances, samples taken every so often."""
+"""Tests of smoothness and consistency that golden cases cannot express."""
 
 from dataclasses import replace
 

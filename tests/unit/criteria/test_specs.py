@@ -1,4 +1,4 @@
-"""What can be asked of a run, what cannot, and what is meant when nothing is said."""
+"""Tests of specifications of criteria: valid values, invalid values, and defaults."""
 
 import pytest
 from pydantic import ValidationError

@@ -1,4 +1,4 @@
-"""Stopping to the tick: a velocity every 0.1 s, given number by number."""
+"""Tests of `stopped_within` with one velocity sample per 0.1 s."""
 
 from dataclasses import replace
 

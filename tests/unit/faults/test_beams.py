@@ -1,4 +1,4 @@
-"""What happens to beams of a lidar, against geometry and distributions worked out by hand."""
+"""Tests of lidar faults against geometry and distributions in closed form."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What happens to commands and wheels, against the kinematics of a differential drive."""
+"""Tests of faults of commands and wheels against the kinematics of a differential drive."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Maps that are shifted, turned or outdated, against points worked out by hand."""
+"""Tests of shifted and outdated maps."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A failure that is expected hides nothing: neither another one, nor that it is gone."""
+"""Tests of expected failures."""
 
 import pytest
 

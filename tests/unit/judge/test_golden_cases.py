@@ -1,4 +1,4 @@
-"""The golden verdict cases of tests/cases: what each criterion answers to a sketched trace, and where that is from."""
+"""Tests of the golden verdict cases in tests/cases."""
 
 from pathlib import Path
 

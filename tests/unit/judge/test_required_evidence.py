@@ -1,4 +1,4 @@
-"""What a log must hold for each criterion and metric, written out once more: without it, no number is a number."""
+"""Tests of the evidence that each criterion and metric needs."""
 
 import pytest
 

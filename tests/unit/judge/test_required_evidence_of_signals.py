@@ -1,4 +1,4 @@
-"""What a log of another robot must hold for temporal criteria and metrics."""
+"""Tests of the evidence that signals need in logs of real robots."""
 
 import pytest
 

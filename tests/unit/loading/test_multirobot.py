@@ -1,4 +1,4 @@
-"""`robots:` is understood, or what is wrong with it is told at its line."""
+"""Tests of `robots:` and its error messages."""
 
 import pytest
 

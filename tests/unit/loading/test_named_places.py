@@ -1,4 +1,4 @@
-"""Places of the world by name, wherever a pose or a point is meant."""
+"""Tests of named places instead of poses and points."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How people take a robot: what HuNavSim's behavior trees say of each, seen from outside."""
+"""Tests of reactions of pedestrians to robots, as in HuNavSim."""
 
 import math
 

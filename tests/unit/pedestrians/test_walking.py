@@ -1,4 +1,4 @@
-"""The social force model: what is published of it, in closed form and as it was seen."""
+"""Tests of the social force model against closed forms and published observations."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The client's messages are those of a log: it reads what the engine packs, and packs what the engine does."""
+"""Tests that the messages of the peer client equal those of the log."""
 
 import contextlib
 

@@ -1,4 +1,4 @@
-"""Scenarios in pytest, as the team of a foreign project calls it: in a pytest of its own."""
+"""Tests of the pytest plug-in in a separate pytest process."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""Runs whose last bits differ agree; runs that went another way do not."""
+"""Tests of the comparison of runs between machines."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""What waits to be written comes in its order, all of it, and also when a run breaks off."""
+"""Tests of the backlog of the recorder: order, completeness, and aborted runs."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""A log that is not whole is read as far as it goes or refused by name: nothing but InvalidInput is raised."""
+"""Tests of damaged logs: they are read partly or refused with InvalidInput."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Where two runs that should be equal part is told by tick and field."""
+"""Tests of the search for the first difference between two runs."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Logs of simscen that somebody edited: what is no longer in them is never passed."""
+"""Tests that edited logs never pass."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`simscen judge` on the logs of real robots: what they do not say is never passed."""
+"""Tests of `simscen judge` on logs of real robots: missing data never passes."""
 
 import inspect
 import re

@@ -1,4 +1,4 @@
-"""A log of simscen's own, with all that says so taken out, is judged like one of others: the two must agree."""
+"""Tests that a simscen log gives the same verdicts when it is read like a third-party log."""
 
 import random
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A log of a real robot as a page: what it shows is there, and what it does not hold is not made up."""
+"""Tests of the replay page of logs of real robots."""
 
 import sys
 from collections.abc import Callable

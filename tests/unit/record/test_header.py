@@ -1,4 +1,4 @@
-"""A log knows which run it is of."""
+"""Tests of the header of a log."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""A log opens in other people's readers and says there what happened."""
+"""Tests of recorded logs with third-party readers."""
 
 import hashlib
 import io

@@ -1,4 +1,4 @@
-"""The log of a run that broke off is made whole for readers that begin with the index."""
+"""Tests of the recovery of aborted logs."""
 
 import os
 import signal

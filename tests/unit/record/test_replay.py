@@ -1,4 +1,4 @@
-"""A log gives back the very Trace that the moments gave, and nothing but InvalidInput when it cannot."""
+"""Tests that a log gives the same trace as the run."""
 
 import dataclasses
 from pathlib import Path

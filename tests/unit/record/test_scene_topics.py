@@ -1,4 +1,4 @@
-"""What there is to see is said when it changes, each time whole: whoever comes late needs the last message only."""
+"""Tests of scene topics: each message is complete."""
 
 import io
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What is kept of a run."""
+"""Tests of the thinning of recorded data."""
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import STOP, Twist

@@ -1,4 +1,4 @@
-"""The Trace holds what the moments said."""
+"""Tests of the trace builder."""
 
 import numpy as np
 import pytest

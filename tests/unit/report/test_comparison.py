@@ -1,4 +1,4 @@
-"""Stacks side by side, as people and machines read them."""
+"""Tests of the reports of stack comparisons."""
 
 import io
 import json

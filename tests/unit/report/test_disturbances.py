@@ -1,4 +1,4 @@
-"""What a session tells of events and faults: everything where something failed, one line where nothing did."""
+"""Tests of events and faults in reports."""
 
 import io
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The journal holds a session so that all its reports can be made again, wherever it was cut off."""
+"""Tests of the journal: reports can be created again, also after an interruption."""
 
 import json
 from dataclasses import replace

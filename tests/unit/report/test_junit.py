@@ -1,4 +1,4 @@
-"""junit.xml as other tools read it."""
+"""Tests of junit.xml with other readers."""
 
 import io
 import re

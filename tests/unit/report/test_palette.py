@@ -1,4 +1,4 @@
-"""Colors that can be read and told apart."""
+"""Tests of the contrast and distinguishability of colors."""
 
 import pytest
 

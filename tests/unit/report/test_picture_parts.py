@@ -1,4 +1,4 @@
-"""What is on a picture and where, in meters of the world, part by part."""
+"""Tests of the parts of a picture in world coordinates."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How long a session will go on."""
+"""Tests of the estimate of the remaining time."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What a replay page is made of: the log's own numbers to within their steps, and every event."""
+"""Tests of the data of replay pages."""
 
 import base64
 import json

@@ -1,4 +1,4 @@
-"""report.html as text: what is on it, in which order, and that nothing from outside is more than text."""
+"""Tests of the HTML of report.html: content, order, and escaping."""
 
 import json
 import re

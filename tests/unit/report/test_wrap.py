@@ -1,4 +1,4 @@
-"""No word of a line is broken at the edge of a terminal."""
+"""Tests of wrapping at the width of a terminal."""
 
 import shlex
 import subprocess

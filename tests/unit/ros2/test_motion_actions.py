@@ -1,4 +1,4 @@
-"""Which node of Nav2 owes a command."""
+"""Tests of which Nav2 server must send a command."""
 
 from types import SimpleNamespace
 from typing import Any

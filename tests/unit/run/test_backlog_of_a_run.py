@@ -1,4 +1,4 @@
-"""Code of others may write into an array that it has handed out: what it says is written at once."""
+"""Test that data of packages is recorded immediately."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Everything that a scenario lets happen happens at whole ticks, in order, with its cause."""
+"""Tests of the times and the order of events."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a base drives while commands come late or get lost."""
+"""Tests of a base with late and lost commands."""
 
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.run.faults.interfaces import CommandLink

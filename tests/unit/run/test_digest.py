@@ -1,4 +1,4 @@
-"""An old answer is kept only for the very question it was given to: whatever a run reads is in the digest."""
+"""Tests of the digest of a run, which includes all inputs."""
 
 import shutil
 from collections.abc import Callable

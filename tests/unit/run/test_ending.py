@@ -1,4 +1,4 @@
-"""A run ends a while after its task, whatever is sampled how often."""
+"""Tests of the end of a run."""
 
 import numpy as np
 import pytest

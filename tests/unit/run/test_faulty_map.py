@@ -1,4 +1,4 @@
-"""The map that each robot gets: of runs that no fault changes it for, what was worked out before stays."""
+"""Tests of the map of each robot, with and without a map fault."""
 
 from pathlib import Path
 

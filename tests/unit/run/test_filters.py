@@ -1,4 +1,4 @@
-"""Which zones of a stack's costmap filters are on, order by order."""
+"""Tests of switching zones of costmap filters."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The tolerances of a stack are those of goals that name none, in the file and of events."""
+"""Test of default goal tolerances."""
 
 from pathlib import Path
 

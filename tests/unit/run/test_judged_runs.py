@@ -1,4 +1,4 @@
-"""Whole runs whose verdict hangs on what reaches the judge: goals that events send, how far clearance is searched."""
+"""Tests of runs whose verdict depends on goals of events and on the search radius of the clearance."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Late sensors and late computing in a run: what comes of what a robot's file and a scenario say."""
+"""Tests of latency of sensors and stack in a run."""
 
 from pathlib import Path
 

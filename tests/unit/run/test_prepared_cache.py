@@ -1,4 +1,4 @@
-"""What the warm process keeps."""
+"""Tests of the cache of the warm process."""
 
 from pathlib import Path
 

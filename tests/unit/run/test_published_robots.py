@@ -1,4 +1,4 @@
-"""Robots as they are published: packages, arguments and includes of xacro, through their *.robot.yaml."""
+"""Tests of published robots: packages, arguments, and includes of xacro."""
 
 import pytest
 from pydantic import ValidationError

@@ -1,4 +1,4 @@
-"""What a log says there was to see."""
+"""Tests of the scenery in logs."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Triggers fire when the trace says that they should: each is compared with its closed form over what was recorded."""
+"""Tests of triggers in whole runs against the recorded trace."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""People in a run: their bodies, what is logged of them, and that one more of them changes nobody else."""
+"""Tests of pedestrians in whole runs."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Numbers drawn ahead are those that would be drawn one by one."""
+"""Test of random numbers that are drawn in blocks."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Who may meet soon, against what moves as fast as it may."""
+"""Tests of the broad phase."""
 
 import numpy as np
 import pytest

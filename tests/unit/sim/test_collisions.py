@@ -1,4 +1,4 @@
-"""Who hit whom, when and how hard."""
+"""Tests of collision events."""
 
 import math
 import random

@@ -1,4 +1,4 @@
-"""The same run twice is the same, bit for bit: in one process and in fresh ones."""
+"""Tests of the determinism of the simulation."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Closed forms of motion: what a robot does must be what its datasheet says."""
+"""Tests of robot motion against closed forms."""
 
 import math
 

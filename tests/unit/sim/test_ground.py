@@ -1,4 +1,4 @@
-"""Wheels on uneven ground, against closed forms: what they climb, what they do not, and what is then true."""
+"""Tests of wheels on uneven ground against closed forms."""
 
 import math
 

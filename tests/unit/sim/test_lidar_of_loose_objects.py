@@ -1,4 +1,4 @@
-"""Lidar ranges of objects that stand about, some of which the robot pushes."""
+"""Tests of lidar ranges of movable objects."""
 
 import math
 

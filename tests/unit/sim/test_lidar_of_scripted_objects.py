@@ -1,4 +1,4 @@
-"""Lidar ranges of objects that follow scripts, most of them out of range."""
+"""Tests of lidar ranges of scripted objects."""
 
 import math
 

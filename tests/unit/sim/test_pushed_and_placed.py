@@ -1,4 +1,4 @@
-"""Objects that are pushed, pressed on, stopped and set down elsewhere."""
+"""Tests of objects that are pushed, stopped, and teleported."""
 
 import math
 

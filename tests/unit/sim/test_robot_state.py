@@ -1,4 +1,4 @@
-"""Where a robot is, asked of the engine once for each tick."""
+"""Tests of the state of a robot, which is read once per tick."""
 
 import pybullet
 

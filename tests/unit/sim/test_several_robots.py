@@ -1,4 +1,4 @@
-"""Several robots in one world are things that move to each other, and are otherwise on their own."""
+"""Tests of several robots in one simulation."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What lies still costs nothing, and is awake the moment that anything touches it."""
+"""Tests of sleeping objects."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Samples of the truth that are looked at later are those that would have been seen at once."""
+"""Tests of ground-truth samples that are evaluated later."""
 
 import pytest
 from playground import box

@@ -1,4 +1,4 @@
-"""Walls of a large world are put up when something comes near them, which nobody notices."""
+"""Tests of walls that are added to the engine when something comes near."""
 
 import math
 from itertools import product

@@ -1,4 +1,4 @@
-"""What the stack does otherwise for a base that cannot turn in place."""
+"""Tests of the stack with a base that cannot turn in place."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Goal, progress, speed and retries: small rules with exact answers."""
+"""Tests of goal checker, progress checker, speed limits, and retries with exact answers."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""No parameter of a controller is read by nobody: each other value of it changes a command, or how one fails."""
+"""Tests that each parameter of a controller has an effect."""
 
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""No parameter of the stack is read by nobody: each other value of it changes what is decided in some scene.
+"""Tests that each parameter of the stack has an effect.
 
 Those of controllers are tried in test_every_field_of_a_controller_counts.py, command by command.
 """

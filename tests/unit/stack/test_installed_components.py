@@ -1,4 +1,4 @@
-"""Components that packages add: chosen by `type`, built by one door, and named where they break."""
+"""Tests of stack components of packages."""
 
 import math
 import pickle

@@ -1,4 +1,4 @@
-"""Costmaps that a stack of a package publishes: what no log could take is an error of its own."""
+"""Tests of costmaps published by stacks of packages."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,4 +1,4 @@
-"""What computing takes: results come late, of what there was when it began, and nobody waits for anybody else."""
+"""Tests of the latency of stack components."""
 
 import math
 from itertools import pairwise

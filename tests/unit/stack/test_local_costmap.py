@@ -1,4 +1,4 @@
-"""What the localizer corrects must move neither what the robot sees around it nor the wheel it steers by."""
+"""Tests of the local costmap during corrections of the localizer."""
 
 import math
 from itertools import pairwise

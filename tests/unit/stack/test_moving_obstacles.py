@@ -1,4 +1,4 @@
-"""Whether what moves may come near at all, beside looking at each moment."""
+"""Tests of the quick check for encounters with moving obstacles."""
 
 import numpy as np
 import pytest

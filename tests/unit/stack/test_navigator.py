@@ -1,4 +1,4 @@
-"""Whole drives: what the navigator makes of doors, walls, blind lidars and impatient clients."""
+"""Tests of whole drives with the navigator."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A robot that stands and waits for a part of its stack says so, and for which."""
+"""Tests of reports about a robot that waits for a part of its stack."""
 
 import pytest
 

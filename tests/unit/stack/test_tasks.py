@@ -1,4 +1,4 @@
-"""The list of goals as a client of Nav2's actions sees it: passed, waited at, preempted and failed together."""
+"""Tests of the list of goals, as a client of Nav2's actions sees it."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""`pytest --simscen-contract` as a plug-in author calls it, in a pytest of its own."""
+"""Tests of `pytest --simscen-contract` in a separate pytest process."""
 
 import json
 import subprocess

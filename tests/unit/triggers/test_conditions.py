@@ -1,4 +1,4 @@
-"""Each condition on both sides of its edge."""
+"""Tests of trigger conditions on both sides of their limits."""
 
 from dataclasses import dataclass, field
 

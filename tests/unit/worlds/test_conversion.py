@@ -1,4 +1,4 @@
-"""Imported worlds in our own language: the same triangles where it can say them, the same cut where it cannot."""
+"""Tests of the conversion of worlds to YAML."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Worlds and maps that others made of the same place must agree with each other in our hands."""
+"""Tests that third-party worlds and maps of the same place agree."""
 
 import math
 from pathlib import Path

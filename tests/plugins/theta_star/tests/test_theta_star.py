@@ -1,4 +1,4 @@
-"""Lazy Theta* keeps what every planner promises, and is as short as an any-angle path can be."""
+"""Tests of Lazy Theta*: the contract of planners, and the length of its paths."""
 
 import math
 

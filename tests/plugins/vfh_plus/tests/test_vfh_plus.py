@@ -1,4 +1,4 @@
-"""VFH+ keeps what every stack promises, and its histogram does what the paper says."""
+"""Tests of VFH+: the contract of stacks, and the histogram of the paper."""
 
 import math
 

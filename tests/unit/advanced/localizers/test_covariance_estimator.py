@@ -1,4 +1,4 @@
-"""A robot whose scans err together is as unsure as its poses scatter, and as what it sees is off the map."""
+"""Tests of the covariance estimator."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""A robot is found anywhere on its map by what it saw."""
+"""Tests of the global search for a pose."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What beams say of how far off the map is: those that it explains, as far as it does."""
+"""Tests of residuals between beams and map."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A scan counts as much as the map can tell of it, and beams that leave the map draw nobody."""
+"""Tests of map trust: weights of scans, and beams that leave the map."""
 
 import numpy as np
 import pytest

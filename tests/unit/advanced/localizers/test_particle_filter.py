@@ -1,4 +1,4 @@
-"""Tests of how particles move when scan matching and odometry disagree."""
+"""Tests of particle motion when scan matching and odometry disagree."""
 
 import numpy as np
 import pytest

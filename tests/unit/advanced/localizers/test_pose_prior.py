@@ -1,4 +1,4 @@
-"""A robot drifts as far as its scans leave open how it went, and no further."""
+"""Tests of the pose prior, which bounds the drift of the robot."""
 
 import numpy as np
 import pytest

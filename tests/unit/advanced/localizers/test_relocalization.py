@@ -1,4 +1,4 @@
-"""A robot that is somewhat off is put right by what it saw on its way."""
+"""Tests of relocalization by recent scans."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""How far a robot went is seen better than its wheels say, and left to them where nothing shows it."""
+"""Tests of scan matching: measured motion, and fallback to odometry."""
 
 import numpy as np
 import pytest

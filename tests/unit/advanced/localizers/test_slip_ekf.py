@@ -1,4 +1,4 @@
-"""The EKF adds up odometry exactly, weighs the gyroscope against the wheels, and knows how wrong it may be."""
+"""Tests of the slip EKF: dead reckoning, sensor fusion, and covariance."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Robots that slide with their wheels locked, are pushed, skid and spin: the EKF is as sure as it may be."""
+"""Tests of the consistency of the slip EKF when robots slide, skid, or are pushed."""
 
 import math
 

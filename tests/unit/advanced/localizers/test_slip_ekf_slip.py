@@ -1,4 +1,4 @@
-"""Wheels that lock, spin and slip: the EKF is never surer than it is right."""
+"""Tests of the slip EKF with locked, spinning, and slipping wheels."""
 
 import math
 

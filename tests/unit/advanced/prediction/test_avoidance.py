@@ -1,4 +1,4 @@
-"""Whole drives among things that move: met as a person would."""
+"""Tests of whole drives among moving obstacles."""
 
 import math
 from collections.abc import Callable

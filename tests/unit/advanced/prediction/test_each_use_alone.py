@@ -1,4 +1,4 @@
-"""Something crosses the robot's way: it is hit where nobody heeds what is predicted, and each who does saves it."""
+"""Tests that each use of the prediction alone prevents a collision."""
 
 from typing import Any
 

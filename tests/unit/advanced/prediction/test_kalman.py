@@ -1,4 +1,4 @@
-"""The filter of a point, beside filterpy's."""
+"""Test of the point filter against filterpy."""
 
 import numpy as np
 import pytest

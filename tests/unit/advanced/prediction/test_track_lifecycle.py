@@ -1,4 +1,4 @@
-"""Which tracks are followed on, from updates written down by hand."""
+"""Tests of the life cycle of tracks."""
 
 from simscen.advanced.prediction.tracks import MAX_NOT_APPEARED, Track, TrackLifecycle
 from simscen.model.guards import Prediction

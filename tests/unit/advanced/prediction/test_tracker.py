@@ -1,4 +1,4 @@
-"""What the tracker makes of scans whose truth is a closed form."""
+"""Tests of the tracker on scans with known motion."""
 
 import cmath
 import math

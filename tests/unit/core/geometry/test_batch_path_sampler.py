@@ -1,4 +1,4 @@
-"""Many paths at many times at once are each path at each time, to the last bit."""
+"""Test of batch sampling of paths against single samples."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Mecanum wheels against what follows from each roller alone, and against the published equations."""
+"""Tests of mecanum kinematics against single rollers and published equations."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Whether a mesh is its own convex hull, by cubes and what was done to them."""
+"""Tests of the convexity check of meshes."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Which things scripts keep away from a place."""
+"""Test of the search for scripted objects that stay far from a position."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The names of runs."""
+"""Tests of the names of runs."""
 
 from itertools import product
 

@@ -1,4 +1,4 @@
-"""Which conditions can be written, and what is said of those that cannot."""
+"""Tests of valid and invalid temporal conditions."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What a temporal criterion asks of a log, in which unit its margin is, and what its finding tells."""
+"""Tests of temporal criteria: required evidence, unit of the margin, and findings."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""How far ahead a condition must look."""
+"""Tests of the decision horizon of conditions."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Conditions and their witnesses in words."""
+"""Tests of descriptions of conditions and witnesses."""
 
 import math
 

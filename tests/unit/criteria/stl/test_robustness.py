@@ -1,4 +1,4 @@
-"""Formulas on whole runs: what is decided stays decided, and the sign of the margin is the verdict."""
+"""Tests of formulas on whole runs: verdicts are final, and the sign of the margin is the verdict."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What the table says of each signal."""
+"""Tests of the catalog of signals."""
 
 import math
 

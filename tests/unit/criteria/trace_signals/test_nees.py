@@ -1,4 +1,4 @@
-"""NEES against closed forms, and of which beliefs."""
+"""Tests of NEES against closed forms."""
 
 import math
 from dataclasses import replace

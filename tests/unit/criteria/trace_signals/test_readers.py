@@ -1,4 +1,4 @@
-"""Named signals against closed forms, and where their samples come from."""
+"""Tests of named signals against closed forms."""
 
 import itertools
 import math

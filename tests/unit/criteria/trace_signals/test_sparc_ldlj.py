@@ -1,4 +1,4 @@
-"""SPARC and LDLJ against their definitions, at the edges of what they are defined for."""
+"""Tests of SPARC and LDLJ against their definitions."""
 
 import cmath
 import itertools

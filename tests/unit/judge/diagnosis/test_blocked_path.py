@@ -1,4 +1,4 @@
-"""What closes the way, and nothing else."""
+"""Tests of the diagnosis of blocked paths."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Failures are explained, and nothing else is."""
+"""Tests that only failures have explanations."""
 
 from diagnosis_cases import STANDS, by, why
 

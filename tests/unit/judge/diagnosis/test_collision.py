@@ -1,4 +1,4 @@
-"""How what was touched came to be there."""
+"""Tests of the diagnosis of collisions."""
 
 from diagnosis_cases import box, by, why
 

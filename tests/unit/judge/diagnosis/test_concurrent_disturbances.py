@@ -1,4 +1,4 @@
-"""What was under way when something failed."""
+"""Test of the report of disturbances at the time of a failure."""
 
 import pytest
 from diagnosis_cases import by, slip, why

@@ -1,4 +1,4 @@
-"""What keeps a robot from its goal."""
+"""Tests of the diagnosis of failed goals."""
 
 import pytest
 from diagnosis_cases import CASE, STANDS, box, why

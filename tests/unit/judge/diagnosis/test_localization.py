@@ -1,4 +1,4 @@
-"""Why a robot is not where it believes to be."""
+"""Tests of the diagnosis of localization errors."""
 
 from diagnosis_cases import GOAL, by, slip, why
 

@@ -1,4 +1,4 @@
-"""What can move, where it stands, and how far away that is."""
+"""Tests of objects in the diagnosis: pose, presence, and distance."""
 
 import numpy as np
 import pytest

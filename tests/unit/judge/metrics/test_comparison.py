@@ -1,4 +1,4 @@
-"""Stacks against each other: what is paired, what is left out, and what is said of the rest."""
+"""Tests of the comparison of stacks: pairs, exclusions, and statistics."""
 
 import itertools
 import json

@@ -1,4 +1,4 @@
-"""Metrics of the goals, the motion and the contacts of a run, to the sample."""
+"""Tests of metrics at the limits of single samples."""
 
 from dataclasses import replace
 

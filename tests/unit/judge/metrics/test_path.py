@@ -1,4 +1,4 @@
-"""The shape of the driven way, in closed form."""
+"""Tests of path shape metrics in closed form."""
 
 import math
 from dataclasses import replace

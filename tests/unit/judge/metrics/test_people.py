@@ -1,4 +1,4 @@
-"""How near people a robot was, in closed form."""
+"""Tests of metrics of distances to people, in closed form."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The figures of a session."""
+"""Tests of the summary of a session."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""Files that are there to be extended are checked for what they say, not for what they leave out."""
+"""Tests of the validation of base files."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A goal where something that can move is at first: it may be gone by then, but nothing says so."""
+"""Test of the warning about goals on movable objects."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Of walls that close the last way, the one told is the one between the robot and its goal."""
+"""Test that the wall between robot and goal is named."""
 
 from pathlib import Path
 

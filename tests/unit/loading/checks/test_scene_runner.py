@@ -1,4 +1,4 @@
-"""What a scenario asks to fail need not be possible, and nothing else is let through."""
+"""Tests of semantic checks for scenarios with expected failures."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""World files of any kind are read on their own, and ours are written so that they read back the same."""
+"""Tests of reading and writing world files."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A stack that is chosen for every scenario: what of the scenario's own stays, and what of the file counts."""
+"""Tests of merging `--stack` with the stack of a scenario."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a path of a variation means."""
+"""Tests of paths of variations."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Values that are drawn: the same every time, of the shape that was asked for, and independent of each other."""
+"""Tests of sampled values: reproducible, correctly distributed, and independent."""
 
 import math
 from statistics import NormalDist, mean

@@ -1,4 +1,4 @@
-"""What becomes of a run whose stack breaks off, hangs, or does not keep to the protocol: real processes."""
+"""Tests of external stacks that crash, hang, or violate the protocol."""
 
 import os
 from pathlib import Path

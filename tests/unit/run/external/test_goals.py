@@ -1,4 +1,4 @@
-"""What a stack says of its goals, and what a run makes of it: its word never makes green what is not so."""
+"""Tests of goal reports of external stacks against the ground truth."""
 
 import pytest
 from stack_programs import DRIVE

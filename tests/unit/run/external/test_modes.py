@@ -1,4 +1,4 @@
-"""Goals that are passed, waited at and driven in loops, behind the protocol; and stacks that know nothing of that."""
+"""Tests of navigation modes of external stacks."""
 
 import pytest
 from stack_programs import DRIVE

@@ -1,4 +1,4 @@
-"""A session in which some stacks are processes: whatever becomes of one of them, the others are as if alone."""
+"""Tests that a failing external stack does not affect other runs."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Two robots, each with a process of its own: they know whose they are, and neither outlives the other's end."""
+"""Tests of external stacks of several robots."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What goes over the socket: big, slow, often or seldom, it is the same run."""
+"""Tests of the traffic with external stacks: slow answers, large messages, and rates."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Whatever bytes a stack says, they are understood or refused, and never anything else."""
+"""Tests that any bytes from a stack are accepted or refused."""
 
 import json
 from contextlib import suppress

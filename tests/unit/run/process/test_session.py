@@ -1,4 +1,4 @@
-"""What a session promises: every run is answered exactly once, and no fault is ever reported as a pass."""
+"""Tests of sessions: each run has one result, and a fault is never a pass."""
 
 import contextlib
 import os

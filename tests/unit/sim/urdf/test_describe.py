@@ -1,4 +1,4 @@
-"""A body written as URDF and read again is the same body."""
+"""Tests of URDF output, which is read back equal."""
 
 import numpy as np
 import pytest

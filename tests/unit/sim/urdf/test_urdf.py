@@ -1,4 +1,4 @@
-"""Robots from URDF files: what they become, and how bad ones are refused (CASES 37-44, 50)."""
+"""Tests of robots from URDF files, and of invalid URDFs (CASES 37-44, 50)."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""Turning in place to a heading: it comes to rest there."""
+"""Tests of turning in place to a heading."""
 
 from collections import deque
 

@@ -1,4 +1,4 @@
-"""DWB's parts against numbers worked out by hand from Nav2's sources: golden/dwb.yaml."""
+"""Tests of DWB against values computed by hand from Nav2's sources: golden/dwb.yaml."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""MPPI's parts against numbers of plain loops after Nav2's sources: golden/mppi.yaml."""
+"""Tests of MPPI against values of plain loops after Nav2's sources: golden/mppi.yaml."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Commands against numbers worked out by hand from Nav2's formulas: golden/regulated_pure_pursuit.yaml."""
+"""Tests of commands against values computed by hand from Nav2's formulas: golden/regulated_pure_pursuit.yaml."""
 
 from pathlib import Path
 from typing import Any

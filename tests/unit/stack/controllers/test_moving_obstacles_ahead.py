@@ -1,4 +1,4 @@
-"""Each controller's own collision check asks where things that move will be when it gets there, not where they are."""
+"""Tests of the collision checks of controllers with predicted obstacles."""
 
 import math
 from dataclasses import replace

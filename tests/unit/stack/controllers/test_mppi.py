@@ -1,4 +1,4 @@
-"""MPPI: the speeds that it reaches, and its parts against numbers worked out by hand from nav2_mppi_controller."""
+"""Tests of MPPI: reached speeds, and parts against values computed by hand from nav2_mppi_controller."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Where a hull with corners may turn, against what the clearance of the world itself says."""
+"""Tests of the free space for turns in place."""
 
 import math
 

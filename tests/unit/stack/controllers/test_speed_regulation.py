@@ -1,4 +1,4 @@
-"""Who is slow in gaps and bends has slowed down before them: a robot that brakes as it can, driven towards one."""
+"""Tests of slowing down before gaps and curves."""
 
 import math
 

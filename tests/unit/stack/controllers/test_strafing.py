@@ -1,4 +1,4 @@
-"""Bases that drive sideways do so under the controllers that Nav2 lets: DWB and MPPI, not regulated pure pursuit."""
+"""Tests of sideways motion with each controller."""
 
 from typing import Any
 

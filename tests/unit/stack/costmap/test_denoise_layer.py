@@ -1,4 +1,4 @@
-"""Specks go, things stay: nav2_costmap_2d's denoise layer."""
+"""Tests of the denoise layer, as in nav2_costmap_2d."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A depth camera shows what a lidar passes under and over."""
+"""Tests of the depth camera layer."""
 
 import math
 

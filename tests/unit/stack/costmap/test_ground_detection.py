@@ -1,4 +1,4 @@
-"""A depth camera takes a slope for ground, and what stands on it for an obstacle."""
+"""Tests of ground detection with a depth camera."""
 
 import math
 from itertools import pairwise

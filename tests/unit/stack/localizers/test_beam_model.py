@@ -1,4 +1,4 @@
-"""The beam model casts rays as exactly as its map allows, and weighs them by table 6.1."""
+"""Tests of the beam model: ray casting, and weights of table 6.1."""
 
 import math
 

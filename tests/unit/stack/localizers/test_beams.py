@@ -1,4 +1,4 @@
-"""A filter looks at evenly spread beams, and only at those that gave an answer."""
+"""Tests of the selection of beams for a filter."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Each specification becomes its localizer, with the models it asks for."""
+"""Tests of building localizers from specifications."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Particles are grouped as a graph library groups them, and summed up as a statistics library sums them up."""
+"""Tests of particle clusters against graph and statistics libraries."""
 
 import numpy as np
 import pytest

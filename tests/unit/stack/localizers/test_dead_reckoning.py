@@ -1,4 +1,4 @@
-"""Dead reckoning is odometry moved to where the robot was told it started."""
+"""Tests of dead reckoning."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The distance field answers for every point there is, on the map and off it."""
+"""Tests of the distance field, on the map and outside."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The ground-truth localizer believes the sensor `ground_truth` and nothing else for longer than a moment."""
+"""Tests of the ground-truth localizer."""
 
 import numpy as np
 import pytest

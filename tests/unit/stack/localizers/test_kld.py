@@ -1,4 +1,4 @@
-"""KLD-sampling asks for as many samples as Fox's bound says."""
+"""Tests of KLD sampling against Fox's bound."""
 
 import numpy as np
 import pytest

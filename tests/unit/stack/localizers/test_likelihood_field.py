@@ -1,4 +1,4 @@
-"""The likelihood fields give what the formulas of nav2_amcl give, worked out beam by beam."""
+"""Tests of the likelihood fields against the formulas of nav2_amcl."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The motion models move particles as odometry says, with the spread that nav2_amcl's formulas give."""
+"""Tests of the motion models against the formulas of nav2_amcl."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A filter begins around a guess, or anywhere that is free."""
+"""Tests of initial particles."""
 
 import numpy as np
 import pytest

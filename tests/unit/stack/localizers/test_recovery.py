@@ -1,4 +1,4 @@
-"""The share of random particles is that of table 8.3, with averages that are honest from the start."""
+"""Tests of the share of random particles (table 8.3)."""
 
 import numpy as np
 import pytest

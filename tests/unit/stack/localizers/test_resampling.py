@@ -1,4 +1,4 @@
-"""Particles are drawn in proportion to their weights, with low variance, until the KLD bound is met."""
+"""Tests of resampling: low variance, and the KLD bound."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""On large costmaps planners look around their ends first, and farther where that cannot suffice."""
+"""Tests of the planning window on large costmaps."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Plans of cars and long hulls: their ends, what is not known, and where a robot is stuck."""
+"""Tests of plans of cars and long hulls."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Searches over poses: their ends, and what they promise of the way between."""
+"""Tests of searches over poses."""
 
 import math
 import time

@@ -1,4 +1,4 @@
-"""What of a world is in the way of a robot that climbs ramps."""
+"""Tests of obstacles for a robot that climbs ramps."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Whether filled polygons share inner points, also where only corners and edges meet."""
+"""Tests of overlaps of polygons."""
 
 from math import cos, pi, sin
 

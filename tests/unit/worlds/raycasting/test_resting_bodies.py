@@ -1,4 +1,4 @@
-"""What lies at home is met where it would be met alone, however it is piled up."""
+"""Tests of ray casting against resting bodies."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Ways in plain numbers never promise what the exact ones deny, and overlaps agree with sampling."""
+"""Tests of the fast shortest paths against the exact ones."""
 
 import math
 

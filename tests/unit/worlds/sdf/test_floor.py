@@ -1,4 +1,4 @@
-"""A floor that is part of a world's geometry becomes the ground that robots drive on."""
+"""Tests of floors in SDF worlds."""
 
 import pytest
 

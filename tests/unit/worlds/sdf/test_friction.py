@@ -1,4 +1,4 @@
-"""`<mu>`: how well wheels hold on what a world is made of."""
+"""Tests of friction in SDF worlds (`<mu>`)."""
 
 import math
 

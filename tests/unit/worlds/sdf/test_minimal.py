@@ -1,4 +1,4 @@
-"""One construct in each of 29 files; most of them break pybullet.loadSDF."""
+"""Tests of 29 minimal SDF files with one construct each."""
 
 import math
 from pathlib import Path

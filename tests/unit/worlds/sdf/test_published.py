@@ -1,4 +1,4 @@
-"""Worlds as they are published: addresses of Fuel, neighbors of missing files, things parked far away."""
+"""Tests of published SDF worlds: Fuel URLs, missing files, and distant objects."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Worlds that others made, against independent readings of the same files and against their own maps."""
+"""Tests of third-party worlds against independent readings and their own maps."""
 
 import math
 import xml.etree.ElementTree as ET

@@ -1,5 +1,5 @@
 # ruff: noqa: E501 (a case reads best on one line)
-"""A robot file is data: it runs nothing, reads nothing outside, and ends (CWE-94, CWE-22, CWE-400)."""
+"""Tests of hostile xacro files: no code execution, no external files, bounded time (CWE-94, CWE-22, CWE-400)."""
 
 import pytest
 

@@ -1,5 +1,5 @@
 # ruff: noqa: E501 (a case reads best on one line)
-"""What xacro itself makes of a file is what we make of it."""
+"""Tests of xacro expansion against the xacro package."""
 
 from xml.dom.minidom import Element
 
