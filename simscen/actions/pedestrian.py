@@ -123,10 +123,10 @@ class Pedestrian(_WalkSettings, WorldAction):
     def perform(self, stage: Stage) -> Effect:
         """Add the pedestrian; has no effect if there is no free space."""
         pose = self.pose.pose
-        if not stage.room((pose.x, pose.y), self.radius):
+        if not stage.has_room((pose.x, pose.y), self.radius):
             return Effect(False, f"there is no free space for {self.name} at ({pose.x:.2f}, {pose.y:.2f})")
         goals = tuple((x, y) for x, y in self.goals)
-        stage.walk(self.to_pedestrian(stage, self.name, pose, goals, self.group))
+        stage.add_pedestrian(self.to_pedestrian(stage, self.name, pose, goals, self.group))
         return Effect(True, f"added {self.name} at ({pose.x:.2f}, {pose.y:.2f})")
 
 

@@ -40,7 +40,7 @@ def missing_disturbances(
     seen = Counter(verdict.id for verdict in others)
     found = []
     for one in missing:
-        name = one.ordered.name
+        name = one.disturbance.name
         seen[name] += 1
         unique = name if seen[name] == 1 else f"{name}#{seen[name]}"
         found.append((Verdict(DISTURBANCE, unique, "fail", (_finding(trace, one),)), one.disturbance.line))
@@ -52,7 +52,7 @@ def _is_reported_earlier(one: DisturbanceOutcome, happened: Sequence[Disturbance
     after = one.disturbance.after
     if after is None or one.fired:
         return False
-    before = [other for other in happened if other.ordered.kind == "event"][after]
+    before = [other for other in happened if other.disturbance.kind == "event"][after]
     return not before.fired and (before.missing or _is_reported_earlier(before, happened))
 
 
@@ -65,7 +65,7 @@ def _with_entries(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturb
 
 
 def _finding(trace: Trace, one: DisturbanceOutcome) -> Finding:
-    text = f"{one.ordered.name} ({one.ordered.trigger})"
+    text = f"{one.disturbance.name} ({one.disturbance.trigger})"
     if not has_ended(trace):
         because = f"{text}, until the log stops at t = {trace.seconds(trace.end):.2f} s"
         return undecided(FINDING_NAME, because, detail=(one.effect,))

@@ -66,7 +66,7 @@ def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
         one.effect,
         "" if one.happened else "so it did not happen",
     )
-    return f"{one.ordered.name}: {', '.join(part for part in parts if part)}"
+    return f"{one.disturbance.name}: {', '.join(part for part in parts if part)}"
 
 
 def violations(verdict: Verdict) -> tuple[Finding, ...]:

@@ -95,7 +95,7 @@ def combine_robots(
     metric `success` also exists for the run. `expected` is set if the run is expected to fail.
     """
     first = next(iter(results.values()))
-    shared = {one.ordered.name for one in first.disturbances if one.ordered.kind == "event"}
+    shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
     judged = [(verdict, line) for verdict, line in _verdicts_with_lines(first) if _is_about_world(verdict, shared)]
     for name, result in results.items():
         own = (
@@ -163,7 +163,7 @@ def _is_world_event(event: Event) -> bool:
 
 
 def _disturbances(result: RunResult, kind: str) -> list[DisturbanceOutcome]:
-    return [one for one in result.disturbances if one.ordered.kind == kind]
+    return [one for one in result.disturbances if one.disturbance.kind == kind]
 
 
 def _faults(results: Mapping[str, RunResult]) -> list[DisturbanceOutcome]:

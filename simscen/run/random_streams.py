@@ -29,7 +29,7 @@ def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list
 
 
 def _content_key(entry: BaseModel) -> str:
-    if any(isinstance(part, Choice) and part.narrow is not None for _, part in walk(entry)):
+    if any(isinstance(part, Choice) and part.original_class is not None for _, part in walk(entry)):
         return json.dumps(_plain(entry), sort_keys=True)
     _build_serializers(entry)
     return entry.model_dump_json(exclude_defaults=True)

@@ -184,7 +184,7 @@ def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
     """
     texts = {name: text.encode() for name, text in sorted(loaded.sources.items())}
     files = {
-        _portable_name(file, loaded): file.read_bytes() for file in sorted({*referenced_files(loaded), *loaded.read})
+        _portable_name(file, loaded): file.read_bytes() for file in sorted({*referenced_files(loaded), *loaded.read_files})
     }
     run = hashlib.sha256(json.dumps(_run_inputs(loaded), sort_keys=True).encode())
     for name, data in (*texts.items(), *files.items()):
@@ -285,6 +285,6 @@ def scenario_files(loaded: LoadedScenario) -> set[Path]:
 
 def _program(loaded: LoadedScenario) -> list[Path]:
     """Return the files among the arguments of an external stack's command."""
-    assert loaded.runs is not None
-    paths = [Path(loaded.runs.cwd, argument) for argument in loaded.runs.argv]
+    assert loaded.external_command is not None
+    paths = [Path(loaded.external_command.cwd, argument) for argument in loaded.external_command.argv]
     return [path for path in paths if path.is_file()]

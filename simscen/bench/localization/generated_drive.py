@@ -68,7 +68,7 @@ def _waypoints(floor: Building, paths: ShortestPaths, rng: np.random.Generator, 
         rooms = floor.rooms[side] if alternate else floor.rooms
         target = rooms[rng.integers(len(rooms))] + rng.normal(0, 0.8, 2)
         start = target if position is None else position
-        path = paths.way(Pose2(*start), Pose2(*target))
+        path = paths.path(Pose2(*start), Pose2(*target))
         failed = failed + 1 if path is None else 0
         if failed > MAX_FAILED_GOALS:  # furniture blocks the door of this room
             raise EnclosedStart(tuple(start))
@@ -84,7 +84,7 @@ def mapping_tour(floor: Building) -> Array:
     order = floor.rooms[np.argsort(floor.rooms[:, 0], kind="stable")]
     points, position = [order[:1]], order[0]
     for room in order[1:]:
-        path = paths.way(Pose2(*position), Pose2(*room))
+        path = paths.path(Pose2(*position), Pose2(*room))
         if path is None:
             continue
         length = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))))

@@ -56,7 +56,7 @@ def _unreachable(case: Case, goal: Goal) -> list[str]:
         return []
     needed = 2 * case.inscribed_radius
     narrow = [passage for passage in case.passages if passage.goal == goal.name and passage.width < needed]
-    where = f"; too narrow is {narrow[0].told}" if narrow else ""
+    where = f"; too narrow is {narrow[0].description}" if narrow else ""
     return [f"the world has no path to goal {goal.name} for a robot {needed:.2f} m wide{where}"]
 
 
@@ -154,7 +154,7 @@ def diagnose_blocked_path(
     verb = "closes" if left < needed else "narrows"
     named = " and ".join(each.describe(trace) for each in blocking)
     text = (
-        f"{named} {verb if len(blocking) == 1 else verb[:-1]} {passage.told} on the shortest path: "
+        f"{named} {verb if len(blocking) == 1 else verb[:-1]} {passage.description} on the shortest path: "
         f"{f'{left:.2f} m are' if left >= NEGLIGIBLE_WIDTH_M else 'nothing is'} left, the robot is {needed:.2f} m wide"
     )
     return [text], {each.event for each in blocking}

@@ -78,7 +78,7 @@ def masks_without_effect(scene: Scene) -> Iterator[Finding]:
     masks = scene.cached(stack_masks)
     if masks.keepout is not None and not (masks.keepout.cells == OCCUPIED).any():
         yield Finding(KEEPOUT_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
-    if masks.speed is not None and not masks.speed.limiting:
+    if masks.speed is not None and not masks.speed.has_limits:
         yield Finding(SPEED_KEYS, f"the speed mask has no effect: {NO_LIMIT_REASON}")
 
 
@@ -102,7 +102,7 @@ def criterion_masks_without_effect(scene: Scene) -> Iterator[Finding]:
             case Keepout(mask=str(name)) if not len(masks[name].forbidden):
                 message = "the criterion judges nothing: no cell of the mask is occupied"
                 yield Finding(("pass", index, "keepout", "mask"), message)
-            case Speed(mask=spec) if spec is not None and not spec.over(masks[spec.file].grid).limiting:
+            case Speed(mask=spec) if spec is not None and not spec.over(masks[spec.file].grid).has_limits:
                 yield Finding(
                     ("pass", index, "speed", "mask", "file"), f"the criterion judges nothing: {NO_LIMIT_REASON}"
                 )

@@ -66,4 +66,4 @@ def with_external_reference(prepared: PreparedScenario) -> PreparedScenario:
         external="reference", ground_truth=stack.gets_ground_truth, goal_checker=GoalTolerances(**tolerances), **shared
     )
     command = ExternalCommand(argv, clean_environment(), str(Path.cwd()))
-    return replace(prepared, stack=external, loaded=replace(prepared.loaded, runs=command))
+    return replace(prepared, stack=external, loaded=replace(prepared.loaded, external_command=command))

@@ -148,7 +148,7 @@ class PedestrianSimulation:
                 self._planners[clearance] = shortest_paths_in(
                     self._built, (), clearance, BODY_HEIGHT_RANGE_M, PATH_CELL_M
                 )
-            corners = self._planners[clearance].way(Pose2(*start, 0.0), Pose2(*goal, 0.0))
+            corners = self._planners[clearance].path(Pose2(*start, 0.0), Pose2(*goal, 0.0))
             if corners is not None:
                 return [(x, y) for x, y in corners[1:].tolist()]
         return [goal]

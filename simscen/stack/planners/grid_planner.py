@@ -78,7 +78,7 @@ class GridPlanner:
             tuple(int((point[axis] - costs.origin[axis]) / costs.resolution) + BORDER_CELLS for axis in (1, 0))
             for point in (ends.start, ends.goal)
         )
-        cells = graph.way((first[0], first[1]), (last[0], last[1]))
+        cells = graph.shortest_path((first[0], first[1]), (last[0], last[1]))
         if cells is None:
             raise NavigationFailure(ErrorCode.NO_VALID_PATH, "start and goal are not connected on the costmap")
         centers: Array = (cells[:, ::-1] - BORDER_CELLS + 0.5) * costs.resolution + np.array(costs.origin)

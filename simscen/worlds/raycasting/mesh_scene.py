@@ -134,7 +134,7 @@ class MeshScene:
     def sweep(self, fan: RayFan, position: Vector, packets: slice = ALL_PACKETS) -> None:
         """Shorten some `packets` of a fan's rays, which start at `position` with their current directions."""
         (x, y, z), (mx, my, mz) = position, self.center
-        fan.begin(x - mx, y - my, z - mz, packets)
+        fan.set_origin(x - mx, y - my, z - mz, packets)
         self._scene.shorten(fan.rays, packets)
 
 
@@ -188,7 +188,7 @@ class MovingMesh:
     def _sweep_packets(self, fan: RayFan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
         (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
         inverse = -i, -j, -k, w
-        fan.turn(rotated(inverse, ahead), rotated(inverse, left), packets)
+        fan.set_directions(rotated(inverse, ahead), rotated(inverse, left), packets)
         self.part.sweep(fan, rotated(inverse, (px - x, py - y, pz - z)), packets)
 
 

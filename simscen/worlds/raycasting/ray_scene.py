@@ -205,8 +205,8 @@ class RayScene(RayCaster):
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
         """See core.geometry.ray_fans.RayCaster. Runs once per scan, so that each numpy call (1 µs) counts."""
         position, (ahead, left) = pose[:3], forward_and_left(pose[3:])
-        fan.turn(ahead, left)
-        fan.end(min(reach, _MAX_RANGE_M) * _END_FACTOR)
+        fan.set_directions(ahead, left)
+        fan.set_length(min(reach, _MAX_RANGE_M) * _END_FACTOR)
         self._static.sweep(fan, position)
         if self._resting:
             rise = _max_rise(math.hypot(ahead[2], left[2]), reach)

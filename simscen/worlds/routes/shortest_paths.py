@@ -127,7 +127,7 @@ class ShortestPaths:
     def _search(self, graph: GridGraph, ends: Array) -> Array | None:
         """Return the tightened path (n, 2) over a graph; None if there is none."""
         first, last = (self._free_cell(graph, end) for end in ends)
-        cells = graph.way(first, last) if first and last else None
+        cells = graph.shortest_path(first, last) if first and last else None
         if cells is None:
             return None
         inner = self._field.grid.center_of(cells)
