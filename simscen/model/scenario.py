@@ -230,7 +230,7 @@ class ScenarioSpec(Spec):
     """Description for people: the tested behavior, and the reason for the test."""
     tags: Annotated[list[PlaceName], Field(max_length=50)] = []
     """Tags; `--tag` selects scenarios by them."""
-    seed: Annotated[int, Field(ge=1, le=LARGEST_SEED)] = 1
+    seed: Annotated[int, Field(ge=1, le=MAX_SEED)] = 1
     """Seed of all random numbers of a run."""
     world: WorldOrFile
     """World: a `*.world.yaml` file, a ROS map `.yaml`, a Gazebo `.sdf` or `.world` file, or an inline world."""

@@ -184,7 +184,8 @@ def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
     """
     texts = {name: text.encode() for name, text in sorted(loaded.sources.items())}
     files = {
-        _portable_name(file, loaded): file.read_bytes() for file in sorted({*referenced_files(loaded), *loaded.read_files})
+        _portable_name(file, loaded): file.read_bytes()
+        for file in sorted({*referenced_files(loaded), *loaded.read_files})
     }
     run = hashlib.sha256(json.dumps(_run_inputs(loaded), sort_keys=True).encode())
     for name, data in (*texts.items(), *files.items()):

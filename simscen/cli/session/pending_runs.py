@@ -88,7 +88,9 @@ def _planned(job: Job, digests: ScenarioDigests) -> PlannedRun:
     scenario = job.scenario
     again = repeat_command(scenario, job.key.seed)
     file, stack = display_path(scenario.file), scenario.stack
-    return PlannedRun(job.key, scenario.path, digests.run, again, file, stack, digests.definition, scenario.varied_values)
+    return PlannedRun(
+        job.key, scenario.path, digests.run, again, file, stack, digests.definition, scenario.varied_values
+    )
 
 
 def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:

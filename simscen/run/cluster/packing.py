@@ -43,7 +43,9 @@ def pack(job: Job, send: Callable[[Path], SentFile]) -> PackedJob:
 
 
 def _input_files(scenario: LoadedScenario) -> Iterable[Path]:
-    paths = {path for view in (scenario, *scenario.robots.values()) for path in (*view.files.values(), *view.read_files)}
+    paths = {
+        path for view in (scenario, *scenario.robots.values()) for path in (*view.files.values(), *view.read_files)
+    }
     return (path for path in paths if path.is_file() and not path.is_relative_to(PACKAGE_FOLDER))
 
 

@@ -42,7 +42,7 @@ def test_dynamic_fields_load_at_three_speeds(tmp_path: Path) -> None:
 
 
 def test_localization_drives_have_different_wrong_estimates(tmp_path: Path) -> None:
-    experiments = localizations(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
+    experiments = localization_experiments(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
     for experiment in experiments:
         loads(experiment)
     _, misled, unknown, _ = experiments

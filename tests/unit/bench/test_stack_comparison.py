@@ -19,11 +19,11 @@ def test_the_interval_is_over_worlds_however_many_seeds_each_has() -> None:
 
 
 def test_equal_outcomes_give_the_wilson_interval() -> None:
-    assert over_worlds([Trial(ARRIVED, world=f"{n}") for n in range(10)]) == pytest.approx((0.722, 1.0), abs=1e-3)
+    assert success_interval([Trial(ARRIVED, world=f"{n}") for n in range(10)]) == pytest.approx((0.722, 1.0), abs=1e-3)
 
 
 def test_mixed_outcomes_give_a_nonempty_interval() -> None:
-    low, high = over_worlds([Trial(r, world=f"{n}") for n in range(6) for r in (ARRIVED, HIT)]) or (0.5, 0.5)
+    low, high = success_interval([Trial(r, world=f"{n}") for n in range(6) for r in (ARRIVED, HIT)]) or (0.5, 0.5)
     assert (low, high) == pytest.approx(wilson_interval(3, 6))
 
 

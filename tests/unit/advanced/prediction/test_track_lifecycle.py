@@ -21,12 +21,12 @@ def ended(*tracks: Track) -> list[bool]:
 
 
 def test_track_that_is_no_longer_in_free_space_ends() -> None:
-    slides, comes = [True] + [False] * UNCOME, [True] * 4 + [False] * (UNCOME - 1) + [True]
+    slides, comes = [True] + [False] * MAX_NOT_APPEARED, [True] * 4 + [False] * (MAX_NOT_APPEARED - 1) + [True]
     assert ended(track(*slides)) == [True]
     assert ended(track(*comes)) == [False]
 
 
 def test_track_next_to_a_moving_obstacle_continues() -> None:
-    beside = track(*[True] * (UNCOME + 1))
+    beside = track(*[True] * (MAX_NOT_APPEARED + 1))
     beside.moving = True
-    assert ended(track(True, *[False] * UNCOME), beside) == [False, False]
+    assert ended(track(True, *[False] * MAX_NOT_APPEARED), beside) == [False, False]
