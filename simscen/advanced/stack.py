@@ -88,7 +88,7 @@ class AdvancedStack(ReferenceStack):
         return self._prediction.with_moving_hits(scan)
 
     def _on_costmaps_updated(self, tick: int, frames: Frames) -> None:
-        """Give the moving obstacles to collision monitor, controller, and planner, each in its frame."""
+        """Pass the moving obstacles to collision monitor, controller, and planner, each in its frame."""
         if self._prediction.is_idle and not self._has_moving_obstacles:
             return
         moving = self._prediction.moving_in_frame(tick, ROBOT_FRAME)

@@ -175,7 +175,7 @@ class Pedestrian:
         return self.path[0] if self.path else self.destination
 
     def _blocking_intent(self, robot: ObservedRobot) -> Intent:
-        """Stand in front of the robot, with sine and cosine corrected, which HuNavSim's blockRobot swaps."""
+        """Return the intent to stand in front of the robot. HuNavSim's blockRobot swaps sine and cosine."""
         gap = max(BLOCKING_DISTANCE_M, robot.radius + self.spec.radius + STOPPING_DISTANCE_M)
         yaw = robot.pose.yaw
         target = robot.pose.x + gap * math.cos(yaw), robot.pose.y + gap * math.sin(yaw)

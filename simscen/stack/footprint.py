@@ -130,7 +130,7 @@ class CoveringDiscs:
     """
 
     def __init__(self, robot: RobotModel) -> None:
-        """Cover the footprint of a robot."""
+        """Compute the discs that cover the footprint of a robot."""
         if robot.radius is not None:
             self.offsets, self.radius, self.reach, self.centered = np.zeros(1), robot.radius, robot.radius, True
             return

@@ -105,7 +105,7 @@ class Navigator:
         self._progress.reset()
 
     def stop(self) -> None:
-        """Drop the goal."""
+        """Remove the goal."""
         self.goal, self.via = None, ()
         self._reset()
 

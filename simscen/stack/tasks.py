@@ -24,6 +24,7 @@ class Task:
         self.goal: Goal | None = None
         """The current goal; None also while the robot waits at a goal."""
         self.since = 0
+        """Tick at which the current goal was accepted."""
 
     def start(self, goals: tuple[Goal, ...]) -> None:
         """Start a task with these goals."""
@@ -127,7 +128,7 @@ class Task:
         return (Event(tick, EventKind.NAVIGATION_ENDED, result.value, details),)
 
     @property
-    def following(self) -> Goal | None:
+    def next_goal(self) -> Goal | None:
         """The next goal."""
         return self._waiting[0] if self._waiting else None
 

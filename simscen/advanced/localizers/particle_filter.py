@@ -65,7 +65,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
     def follow(self, step: Step, delta: Pose2) -> None:
         """Move each particle by its own sample of a motion from scan matching. `delta` is the same by odometry.
 
-        Where the two disagree, wheels slip, people walk beside the robot, or the match is wrong. Some particles then
+        Where the two disagree, wheels slip, people walk next to the robot, or the match is wrong. Some particles then
         follow the motion model of odometry, and the map decides, unless it does not show the surroundings.
         """
         self._settle(delta)

@@ -28,7 +28,7 @@ from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.frames import is_plausible
-from simscen.stack.localizers.dead_reckoning import start_of
+from simscen.stack.localizers.dead_reckoning import initial_pose
 
 MAX_TURN_RATE = 100.0
 """Turn rate in rad/s above which readings of the gyroscope are ignored as faulty."""
@@ -56,7 +56,7 @@ class SlipEkfLocalizer:
         """Restart at an estimate, with unknown bias of the gyroscope."""
         from filterpy.kalman import ExtendedKalmanFilter
 
-        pose, covariance = start_of(estimate)
+        pose, covariance = initial_pose(estimate)
         bias = self._spec.gyro_noise if self._spec.gyro_bias is None else self._spec.gyro_bias
         self._filter = ExtendedKalmanFilter(dim_x=7, dim_z=1)
         self._filter.predict_x = self._advance

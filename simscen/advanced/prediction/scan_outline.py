@@ -25,7 +25,7 @@ class LidarPose(NamedTuple):
 
     @classmethod
     def of(cls, pose: Pose2) -> "LidarPose":
-        """Convert a pose."""
+        """Return the lidar pose for a pose of the plane."""
         return cls(complex(pose.x, pose.y), cmath.rect(1.0, pose.yaw))
 
     def to_parent(self, points: PointOrPoints) -> PointOrPoints:

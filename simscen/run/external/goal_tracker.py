@@ -102,7 +102,7 @@ class GoalTracker:
         self.advance(tick)
         if self._task.waits:
             raise ProtocolViolation(f"goal.accepted `{name[:60]}`, but the robot must still wait at its last goal")
-        following = self._task.following
+        following = self._task.next_goal
         if following is None or name not in ("", following.name):
             expected = "there is no next goal" if following is None else f"the next goal is `{following.name}`"
             raise ProtocolViolation(f"goal.accepted `{name[:60]}`, but {expected}")

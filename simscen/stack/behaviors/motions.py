@@ -29,7 +29,7 @@ class Spin:
         self._turned, self._yaw = 0.0, 0.0
 
     def start(self, pose: Pose2) -> None:
-        """Begin from this pose."""
+        """Start at this pose."""
         self._turned, self._yaw = 0.0, pose.yaw
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
@@ -66,7 +66,7 @@ class BackUp:
         self._from = Pose2(0.0, 0.0)
 
     def start(self, pose: Pose2) -> None:
-        """Begin from this pose."""
+        """Start at this pose."""
         self._from = pose
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:

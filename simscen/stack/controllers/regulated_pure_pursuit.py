@@ -240,7 +240,7 @@ DECELERATION_RATIO, REACTION_TIME_S = 0.9, 0.1
 SAMPLE_SPACING_M = 0.1
 """Distance along the path between the points that are checked."""
 SPEED_PER_CLEARANCE_1_S = 10.0
-"""Speed allowed per meter of clearance beside the footprint, to react when the robot leaves the center of a gap."""
+"""Speed allowed per meter of clearance next to the footprint, to react when the robot leaves the center of a gap."""
 
 
 class SpeedRegulation:

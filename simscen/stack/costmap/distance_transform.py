@@ -31,7 +31,7 @@ def squared_distances_within(marked: npt.NDArray[np.bool_], reach: int) -> Squar
 
     Exact up to `reach` cells (at most MAX_REACH_CELLS); farther cells have the value reach² + 1.
     """
-    return SquaredDistanceTransform(marked.shape, reach, reuse=False).of(marked)
+    return SquaredDistanceTransform(marked.shape, reach, reuse=False).transform(marked)
 
 
 class SquaredDistanceTransform:
@@ -54,7 +54,7 @@ class SquaredDistanceTransform:
         self._across = _AxisPass(height, width, reach, buffer[: reach * rows * width], reuse)
         self._squared: Squares = np.empty((height, width), dtype=np.uint16)
 
-    def of(self, marked: npt.NDArray[np.bool_]) -> Squares:
+    def transform(self, marked: npt.NDArray[np.bool_]) -> Squares:
         """Return the squared distances (rows, columns) of a grid; valid until the next call."""
         if self._reach > MAX_COMPARED_CELLS:
             return self._by_scipy(marked)

@@ -317,7 +317,9 @@ class LayeredCostmap:
     def _refresh_all(self) -> None:
         """Recompute the distances and costs of all cells."""
         obstacles = self._obstacles(WHOLE_GRID)
-        squared = self._transform.of(obstacles) if self._is_small else squared_distances(obstacles, self._margin_cells)
+        squared = (
+            self._transform.transform(obstacles) if self._is_small else squared_distances(obstacles, self._margin_cells)
+        )
         if self._has_walls:
             squared = np.minimum(self._static_squared, squared)
         indices = squared.astype(np.intp)  # converted once for both lookups

@@ -1,1 +1,1 @@
-"""Where the robot is: AMCL, an EKF, dead reckoning, and the truth. Names, parameters and defaults are Nav2's."""
+"""Localizers: AMCL, an EKF, dead reckoning, and ground truth. Names, parameters, and defaults are those of Nav2."""

@@ -14,7 +14,7 @@ _UNKNOWN_STD = (100.0, 100.0, np.pi / np.sqrt(3))
 _NOISE = Ekf(type="ekf")
 
 
-def start_of(estimate: Estimate) -> tuple[Pose2, Array]:
+def initial_pose(estimate: Estimate) -> tuple[Pose2, Array]:
     """Return the initial pose and covariance (3, 3). An unknown pose starts at the origin of the map."""
     if estimate.pose is None:
         return Pose2(0.0, 0.0, 0.0), np.diag(np.square(_UNKNOWN_STD))
@@ -29,7 +29,7 @@ class DeadReckoning:
 
     def reset(self, estimate: Estimate) -> None:
         """Restart at an estimate."""
-        pose, covariance = start_of(estimate)
+        pose, covariance = initial_pose(estimate)
         self._belief = Belief(pose, covariance, pose)
         self._odometry: Pose2 | None = None
 

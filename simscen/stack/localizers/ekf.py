@@ -12,7 +12,7 @@ from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.frames import is_plausible
-from simscen.stack.localizers.dead_reckoning import start_of
+from simscen.stack.localizers.dead_reckoning import initial_pose
 
 X, Y, YAW, VX, VY, VYAW, BIAS = range(7)
 """State: the pose in the map frame, the velocity in the base frame, and the bias of the gyroscope."""
@@ -44,7 +44,7 @@ class EkfLocalizer:
         """Restart at an estimate."""
         from filterpy.kalman import ExtendedKalmanFilter
 
-        pose, covariance = start_of(estimate)
+        pose, covariance = initial_pose(estimate)
         bias = self._spec.gyro_noise if self._spec.gyro_bias is None else self._spec.gyro_bias
         self._filter = ExtendedKalmanFilter(dim_x=7, dim_z=1)
         self._filter.predict_x = self._set_state

@@ -6,7 +6,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.frames import is_plausible
-from simscen.stack.localizers.dead_reckoning import start_of
+from simscen.stack.localizers.dead_reckoning import initial_pose
 
 TRUTH = "ground_truth"
 """The name of the sensor whose odometry readings are true poses in the map frame."""
@@ -28,7 +28,7 @@ class GroundTruthLocalizer:
     def reset(self, estimate: Estimate) -> None:
         """Restart at an estimate; the next true pose replaces it."""
         self._started = False
-        self._pose, self._covariance = start_of(estimate)
+        self._pose, self._covariance = initial_pose(estimate)
         self._map_from_odom, self._odometry, self._updated = self._pose, Pose2(0.0, 0.0, 0.0), -1
 
     def on_odometry(self, odometry: Odometry) -> None:

@@ -70,7 +70,7 @@ class PosePlanner:
         escape = self._escape_path(costs, start)
         free_start = Pose2(*escape[-1].tolist())
         for attempt in self._attempts(costs, ends, free_start, goal):
-            valid = self._valid(field, attempt, (free_start, goal))
+            valid = self._validity_check(field, attempt, (free_start, goal))
             iterations = max(1, round(attempt.share * self._spec.max_iterations))
             found: list[Array] = []
             for _ in range(SEARCHES):
@@ -152,7 +152,7 @@ class PosePlanner:
             raise NavigationFailure(ErrorCode.START_OCCUPIED, message)
         return best
 
-    def _valid(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> Valid:
+    def _validity_check(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> Valid:
         """Return a check of poses: in the region and free of collisions, with the clearance except near the ends."""
         offsets = self._footprint.discs.offsets.tolist()
         required = self._footprint.discs.radius + attempt.clearance

@@ -1,1 +1,1 @@
-"""Checks of the answers of stacks and components that come from other packages."""
+"""Checks of what stacks and components from other packages return."""

@@ -44,7 +44,7 @@ class CheckedPlanner(CheckedPlugin):
 
 
 def lethal(costmap: CostmapView, points: Array) -> npt.NDArray[np.bool_]:
-    """Return which of the points (n, …) lie on a lethal cell; points off the costmap do not."""
+    """Return which of the points (n, …) are on a lethal cell; points outside the costmap are not."""
     cells = np.floor((points[:, :2] - costmap.origin) / costmap.resolution)[:, ::-1]
     inside: npt.NDArray[np.bool_] = np.all((cells >= 0) & (cells < costmap.costs.shape), axis=1)
     rows, columns = np.where(inside[:, None], cells, 0).astype(np.int64).T
@@ -117,7 +117,7 @@ class CheckedBehavior(CheckedPlugin):
         self.name: str = spec.type or self.inner.name
 
     def start(self, pose: Pose2) -> None:
-        """Begin from this pose."""
+        """Start at this pose."""
         self.call(self.inner.start, pose)
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
@@ -136,7 +136,7 @@ class CheckedLocalizer(CheckedPlugin):
         self._last: Belief | None = None
 
     def reset(self, estimate: Estimate) -> None:
-        """Start over at an estimate."""
+        """Restart at an estimate."""
         self.call(self.inner.reset, estimate)
 
     def on_odometry(self, odometry: Odometry) -> None:

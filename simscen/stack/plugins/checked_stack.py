@@ -41,11 +41,11 @@ class CheckedStack(CheckedPlugin):
 
     @property
     def can_switch_zones(self) -> bool:
-        """Whether the stack implements SwitchesZones."""
+        """Whether the stack implements SupportsZones."""
         return callable(getattr(self.inner, "set_zones", None))
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """Apply these zones, and no others, from the next update of the costmap on."""
+        """Replace all zones from the next costmap update on."""
         self.call(self.inner.set_zones, tick, zones)
 
     def decide(self, tick: int, readings: Readings) -> Decision:

@@ -49,7 +49,7 @@ MIN_PLAN_LENGTH_M, PLAN_MARGIN_M = 2.0, 1.0
 PathFollowCritic and PathAngleCritic need."""
 SPEED_STD_RATIO = 0.5
 """Default standard deviation of the sampled speeds relative to the maximum speed. With Nav2's fixed 0.2 m/s, the robot
-settles at about 0.5 m/s whatever its maximum speed is."""
+settles at about 0.5 m/s regardless of its maximum speed."""
 
 
 class MppiController(PathFollower):

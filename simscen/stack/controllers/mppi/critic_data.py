@@ -81,7 +81,7 @@ class CriticData:
 
     @cached_property
     def free_points(self) -> Mask:
-        """Which points (m,) of the plan are not known to be occupied for the center of the robot."""
+        """Mask (m,) of the points of the plan that are not known to be occupied for the center of the robot."""
         costs = self.costs(self.lookup(*self.path[:2]))
         return np.asarray((costs < INSCRIBED) | (costs == UNKNOWN))
 

@@ -19,7 +19,7 @@ def scanned(pose: Pose2) -> View:
 
 @pytest.mark.parametrize("pose", PLACES)
 def test_best_match_is_the_true_pose(pose: Pose2) -> None:
-    poses, fits = GlobalSearch(grid()).places(scanned(pose))
+    poses, fits = GlobalSearch(grid()).search(scanned(pose))
     off = pose.between(Pose2(*poses[0].tolist()))
     assert np.hypot(off.x, off.y) < 0.1
     assert abs(off.yaw) < 0.03
@@ -46,7 +46,7 @@ def test_the_same_view_gives_the_same_places_bit_for_bit() -> None:
 
 
 def test_empty_scans_find_no_pose() -> None:
-    poses, fits = GlobalSearch(grid()).places(View(np.empty(0, dtype=np.complex128), np.empty(0, dtype=np.complex128)))
+    poses, fits = GlobalSearch(grid()).search(View(np.empty(0, dtype=np.complex128), np.empty(0, dtype=np.complex128)))
     assert poses.shape == (0, 3)
     assert fits.shape == (0,)
 

@@ -28,5 +28,5 @@ def test_track_that_is_no_longer_in_free_space_ends() -> None:
 
 def test_track_next_to_a_moving_obstacle_continues() -> None:
     beside = track(*[True] * (MAX_NOT_APPEARED + 1))
-    beside.moving = True
+    beside.is_moving = True
     assert ended(track(True, *[False] * MAX_NOT_APPEARED), beside) == [False, False]

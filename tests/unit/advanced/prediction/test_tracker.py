@@ -308,5 +308,5 @@ def test_a_circle_that_is_seen_in_part_is_found_from_half_its_radius_off(seen: f
 
 @pytest.mark.filterwarnings("error")
 def test_too_close_returns_are_ignored() -> None:
-    moving = [Watch(crossing, covered=value).run(3.0).tracker.moving.things for value in (-np.inf, np.nan)]
+    moving = [Watch(crossing, covered=value).run(3.0).tracker.moving.obstacles for value in (-np.inf, np.nan)]
     assert moving[0] == moving[1] != ()
