@@ -16,7 +16,11 @@ from simscen.stack.protocols import RobotModel, Surroundings
 
 @dataclass(frozen=True)
 class RunParameters:
-    """Parameters of a run that a stack receives besides its surroundings; `robot_name` is "" for a single robot."""
+    """Parameters of a run that a stack receives besides its surroundings.
+
+    `control_period` is in ticks. By sensor name, `sensors` are reading types, `mounts` poses, `rates` in Hz.
+    `robot_name` is "" for a single robot.
+    """
 
     seed: int
     control_period: int
