@@ -90,7 +90,7 @@ def _stack_warnings(folder: Path) -> tuple[str, ...]:
 
 def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
     if isinstance(end, ForkServerDeath):
-        when = "while it prepared this one" if end.was_preparing else "during this run"
+        when = "while it prepared this one" if end.was_preparing else "while this run was active"
         kind = "timeout" if end.timed_out else "crashed"
         return RunFailure(
             kind, f"the process that prepares runs {end.description} {when}{_place(end)}", output_tail(end.output)

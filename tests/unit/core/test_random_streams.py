@@ -25,5 +25,5 @@ def test_integers_for_engines_lie_in_their_range():
 
 @pytest.mark.parametrize("seed", [0, -1, MAX_SEED + 1])
 def test_a_seed_out_of_range_is_refused(seed):
-    with pytest.raises(ValueError, match="seed must lie in"):
+    with pytest.raises(ValueError, match="seed must be in"):
         Streams(seed)
