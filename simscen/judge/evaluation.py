@@ -64,7 +64,7 @@ def missing_evidence_finding(entry: AnyCriterion, coverage: LogCoverage) -> Find
     missing = coverage.lacking(required_evidence(entry))
     if not missing:
         return None
-    because = f"the log does not say {' nor '.join(evidence.value for evidence in missing)}"
+    because = f"the log lacks {' and '.join(evidence.value for evidence in missing)}"
     reasons = dict.fromkeys(reason for evidence in missing if (reason := coverage.missing[evidence]))
     return Finding(Status.INCONCLUSIVE, entry.kind, because, "", detail=tuple(reasons))
 

@@ -41,7 +41,7 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = None) -> RunSetup:
     """Build everything that one run needs. The stacks are not started yet.
 
-    `printed` is the file that receives the output of an external stack.
+    `stack_log` is the file that receives the output of an external stack.
     """
     spec, world = prepared.spec, prepared.built.world
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed)

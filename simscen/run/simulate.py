@@ -43,7 +43,7 @@ def simulate(
 ) -> Run:
     """Run a prepared scenario with a seed (default: its own) and judge it; `log` is the MCAP file to write.
 
-    `printed` is the file for the output of an external stack; with several robots, each name is added to it.
+    `stack_log` is the file for the output of an external stack; with several robots, each name is added to it.
 
     *Given* the same scenario and seed *then* the same run and the same bytes in `log`, regardless of earlier runs in
     this process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.

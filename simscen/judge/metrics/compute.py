@@ -95,7 +95,7 @@ def _missing_evidence(name: str, coverage: LogCoverage) -> str:
     """Return which evidence of a metric the log lacks, in words; "" if it has all of it."""
     required = METRICS[name].evidence
     if missing := coverage.lacking(required):
-        return f"the log does not say {' nor '.join(evidence.value for evidence in missing)}"
+        return f"the log lacks {' and '.join(evidence.value for evidence in missing)}"
     return "; ".join(dict.fromkeys(reason for evidence, reason in coverage.partial.items() if evidence in required))
 
 
