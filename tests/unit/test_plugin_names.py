@@ -23,7 +23,7 @@ def test_a_name_is_what_it_says(name: str) -> None:
 def test_what_type_checkers_see_is_what_there_is() -> None:
     source = inspect.getsource(public)
     seen = source[source.index("if TYPE_CHECKING") : source.index("__all__")]
-    for module, names in public._WHERE.items():
+    for module, names in public._NAMES_BY_MODULE.items():
         assert f"from {module} import " in seen
         for name in names:
             assert f" {name}" in seen
