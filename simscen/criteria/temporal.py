@@ -113,13 +113,13 @@ class Whenever(Windowed):
     """At every moment at which one condition was true, another one was; it may look ahead: `then: {eventually: …}`.
 
     What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the
-        worst answer among the moments at which the premise was true.
-    When it fails: the premise was true at some sample, and the answer was not.
+        worst response among the moments at which the premise was true.
+    When it fails: the premise was true at some sample, and the response was not.
     Why this: a robot that is lost, blind or too near must react, each time and in time.
     Source: the bounded response pattern of Dwyer, Avrunin and Corbett 1999; robust semantics of Donzé and Maler 2010.
 
     Inconclusive if the premise was never known to be true, because then nothing was tested (unless `required: false`),
-    and if the window of an answer goes on after the end of the run.
+    and if the window of a response goes on after the end of the run.
 
     Example: `{whenever: {signal: scan_age, op: ">", value: 0.3 s}, then: {eventually: {signal: speed, op: "<", value: 1 cm/s, within: 1 s}}}`
     """  # noqa: E501 (an example is on one line)
@@ -132,28 +132,28 @@ class Response(Spec, TemporalCriterion):
     """The premise `whenever` and the response `then`, which are separate keys of a scenario."""
 
     premise: Whenever
-    answer: Condition
+    response: Condition
 
     @classmethod
-    def of(cls, premise: BaseModel | None, answer: BaseModel | None) -> Response:
+    def of(cls, premise: BaseModel | None, response: BaseModel | None) -> Response:
         """Return the criterion of two validated parts."""
-        assert isinstance(premise, Whenever) and isinstance(answer, Condition)
-        return cls.model_construct(premise=premise, answer=answer)
+        assert isinstance(premise, Whenever) and isinstance(response, Condition)
+        return cls.model_construct(premise=premise, response=response)
 
     def compared(self) -> list[Condition]:
         """Return every comparison in both conditions."""
-        return [*self.premise.comparisons(), *self.answer.comparisons()]
+        return [*self.premise.comparisons(), *self.response.comparisons()]
 
     def formula(self) -> str:
         """Return the condition in words."""
-        return describe_response(self.premise, self.answer)
+        return describe_response(self.premise, self.response)
 
     @property
     def horizon(self) -> float:
         """Minimum simulated time in s for a decision: until the last response to a premise in the window is due."""
-        return window_horizon("always", self.answer, self.premise)
+        return window_horizon("always", self.response, self.premise)
 
     def evaluate(self, context: EvaluationContext) -> Robustness:
-        """Return the robustness, decided by the worst answer; undecided if the premise never was true."""
+        """Return the robustness, decided by the worst response; undecided if the premise never was true."""
         premise, required = self.premise, self.premise.required
-        return response_robustness(premise, self.answer, premise, context, required=required)
+        return response_robustness(premise, self.response, premise, context, required=required)

@@ -155,9 +155,9 @@ def describe_until(hold: Condition, release: Condition, window: Window) -> str:
     return " ".join(filter(None, (_grouped(hold), "until", describe_window(window), _grouped(release))))
 
 
-def describe_response(premise: Condition, answer: Condition) -> str:
+def describe_response(premise: Condition, response: Condition) -> str:
     """Return "whenever …, then …"."""
-    return f"whenever {describe(premise)}, then {describe(answer)}"
+    return f"whenever {describe(premise)}, then {describe(response)}"
 
 
 def describe_window(window: Window) -> str:

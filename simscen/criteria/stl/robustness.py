@@ -169,7 +169,7 @@ class ResponseRobustness(Robustness):
     """
 
     premise: Robustness
-    answer: Robustness
+    response: Robustness
     implied: Robustness
     window: SampleWindow
     condition: Condition
@@ -193,7 +193,7 @@ class ResponseRobustness(Robustness):
 
     def parts(self) -> Sequence[Robustness]:
         """Return premise and response."""
-        return (self.premise, self.answer)
+        return (self.premise, self.response)
 
     def untested(self) -> Iterator[ResponseRobustness]:
         """Yield itself and each nested `whenever` whose premise was never certainly true."""
@@ -290,26 +290,26 @@ def until_robustness(
 
 def response_robustness(
     premise: Condition,
-    answer: Condition,
+    response: Condition,
     window: Window | None,
     context: EvaluationContext,
     begin: int = 0,
     required: bool = True,
 ) -> ResponseRobustness:
-    """Return the robustness of: whenever `premise` is true in the window, `answer` is.
+    """Return the robustness of: whenever `premise` is true in the window, `response` is.
 
     If the premise is `required` but never certainly true, `low` is -inf, because nothing was tested.
     """
     samples = context.rest_of_run if window is None else context.window(window)
     start = _start(samples, begin)
-    premise_part, answer_part = robustness(premise, context, start), robustness(answer, context, start)
+    premise_part, response_part = robustness(premise, context, start), robustness(response, context, start)
     negated = _NegationRobustness(-premise_part.high, -premise_part.low, premise_part)
-    implied = _combine([negated, answer_part], "any")
+    implied = _combine([negated, response_part], "any")
     always = _windowed("always", implied, samples, context)
     # A nested response is evaluated at every later sample as well; one at the start of the run only there.
     end = None if window is None or samples.unbounded or not len(samples.last) else int(samples.last[begin]) + 1
     found = ResponseRobustness(
-        always.low, always.high, premise_part, answer_part, implied, samples, premise, slice(start, end), required
+        always.low, always.high, premise_part, response_part, implied, samples, premise, slice(start, end), required
     )
     return replace(found, low=np.full_like(found.low, -math.inf)) if required and not found.tested else found
 

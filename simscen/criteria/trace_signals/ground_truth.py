@@ -196,8 +196,8 @@ def nees(error: Array, covariance: Array) -> Array:
         yaw_rest = yaw - xa / xx * x - slope * y_rest
         value = x * x / xx + y_rest * y_rest / y_pivot + yaw_rest * yaw_rest / yaw_pivot
     definite = (np.array([xx, y_pivot, yaw_pivot]) > 0).all(axis=0) & np.isfinite(value)
-    answer: Array = np.where(definite, value, np.inf)
-    return answer
+    values: Array = np.where(definite, value, np.inf)
+    return values
 
 
 def nees_samples(trace: Trace) -> Samples:

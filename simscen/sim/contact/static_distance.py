@@ -168,9 +168,9 @@ class StaticDistance:
             is_on_line = ((low[:, :2] - tilt <= point[:2]) & (point[:2] <= high[:, :2] + tilt)).all(axis=1)
             on_line = [parts.faces(tile) for tile, on in zip(tiles, is_on_line.tolist(), strict=True) if on]
             faces = np.concatenate([np.empty(0, np.int64), *on_line])
-            answer = encloses_along_line(vertices[self._mesh.faces[faces]], point)
-            if answer is not None:
-                return answer
+            is_enclosed = encloses_along_line(vertices[self._mesh.faces[faces]], point)
+            if is_enclosed is not None:
+                return is_enclosed
         return encloses(vertices[self._faces_of(owner)], point)
 
     def is_convex(self, owner: int) -> bool:
