@@ -79,7 +79,7 @@ class AnyAction(Choice):
         return action.perform(stage) if self.original_class is None else perform_checked(action, stage, self.added_by)
 
 
-_QUERIES = frozenset({*dir(Situation), "room", "rng", "door", "motion", "mass"})
+_QUERIES = frozenset({*dir(Situation), "has_room", "rng", "door", "motion", "mass"})
 """Members of a stage that only return information; all others change the run."""
 
 
