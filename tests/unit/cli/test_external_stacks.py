@@ -92,7 +92,7 @@ def test_command_line_overrides_the_configuration(project: Path) -> None:
     assert loaded("mine")[0].external_command.argv == ("sh", "-c", "true")
     assert loaded("mine", "mine=./nav 'a b'")[0].external_command.argv == ("./nav", "a b")
     both = loaded("mine", "mine", "x=other", "ref=reference")
-    assert [(one.stack_name, one.runs and one.runs.argv) for one in both] == [
+    assert [(one.stack_name, one.external_command and one.external_command.argv) for one in both] == [
         ("mine", ("sh", "-c", "true")),
         ("x", ("./nav", "--other")),
         ("ref", None),
@@ -110,7 +110,7 @@ def test_stack_file_can_name_an_external_stack(project: Path) -> None:
     (project / "slow.stack.yaml").write_text("simscen: 1\nstack: {external: mine, controller_frequency: 5 Hz}\n")
     configure(project, "stacks: {mine: {command: ./nav --slow}}\n")
     (one,) = loaded("plain", "slow=slow.stack.yaml")
-    assert (one.spec.stack.controller_frequency, one.runs.argv) == (5.0, ("./nav", "--slow"))
+    assert (one.spec.stack.controller_frequency, one.external_command.argv) == (5.0, ("./nav", "--slow"))
 
 
 def test_goal_tolerances_of_the_scenario_apply_to_every_stack(project: Path) -> None:
