@@ -43,12 +43,12 @@ def _intermediate_goal(goal: Goal, entry: GoalEntry, radius: float) -> Goal:
     return replace(goal, via=True, xy_tolerance=entry.xy_tolerance or radius, yaw_tolerance=math.pi)
 
 
-def event_goals(spec: ScenarioSpec, concerns: Callable[[str | None], bool]) -> dict[tuple[str | int, ...], Goal]:
-    """Return the goals that events send to the robot selected by `concerns`, by their path in the scenario file."""
+def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]) -> dict[tuple[str | int, ...], Goal]:
+    """Return the goals that events send to robots for which `includes_robot` is true, by path in the scenario file."""
     checker = spec.stack.goal_checker
     found: dict[tuple[str | int, ...], Goal] = {}
     for keys, action in (placed for step in spec.steps for placed in step.located_actions()):
-        if isinstance(sent := action.chosen, NewGoal) and concerns(action.robot):
+        if isinstance(sent := action.chosen, NewGoal) and includes_robot(action.robot):
             where = (*keys, "new_goal")
             found[where] = Goal(
                 name=sent.name,

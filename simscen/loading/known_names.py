@@ -121,7 +121,7 @@ def pedestrian_names(loaded: LoadedScenario) -> list[str]:
 def _defined(loaded: LoadedScenario, kind: str) -> list[str]:
     """Return the names that actions of one kind define; goals of other robots are skipped."""
     actions = [action for step in loaded.spec.steps for action in step.actions]
-    relevant = [action for action in actions if kind != "new_goal" or loaded.concerns(action.robot)]
+    relevant = [action for action in actions if kind != "new_goal" or loaded.includes_robot(action.robot)]
     return [str(getattr(action.chosen, "name", "")) for action in relevant if action.kind == kind]
 
 

@@ -127,8 +127,8 @@ class LoadedScenario:
         robots = {name: view.with_changes(**changes) for name, view in self.robots.items()}
         return replace(self, **changes, robots=robots)
 
-    def concerns(self, robot: str | None) -> bool:
-        """Return whether a part of the scenario that names `robot` (None: names no robot) applies to this robot."""
+    def includes_robot(self, robot: str | None) -> bool:
+        """Return whether parts of the scenario that name `robot` (None: that name no robot) apply to this view."""
         return robot is None or not self.robot_name or robot == self.robot_name
 
     @property

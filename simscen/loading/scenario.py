@@ -297,7 +297,7 @@ def _load_single_robot(
 def _world(spec: ScenarioSpec, tree: MappingNode, assets: Assets, file: Path) -> LoadedWorld | None:
     node = node_at(tree, ("world",))
     if isinstance(spec.world, WorldSpec):
-        return assets.own_world(spec.world, node, file)
+        return assets.complete_world(spec.world, node, file)
     return assets.world(node) if isinstance(node, ScalarNode) else None
 
 

@@ -24,18 +24,20 @@ class Reference(NamedTuple):
         return self.mark.target
 
 
-Concerns = Callable[[str | None], bool]
-"""Predicate: does a part that names this robot (None: names no robot) apply to the robot that is checked?"""
+RobotFilter = Callable[[str | None], bool]
+"""Predicate that selects the parts to walk through, by the robot that they name (None: no robot)."""
 
 
-def references(spec: BaseModel, keys: tuple[Key, ...] = (), concerns: Concerns | None = None) -> Iterator[Reference]:
-    """Yield every reference below `spec`, in the order of its fields; parts that name other robots are skipped."""
+def references(
+    spec: BaseModel, keys: tuple[Key, ...] = (), includes_robot: RobotFilter | None = None
+) -> Iterator[Reference]:
+    """Yield every reference below `spec`, in the order of its fields, without parts that `includes_robot` rejects."""
     robot = getattr(spec, "robot", None)
-    if concerns is not None and isinstance(robot, str) and not concerns(robot):
+    if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
         return
     for name, key, mark in _fields_of(type(spec)):
         below = keys if isinstance(spec, RootModel) else (*keys, key)
-        yield from _in_value(getattr(spec, name), mark, below, concerns)
+        yield from _in_value(getattr(spec, name), mark, below, includes_robot)
 
 
 @cache
@@ -49,16 +51,16 @@ def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | Non
 
 
 def _in_value(
-    value: Any, mark: ReferenceTo | None, keys: tuple[Key, ...], concerns: Concerns | None
+    value: Any, mark: ReferenceTo | None, keys: tuple[Key, ...], includes_robot: RobotFilter | None
 ) -> Iterator[Reference]:
     if isinstance(value, BaseModel):
-        yield from references(value, keys, concerns)
+        yield from references(value, keys, includes_robot)
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            yield from _in_value(item, mark, (*keys, index), concerns)
+            yield from _in_value(item, mark, (*keys, index), includes_robot)
     elif isinstance(value, dict):
         for key, item in value.items():
-            yield from _in_value(item, mark, (*keys, key), concerns)
+            yield from _in_value(item, mark, (*keys, key), includes_robot)
     elif (
         isinstance(value, str) and mark is not None and not (isinstance(mark, PlaceAllowed) and value in mark.keywords)
     ):
@@ -78,23 +80,25 @@ def _mark(kind: Any) -> ReferenceTo | None:
 Keys = tuple[Key, ...]
 
 
-def walk(spec: Any, keys: Keys = (), concerns: Callable[[str], bool] | None = None) -> Iterator[tuple[Keys, BaseModel]]:
-    """Yield a specification and every mapping in it, with their keys; parts that name other robots are skipped."""
+def walk(
+    spec: Any, keys: Keys = (), includes_robot: Callable[[str], bool] | None = None
+) -> Iterator[tuple[Keys, BaseModel]]:
+    """Yield a specification and every mapping in it, with their keys, without parts that `includes_robot` rejects."""
     robot = getattr(spec, "robot", None)
-    if concerns is not None and isinstance(robot, str) and not concerns(robot):
+    if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
         return
     if isinstance(spec, RootModel):
-        yield from walk(spec.root, keys, concerns)
+        yield from walk(spec.root, keys, includes_robot)
     elif isinstance(spec, BaseModel):
         yield keys, spec
         for name, field in type(spec).model_fields.items():
-            yield from walk(getattr(spec, name), (*keys, field.alias or name), concerns)
+            yield from walk(getattr(spec, name), (*keys, field.alias or name), includes_robot)
     elif isinstance(spec, list | tuple):
         for index, item in enumerate(spec):
-            yield from walk(item, (*keys, index), concerns)
+            yield from walk(item, (*keys, index), includes_robot)
     elif isinstance(spec, dict):
         for key, item in spec.items():
-            yield from walk(item, (*keys, key), concerns)
+            yield from walk(item, (*keys, key), includes_robot)
 
 
 def quantities_of(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float]]:

@@ -135,7 +135,7 @@ def _prepare_robot(loaded: LoadedScenario, build: BuildWorld, find_legs: FindLeg
         start=start,
         goals=goals,
         expected=expected_failures(spec, goals),
-        sent=tuple(event_goals(spec, loaded.concerns).values()),
+        sent=tuple(event_goals(spec, loaded.includes_robot).values()),
         regions=world.regions,
         footprint=body.footprint,
         inscribed_radius=inscribed_radius(body.radius, body.footprint),

@@ -19,29 +19,29 @@ GROUP_KEY, NAMES_ALLOWED_KEY, MAPPINGS_ALLOWED_KEY = "simscen group", "simscen n
 
 @dataclass(frozen=True)
 class ExtensibleUnion:
-    """Annotation of a field with a specification of a group; `own` is the union of the shipped types.
+    """Annotation of a field with a specification of a group; `shipped_union` contains the shipped types.
 
     A mapping with another `type` is validated by the specification that an installed package adds under that name. With
-    `named`, the bare name is also valid.
+    `named`, the name alone is also valid.
     """
 
     group: str
-    own: Any
+    shipped_union: Any
     named: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        inner = handler.generate_schema(self.own)
+        inner = handler.generate_schema(self.shipped_union)
         metadata = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: self.named, MAPPINGS_ALLOWED_KEY: True}
         return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata=metadata)
 
-    def _validate(self, value: Any, own: core_schema.ValidatorFunctionWrapHandler) -> Any:
+    def _validate(self, value: Any, validate_shipped: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, Typed) and not type(value).__module__.startswith("simscen."):
             return value
         if self.named and isinstance(value, str) and value not in _names(self.group):
             return specification(_find_or_raise(self.group, value), {})
         name = value.get("type") if isinstance(value, dict) else None
         if not isinstance(name, str) or name in _names(self.group):
-            return own(value)
+            return validate_shipped(value)
         entry = find(self.group, name)
         if entry is not None:
             return specification(entry, value)
@@ -59,10 +59,10 @@ class TypeName:
         metadata = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: True, MAPPINGS_ALLOWED_KEY: False}
         return core_schema.no_info_wrap_validator_function(self._validate, handler(source), metadata=metadata)
 
-    def _validate(self, value: Any, own: core_schema.ValidatorFunctionWrapHandler) -> Any:
+    def _validate(self, value: Any, validate_shipped: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, str) and value not in _names(self.group):
             return _find_or_raise(self.group, value).name
-        return own(value)
+        return validate_shipped(value)
 
 
 BehaviorName = Annotated[RecoveryBehavior, TypeName("behavior")]

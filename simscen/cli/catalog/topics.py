@@ -209,7 +209,7 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
     if isinstance(kind, FieldInfo):
         return kind_of(kind.annotation, tuple(kind.metadata))
     if mark := next((mark for mark in metadata if isinstance(mark, ExtensibleUnion)), None):
-        return kind_of(mark.own)
+        return kind_of(mark.shipped_union)
     if get_origin(kind) is Annotated:
         return kind_of(get_args(kind)[0], (*get_args(kind)[1:], *metadata))
     if place := next((mark for mark in metadata if isinstance(mark, PlaceAllowed | PlaceShorthand)), None):
@@ -231,7 +231,7 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
 def by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
     """Yield the shipped members of a union discriminated by `type`."""
     mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ExtensibleUnion)), None)
-    members = get_args(get_args(union if mark is None else mark.own)[0])
+    members = get_args(get_args(union if mark is None else mark.shipped_union)[0])
     for member in members:
         lazy = next((mark for mark in get_args(member)[1:] if isinstance(mark, LazySpec)), None)
         model = lazy.load() if lazy else get_args(member)[0] if get_origin(member) is Annotated else member

@@ -27,7 +27,7 @@ def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
         (step.name, (*keys, action.kind), action.chosen)
         for step in loaded.spec.steps
         for keys, action in step.located_actions()
-        if action.kind in ("keepout", "speed_zone") and loaded.concerns(action.robot)
+        if action.kind in ("keepout", "speed_zone") and loaded.includes_robot(action.robot)
     ]
 
 

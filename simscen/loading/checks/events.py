@@ -1,4 +1,4 @@
-"""Checks of triggers: events and faults that can never happen, or happen less often than the scenario says."""
+"""Checks of triggers: events and faults that can never happen, or happen less often than specified."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -150,7 +150,7 @@ class PossibleRun:
         return self._reason(trigger, keys)
 
     def _reason(self, test: AnyCondition, keys: Keys) -> Reason | None:
-        if not self.loaded.concerns(test.robot):
+        if not self.loaded.includes_robot(test.robot):
             return None
         limit = self.loaded.spec.time_limit
         if test.for_ is not None and test.for_ >= limit:
@@ -184,7 +184,7 @@ class PossibleRun:
             for action in step.actions
             if step.name in self.possible
             and action.kind == "new_goal"
-            and self.loaded.concerns(action.robot)
+            and self.loaded.includes_robot(action.robot)
             and goal in (None, getattr(action.chosen, "name", ""))
         )
         return len(own) + more

@@ -97,7 +97,7 @@ def unsupported_faults(scope: NameScope) -> Iterator[Finding]:
         if instance.kind != MAP:
             continue
         if loaded.spec.map == "none":
-            message = "the map cannot have faults: the scenario says `map: none`"
+            message = "the map cannot have faults: the scenario has `map: none`"
             yield Finding(("faults", index, "sensor"), message)
         for key, given in (("when", entry.when), ("for", entry.for_)):
             if given is not None:

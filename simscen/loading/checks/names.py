@@ -21,7 +21,7 @@ def unknown_names(scope: NameScope) -> Iterator[Finding]:
     """Find names that refer to nothing."""
     loaded = scope.loaded
     known = known_names(loaded, scope.world)
-    for reference in references(loaded.spec, concerns=loaded.concerns):
+    for reference in references(loaded.spec, includes_robot=loaded.includes_robot):
         names = known.get(reference.target)
         if names is not None and reference.name not in names and not _is_immovable(scope, reference):
             hint = suggestion(reference.name, dict.fromkeys(names)) or "there is none"
@@ -31,10 +31,10 @@ def unknown_names(scope: NameScope) -> Iterator[Finding]:
 
 @NAMES.check("SC035")
 def immovable_names(scope: NameScope) -> Iterator[Finding]:
-    """Find fixed parts of the world, and robots, where something that can be moved is expected."""
+    """Find names of fixed parts of the world, or of robots, where the name of a movable object is expected."""
     loaded = scope.loaded
     known = known_names(loaded, scope.world)
-    for reference in references(loaded.spec, concerns=loaded.concerns):
+    for reference in references(loaded.spec, includes_robot=loaded.includes_robot):
         names = known.get(reference.target)
         if names is None or reference.name in names or not _is_immovable(scope, reference):
             continue
@@ -67,7 +67,7 @@ def unknown_lidars(scope: NameScope) -> Iterator[Finding]:
     if loaded.robot.spec is None:
         return
     lidars = [name for name, sensor in loaded.robot.spec.sensors.items() if sensor.reading_type == "Scan"]
-    for keys, part in walk(loaded.spec, concerns=loaded.concerns):
+    for keys, part in walk(loaded.spec, includes_robot=loaded.includes_robot):
         named = getattr(part.scan_age, "sensor", None) if isinstance(part, AnyCondition) else None
         if named is not None and named not in lidars:
             message = f"robot `{loaded.robot.name}` has no lidar called {quoted(named)}"
@@ -93,7 +93,7 @@ def duplicate_names(scope: NameScope) -> Iterator[Finding]:
             seen.setdefault(name or "", keys)
     for index, fault in enumerate(loaded.spec.faults):
         if fault.name is not None and fault.name in event_names(loaded):
-            message = f"an event is also called {quoted(fault.name)}; criteria could not tell them apart"
+            message = f"an event is also called {quoted(fault.name)}; criteria cannot distinguish them"
             yield Finding(("faults", index, "name"), message, RENAME_HINT)
 
 
@@ -106,12 +106,12 @@ def duplicate_names_of_actions(scope: NameScope) -> Iterator[Finding]:
     for keys, action in (placed for step in loaded.spec.steps for placed in step.located_actions()):
         name = getattr(action.chosen, "name", "")
         if action.kind == "mark" and name in disturbances:
-            message = f"an event or a fault is also called {quoted(name)}; criteria could not tell them apart"
+            message = f"an event or a fault is also called {quoted(name)}; criteria cannot distinguish them"
             yield Finding((*keys, "mark", "name"), message, RENAME_HINT)
-        if action.kind != "new_goal" or not name or not loaded.concerns(action.robot):
+        if action.kind != "new_goal" or not name or not loaded.includes_robot(action.robot):
             continue
         if name in goals:
-            message = f"another goal is also called {quoted(name)}; criteria could not tell them apart"
+            message = f"another goal is also called {quoted(name)}; criteria cannot distinguish them"
             yield Finding((*keys, "new_goal", "name"), message, "choose another name")
         goals.append(name)
 

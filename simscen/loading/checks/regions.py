@@ -113,7 +113,7 @@ def trigger_areas(scene: Scene) -> list[TriggerArea]:
 
 def _areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
     """Return the areas of all conditions that must be true for a test to be true."""
-    if not scene.loaded.concerns(test.robot) or test.any is not None or test.not_ is not None:
+    if not scene.loaded.includes_robot(test.robot) or test.any is not None or test.not_ is not None:
         return
     if test.all is not None:
         for k, part in enumerate(test.all):

@@ -160,14 +160,14 @@ class Scene:
         spec = self.loaded.spec
         first = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses
         own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
-        goals = {**own, **event_goals(spec, self.loaded.concerns)}
+        goals = {**own, **event_goals(spec, self.loaded.includes_robot)}
         return [((*keys, "pose"), goal) for keys, goal in goals.items() if not expects_failure(spec, goal.name)]
 
     @cached_property
     def actions(self) -> list[tuple[Keys, str, BaseModel]]:
         """Keys, kind and specification of every action of every event."""
         located = [found for step in self.loaded.spec.steps for found in step.located_actions()]
-        relevant = [(keys, action) for keys, action in located if self.loaded.concerns(action.robot)]
+        relevant = [(keys, action) for keys, action in located if self.loaded.includes_robot(action.robot)]
         return [((*keys, action.kind), action.kind, action.chosen) for keys, action in relevant]
 
     def may_do(self, *kinds: str) -> bool:

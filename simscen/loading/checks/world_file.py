@@ -25,7 +25,7 @@ def shared_names(world: LoadedWorld) -> Iterator[Finding]:
             message = f"an object or a door is also called {quoted(obstacle.name)}"
             yield Finding(keys, message, "rename one of them")
         elif obstacle.name in seen:
-            message = f"another obstacle is also called {quoted(obstacle.name)}; reports cannot tell them apart"
+            message = f"another obstacle is also called {quoted(obstacle.name)}; reports cannot distinguish them"
             yield Finding(keys, message, warning=True)
         seen.add(obstacle.name)
     for number, wall in enumerate(spec.walls, start=1):

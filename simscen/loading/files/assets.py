@@ -52,10 +52,10 @@ class Assets:
             loaded = self._ros_map(tree, path)
             return LoadedWorld(path.stem, path, map=loaded) if loaded else None
         spec = self._model(WorldSpec, tree)
-        return self.own_world(spec, tree, path) if spec and tree else None
+        return self.complete_world(spec, tree, path) if spec and tree else None
 
-    def own_world(self, spec: WorldSpec, tree: Node, path: Path) -> LoadedWorld | None:
-        """Load the map or SDF that a simscen world extends, and replace names of places by poses."""
+    def complete_world(self, spec: WorldSpec, tree: Node, path: Path) -> LoadedWorld | None:
+        """Return a simscen world with the map or SDF that it extends, and with poses instead of names of places."""
         before = len(self.problems)
         loaded_map = sdf = None
         if spec.map is not None:

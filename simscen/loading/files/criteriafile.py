@@ -101,5 +101,5 @@ def _world(spec: CriteriaSpec, tree: MappingNode, file: Path, assets: Assets) ->
     """Load the world that the file names, if any."""
     node = node_at(tree, ("world",))
     if isinstance(spec.world, WorldSpec):
-        return assets.own_world(spec.world, node, file)
+        return assets.complete_world(spec.world, node, file)
     return assets.world(node) if spec.world is not None and isinstance(node, ScalarNode) else None

@@ -198,7 +198,7 @@ class _Composer:
     def _report_duplicate(self, event: ev.Event, key: str, first: Position) -> None:
         message = f"duplicate key `{key}` (first at {first.line}:{first.col})"
         if self.last_wins:
-            problem = self._problem(event, "SC007", message, "this one counts, as in ROS 2")
+            problem = self._problem(event, "SC007", message, "this one is used, as in ROS 2")
             self.problems.append(replace(problem, severity="warning"))
         else:
             self.problems.append(self._problem(event, "SC007", message, "remove one of them"))

@@ -91,7 +91,7 @@ def _is_convex_and_anticlockwise(base: Polygon) -> bool:
 def has_no_drivable_solids(solids: Iterable[Solid], max_height: float) -> bool:
     """Return True if wheels cannot drive onto any solid: all are prisms, and higher than `max_height` or flat.
 
-    False means that only the triangles of the solids can tell.
+    If False, the triangles of the solids must be examined.
     """
     prisms = [upright_prism(solid) for solid in solids]
     return all(prism is not None and (prism.top > max_height or prism.top <= FLOOR_HEIGHT_M) for prism in prisms)

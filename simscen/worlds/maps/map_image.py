@@ -31,7 +31,7 @@ _PNM_HEADER = re.compile(rb"(P[25])" + _GAP + rb"(\d{1,10})" + _GAP + rb"(\d{1,1
 
 @dataclass(frozen=True, eq=False)
 class MapImage:
-    """Pixels as nav2_map_server gets them from GraphicsMagick: `gray` (h, w), top row first; `alpha` if it has one."""
+    """Pixels as nav2_map_server reads them with GraphicsMagick: `gray` (h, w), top row first; `alpha` if it has one."""
 
     gray: Bytes8
     alpha: Bytes8 | None = None
@@ -42,7 +42,7 @@ class UnreadableImage(Exception):
 
 
 def read_image(path: Path) -> MapImage:
-    """Read a pgm (P2 or P5, 8 or 16 bit), png or bmp; raises InvalidInput for anything else or too large."""
+    """Read a pgm (P2 or P5, 8 or 16 bit), png or bmp; raises InvalidInput for other or too large files."""
     try:
         data = _read_bytes(path)
         if data[:2] in (b"P2", b"P5"):

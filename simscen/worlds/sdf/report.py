@@ -33,13 +33,13 @@ class UnusableElement(Exception):
 
 
 class OutOfReach(UnusableElement):
-    """Something so far away that no robot can reach it."""
+    """An element is so far away that no robot can reach it."""
 
     is_harmless = True
 
 
 class MissingAsset(UnusableElement):
-    """A file or model that does not exist in the allowed folders."""
+    """A file or model does not exist in the allowed folders."""
 
     def __init__(self, place: SourcePlace, message: str, hint: str, uri: str) -> None:
         super().__init__(place, message, hint)

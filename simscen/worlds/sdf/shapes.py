@@ -191,7 +191,7 @@ def _crossing_levels(outlines: list[Array]) -> list[float]:
 
 
 def _trapezoids_between(starts: Array, ends: Array, low: float, high: float) -> list[Array]:
-    """Return the pieces between two levels that no corner and no crossing lies between."""
+    """Return the pieces between two levels, between which there is no corner and no crossing."""
     middle = (low + high) / 2
     passes = (starts[:, 1] < middle) != (ends[:, 1] < middle)
     start, along = starts[passes], (ends - starts)[passes]
