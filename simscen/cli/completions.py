@@ -45,10 +45,10 @@ def stacks(incomplete: str) -> list[str]:
     from simscen.spec.registry import entries
 
     try:
-        own = list(load_config(config_file()).spec.stacks)
+        configured = list(load_config(config_file()).spec.stacks)
     except SimscenError:  # the command itself reports what is wrong with the file
-        own = []
-    names = dict.fromkeys([*(entry.name for entry in entries("stack")), *own])
+        configured = []
+    names = dict.fromkeys([*(entry.name for entry in entries("stack")), *configured])
     return [name for name in names if name.startswith(incomplete)]
 
 
@@ -69,13 +69,13 @@ def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
 
 
 SUFFIX = ".scenario.yaml"
-_PLACES = (PACKAGE / "data" / "library", PACKAGE.parent)
+_SHIPPED_ROOTS = (PACKAGE / "data" / "library", PACKAGE.parent)
 """Folders of the shipped scenarios: in an installed package, and in a checkout."""
 
 
 def shipped_scenarios() -> dict[str, Path]:
     """Return the files by id, such as "navigation/goal"; empty if the installation does not contain them."""
-    home = next((place / "scenarios" for place in _PLACES if (place / "scenarios").is_dir()), None)
+    home = next((root / "scenarios" for root in _SHIPPED_ROOTS if (root / "scenarios").is_dir()), None)
     if home is None:
         return {}
     return {path.relative_to(home).as_posix().removesuffix(SUFFIX): path for path in sorted(home.rglob(f"*{SUFFIX}"))}

@@ -33,14 +33,14 @@ def signals_interrupt(clock: Callable[[], float] = time.monotonic) -> Iterator[N
     handled = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         handled.append(signal.SIGHUP)
-    before = {number: signal.getsignal(number) for number in handled}
+    previous = {number: signal.getsignal(number) for number in handled}
     for number in handled:
         signal.signal(number, interrupt)
     try:
         yield
     finally:
         if not first:
-            for number, handler in before.items():
+            for number, handler in previous.items():
                 signal.signal(number, handler)
 
 

@@ -43,7 +43,7 @@ def require_folder() -> None:
 
 
 def report_lost_output(error: OSError) -> Exit:
-    """Print to stderr why stdout accepts no more output, and discard all further output."""
+    """Print to stderr why stdout accepts no more output, discard all further output, and return INCOMPLETE."""
     _discard_output(1)
     try:
         print(f"simscen: cannot write the output: {error.strerror}", file=sys.stderr, flush=True)
@@ -67,9 +67,9 @@ def flush_output(code: Exit | int) -> Exit | int:
 
 
 def _discard_output(descriptor: int) -> None:
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, descriptor)
-    os.close(nowhere)
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, descriptor)
+    os.close(null)
 
 
 @contextmanager

@@ -7,10 +7,10 @@ MIN_TYPER = (0, 20)
 """The oldest typer version that works with every version of click, as in pyproject.toml."""
 
 _COMPARE = {
-    ">=": lambda have, want: have >= want,
-    "<": lambda have, want: have < want,
-    "==": lambda have, want: have == want,
-    "!=": lambda have, want: have != want,
+    ">=": lambda installed, required: installed >= required,
+    "<": lambda installed, required: installed < required,
+    "==": lambda installed, required: installed == required,
+    "!=": lambda installed, required: installed != required,
 }
 _CLAUSE = re.compile(r"(>=|<|==|!=)\s*([\w.]+)")
 
@@ -20,18 +20,18 @@ def unmet_requirements() -> list[str]:
     from importlib.metadata import PackageNotFoundError, requires
 
     try:
-        needed = requires("simscen") or []
+        requirements = requires("simscen") or []
     except PackageNotFoundError:  # run from a source folder without package metadata
         return []
-    return [message for each in needed if "extra ==" not in each for message in _unmet(each)]
+    return [message for each in requirements if "extra ==" not in each for message in _unmet(each)]
 
 
 def unmet_typer() -> list[str]:
     """Return a message if typer is too old; checking all packages takes 20 ms longer."""
     from typer import __version__
 
-    wanted = f">={'.'.join(map(str, MIN_TYPER))}"
-    return [] if _version_numbers(__version__) >= MIN_TYPER else [_mismatch("typer", __version__, wanted)]
+    required = f">={'.'.join(map(str, MIN_TYPER))}"
+    return [] if _version_numbers(__version__) >= MIN_TYPER else [_mismatch("typer", __version__, required)]
 
 
 def _unmet(requirement: str) -> Iterator[str]:
@@ -39,20 +39,20 @@ def _unmet(requirement: str) -> Iterator[str]:
     from importlib.metadata import PackageNotFoundError, version
 
     name = re.split(r"[\s<>=!;\[(]", requirement, maxsplit=1)[0]
-    wanted = requirement[len(name) :].split(";", maxsplit=1)[0]
+    required = requirement[len(name) :].split(";", maxsplit=1)[0]
     try:
-        have = version(name)
+        installed = version(name)
     except PackageNotFoundError:
         yield f"{name} is not installed: pip install {name!r}"
         return
-    numbers = _version_numbers(have)
-    if not all(_COMPARE[sign](numbers, _version_numbers(want)) for sign, want in _CLAUSE.findall(wanted)):
-        yield _mismatch(name, have, wanted.strip())
+    numbers = _version_numbers(installed)
+    if not all(_COMPARE[sign](numbers, _version_numbers(bound)) for sign, bound in _CLAUSE.findall(required)):
+        yield _mismatch(name, installed, required.strip())
 
 
-def _mismatch(name: str, have: str, wanted: str) -> str:
-    wanted = ",".join(sorted(wanted.split(","), reverse=True))
-    return f"{name} {have} is installed, but simscen needs {name}{wanted}: pip install '{name}{wanted}'"
+def _mismatch(name: str, installed: str, required: str) -> str:
+    required = ",".join(sorted(required.split(","), reverse=True))
+    return f"{name} {installed} is installed, but simscen needs {name}{required}: pip install '{name}{required}'"
 
 
 def _version_numbers(version: str) -> tuple[int, ...]:

@@ -38,7 +38,7 @@ def start() -> None:
 
 
 def _check_requirements(all_packages: bool) -> None:
-    """Exit with a message if a package is missing or has an unsupported version; `all_packages` or typer alone."""
+    """Exit with a message if a package is missing or has an unsupported version; without `all_packages`, only typer."""
     from simscen.cli.requirements import unmet_requirements, unmet_typer
 
     if problems := unmet_requirements() if all_packages else unmet_typer():

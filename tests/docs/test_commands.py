@@ -35,7 +35,7 @@ def test_commands_are_shown_with_options_that_they_have(page: str) -> None:
             words = f"{name} {rest.split()[0]}" if rest.split() else name
             functions = dict(commands_of(name))
             function = functions.get(words) or functions.get(name) or next(iter(functions.values()))
-            known = {option for p in parameters_of(function) for option in p.written.split(", ")} | GLOBAL
+            known = {option for p in parameters_of(function) for option in p.spelling.split(", ")} | GLOBAL
             unknown += [f"simscen {name} {option}" for option in OPTION.findall(rest) if option not in known]
     assert unknown == []
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simscen.cli.benchmarks.navigation_table import aligned, fits, labeled, wrapped
+from simscen.cli.benchmarks.navigation_table import align_columns, fits, label_cells, wrap_lines
 from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import NothingSelected, UsageError
@@ -69,14 +69,14 @@ def command(
             "no set of parameters matches --only; available: " + ", ".join(map(quoted, PARAMETER_SETS))
         )
     trials: dict[str, list[Trial]] = {name: [] for name in names}
-    for done, of_one in enumerate(run_buildings(numbers, names, min(buildings, workers)), 1):
-        for name, some in of_one.items():
-            trials[name] += some
-            _print_failures(name, some)
+    for done, building_trials in enumerate(run_buildings(numbers, names, min(buildings, workers)), 1):
+        for name, new in building_trials.items():
+            trials[name] += new
+            _print_failures(name, new)
         print_progress(f"{done} of {buildings} buildings" if done < buildings else "")
-    rows = [summarize(name, some) for name, some in trials.items()]
+    rows = [summarize(name, own) for name, own in trials.items()]
     if format_ is Format.JSON:
-        logs = {name: [asdict(trial) for trial in some] for name, some in trials.items()}
+        logs = {name: [asdict(trial) for trial in own] for name, own in trials.items()}
         print(json.dumps({"rows": [asdict(row) for row in rows], "logs": logs}, indent=2))
     else:
         print_text(as_text(rows, detect_style(sys.stdout, os.environ).columns))
@@ -88,77 +88,77 @@ def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, f
     if only:
         raise UsageError("--sparse compares all localizers; remove --only")
     trials: list[SparseTrial] = []
-    for some in run_sparse(numbers, workers):
-        trials += some
-        print_progress(f"{some[0].kind}, building {some[0].building}")
+    for new in run_sparse(numbers, workers):
+        trials += new
+        print_progress(f"{new[0].kind}, building {new[0].building}")
     print_progress("")
     if format_ is Format.JSON:
-        print(json.dumps({"logs": [asdict(one) for one in trials]}, indent=2))
+        print(json.dumps({"logs": [asdict(trial) for trial in trials]}, indent=2))
     else:
         head, *rows = sparse_table(trials)
-        lines = aligned([head, *rows], str.ljust)
+        lines = align_columns([head, *rows], str.ljust)
         columns = detect_style(sys.stdout, os.environ).columns
         if columns is not None and not fits(lines, columns):
-            lines = [line for row in rows for line in labeled(head, row, columns)]
+            lines = [line for row in rows for line in label_cells(head, row, columns)]
         print_text("\n".join(["lost runs, median error, error at the end", *lines]))
 
 
 def _print_failures(name: str, trials: "Sequence[Trial]") -> None:
-    for one in trials:
-        if not one.succeeded:
-            place = f"building {one.building}, log {one.number}, {one.circumstance}"
+    for trial in trials:
+        if not trial.succeeded:
+            log = f"building {trial.building}, log {trial.number}, {trial.circumstance}"
             print_progress("")
-            found = "not found" if one.found is None else f"found after {one.found:.1f} s"
-            print_text(f"{name}: {place}: up to {one.largest:.1f} m off, {found}", sys.stderr)
+            found = "not localized" if trial.found is None else f"localized after {trial.found:.1f} s"
+            print_text(f"{name}: {log}: error up to {trial.largest:.1f} m, {found}", sys.stderr)
 
 
-SHARES = {
+COLUMN_NAMES = {
     "tracked": "tracked", "unknown": "start unknown", "outdated": "half rebuilt", "half": "half a map",
     "kidnapped": "kidnapped",
 }  # fmt: skip
-"""Circumstances of the logs and their names in the table."""
+"""Circumstances of the logs and their column names in the table."""
 
 
 def as_text(rows: "Sequence[Row]", columns: int | None = None) -> str:
     """Return one line per set of parameters, then the consistency of each, in at most `columns`."""
-    head = ("parameters", *SHARES.values(), "median error", "ms a scan", "slowest")
+    head = ("parameters", *COLUMN_NAMES.values(), "median error", "ms a scan", "slowest")
     table = [_cells(row) for row in rows]
-    lines = aligned([head, *table], str.ljust)
+    lines = align_columns([head, *table], str.ljust)
     if columns is not None and not fits(lines, columns):
-        lines = [line for row in table for line in labeled(head, row, columns)]
-    return "\n".join(wrapped([*lines, "", *(line for row in rows for line in _consistency_lines(row))], columns))
+        lines = [line for row in table for line in label_cells(head, row, columns)]
+    return "\n".join(wrap_lines([*lines, "", *(line for row in rows for line in _consistency_lines(row))], columns))
 
 
 def _cells(row: "Row") -> tuple[str, ...]:
     return (
         row.parameters,
-        *(_share(row.shares[name]) for name in SHARES),
-        f"{row.median:.3f} m{_between(row.median_interval)}",
+        *(_share(row.shares[name]) for name in COLUMN_NAMES),
+        f"{row.median:.3f} m{_interval_text(row.median_interval)}",
         f"{row.ms:.1f}",
         f"{row.slowest_ms:.0f}",
     )
 
 
 def _share(share: "Share") -> str:
-    return f"{share.count} of {share.of}{_between(share.interval, '.2f')}"
+    return f"{share.count} of {share.of}{_interval_text(share.interval, '.2f')}"
 
 
-def _between(interval: "Interval", form: str = ".3f") -> str:
+def _interval_text(interval: "Interval", form: str = ".3f") -> str:
     return "" if interval is None else f" ({interval[0]:{form}} … {interval[1]:{form}})"
 
 
 def _consistency_lines(row: "Row") -> list[str]:
     from simscen.bench.localization.campaign import MOMENTS_S
 
-    def lines(name: str, sure: "Consistency") -> list[str]:
-        within = (
-            "" if sure.bounds is None else f"; right on average: {sure.bounds[0]:.2f} … {sure.bounds[1]:.2f} (95 %)"
-        )
-        moments = ", ".join(f"{value:.2f} at {when:g} s" for when, value in zip(MOMENTS_S, sure.moments, strict=True))
-        low, high = sure.moment_bounds
+    def lines(name: str, consistency: "Consistency") -> list[str]:
+        low, high = consistency.bounds or (0.0, 0.0)
+        right = "" if consistency.bounds is None else f"; right on average: {low:.2f} … {high:.2f} (95 %)"
+        pairs = zip(MOMENTS_S, consistency.moments, strict=True)
+        moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in pairs)
+        low, high = consistency.moment_bounds
         return [
-            f"  ANEES {name}: {sure.anees:.2f}{within}; in the 95 % ellipsoid: {sure.inside:.1%}",
+            f"  ANEES {name}: {consistency.anees:.2f}{right}; in the 95 % ellipsoid: {consistency.inside:.1%}",
             f"    {moments}; normal, independent: {low:.2f} … {high:.2f} (95 %)",
         ]
 
-    return [row.parameters, *(line for name, sure in row.sure.items() for line in lines(name, sure))]
+    return [row.parameters, *(line for name, consistency in row.sure.items() for line in lines(name, consistency))]

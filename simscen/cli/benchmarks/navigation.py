@@ -80,44 +80,50 @@ def command(
     """
     from simscen.bench.navigation.summary import compare_drives
     from simscen.cli.benchmarks.navigation_experiments import Sizes, available_experiments
-    from simscen.cli.benchmarks.navigation_runs import drive, driven, measured
+    from simscen.cli.benchmarks.navigation_runs import completed_trials, execute_experiments, summarize_experiment
     from simscen.cli.benchmarks.navigation_table import as_json, as_text
     from simscen.cli.session.run_session import output_folder
 
     folder, journal = output_folder(out, resume)
-    made = folder / "generated"
-    made.mkdir(exist_ok=True)
+    generated = folder / "generated"
+    generated.mkdir(exist_ok=True)
     experiments: list[Experiment] = []
-    for offer in available_experiments(barn, nav2, project, made, Sizes(first, seeds, fields, dynamic, goals, lost)):
-        whole = _named(offer.name, only)
-        if not whole and not any(_named(name, only) for name in offer.parts):
+    sizes = Sizes(first, seeds, fields, dynamic, goals, lost)
+    for group in available_experiments(barn, nav2, project, generated, sizes):
+        is_whole = _is_selected(group.name, only)
+        if not is_whole and not any(_is_selected(name, only) for name in group.parts):
             continue
-        if offer.missing:
-            print(f"{offer.name}: skipped, {offer.missing}", file=sys.stderr)
+        if group.missing:
+            print(f"{group.name}: skipped, {group.missing}", file=sys.stderr)
             continue
-        experiments += [each for each in offer.make() if whole or _named(each.name, only)]
+        experiments += [experiment for experiment in group.make() if is_whole or _is_selected(experiment.name, only)]
     if not experiments:
         raise NothingSelected("no experiment matches --only, or its data is missing")
-    others = [] if stack is None else with_stack(stack, experiments, made, project)
-    all_of_them = [*experiments, *others]
-    trials, stopped = drive(all_of_them, journal, workers or len(os.sched_getaffinity(0)))
-    rows = [measured(one, done) for one, runs in zip(all_of_them, trials, strict=True) if (done := driven(runs))]
+    others = [] if stack is None else with_stack(stack, experiments, generated, project)
+    all_experiments = [*experiments, *others]
+    trials, stopped = execute_experiments(all_experiments, journal, workers or len(os.sched_getaffinity(0)))
+    rows = [
+        summarize_experiment(experiment, done)
+        for experiment, runs in zip(all_experiments, trials, strict=True)
+        if (done := completed_trials(runs))
+    ]
+    compared = zip(experiments if others else [], trials, trials[len(experiments) :], strict=False)
     pairs = [
-        compare_drives(one.name, before, after)
-        for one, before, after in zip(experiments if others else [], trials, trials[len(experiments) :], strict=False)
-        if driven(before) and driven(after)
+        compare_drives(experiment.name, before, after)
+        for experiment, before, after in compared
+        if completed_trials(before) and completed_trials(after)
     ]
     columns = detect_style(sys.stdout, os.environ).columns
     print_text(as_json(rows, pairs) if format_ is Format.JSON else as_text(rows, pairs, columns))
     if stopped:
-        count = f"{sum(len(driven(runs)) for runs in trials)} of {sum(map(len, trials))} runs"
+        count = f"{sum(len(completed_trials(runs)) for runs in trials)} of {sum(map(len, trials))} runs"
         print_text(f"simscen: interrupted: {count}; continue with --resume {escaped(str(folder))}", sys.stderr)
         sys.exit(stopped)
     if any(row.tally.errors for row in rows):
         sys.exit(Exit.INCOMPLETE)
 
 
-def with_stack(file: Path, experiments: list["Experiment"], made: Path, project: Path) -> list["Experiment"]:
+def with_stack(file: Path, experiments: list["Experiment"], generated: Path, project: Path) -> list["Experiment"]:
     """Return the same experiments with the parameters of a stack file. Raises InvalidInput."""
     from simscen.bench.navigation.experiments import with_stack_parameters
     from simscen.loading.stacks.stackfile import load_stack_file
@@ -127,10 +133,12 @@ def with_stack(file: Path, experiments: list["Experiment"], made: Path, project:
         print_text(problems_as_text(from_here(choice.notes, project)), sys.stderr)
     parameters = choice.section.plain if choice.section else {}
     return [
-        with_stack_parameters(one, f"{one.name}, {choice.name}", parameters, made / "with_stack" / str(number))
-        for number, one in enumerate(experiments)
+        with_stack_parameters(
+            experiment, f"{experiment.name}, {choice.name}", parameters, generated / "with_stack" / str(number)
+        )
+        for number, experiment in enumerate(experiments)
     ]
 
 
-def _named(name: str, only: list[str] | None) -> bool:
+def _is_selected(name: str, only: list[str] | None) -> bool:
     return not only or any(part.casefold() in name.casefold() for part in only)

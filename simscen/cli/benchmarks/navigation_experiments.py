@@ -14,18 +14,18 @@ from simscen.bench.navigation.office_maps import write_building
 if TYPE_CHECKING:
     from simscen.core.environment.world_model import BuiltWorld
 
-SHIPPED = ("house", "office", "warehouse")
-BARN = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
-NAV2 = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
-LIDAR_HEIGHT = 0.2
-"""Height in meters of the lidar for which the maps of worlds are made."""
+SHIPPED_WORLDS = ("house", "office", "warehouse")
+BARN_SOURCE = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
+NAV2_SOURCE = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
+LIDAR_HEIGHT_M = 0.2
+"""Height of the lidar for which the maps of worlds are generated."""
 
 
 @dataclass(frozen=True)
 class Sizes:
     """Size of the experiments, and the `first` number of their fields, buildings, drives, and seeds.
 
-    `seeds` is None for the usual number of each experiment.
+    `seeds` is None for the default number of each experiment.
     """
 
     first: int = 1
@@ -35,9 +35,9 @@ class Sizes:
     goals: int = 20
     lost: int = 50
 
-    def seeded(self, usual: int) -> Sequence[int]:
-        """Return the seeds of a scenario that usually runs with `usual` seeds."""
-        return self.numbers(self.seeds or usual)
+    def seeds_or(self, default: int) -> Sequence[int]:
+        """Return the seeds of a scenario that runs with `default` seeds unless `seeds` is set."""
+        return self.numbers(self.seeds or default)
 
     def numbers(self, count: int) -> Sequence[int]:
         """Return `count` numbers starting at `first`."""
@@ -48,7 +48,7 @@ class Sizes:
 class AvailableExperiment:
     """Group of experiments, the folder that it needs, and the function that creates it.
 
-    `parts` are the names of its experiments with other names than the group; creating them all may take a while.
+    `parts` are the names of its experiments that differ from its own; creating all experiments may take a while.
     Without a folder, `source` names the option for it and the origin of its data.
     """
 
@@ -67,13 +67,13 @@ class AvailableExperiment:
 
 
 def available_experiments(
-    data: Path | None, nav2: Path | None, project: Path, made: Path, sizes: Sizes
+    data: Path | None, nav2: Path | None, project: Path, generated: Path, sizes: Sizes
 ) -> list[AvailableExperiment]:
-    """Return all groups of experiments in the order of the table; generated files are written to `made`."""
+    """Return all groups of experiments in the order of the table; generated files are written to `generated`."""
     worlds, scenarios = project / "worlds", project / "scenarios"
     return [
-        replace(offer, parts=_parts(offer.name, scenarios))
-        for offer in _offers(data, nav2, worlds, scenarios, made, sizes)
+        replace(group, parts=_parts(group.name, scenarios))
+        for group in _experiment_groups(data, nav2, worlds, scenarios, generated, sizes)
     ]
 
 
@@ -83,7 +83,7 @@ def _parts(name: str, scenarios: Path) -> list[str]:
         case "BARN":
             return [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)]
         case "narrow fields":
-            return [experiments.narrow_name(room) for room in experiments.NARROW_MARGINS_M]
+            return [experiments.narrow_name(margin) for margin in experiments.NARROW_MARGINS_M]
         case "dynamic fields":
             return [experiments.dynamic_name(speed) for speed in dynamic_fields.SPEEDS_M_S]
         case "random goals":
@@ -102,77 +102,85 @@ def _parts(name: str, scenarios: Path) -> list[str]:
             return []
 
 
-def _offers(
-    data: Path | None, nav2: Path | None, worlds: Path, scenarios: Path, made: Path, sizes: Sizes
+def _experiment_groups(
+    data: Path | None, nav2: Path | None, worlds: Path, scenarios: Path, generated: Path, sizes: Sizes
 ) -> list[AvailableExperiment]:
     return [
-        AvailableExperiment("BARN", data, lambda: list(_barn(made, data or Path(), sizes)), BARN),
+        AvailableExperiment("BARN", data, lambda: list(_barn(generated, data or Path(), sizes)), BARN_SOURCE),
         AvailableExperiment(
-            "generated fields", made, lambda: [experiments.generated_fields(made, sizes.numbers(sizes.fields))]
+            "generated fields",
+            generated,
+            lambda: [experiments.generated_fields(generated, sizes.numbers(sizes.fields))],
         ),
         AvailableExperiment(
-            "narrow fields", made, lambda: experiments.narrow_fields(made, sizes.numbers(sizes.fields // 2))
+            "narrow fields", generated, lambda: experiments.narrow_fields(generated, sizes.numbers(sizes.fields // 2))
         ),
         AvailableExperiment(
-            "dynamic fields", made, lambda: experiments.dynamic_fields(made, sizes.numbers(sizes.dynamic))
+            "dynamic fields", generated, lambda: experiments.dynamic_fields(generated, sizes.numbers(sizes.dynamic))
         ),
-        AvailableExperiment("random goals", worlds, lambda: list(_random_goals(made, worlds, sizes))),
-        AvailableExperiment("degraded sensing", worlds, lambda: _degraded(made, worlds, sizes)),
-        AvailableExperiment("ramps", made, lambda: [office_maps.ramps(made / "ramps", sizes.numbers(sizes.goals))]),
+        AvailableExperiment("random goals", worlds, lambda: list(_random_goals(generated, worlds, sizes))),
+        AvailableExperiment("degraded sensing", worlds, lambda: _degraded(generated, worlds, sizes)),
         AvailableExperiment(
-            "two robots", made, lambda: [office_maps.two_robots(made / "corridors", sizes.numbers(sizes.goals))]
-        ),
-        AvailableExperiment(
-            "tb3_sandbox", nav2, lambda: experiments.sandbox(made, nav2 or Path(), sizes.seeded(20)), NAV2
+            "ramps", generated, lambda: [office_maps.ramps(generated / "ramps", sizes.numbers(sizes.goals))]
         ),
         AvailableExperiment(
-            "corner cases", scenarios, lambda: experiments.corner_cases(scenarios, scenarios.parent, sizes.seeded(20))
+            "two robots",
+            generated,
+            lambda: [office_maps.two_robots(generated / "corridors", sizes.numbers(sizes.goals))],
+        ),
+        AvailableExperiment(
+            "tb3_sandbox", nav2, lambda: experiments.sandbox(generated, nav2 or Path(), sizes.seeds_or(20)), NAV2_SOURCE
+        ),
+        AvailableExperiment(
+            "corner cases", scenarios, lambda: experiments.corner_cases(scenarios, scenarios.parent, sizes.seeds_or(20))
         ),
         AvailableExperiment(
             "localization",
             worlds,
-            lambda: experiments.localization_experiments(made, worlds, sizes.seeded(20), sizes.numbers(sizes.lost)),
+            lambda: experiments.localization_experiments(
+                generated, worlds, sizes.seeds_or(20), sizes.numbers(sizes.lost)
+            ),
         ),
     ]
 
 
-def _barn(made: Path, data: Path, sizes: Sizes) -> Iterator[Experiment]:
+def _barn(generated: Path, data: Path, sizes: Sizes) -> Iterator[Experiment]:
     """Yield the BARN challenge at 2 m/s, with default parameters, and with each controller at the same speed."""
-    seeds = sizes.seeded(5)
-    yield experiments.barn_challenge(made, data, seeds)
-    yield experiments.barn_challenge(made, data, seeds, "default parameters", barn.DEFAULT)
+    seeds = sizes.seeds_or(5)
+    yield experiments.barn_challenge(generated, data, seeds)
+    yield experiments.barn_challenge(generated, data, seeds, "default parameters", barn.DEFAULT)
     for controller, stack in barn.CONTROLLERS.items():
-        yield experiments.barn_challenge(made, data, seeds, controller, stack)
+        yield experiments.barn_challenge(generated, data, seeds, controller, stack)
 
 
-def _random_goals(made: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:
-    folder, maps = made / "random_goals", made / "buildings"
+def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:
+    folder, maps = generated / "random_goals", generated / "buildings"
     yield random_goals.random_goals(
-        "random goals", folder, _shipped(folder, worlds), sizes.numbers(sizes.goals), (worlds.absolute(),)
+        "random goals", folder, _shipped_worlds(folder, worlds), sizes.numbers(sizes.goals), (worlds.absolute(),)
     )
-    buildings = _buildings(maps, sizes.numbers(sizes.goals))
+    buildings = _generated_buildings(maps, sizes.numbers(sizes.goals))
     yield random_goals.random_goals("random goals, ROS maps", maps, buildings, range(1, 4))
 
 
-def _degraded(made: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
+def _degraded(generated: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
     """Return the experiments in shipped worlds and generated buildings, a quarter as many worlds as `goals`."""
-    folder, maps = made / "degraded", made / "degraded_buildings"
+    folder, maps = generated / "degraded", generated / "degraded_buildings"
     count = max(1, sizes.goals // 4)
-    buildings = _buildings(maps, sizes.numbers(max(0, count - len(SHIPPED))))
-    built = {**_shipped(folder, worlds), **buildings}
-    chosen = {name: built[name] for name in list(built)[:count]}
-    return random_goals.degraded(folder, chosen, sizes.first, (worlds.absolute(), maps.absolute()))
+    buildings = _generated_buildings(maps, sizes.numbers(max(0, count - len(SHIPPED_WORLDS))))
+    built = {**_shipped_worlds(folder, worlds), **buildings}
+    selected = {name: built[name] for name in list(built)[:count]}
+    return random_goals.degraded(folder, selected, sizes.first, (worlds.absolute(), maps.absolute()))
 
 
-def _shipped(folder: Path, worlds: Path) -> Mapping[str, BuiltWorld]:
-    return _built(folder, worlds, [f"{name}.world.yaml" for name in SHIPPED])
+def _shipped_worlds(folder: Path, worlds: Path) -> Mapping[str, BuiltWorld]:
+    return _build_worlds(folder, worlds, [f"{name}.world.yaml" for name in SHIPPED_WORLDS])
 
 
-def _buildings(folder: Path, numbers: Sequence[int]) -> Mapping[str, BuiltWorld]:
-    return _built(folder, folder, [write_building(number, folder).name for number in numbers])
+def _generated_buildings(folder: Path, numbers: Sequence[int]) -> Mapping[str, BuiltWorld]:
+    return _build_worlds(folder, folder, [write_building(number, folder).name for number in numbers])
 
 
-def _built(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:
+def _build_worlds(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:
     """Return the built worlds by the names that scenarios in `folder` use for them."""
     from simscen.loading.builders import world_from_file
     from simscen.loading.files.single_files import load_world_file
@@ -180,6 +188,6 @@ def _built(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, Bui
 
     folder.mkdir(parents=True, exist_ok=True)
     return {
-        file: build_world_and_map(world_from_file(load_world_file(worlds / file, worlds), worlds), LIDAR_HEIGHT)
+        file: build_world_and_map(world_from_file(load_world_file(worlds / file, worlds), worlds), LIDAR_HEIGHT_M)
         for file in files
     }

@@ -13,8 +13,8 @@ from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
 from simscen.cli.interrupts import signals_interrupt
 from simscen.cli.session.backends import backend_of
-from simscen.cli.session.pending_runs import begin
-from simscen.cli.session.selection import checked
+from simscen.cli.session.pending_runs import plan_session
+from simscen.cli.session.selection import world_problems
 from simscen.core.errors import Exit, InvalidInput
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionEvent
@@ -36,10 +36,10 @@ MOMENTS_S = (5.0, 10.0, 20.0, 30.0)
 
 
 @dataclass(frozen=True)
-class Localized:
+class LocalizationAccuracy:
     """Accuracy of the localization: RMSE in m (mean and worst over runs), and ANEES at MOMENTS_S.
 
-    `bounds` are those of ANEES with 95 % probability if the covariance is consistent.
+    `bounds` contain the ANEES with 95 % probability if the covariance is consistent.
     """
 
     rmse: float | None
@@ -49,21 +49,23 @@ class Localized:
 
 
 @dataclass(frozen=True)
-class Measured:
-    """Result of one experiment."""
+class ExperimentResult:
+    """Result of one experiment: the row of the table, and the accuracy of the localization if it was measured."""
 
     tally: Row
-    localized: Localized | None = None
+    localized: LocalizationAccuracy | None = None
 
 
-def drive(experiments: Sequence[Experiment], journal: Journal, workers: int) -> tuple[list[list[Trial]], Exit | None]:
+def execute_experiments(
+    experiments: Sequence[Experiment], journal: Journal, workers: int
+) -> tuple[list[list[Trial]], Exit | None]:
     """Execute all runs of each experiment without a result in the journal; print progress and failures to stderr.
 
     Returns the trials of each experiment, and the exit code of an interrupt or None. Raises InvalidInput.
     """
-    jobs, owners = _planned(experiments, journal.folder)
-    work = begin(journal, jobs, workers)
-    progress = _Progress(len(jobs), len(work.kept), {job.key: job for job in jobs})
+    jobs, drives = _plan_jobs(experiments, journal.folder)
+    pending = plan_session(journal, jobs, workers)
+    progress = _Progress(len(jobs), len(pending.reused), {job.key: job for job in jobs})
 
     def listen(event: SessionEvent) -> None:
         journal(event)
@@ -71,30 +73,30 @@ def drive(experiments: Sequence[Experiment], journal: Journal, workers: int) -> 
 
     options = SessionOptions(workers=workers, wall_limit=WALL_LIMIT_S)
     with signals_interrupt(), backend_of(options) as backend:
-        answers, stopped = run_session(work.jobs, options, backend, listen)
+        finished_runs, stopped = run_session(pending.jobs, options, backend, listen)
     print_progress("")
-    finished = {answer.key: answer for answer in (*work.kept, *answers)}
+    results = {finished.key: finished for finished in (*pending.reused, *finished_runs)}
     trials: list[list[Trial]] = [[] for _ in experiments]
     for job in jobs:
-        number, drive = owners[job.key]
+        number, drive = drives[job.key]
         world, speed = drive.world or str(drive.file), _top_speed(job.scenario)
-        trials[number].append(Trial(finished[job.key], drive.reference_length, world, speed))
+        trials[number].append(Trial(results[job.key], drive.reference_length, world, speed))
     return trials, stopped
 
 
-def driven(trials: Sequence[Trial]) -> list[Trial]:
+def completed_trials(trials: Sequence[Trial]) -> list[Trial]:
     """Return the trials that were not interrupted."""
-    return [trial for trial in trials if not _undecided(trial.run)]
+    return [trial for trial in trials if not _was_interrupted(trial.run)]
 
 
-def _undecided(run: RunFinished) -> bool:
+def _was_interrupted(run: RunFinished) -> bool:
     return run.result.error is not None and run.result.error.kind in UNDECIDED_KINDS
 
 
-Owner = tuple[int, Drive]
+ExperimentDrive = tuple[int, Drive]
 
 
-def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, Owner]]:
+def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, ExperimentDrive]]:
     """Return a job for each run, and the experiment and drive of each.
 
     Raises ValueError for two runs with the same key. Only the first scenario of each experiment is checked as by
@@ -102,20 +104,20 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
     were drawn.
     """
     jobs: list[Job] = []
-    owners: dict[RunKey, Owner] = {}
+    drives: dict[RunKey, ExperimentDrive] = {}
     for number, experiment in enumerate(experiments):
-        for which, planned in enumerate(experiment.drives):
-            scenario = load_scenario(planned.file, experiment.root, experiment.world_path)
-            found = checked(scenario) if which == 0 else []
+        for index, drive in enumerate(experiment.drives):
+            scenario = load_scenario(drive.file, experiment.root, experiment.world_path)
+            found = world_problems(scenario) if index == 0 else []
             if problems := [problem for problem in found if problem.severity == "error"]:
                 raise InvalidInput(problems)
-            for seed in planned.seeds:
+            for seed in drive.seeds:
                 key = RunKey(scenario.id, seed)
-                if key in owners:
+                if key in drives:
                     raise ValueError(f"several runs of {key.scenario} with seed {seed}")
                 jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), WALL_LIMIT_S))
-                owners[key] = number, planned
-    return jobs, owners
+                drives[key] = number, drive
+    return jobs, drives
 
 
 def _top_speed(scenario: LoadedScenario) -> float | None:
@@ -140,7 +142,7 @@ class _Progress:
 
     def __call__(self, event: SessionEvent) -> None:
         """Process an event of the session."""
-        if not isinstance(event, RunFinished) or _undecided(event):
+        if not isinstance(event, RunFinished) or _was_interrupted(event):
             return
         self._done += 1
         if event.outcome is not Outcome.PASSED:
@@ -152,19 +154,19 @@ class _Progress:
         print_progress(f"{self._done} of {self._total} runs" if self._done < self._total else "")
 
 
-def measured(experiment: Experiment, trials: list[Trial]) -> Measured:
+def summarize_experiment(experiment: Experiment, trials: list[Trial]) -> ExperimentResult:
     """Return the result of an experiment with these trials."""
     row = summarize(experiment.name, trials)
-    return Measured(row, _localized(trials) if experiment.localization else None)
+    return ExperimentResult(row, _localization_accuracy(trials) if experiment.localization else None)
 
 
-def _localized(trials: list[Trial]) -> Localized:
+def _localization_accuracy(trials: list[Trial]) -> LocalizationAccuracy:
     errors = [value for trial in trials if (value := trial.metric("ape_trans_rmse")) is not None]
     traces = [read_log(Path(trial.run.artifacts.mcap)).trace for trial in trials if trial.run.artifacts.mcap]
-    at = {seconds: [v for trace in traces if (v := nees_at(trace, seconds)) is not None] for seconds in MOMENTS_S}
-    return Localized(
+    samples = {seconds: [v for trace in traces if (v := nees_at(trace, seconds)) is not None] for seconds in MOMENTS_S}
+    return LocalizationAccuracy(
         rmse=mean(errors),
         worst_rmse=max(errors, default=None),
-        anees={seconds: anees(values) for seconds, values in at.items() if values},
+        anees={seconds: anees(values) for seconds, values in samples.items() if values},
         bounds=anees_bounds(max(1, len(traces))),
     )

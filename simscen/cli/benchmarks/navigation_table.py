@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 from simscen.bench.navigation.barn import DWA
 from simscen.bench.navigation.summary import Difference, DriveComparison, Row
-from simscen.cli.benchmarks.navigation_runs import Localized, Measured
+from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
 from simscen.report.styled_line import StyledText, plain_text, wrap_line
 
 TableRow = Sequence[str]
@@ -18,43 +18,43 @@ def fits(lines: Sequence[str], columns: int | None) -> bool:
     return columns is None or max(map(len, lines)) <= columns
 
 
-def aligned(table: Sequence[TableRow], adjust: Adjust = str.rjust) -> list[str]:
-    """Return one line per row with aligned cells: the first cell left-aligned, the others as by `adjust`."""
-    widths = widths_of(table)
+def align_columns(table: Sequence[TableRow], adjust: Adjust = str.rjust) -> list[str]:
+    """Return one line per row with aligned cells: the first cell left-aligned, the others with `adjust`."""
+    widths = column_widths(table)
     return [
         "  ".join((row[0].ljust(widths[0]), *map(adjust, row[1:], widths[1:]))).rstrip()
         for row in table
     ]  # fmt: skip
 
 
-def stacked(table: Sequence[TableRow], columns: int) -> list[str]:
+def stack_rows(table: Sequence[TableRow], columns: int) -> list[str]:
     """Return two lines per row: its name, and its aligned numbers."""
-    widths = widths_of(table)[1:]
+    widths = column_widths(table)[1:]
     gap = "  " if 2 + sum(widths) + 2 * (len(widths) - 1) <= columns else " "
     return [line for name, *rest in table for line in (name, "  " + gap.join(map(str.rjust, rest, widths)))]
 
 
-def labeled(head: TableRow, row: TableRow, columns: int) -> list[str]:
+def label_cells(head: TableRow, row: TableRow, columns: int) -> list[str]:
     """Return the name of a row, then its labeled numbers, as many per line as fit."""
     pieces = tuple(StyledText(f"  {name} {cell}") for name, cell in zip(head[1:], row[1:], strict=True))
     return [row[0], *(plain_text(line) for line in wrap_line(pieces, columns))]
 
 
-def wrapped(lines: Sequence[str], columns: int | None) -> list[str]:
+def wrap_lines(lines: Sequence[str], columns: int | None) -> list[str]:
     """Return the lines, wrapped between words if they are too long."""
     return [plain_text(piece) for line in lines for piece in wrap_line((StyledText(line),), columns)]
 
 
-def widths_of(table: Sequence[TableRow]) -> list[int]:
+def column_widths(table: Sequence[TableRow]) -> list[int]:
     """Return the widths of the columns of a table."""
     return [max(map(len, cells)) for cells in zip(*table, strict=True)]
 
 
-PUBLISHED = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
+PUBLISHED_DWA = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
     f"{name} {value:.3f}" for name, value in DWA.items()
 )
-VERSUS = ("same drives, with and without", "pairs", "better", "worse", "success", "seconds", "SCT", "score")
-HEAD = (
+COMPARISON_HEAD = ("same drives, with and without", "pairs", "better", "worse", "success", "seconds", "SCT", "score")
+TABLE_HEAD = (
     "experiment",
     "runs",
     "success",
@@ -69,26 +69,26 @@ HEAD = (
 )
 
 
-def as_text(rows: Sequence[Measured], pairs: Sequence[DriveComparison] = (), columns: int | None = None) -> str:
+def as_text(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = (), columns: int | None = None) -> str:
     """Return the table of results, the effect of another stack, and published figures for comparison.
 
     If a line would be longer than `columns`, each experiment has one line for its name and one for its numbers.
     """
-    table = [HEAD, *(_cells(measured.tally) for measured in rows)]
-    lines = aligned(table)
+    table = [TABLE_HEAD, *(_cells(result.tally) for result in rows)]
+    lines = align_columns(table)
     if columns is not None and not fits(lines, columns):
-        lines = stacked(table, columns)
-    for measured in rows:
-        if measured.localized is not None:
-            lines += ["", *_localization_lines(measured.tally.case, measured.localized)]
+        lines = stack_rows(table, columns)
+    for result in rows:
+        if result.localized is not None:
+            lines += ["", *_localization_lines(result.tally.case, result.localized)]
     if pairs:
         lines += ["", *_comparison_lines(pairs, columns)]
-    if any(measured.tally.case.startswith("BARN") for measured in rows):
-        lines += ["", PUBLISHED]
-    return "\n".join(wrapped(lines, columns))
+    if any(result.tally.case.startswith("BARN") for result in rows):
+        lines += ["", PUBLISHED_DWA]
+    return "\n".join(wrap_lines(lines, columns))
 
 
-def as_json(rows: Sequence[Measured], pairs: Sequence[DriveComparison] = ()) -> str:
+def as_json(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = ()) -> str:
     """Return all numbers, and those of DWA, as JSON."""
     data = {"experiments": [asdict(row) for row in rows], "dwa_published": DWA}
     return json.dumps({**data, "versus": [asdict(pair) for pair in pairs]} if pairs else data, indent=2)
@@ -97,10 +97,10 @@ def as_json(rows: Sequence[Measured], pairs: Sequence[DriveComparison] = ()) -> 
 def _comparison_lines(pairs: Sequence[DriveComparison], columns: int | None) -> list[str]:
     """Return one line per pair of experiments, or labeled numbers if such lines are too long."""
     changes = [_changes(pair) for pair in pairs]
-    lines = aligned([VERSUS, *changes])
+    lines = align_columns([COMPARISON_HEAD, *changes])
     if columns is None or fits(lines, columns):
         return lines
-    return [VERSUS[0], *(line for row in changes for line in labeled(VERSUS, row, columns))]
+    return [COMPARISON_HEAD[0], *(line for row in changes for line in label_cells(COMPARISON_HEAD, row, columns))]
 
 
 def _changes(pair: DriveComparison) -> tuple[str, ...]:
@@ -139,7 +139,7 @@ def _or_none(value: float | None, form: str, unit: str = "") -> str:
     return "-" if value is None else f"{value:{form}}{unit}"
 
 
-def _localization_lines(case: str, localized: Localized) -> list[str]:
+def _localization_lines(case: str, localized: LocalizationAccuracy) -> list[str]:
     low, high = localized.bounds
     moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in localized.anees.items())
     errors = f"{_or_none(localized.rmse, '.3f', ' m')} RMSE, worst run {_or_none(localized.worst_rmse, '.3f', ' m')}"

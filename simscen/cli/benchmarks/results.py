@@ -28,8 +28,8 @@ class Result:
     simscen: str
 
     @classmethod
-    def here(cls, figures: Measurements) -> "Result":
-        """Return the result of measurements on this machine."""
+    def on_this_machine(cls, figures: Measurements) -> "Result":
+        """Return the result with the processor of this machine and the installed version of simscen."""
         return cls(figures, processor(), version("simscen"))
 
 
@@ -45,8 +45,8 @@ def read_result(file: Path) -> Result:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "no text"
-        raise UsageError(f"cannot read {file}: {why}") from None
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise UsageError(f"cannot read {file}: {reason}") from None
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -54,9 +54,9 @@ def read_result(file: Path) -> Result:
     if not isinstance(data, dict) or "simscen_bench" not in data:
         raise UsageError(f"{file} is not a result of `simscen bench --format json`: the key `simscen_bench` is missing")
     if data["simscen_bench"] != FORMAT:
-        other = f"format {data['simscen_bench']!r}, this version reads {FORMAT}"
+        versions = f"format {data['simscen_bench']!r}, this version reads {FORMAT}"
         raise UsageError(
-            f"{file} is a result of another version of simscen bench ({other}): measure again with this one"
+            f"{file} is a result of another version of simscen bench ({versions}): measure again with this one"
         )
     try:
         figures = {str(name): _figure(entry) for name, entry in data["figures"].items()}
@@ -95,9 +95,9 @@ def comparison_text(before: Result, after: Result) -> str:
     table = [HEAD, *(_row(name, before.figures[name], after.figures[name]) for name in common)]
     widths = [max(len(row[column]) for row in table) for column in range(len(HEAD))]
     lines = [_aligned(row, widths) for row in table]
-    for only, where in ((before.figures, "before"), (after.figures, "after")):
-        if names := [name for name in only if name not in common]:
-            lines.append(f"only {where}: " + ", ".join(names))
+    for figures, label in ((before.figures, "before"), (after.figures, "after")):
+        if names := [name for name in figures if name not in common]:
+            lines.append(f"only {label}: " + ", ".join(names))
     if before.simscen != after.simscen:
         lines.append(f"simscen {before.simscen} before, {after.simscen} after")
     if before.machine != after.machine:
@@ -144,10 +144,10 @@ class Format(str, Enum):
 COMPARE_HELP = "Compare with this result of --format json, and tell changes from noise."
 
 
-def print_progress(what: str) -> None:
-    """Print what is being measured, if stderr is a terminal."""
+def print_progress(text: str) -> None:
+    """Replace the progress line of a terminal by this text; without a terminal on stderr, print nothing."""
     if sys.stderr.isatty():
-        print(f"\r\x1b[K{what}", end="", file=sys.stderr, flush=True)
+        print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
 
 def print_result(result: Result, text: str, sections: dict[str, Any], format_: Format, before: Result | None) -> None:

@@ -28,7 +28,7 @@ def growth_command(
 ) -> None:
     """Measure how the cost of a simulated second grows with the size of the scenario.
 
-    A patrol of 15 s with more of one thing at a time: static obstacles, pushable objects, scripted objects, lidar
+    A patrol of 15 s with more of one quantity at a time: static obstacles, pushable objects, scripted objects, lidar
     beams, AMCL particles, and robots. Prints CPU times of one core; takes a minute and a half.
     """
     from simscen.cli.process import engine_output_on_stderr
@@ -38,7 +38,7 @@ def growth_command(
         from simscen.bench.speed.scaling import measure_growth
 
         figures = measure_growth(rounds, print_progress)
-    print_result(Result.here(figures), growth_text(figures), {}, format_, before)
+    print_result(Result.on_this_machine(figures), growth_text(figures), {}, format_, before)
 
 
 def growth_text(figures: Measurements) -> str:
@@ -115,7 +115,7 @@ def suite_command(
 
         scenarios, _ = load_all(paths or [Path("scenarios")], None, (), False, Selection())
         suite = measure_suite(evenly_spaced(scenarios, most), workers, Path(folder), WARM_PROCESS, print_progress)
-    print_result(Result.here(suite.figures), suite_text(suite), {"suite": asdict(suite)}, format_, before)
+    print_result(Result.on_this_machine(suite.figures), suite_text(suite), {"suite": asdict(suite)}, format_, before)
     if suite.unfinished:
         print(f"{len(suite.unfinished)} runs were aborted: {', '.join(suite.unfinished)}", file=sys.stderr)
         sys.exit(Exit.INCOMPLETE)
@@ -123,14 +123,15 @@ def suite_command(
 
 def suite_text(suite: "Suite") -> str:
     """Return the lines about the wall time, the CPU time, and the memory of a suite."""
-    figures, alone = suite.figures, suite.bare * suite.simulated
-    took = f"{suite.simulated:.0f} s simulated in {suite.wall:.1f} s of wall time, {suite.workers} at a time"
+    figures, baseline = suite.figures, suite.bare * suite.simulated
+    duration = f"{suite.simulated:.0f} s simulated in {suite.wall:.1f} s of wall time, {suite.workers} at a time"
     return "\n".join([
-        f"{suite.runs} runs, {took}",
+        f"{suite.runs} runs, {duration}",
         f"  {figures['suite: runs a minute'].value:.0f} runs a minute",
-        f"  {suite.wall / alone:.2f} times what PyBullet alone takes on one core to step and scan as long"
-        f" ({alone:.1f} s)",
-        f"  CPU time {suite.cpu / alone:.2f} times that, {1e3 * suite.cpu / suite.simulated:.1f} ms a simulated second",
+        f"  {suite.wall / baseline:.2f} times what PyBullet alone takes on one core to step and scan as long"
+        f" ({baseline:.1f} s)",
+        f"  CPU time {suite.cpu / baseline:.2f} times that,"
+        f" {1e3 * suite.cpu / suite.simulated:.1f} ms a simulated second",
         f"  memory of a worker {figures['suite: memory of a worker'].value:.0f} MB,"
         f" of the largest {figures['suite: memory of the largest worker'].value:.0f} MB",
     ])  # fmt: skip

@@ -13,11 +13,11 @@ from typer.models import ArgumentInfo, OptionInfo
 
 from simscen.core.errors import Exit
 
-EXITS = {
+EXIT_CODES = {
     Exit.PASSED: "All runs passed, or failed as expected by their scenarios.",
     Exit.FAILED: "A criterion failed, or held although it was expected to fail.",
     Exit.USAGE: "Invalid file, wrong usage, or unusable output folder. Nothing was run.",
-    Exit.INCOMPLETE: "A run could not be completed (crash, timeout, out of memory), or a result could not be written.",
+    Exit.INCOMPLETE: "A run could not be completed (crash, timeout, out of memory), or a result could not be spelling.",
     Exit.INTERNAL: "A bug in simscen.",
     Exit.NOTHING_SELECTED: "Nothing was selected, or all selected scenarios are skipped.",
     Exit.UNDECIDED: "The claim of a study is undecided: more runs may decide it.",
@@ -25,14 +25,14 @@ EXITS = {
     Exit.INTERRUPTED: "Interrupted by Ctrl-C (SIGINT).",
     Exit.TERMINATED: "Interrupted by SIGTERM.",
 }
-_WORDS = {int: "integer", float: "number", str: "text", Path: "path"}
+_TYPE_NAMES = {int: "integer", float: "number", str: "text", Path: "path"}
 
 
 @dataclass(frozen=True)
 class Parameter:
     """Argument or option: its spelling, the kind of its value, its default ("" = none), and its description."""
 
-    written: str
+    spelling: str
     value: str
     default: str
     help: str
@@ -55,28 +55,30 @@ def commands_of(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
 
 def parameters_of(function: Callable[..., Any]) -> list[Parameter]:
     """Return the parameters of the function of a command in the order of its help."""
-    return [_parameter(*found) for found in _parameters_of(function)]
+    return [_parameter(*annotated) for annotated in _annotated_parameters(function)]
 
 
-def section(words: str, function: Callable[..., Any]) -> str:
-    """Return the section of a command."""
+def section(command: str, function: Callable[..., Any]) -> str:
+    """Return the section of a command, with the words that call it and its function."""
     rows = [
-        f"| `{p.written}` | {p.value} | {f'`{p.default}`' if p.default else ''} | {_plain(p.help)} |"
+        f"| `{p.spelling}` | {p.value} | {f'`{p.default}`' if p.default else ''} | {_plain(p.help)} |"
         for p in parameters_of(function)
     ]
     head = ["| argument or option | value | default | meaning |", "|---|---|---|---|"]
     table = "\n".join([*head, *rows]) if rows else "No arguments or options."
-    return f"## `simscen {words}`\n\n{_plain(inspect.cleandoc(function.__doc__ or ''))}\n\n{table}\n"
+    return f"## `simscen {command}`\n\n{_plain(inspect.cleandoc(function.__doc__ or ''))}\n\n{table}\n"
 
 
-def exits() -> str:
-    """Return the table of exit codes."""
-    rows = "\n".join(f"| {code.value} | {text} |" for code, text in EXITS.items())
+def exit_code_section() -> str:
+    """Return the section of the exit codes."""
+    rows = "\n".join(f"| {code.value} | {text} |" for code, text in EXIT_CODES.items())
     text = "If several apply, the first of 129, 130, 143, 4, 3, 1 is returned."
     return f"## Exit codes\n\n{text}\n\n| code | meaning |\n|---|---|\n{rows}\n"
 
 
-def _parameters_of(function: Callable[..., Any]) -> list[tuple[inspect.Parameter, Any, ArgumentInfo | OptionInfo]]:
+def _annotated_parameters(
+    function: Callable[..., Any],
+) -> list[tuple[inspect.Parameter, Any, ArgumentInfo | OptionInfo]]:
     found = []
     # get_type_hints cannot be used: in Python 3.10 it hides Annotated in an Optional if the default is None.
     for parameter in inspect.signature(function, eval_str=True).parameters.values():
@@ -89,20 +91,20 @@ def _parameters_of(function: Callable[..., Any]) -> list[tuple[inspect.Parameter
 
 
 def _parameter(parameter: inspect.Parameter, kind: Any, info: ArgumentInfo | OptionInfo) -> Parameter:
-    repeated, kind = _bare(kind)
+    repeated, kind = _item_type(kind)
     required = parameter.default is inspect.Parameter.empty
-    default = "" if required or parameter.default in (None, False, "") else _shown(parameter.default)
+    default = "" if required or parameter.default in (None, False, "") else _default_text(parameter.default)
     if isinstance(info, ArgumentInfo):
-        word = (info.metavar or parameter.name).upper()
-        written = f"{word}…" if repeated else word if required else f"[{word}]"
+        name = (info.metavar or parameter.name).upper()
+        spelling = f"{name}…" if repeated else name if required else f"[{name}]"
     else:
         # Within Annotated, typer stores the first name as the default.
         names = [name for name in (info.default, *(info.param_decls or ())) if isinstance(name, str)]
-        written = ", ".join(names or [f"--{parameter.name.replace('_', '-')}"])
-    return Parameter(written, "" if kind is bool else _word(kind, info), default, info.help or "")
+        spelling = ", ".join(names or [f"--{parameter.name.replace('_', '-')}"])
+    return Parameter(spelling, "" if kind is bool else _value_text(kind, info), default, info.help or "")
 
 
-def _bare(kind: Any) -> tuple[bool, Any]:
+def _item_type(kind: Any) -> tuple[bool, Any]:
     """Return whether a type that may be None is a list, and the type of its items."""
     if get_origin(kind) in (Union, types.UnionType):
         kind = next(member for member in get_args(kind) if member is not type(None))
@@ -110,13 +112,13 @@ def _bare(kind: Any) -> tuple[bool, Any]:
     return repeated, get_args(kind)[0] if repeated else kind
 
 
-def _word(kind: Any, info: ArgumentInfo | OptionInfo) -> str:
+def _value_text(kind: Any, info: ArgumentInfo | OptionInfo) -> str:
     if isinstance(kind, type) and issubclass(kind, Enum):
         return " or ".join(f"`{member.value}`" for member in kind)
-    word = _WORDS[kind]
+    text = _TYPE_NAMES[kind]
     if info.min is not None and info.max is not None:
-        return f"{word}, {info.min:g} to {info.max:g}" if kind is float else f"{word}, {info.min} to {info.max}"
-    return f"{word}, at least {info.min:g}" if info.min is not None else word
+        return f"{text}, {info.min:g} to {info.max:g}" if kind is float else f"{text}, {info.min} to {info.max}"
+    return f"{text}, at least {info.min:g}" if info.min is not None else text
 
 
 def _plain(text: str) -> str:
@@ -124,5 +126,5 @@ def _plain(text: str) -> str:
     return text.replace("*", "\\*").replace("<", "\\<").replace("|", "\\|")
 
 
-def _shown(default: Any) -> str:
+def _default_text(default: Any) -> str:
     return str(default.value if isinstance(default, Enum) else default)

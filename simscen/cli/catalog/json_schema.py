@@ -39,12 +39,12 @@ def schema_of(name: str, installed: bool = False) -> Schema:
         _remove_scenario_keys(generated)
     if name == "base":
         _make_extensible_keys_optional(generated)
-    known = {
+    properties = {
         "extends": _EXTENDS,
         **generated["properties"],
         **(_append_keys(generated) if model is ScenarioSpec else {}),
     }
-    schema = _simplified({**generated, "properties": known}, generated.get("$defs", {}))
+    schema = _simplify({**generated, "properties": properties}, generated.get("$defs", {}))
     # Other required keys may come from the extended file or from a defaults.yaml in the same folder.
     needed = ["simscen"] if model.model_fields["simscen"].is_required() and name != "base" else []
     return {"$schema": DRAFT, "title": f"simscen {name}", **schema, "required": needed}
@@ -82,21 +82,21 @@ def _referenced_definitions(schema: Schema, definitions: Schema, lists: bool) ->
     found: set[str] = set()
     seen: set[tuple[str, bool]] = set()
 
-    def walk(node: Any, behind: bool) -> None:
+    def walk(node: Any, in_list: bool) -> None:
         if isinstance(node, list):
             for item in node:
-                walk(item, behind)
+                walk(item, in_list)
         if not isinstance(node, dict):
             return
         name = str(node.get("$ref", "")).rpartition("/")[2]
-        if name and (name, behind) not in seen:
-            seen.add((name, behind))
-            if behind == lists:
+        if name and (name, in_list) not in seen:
+            seen.add((name, in_list))
+            if in_list == lists:
                 found.add(name)
-            walk(definitions[name], behind)
+            walk(definitions[name], in_list)
         for key, value in node.items():
             if key != "$defs":
-                walk(value, behind or key in ("items", "prefixItems"))
+                walk(value, in_list or key in ("items", "prefixItems"))
 
     walk(schema, False)
     return found
@@ -114,35 +114,39 @@ _EXTENDS: Schema = {
 
 
 class _Generator(GenerateJsonSchema):
-    """Generator of pydantic schemas that adds single-key choices and the docstrings of bare values."""
+    """Generator of pydantic schemas that adds single-key choices and the docstrings of values that are not mappings."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
-        made, model = super().model_schema(schema), schema["cls"]
+        result, model = super().model_schema(schema), schema["cls"]
         if issubclass(model, RootModel) and model.__doc__:
-            made["description"] = _joined(model.__doc__.strip(), made.get("description", ""))
+            result["description"] = _join_descriptions(model.__doc__.strip(), result.get("description", ""))
         if issubclass(model, Choice):
-            made.update(_exactly_one(model, list(model.choices())))
-        return made
+            result.update(_exactly_one(model, list(model.choices())))
+        return result
 
 
 class _InstalledTypesGenerator(_Generator):
     """Generator that also adds the usable types of installed packages."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
-        made, model = super().model_schema(schema), schema["cls"]
+        result, model = super().model_schema(schema), schema["cls"]
         if not issubclass(model, Choice) or with_installed_choices(model) is model:
-            return made
-        for key, found in installed_choices(model).items():
-            made["properties"][key] = self.generate_inner(core_schema.nullable_schema(found.__pydantic_core_schema__))
-        return {**made, **_exactly_one(model, [*model.choices(), *installed_choices(model)])}
+            return result
+        for key, choice in installed_choices(model).items():
+            result["properties"][key] = self.generate_inner(
+                core_schema.nullable_schema(choice.__pydantic_core_schema__)
+            )
+        return {**result, **_exactly_one(model, [*model.choices(), *installed_choices(model)])}
 
     def function_wrap_schema(self, schema: core_schema.WrapValidatorFunctionSchema) -> JsonSchemaValue:
-        made, value = super().function_wrap_schema(schema), schema.get("metadata", {})
-        models = dict(extensible_union.installed_specs(value[GROUP_KEY])) if GROUP_KEY in value else {}
-        more: list[Schema] = [self._named(name, model) for name, model in models.items() if value[MAPPINGS_ALLOWED_KEY]]
-        if models and value[NAMES_ALLOWED_KEY]:
+        result, metadata = super().function_wrap_schema(schema), schema.get("metadata", {})
+        models = dict(extensible_union.installed_specs(metadata[GROUP_KEY])) if GROUP_KEY in metadata else {}
+        more: list[Schema] = [
+            self._named(name, model) for name, model in models.items() if metadata[MAPPINGS_ALLOWED_KEY]
+        ]
+        if models and metadata[NAMES_ALLOWED_KEY]:
             more.append({"enum": list(models)})
-        return {"anyOf": [made, *more]} if more else made
+        return {"anyOf": [result, *more]} if more else result
 
     def _named(self, name: str, model: type[BaseModel]) -> JsonSchemaValue:
         """Return the schema of a specification that is selected by the name of its entry point."""
@@ -157,29 +161,29 @@ def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
     Without any of them, the error is left to the schema that does not know the key. `maxProperties` is not used, since
     yaml-language-server would then offer no completions: it counts the key that is being typed.
     """
-    given: list[Schema] = [{"type": "object", "required": [key]} for key in keys]
-    beside = [field.alias or name for name, field in model.model_fields.items() if name in model.modifiers]
+    present: list[Schema] = [{"type": "object", "required": [key]} for key in keys]
+    modifiers = [field.alias or name for name, field in model.model_fields.items() if name in model.modifiers]
     missing = {"type": "string", "errorMessage": f"expected one of: {', '.join(keys)}"}
     return {
-        "oneOf": [*given, {"not": {"anyOf": given}}],
-        "if": {"type": "object", "propertyNames": {"enum": beside}},
+        "oneOf": [*present, {"not": {"anyOf": present}}],
+        "if": {"type": "object", "propertyNames": {"enum": modifiers}},
         "then": missing,
     }
 
 
-def _simplified(node: Any, definitions: Schema) -> Any:
+def _simplify(node: Any, definitions: Schema) -> Any:
     """Return a schema without titles, nulls, and large defaults, and with unions as if/then."""
     if isinstance(node, list):
-        return [_simplified(item, definitions) for item in node]
+        return [_simplify(item, definitions) for item in node]
     if not isinstance(node, dict):
         return node
     node = _without_noise(_without_null(node))
     node = _by_json_type(_by_type(node, definitions))
     return {
         # The keys below these are names, not keywords: a property may be named `title`.
-        key: {name: _simplified(schema, definitions) for name, schema in value.items()}
+        key: {name: _simplify(schema, definitions) for name, schema in value.items()}
         if key in ("properties", "$defs")
-        else _simplified(value, definitions)
+        else _simplify(value, definitions)
         for key, value in node.items()
     }
 
@@ -190,11 +194,11 @@ def _by_type(node: Schema, definitions: Schema) -> Schema:
         ref["$ref"]: definitions[ref["$ref"].rpartition("/")[2]] for ref in node.get("oneOf", []) if "$ref" in ref
     }
     types = {ref: member["properties"].get("type", {}).get("const") for ref, member in members.items()}
-    apart = {ref: members[ref].get("required", []) for ref, kind in types.items() if kind is None}
-    if len(members) < 2 or any(len(required) != 1 for required in apart.values()):
+    untyped = {ref: members[ref].get("required", []) for ref, kind in types.items() if kind is None}
+    if len(members) < 2 or any(len(required) != 1 for required in untyped.values()):
         return node
-    if apart:
-        return _by_key(node, {ref: required[0] for ref, required in apart.items()}, definitions)
+    if untyped:
+        return _by_key(node, {ref: required[0] for ref, required in untyped.items()}, definitions)
     rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
     cases = []
     for ref, kind in types.items():
@@ -206,14 +210,14 @@ def _by_type(node: Schema, definitions: Schema) -> Schema:
     return {**rest, "type": "object", "properties": {"type": {"enum": list(types.values())}}, **needed, "allOf": cases}
 
 
-def _by_key(node: Schema, apart: dict[str, str], definitions: Schema) -> Schema:
+def _by_key(node: Schema, keys: dict[str, str], definitions: Schema) -> Schema:
     """Return a union of which some members have no `type`: each of them is selected by its only required key."""
     rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
-    others = [option for option in node["oneOf"] if option.get("$ref") not in apart]
-    made = others[0] if len(others) == 1 else _by_type({"oneOf": others}, definitions)
-    for ref, key in apart.items():
-        made = {"if": {"type": "object", "required": [key]}, "then": {"$ref": ref}, "else": made}
-    return {**rest, **made}
+    others = [option for option in node["oneOf"] if option.get("$ref") not in keys]
+    schema = others[0] if len(others) == 1 else _by_type({"oneOf": others}, definitions)
+    for ref, key in keys.items():
+        schema = {"if": {"type": "object", "required": [key]}, "then": {"$ref": ref}, "else": schema}
+    return {**rest, **schema}
 
 
 def _by_json_type(node: Schema) -> Schema:
@@ -224,8 +228,8 @@ def _by_json_type(node: Schema) -> Schema:
         return node
     other = next(option for option in options if option is not plain[0])
     rest = {key: value for key, value in node.items() if key != "oneOf"}
-    words = plain[0].get("enum", plain[0].get("examples", []))
-    offered = {"examples": words} if words else {}  # an editor uses neither branch for an empty value
+    values = plain[0].get("enum", plain[0].get("examples", []))
+    offered = {"examples": values} if values else {}  # an editor uses neither branch for an empty value
     return {**rest, **offered, "if": {"type": plain[0]["type"]}, "then": plain[0], "else": other}
 
 
@@ -237,7 +241,7 @@ def _without_null(node: Schema) -> Schema:
     rest = [option for option in options if option != {"type": "null"}]
     outer = {key: value for key, value in node.items() if key not in ("anyOf", "default")}
     inner: Schema = rest[0] if len(rest) == 1 else {"anyOf": rest}
-    texts = _joined(outer.get("description", ""), inner.get("description", ""))
+    texts = _join_descriptions(outer.get("description", ""), inner.get("description", ""))
     return {**inner, **outer, **({"description": texts} if texts else {})}
 
 
@@ -246,7 +250,7 @@ def _without_noise(node: Schema) -> Schema:
     return {key: value for key, value in node.items() if key != "title" and not (key == "default" and bulky)}
 
 
-def _joined(text: str, more: str) -> str:
+def _join_descriptions(text: str, more: str) -> str:
     if text and more and text != more:
         return f"{text}\n\n({more})"
     return text or more

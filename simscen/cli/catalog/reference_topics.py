@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from pydantic import BaseModel
 
-from simscen.cli.catalog.commands_page import EXITS
+from simscen.cli.catalog.commands_page import EXIT_CODES
 from simscen.cli.catalog.json_schema import MODELS
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, fields_of, topics
 from simscen.core.errors import BROKEN_COMPONENT
@@ -87,7 +87,7 @@ def code_topics() -> list[Topic]:
     note = "The run could not be completed: a JUnit `<error>`, and exit code 3."
     junit = [Topic("error type", kind, None, f"{text}\n\n{note}") for kind, text in JUNIT_ERROR_TYPES.items()]
     exits = [
-        Topic("exit code", f"exit {code.value}", None, text, alias=f"{code.value}") for code, text in EXITS.items()
+        Topic("exit code", f"exit {code.value}", None, text, alias=f"{code.value}") for code, text in EXIT_CODES.items()
     ]
     return [*nav2, *junit, *exits]
 
@@ -96,7 +96,7 @@ def _error_code_text(code: ErrorCode) -> str:
     return f"{NAV2_ERROR_CODES[code]} {EXTERNAL_ONLY_NOTE}" if code in EXTERNAL_ONLY_CODES else NAV2_ERROR_CODES[code]
 
 
-CLOCK = """\
+SIGNALS_TEXT = """\
 A signal has one value per sample of the truth (`physics: truth_rate`, 40 Hz by default). Its values are the same in the
 run and in its log. Data with a lower rate (belief, command, scans, plans) keeps its value until the next message; the
 first value also holds before it. An event that is shorter than a sample counts at the next sample. A signal that is not
@@ -107,10 +107,10 @@ Derivatives are differences over the time between two samples. A jump by `kidnap
 def signal_topics() -> list[Topic]:
     """Return the overview of all signals, then the topic of each."""
     rows = tuple(Field(name, value_kind(signal), OPTIONAL, signal.text) for name, signal in SIGNALS.items())
-    every = [
+    single = [
         Topic("signal", name, None, description(signal), example(name, signal)) for name, signal in SIGNALS.items()
     ]
-    return [Topic("signal", "signals", None, CLOCK, rows=rows), *every]
+    return [Topic("signal", "signals", None, SIGNALS_TEXT, rows=rows), *single]
 
 
 def value_kind(signal: Signal) -> str:
@@ -121,22 +121,22 @@ def value_kind(signal: Signal) -> str:
 def description(signal: Signal) -> str:
     """Return the description of a signal with its unit and its arguments."""
     return (
-        f"{signal.text}\n\nIt is a {value_kind(signal)}.{_keys(signal)}"
+        f"{signal.text}\n\nIt is a {value_kind(signal)}.{_arguments_sentence(signal)}"
         if not signal.is_boolean
-        else signal.text + _keys(signal)
+        else signal.text + _arguments_sentence(signal)
     )
 
 
 def example(name: str, signal: Signal) -> str:
     """Return a condition that uses the signal."""
-    about = "".join(
-        f", {key}: {_EXAMPLES[key]}" for key in (*signal.required_arguments[:1], *signal.optional_arguments)
+    arguments = "".join(
+        f", {key}: {_EXAMPLE_ARGUMENTS[key]}" for key in (*signal.required_arguments[:1], *signal.optional_arguments)
     )
     bound = "" if signal.is_boolean else f', op: "<=", value: 1.5 {signal.unit}'.rstrip()
-    return f"{{signal: {name}{about}{bound}}}"
+    return f"{{signal: {name}{arguments}{bound}}}"
 
 
-_EXAMPLES = {
+_EXAMPLE_ARGUMENTS = {
     "object": "cart",
     "region": "dock",
     "fault": "lidar.off",
@@ -147,7 +147,7 @@ _EXAMPLES = {
 }
 
 
-def _keys(signal: Signal) -> str:
+def _arguments_sentence(signal: Signal) -> str:
     needed = (
         f" Needs {' or '.join(f'`{key}`' for key in signal.required_arguments)}." if signal.required_arguments else ""
     )
@@ -158,32 +158,32 @@ def signals_page() -> str:
     """Return the content of docs/reference/signals.md."""
     head = "| signal | what | unit | about |\n|---|---|---|---|"
     rows = [
-        f"| `{name}` | {signal.text} | {signal.unit or signal.dimension} | {_cell(signal)} |"
+        f"| `{name}` | {signal.text} | {signal.unit or signal.dimension} | {_arguments_text(signal)} |"
         for name, signal in SIGNALS.items()
     ]
     intro = "# Signals\n\nThe quantities that [temporal criteria](../guides/temporal-criteria.md) can use."
-    return "\n".join([f"{intro} `simscen explain signals` prints the same.\n\n{CLOCK}\n\n{head}", *rows]) + "\n"
+    return "\n".join([f"{intro} `simscen explain signals` prints the same.\n\n{SIGNALS_TEXT}\n\n{head}", *rows]) + "\n"
 
 
-def _cell(signal: Signal) -> str:
+def _arguments_text(signal: Signal) -> str:
     names = [f"`{key}`" for key in signal.required_arguments] + [f"(`{key}`)" for key in signal.optional_arguments]
     return " or ".join(names)
 
 
-REPORTED = """\
+METRICS_TEXT = """\
 Every run reports these numbers in result.json, independently of its criteria. They are computed from the trace, so
 `simscen judge` returns the same numbers for its log. They refer to the truth unless noted otherwise. A number that is
 not defined (a robot that never moved has no smoothness) is null, and `undefined` contains the reason. A jump by
 `kidnap` counts neither as driving nor as turning. Subjective measures of people near a robot (`intrusion_*`) are not
 included."""
 
-CAVEATS = """\
+METRICS_CAVEATS = """\
 SPARC and LDLJ are reported, but affect the verdict only with a `smoothness` criterion. SPARC hardly notices a stop of
 2 s but shows a slow wobble; LDLJ shows the stop; both depend on the duration of a drive. Compare them only between
 drives on the same route. The NEES of one run is a mean over correlated errors; the bounds of the chi-square
 distribution apply to a mean over runs at a fixed time, as computed by `simscen bench nav`."""
 
-SESSION = """\
+SESSION_METRICS_TEXT = """\
 A session reports these numbers in results.json under `suite` (`suites` by name with several `--stack`), and
 `simscen report DIR` prints them: `runs`, without the second runs of `--check-determinism`; `success_rate` of all runs,
 including errors, with its 95 % Wilson interval; `spl` and `soft_spl`, means over the `spl_runs` that have them;
@@ -200,10 +200,10 @@ and `p` Wilcoxon's signed-rank test ([Statistics](statistics.md))."""
 def metric_topics(installed: bool = False) -> list[Topic]:
     """Return the overview of all metrics, then the topic of each; with those of installed packages if `installed`."""
     rows = tuple(Field(name, metric.unit or "number", OPTIONAL, metric.text) for name, metric in METRICS.items())
-    every = [Topic("metric", name, None, _metric_text(metric)) for name, metric in METRICS.items()]
+    single = [Topic("metric", name, None, _metric_text(metric)) for name, metric in METRICS.items()]
     return [
-        Topic("metric", "metrics", None, f"{REPORTED}\n\n{CAVEATS}\n\n{SESSION}", rows=rows),
-        *every,
+        Topic("metric", "metrics", None, f"{METRICS_TEXT}\n\n{METRICS_CAVEATS}\n\n{SESSION_METRICS_TEXT}", rows=rows),
+        *single,
         *added_topics(AnyMeasure, installed),
     ]
 
@@ -217,7 +217,8 @@ def metrics_page() -> str:
     head = "| metric | unit | definition | source |\n|---|---|---|---|"
     table = "\n".join([head, *rows])
     intro = "# Metrics\n\n`simscen explain metrics` prints the same."
-    return f"{intro}\n\n{REPORTED}\n\n{table}\n\n{CAVEATS}\n\n## Metrics of a session\n\n{SESSION}\n"
+    session = f"## Metrics of a session\n\n{SESSION_METRICS_TEXT}\n"
+    return f"{intro}\n\n{METRICS_TEXT}\n\n{table}\n\n{METRICS_CAVEATS}\n\n{session}"
 
 
 def _metric_text(metric: Metric) -> str:
@@ -244,13 +245,16 @@ def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
     parts = path.split(".")
     if len(parts) == 1:
         found = [
-            _key(f"{topic.name}.{path}", field, ()) for topic in known for field in topic.fields if field.key == path
+            _key_topic(f"{topic.name}.{path}", field, ())
+            for topic in known
+            for field in topic.fields
+            if field.key == path
         ]
     else:
-        found = [topic for model, keys in _starts(parts, known) for topic in _below(model, keys, path)]
+        found = [topic for model, keys in _path_starts(parts, known) for topic in _keys_below(model, keys, path)]
         name, _, key = path.rpartition(".")
         listed = [row for topic in known if topic.name == name for row in topic.rows if row.key == key]
-        found += [_key(path, row, ()) for row in listed]
+        found += [_key_topic(path, row, ()) for row in listed]
     return list({(topic.name, topic.text): topic for topic in found}.values())
 
 
@@ -259,7 +263,7 @@ def keys_of_topics(known: Sequence[Topic]) -> list[str]:
     return [f"{topic.name}.{field.key}" for topic in known for field in topic.fields]
 
 
-def _starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[type[BaseModel], list[str]]]:
+def _path_starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[type[BaseModel], list[str]]]:
     for length in (1, 2):
         prefix, keys = ".".join(parts[:length]), parts[length:]
         for topic in known:
@@ -269,15 +273,15 @@ def _starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[type[Bas
         yield model, parts
 
 
-def _below(model: type[BaseModel], keys: list[str], path: str) -> Iterator[Topic]:
+def _keys_below(model: type[BaseModel], keys: list[str], path: str) -> Iterator[Topic]:
     """Yield the last of `keys` below a model, with its own keys if its value is one mapping."""
-    *above, key = keys
-    for holder in models_at(model, _with_indices(model, above)):
-        for field in fields_of(holder):
+    *parents, key = keys
+    for parent in models_at(model, _with_indices(model, parents)):
+        for field in fields_of(parent):
             if field.key == key:
-                within = models_at(holder, _with_indices(holder, [key]))
-                rows = fields_of(within[0]) if len(within) == 1 and not issubclass(within[0], Choice) else []
-                yield _key(path, field, tuple(rows))
+                children = models_at(parent, _with_indices(parent, [key]))
+                rows = fields_of(children[0]) if len(children) == 1 and not issubclass(children[0], Choice) else []
+                yield _key_topic(path, field, tuple(rows))
 
 
 def _with_indices(model: type[BaseModel], keys: list[str]) -> list[str | int]:
@@ -290,7 +294,7 @@ def _with_indices(model: type[BaseModel], keys: list[str]) -> list[str | int]:
     return path
 
 
-def _key(path: str, field: Field, rows: tuple[Field, ...]) -> Topic:
+def _key_topic(path: str, field: Field, rows: tuple[Field, ...]) -> Topic:
     needed = (
         "required" if not field.default else "optional" if field.default == OPTIONAL else f"default {field.default}"
     )

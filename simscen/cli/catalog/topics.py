@@ -79,14 +79,14 @@ class Topic:
 
     @property
     def fields(self) -> list[Field]:
-        """Keys in order; empty for a bare value."""
+        """Keys in order; empty for a value that is not a mapping."""
         if self.rows:
             return list(self.rows)
         return fields_of(self.model) if self.model is not None and not issubclass(self.model, RootModel) else []
 
     @property
     def value(self) -> str:
-        """Kind of a bare value."""
+        """Kind of a value that is not a mapping; "" for a mapping."""
         if self.model is not None and issubclass(self.model, RootModel):
             return kind_of(self.model)
         return ""
@@ -108,16 +108,16 @@ def topics(installed: bool = False) -> list[Topic]:
         _topic("criterion", "pass", AnyCriterion),
         *(_topic("scenario", name, model) for name, model in _SCENARIO.items()),
         *(_topic("stack", name, model) for name, model in _STACK.items()),
-        *_more("stack", installed),
+        *_installed_types("stack", installed),
         *(_topic("stack file", name, model) for name, model in _STACK_FILES.items()),
         *(_topic("localizer", kind, model) for kind, model in by_type(localizers.Localizer)),
-        *_more("localizer", installed),
-        *_more("planner", installed),
+        *_installed_types("localizer", installed),
+        *_installed_types("planner", installed),
         *(_topic("controller", kind, model) for kind, model in by_type(controllers.Controller)),
-        *_more("controller", installed),
+        *_installed_types("controller", installed),
         *(_topic("behavior", name, model) for name, model in _BEHAVIORS.items()),
-        *_more("behavior", installed),
-        *_more("goal_checker", installed),
+        *_installed_types("behavior", installed),
+        *_installed_types("goal_checker", installed),
         *(_topic("world", name, model) for name, model in _WORLD.items()),
         *(_topic("robot", name, model) for name, model in _ROBOT.items()),
         *(_topic("drive", kind, model) for kind, model in by_type(robot.Drive)),
@@ -196,16 +196,16 @@ _ROBOT: dict[str, type[BaseModel]] = {
 def fields_of(model: type[BaseModel]) -> list[Field]:
     """Return the keys of a mapping in the order of the model; of a choice, only its modifiers."""
     docs = field_docs(model)
-    shown = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
+    names = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
     return [
         Field(field.alias or name, kind_of(field), _default(field), docs.get(name, ""))
         for name, field in model.model_fields.items()
-        if name in shown
+        if name in names
     ]
 
 
 def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
-    """Return a type in words, with unit and range: "length in m, ≥ 0"."""
+    """Return the description of a type with unit and range, such as "length in m, ≥ 0"."""
     if isinstance(kind, FieldInfo):
         return kind_of(kind.annotation, tuple(kind.metadata))
     if mark := next((mark for mark in metadata if isinstance(mark, ExtensibleUnion)), None):
@@ -213,8 +213,8 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
     if get_origin(kind) is Annotated:
         return kind_of(get_args(kind)[0], (*get_args(kind)[1:], *metadata))
     if place := next((mark for mark in metadata if isinstance(mark, PlaceAllowed | PlaceShorthand)), None):
-        words = [f"`{word}`" for word in getattr(place, "keywords", ())]
-        return " or ".join([*words, "place", kind_of(kind, tuple(mark for mark in metadata if mark is not place))])
+        keywords = [f"`{word}`" for word in getattr(place, "keywords", ())]
+        return " or ".join([*keywords, "place", kind_of(kind, tuple(mark for mark in metadata if mark is not place))])
     if get_origin(kind) in (Union, UnionType):
         return " or ".join(dict.fromkeys(kind_of(member) for member in get_args(kind) if member is not NoneType))
     if get_origin(kind) is Literal:
@@ -225,7 +225,7 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
         return f"names, each with {kind_of(get_args(kind)[1])}"
     if isinstance(kind, type) and issubclass(kind, RootModel):
         return kind_of(kind.model_fields["root"])
-    return _plain(kind, metadata)
+    return _simple_kind(kind, metadata)
 
 
 def by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
@@ -238,16 +238,16 @@ def by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
         yield get_args(model.model_fields["type"].annotation)[0], model
 
 
-def _plain(kind: Any, metadata: tuple[Any, ...]) -> str:
-    words = {int: "integer", float: "number", str: "text", bool: "true or false"}
-    quantity = next((mark for mark in _flat(metadata) if isinstance(mark, Quantity)), None)
+def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
+    names = {int: "integer", float: "number", str: "text", bool: "true or false"}
+    quantity = next((mark for mark in _all_marks(metadata) if isinstance(mark, Quantity)), None)
     if quantity is not None:
-        word = f"{quantity.dimension} in {next(iter(UNITS[quantity.dimension]))}"
+        text = f"{quantity.dimension} in {next(iter(UNITS[quantity.dimension]))}"
     else:
-        word = words.get(kind, "mapping" if isinstance(kind, type) and issubclass(kind, BaseModel) else "choice")
+        text = names.get(kind, "mapping" if isinstance(kind, type) and issubclass(kind, BaseModel) else "choice")
     bounds = {
         name: getattr(mark, name)
-        for mark in _flat(metadata)
+        for mark in _all_marks(metadata)
         for name in _BOUNDS
         if getattr(mark, name, None) is not None
     }
@@ -255,10 +255,10 @@ def _plain(kind: Any, metadata: tuple[Any, ...]) -> str:
         texts = [f"{bounds['ge']:g} … {bounds['le']:g}"]
     else:
         texts = [f"{_BOUNDS[name]} {bound:g}" for name, bound in bounds.items()]
-    return ", ".join([word.replace("ratio in %", "ratio"), *texts])
+    return ", ".join([text.replace("ratio in %", "ratio"), *texts])
 
 
-def _flat(metadata: tuple[Any, ...]) -> Iterator[Any]:
+def _all_marks(metadata: tuple[Any, ...]) -> Iterator[Any]:
     """Yield all annotations, including those nested in pydantic's Field."""
     for mark in metadata:
         yield from mark.metadata if isinstance(mark, FieldInfo) else [mark]
@@ -284,18 +284,18 @@ def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
         yield _topic(group, key, model) if model is not None else Topic(group, key, None, docs.get(name, ""))
 
 
-def added_topics(choice: type[Choice], wanted: bool = True) -> Iterator[Topic]:
-    """Yield the usable choices of installed packages if they are `wanted`."""
-    if not wanted:
+def added_topics(choice: type[Choice], installed: bool = True) -> Iterator[Topic]:
+    """Yield the usable choices of installed packages, or nothing without `installed`."""
+    if not installed:
         return
     origins = {entry.name: entry.origin for entry in registry.installed(choice.group)}
     for key, model in installed_choices(choice).items():
         yield replace(_topic(choice.group, key, model), origin=origins[key])
 
 
-def _more(group: str, wanted: bool) -> Iterator[Topic]:
-    """Yield the usable types of installed packages in a group if they are `wanted`."""
-    if wanted:
+def _installed_types(group: str, installed: bool) -> Iterator[Topic]:
+    """Yield the usable types of installed packages in a group, or nothing without `installed`."""
+    if installed:
         origins = {entry.name: entry.origin for entry in registry.installed(group)}
         for name, model in extensible_union.installed_specs(group):
             yield replace(_topic(group, name, model), origin=origins[name])

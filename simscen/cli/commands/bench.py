@@ -61,7 +61,7 @@ def command(
     figures = {**_patrol_figures(patrol), **overhead.figures, **_other_figures(fields, external)}
     lines = [*_patrol_lines(patrol, rounds), *_overhead_lines(overhead), *_field_lines(fields)]
     text = "\n".join([*lines, *_external_lines(external)])
-    print_result(Result.here(figures), text, _sections(patrol, overhead, fields, external), format_, before)
+    print_result(Result.on_this_machine(figures), text, _sections(patrol, overhead, fields, external), format_, before)
 
 
 def _sections(
@@ -76,12 +76,15 @@ def _sections(
 
 
 def _patrol_figures(patrol: "Patrol") -> Measurements:
-    each, unit = 1e3 / patrol.simulated, "ms a simulated second"
+    scale, unit = 1e3 / patrol.simulated, "ms a simulated second"
     return {
         "patrol, times PyBullet alone": Measurement.of(patrol.ratios, ""),
-        "patrol": Measurement.of([each * cpu for cpu in patrol.cpus], unit),
-        "PyBullet alone": Measurement.of([each * bare for bare in patrol.bares], unit),
-        **{name: Measurement.of([each * one for one in rounds], unit) for name, rounds in patrol.parted.items()},
+        "patrol": Measurement.of([scale * cpu for cpu in patrol.cpus], unit),
+        "PyBullet alone": Measurement.of([scale * baseline for baseline in patrol.bares], unit),
+        **{
+            name: Measurement.of([scale * seconds for seconds in rounds], unit)
+            for name, rounds in patrol.parted.items()
+        },
     }
 
 
@@ -112,7 +115,7 @@ def _patrol_lines(patrol: "Patrol", rounds: int) -> list[str]:
 
 def _overhead_lines(overhead: "Overhead") -> list[str]:
     width = max(map(len, overhead.figures))
-    lines = [f"    {name:{width}} {one.value:7.1f} {one.unit}" for name, one in overhead.figures.items()]
+    lines = [f"    {name:{width}} {figure.value:7.1f} {figure.unit}" for name, figure in overhead.figures.items()]
     return ["overhead of a run (CPU time unless noted otherwise)", *lines]
 
 

@@ -23,7 +23,7 @@ BASELINE, CANDIDATE = "baseline", "candidate"
 
 
 class Gate(str, Enum):
-    """What makes `simscen compare` exit with 1."""
+    """Condition under which `simscen compare` exits with 1."""
 
     WORSE = "worse"
     FLIP = "flip"
@@ -82,19 +82,21 @@ def command(
     (against,) = comparison.against
     if not against.pairs + against.broken:
         hint = "run the same scenarios with the same seeds in both"
-        raise InvalidInput([Problem(str(candidate), 0, 0, "SC811", f"no run has a partner in {baseline}", hint)])
+        raise InvalidInput([Problem(str(candidate), 0, 0, "SC811", f"no run has a counterpart in {baseline}", hint)])
     is_worse = any(change.is_worse for change in against.changes)
     _print(comparison, _links(sessions), format_, is_worse)
     incomplete = any(row[CANDIDATE].errors for row in comparison.outcomes.values())
-    lost = any(flip.failed == CANDIDATE for flip in against.flips)
-    has_failed = {Gate.WORSE: is_worse, Gate.FLIP: lost, Gate.NEVER: False}[fail_on]
+    has_flipped = any(flip.failed == CANDIDATE for flip in against.flips)
+    has_failed = {Gate.WORSE: is_worse, Gate.FLIP: has_flipped, Gate.NEVER: False}[fail_on]
     sys.exit(Exit.FAILED if has_failed else Exit.INCOMPLETE if incomplete else Exit.PASSED)
 
 
 def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, changed_scenarios: bool) -> None:
     """Raise InvalidInput if a scenario is not the same in both sessions."""
-    before, now = ({run.key.test: run for run in session.planned if run.definition} for session in sessions.values())
-    changed = [run for test, run in now.items() if test in before and run.definition != before[test].definition]
+    baseline, current = (
+        {run.key.test: run for run in session.planned if run.definition} for session in sessions.values()
+    )
+    changed = [run for test, run in current.items() if test in baseline and run.definition != baseline[test].definition]
     if changed and not changed_scenarios:
         hint = "compare runs of the same scenario files, or accept it with --changed-scenarios"
         raise InvalidInput([

@@ -110,8 +110,8 @@ def stacks() -> str:
         raise CheckFailed(str(error)) from error
     if config.tree is None:
         return f"{config.file} does not exist; define external stacks with --stack"
-    listed = ", ".join(f"{name} = {shlex.join(command.argv)}" for name, command in commands.items() if command)
-    return f"{config.file}: {listed or 'no stacks'}"
+    stack_list = ", ".join(f"{name} = {shlex.join(command.argv)}" for name, command in commands.items() if command)
+    return f"{config.file}: {stack_list or 'no stacks'}"
 
 
 def speed() -> str:
@@ -130,7 +130,7 @@ def speed() -> str:
 
 
 def run_twice() -> str:
-    """Check that one simulated second passes twice with equal logs."""
+    """Simulate one second twice, check that both runs pass with equal logs, and return the hash of the log."""
     from simscen.cli.session.backends import backend_of
     from simscen.core.records.run_result import Outcome
     from simscen.loading.scenario import load_scenario
@@ -143,12 +143,12 @@ def run_twice() -> str:
         try:
             jobs = plan_jobs([load_scenario(folder / "doctor.scenario.yaml", folder)], options, folder / "out")
             with backend_of(options) as backend:
-                answers, _ = run_session(jobs, options, backend, lambda _: None)
+                finished_runs, _ = run_session(jobs, options, backend, lambda _: None)
         except SimscenError as error:
             raise CheckFailed(str(error)) from error
-        for answer in answers:
-            if answer.outcome is not Outcome.PASSED:
-                broken = answer.result.error
-                raise CheckFailed(broken.message if broken else "the robot collided in an empty room")
-        log = Path(answers[0].artifacts.mcap).read_bytes()
+        for finished in finished_runs:
+            if finished.outcome is not Outcome.PASSED:
+                failure = finished.result.error
+                raise CheckFailed(failure.message if failure else "the robot collided in an empty room")
+        log = Path(finished_runs[0].artifacts.mcap).read_bytes()
     return f"1 s simulated twice, equal logs: sha256 {hashlib.sha256(log).hexdigest()[:16]}"

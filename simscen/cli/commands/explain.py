@@ -42,7 +42,7 @@ def command(
 
 
 def explained(name: str, width: int = 100) -> str:
-    """Return the explanation of all_topics called `name`. Raises UsageError if there is nothing."""
+    """Return the explanation of all topics with this name. Raises UsageError if there are none."""
     if name.upper() in CODES:
         return f"{name.upper()}\n{_wrapped(CODES[name.upper()], width, '  ')}"
     return "\n\n".join(_explained(topic, width) for topic in _topics_named(name))
@@ -54,7 +54,7 @@ def _topics_named(name: str) -> list[Topic]:
     found = [topic for topic in known if lowered in (name.lower() for name in _names(topic))]
     found = found or key_topics(name, known)
     if not found:
-        hint = suggestion(name, [*known_names(), *(known_names(keys=True) if "." in name else _bare_keys(known))])
+        hint = suggestion(name, [*known_names(), *(known_names(keys=True) if "." in name else _key_names(known))])
         raise UsageError(
             f"unknown name {quoted(name)}; " + (hint if hint.startswith("did") else "run `simscen explain` for a list")
         )
@@ -65,8 +65,8 @@ def _names(topic: Topic) -> tuple[str, ...]:
     return (topic.name, f"{topic.group}.{topic.name}", *((topic.alias,) if topic.alias else ()))
 
 
-def _bare_keys(all_topics: list[Topic]) -> list[str]:
-    return [field.key for topic in all_topics for field in topic.fields]
+def _key_names(topics: list[Topic]) -> list[str]:
+    return [field.key for topic in topics for field in topic.fields]
 
 
 def _overview(width: int) -> str:
@@ -80,8 +80,8 @@ def _overview(width: int) -> str:
 
 
 def _explained(topic: Topic, width: int) -> str:
-    of = f"{topic.group} of {topic.origin}" if topic.origin else topic.group
-    parts = [f"{topic.name} ({of})", _paragraphs(topic.text, width)]
+    kind = f"{topic.group} of {topic.origin}" if topic.origin else topic.group
+    parts = [f"{topic.name} ({kind})", _paragraphs(topic.text, width)]
     if topic.value:
         parts.append(f"  Value: {topic.value}")
     if topic.fields:

@@ -63,8 +63,11 @@ def command(
     foreign = foreign_log_options(truth, topic, time, tick_rate, same_frame)
     files = find_logs(logs)
     judging = LogJudge(foreign, scenario, root, world_path or [])
-    lost = runs_without_log(logs)
-    runs = [*((str(file), judging.judge(file, alone=len(files) + len(lost) == 1)) for file in files), *lost]
+    without_log = runs_without_log(logs)
+    runs = [
+        *((str(file), judging.judge(file, is_only_log=len(files) + len(without_log) == 1)) for file in files),
+        *without_log,
+    ]
     if foreign != ForeignLogOptions() and not judging.foreign:
         judging.notes.append("logs of simscen contain truth and times; options for foreign logs have no effect")
     for note in judging.notes:
@@ -77,10 +80,10 @@ def command(
     sys.exit(exit_code([run for _, run in runs]))
 
 
-def _print(runs: list[tuple[str, RunFinished]], one_scenario: bool) -> None:
+def _print(runs: list[tuple[str, RunFinished]], same_criteria: bool) -> None:
     if len(runs) == 1:
         lines = list(full_log_lines(runs[0][1], runs[0][0]))
-    elif one_scenario:
+    elif same_criteria:
         lines = [*margin_table(runs), summary_line([run for _, run in runs])]
     else:
         width = max(len(name) for name, _ in runs)
@@ -104,11 +107,11 @@ def _document(runs: list[RunFinished], options: list[str]) -> str:
 
 def _options(foreign: ForeignLogOptions, scenario: Path | None, root: Path | None, world_path: list[Path]) -> list[str]:
     """Return the options of this command that affect the result."""
-    given = {"--scenario": scenario, "--truth": foreign.truth, "--root": root}
-    several = [("--topic", f"{name}={topic}") for name, topic in foreign.topics.items()]
-    several += [("--world-path", str(folder)) for folder in world_path]
-    words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
-    words += [word for pair in several for word in pair]
+    single = {"--scenario": scenario, "--truth": foreign.truth, "--root": root}
+    repeated = [("--topic", f"{name}={topic}") for name, topic in foreign.topics.items()]
+    repeated += [("--world-path", str(folder)) for folder in world_path]
+    words = [word for name, value in single.items() if value is not None for word in (name, str(value))]
+    words += [word for pair in repeated for word in pair]
     words += ["--time", "log"] if foreign.clock == "log" else []
     words += ["--tick-rate", str(foreign.tick_rate)] if foreign.tick_rate != ForeignLogOptions.tick_rate else []
     return [*words, *(["--same-frame"] if foreign.same_frame else [])]

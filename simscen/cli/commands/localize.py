@@ -24,8 +24,8 @@ from simscen.record.localization_logs.read import LocalizationLog, read_localiza
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import RobotModel, Surroundings
 
-MOSTLY_COMPARED = 0.99
-"""Share of the beliefs from which on a log counts as compared as a whole."""
+MIN_COMPARED_SHARE = 0.99
+"""Share of beliefs with a reference from which a log counts as compared as a whole."""
 
 
 def command(
@@ -63,20 +63,20 @@ def command(
     A CSV file has the rows `odom,TIME,X,Y,YAW`, `scan,TIME,ANGLE_MIN,ANGLE_INCREMENT,RANGE_MIN,RANGE_MAX,R0,R1,…`,
     `truth,TIME,X,Y,YAW`, and, before the scans, `mount,X,Y,YAW` for the pose of the lidar on the robot.
 
-    Exit code 0: the log was processed, whatever the figures; 2: an input is unusable.
+    Exit code 0: the log was processed, independently of the figures; 2: an input is unusable.
     """
-    sensed = read_localization_log(log, odom, scan, reference)
-    spec, grid, model = _given(scenario, map_, robot, root)
+    log_data = read_localization_log(log, odom, scan, reference)
+    spec, grid, model = _load_inputs(scenario, map_, robot, root)
     grid = grid.refined(spec.costmap.resolution)
-    estimate = _estimate(start, sensed)
-    localized = localize(sensed, spec, Surroundings(model, grid, TICK_RATE_HZ), estimate, seed)
-    errors = compare_with_reference(localized, sensed, lost)
-    for note in sensed.notes:
+    estimate = _estimate(start, log_data)
+    localized = localize(log_data, spec, Surroundings(model, grid, TICK_RATE_HZ), estimate, seed)
+    errors = compare_with_reference(localized, log_data, lost)
+    for note in log_data.notes:
         print_text(f"note: {escaped(note)}", sys.stderr)
     if picture is not None:
-        _draw(grid, localized, sensed, picture, [log, map_])
-    each = localized.cpu * 1e3 / max(1, localized.scans)
-    print_text(f"{each:.2f} ms of CPU time per scan", sys.stderr)
+        _draw(grid, localized, log_data, picture, [log, map_])
+    cpu_ms = localized.cpu * 1e3 / max(1, localized.scans)
+    print_text(f"{cpu_ms:.2f} ms of CPU time per scan", sys.stderr)
     if json_:
         print(json.dumps(_document(localized, errors, seed), sort_keys=True, indent=2, allow_nan=False))
     else:
@@ -84,7 +84,7 @@ def command(
             print_text(escaped(line))
 
 
-def _given(
+def _load_inputs(
     scenario: Path | None, map_: Path, robot: str, root: Path | None
 ) -> tuple[StackSpec, OccupancyGrid, RobotModel]:
     from simscen.loading.builders import load_map, robot_from_file
@@ -94,12 +94,12 @@ def _given(
     if scenario is not None:
         home = root if root is not None else default_root([scenario])
         try:
-            written = load_criteria(scenario, home)
+            criteria = load_criteria(scenario, home)
         except InvalidInput as error:
             raise InvalidInput(from_here(error.problems, home)) from error
-        if not isinstance(written.spec.stack, StackSpec):
-            raise InvalidInput(from_here([_without_localizer(written)], home))
-        spec = written.spec.stack
+        if not isinstance(criteria.spec.stack, StackSpec):
+            raise InvalidInput(from_here([_missing_localizer_problem(criteria)], home))
+        spec = criteria.spec.stack
     home = root if root is not None else default_root([map_])
     try:
         world = load_world_file(map_, home)
@@ -118,23 +118,23 @@ def _given(
     return spec, load_map(world.map), robot_model(body)
 
 
-def _without_localizer(written: LoadedCriteria) -> Problem:
+def _missing_localizer_problem(criteria: LoadedCriteria) -> Problem:
     """Return the problem that the stack of a file is not simscen's own."""
-    place = value_position(written.tree, ("stack",))
+    position = value_position(criteria.tree, ("stack",))
     hint = "name a file whose `stack` is simscen's own"
-    return written.library.with_source([Problem(*place, "SC016", "this stack has no simscen localizer", hint)])[0]
+    return criteria.library.with_source([Problem(*position, "SC016", "this stack has no simscen localizer", hint)])[0]
 
 
-def _estimate(start: str | None, sensed: LocalizationLog) -> Estimate:
+def _estimate(start: str | None, log_data: LocalizationLog) -> Estimate:
     """Return the initial estimate. Raises UsageError if neither the option nor the log gives one."""
     if start == "unknown":
         return Estimate(None)
     if start is None:
-        if len(sensed.truth):
-            return Estimate(Pose2(*sensed.truth[0].tolist()))
-        if sensed.initial_pose is None:
+        if len(log_data.truth):
+            return Estimate(Pose2(*log_data.truth[0].tolist()))
+        if log_data.initial_pose is None:
             raise UsageError("the log has no initial pose; use --start X,Y,YAW or --start unknown")
-        return Estimate(sensed.initial_pose)
+        return Estimate(log_data.initial_pose)
     try:
         x, y, yaw = (float(part) for part in start.split(","))
     except ValueError as error:
@@ -145,13 +145,13 @@ def _estimate(start: str | None, sensed: LocalizationLog) -> Estimate:
 
 
 def _draw(
-    grid: OccupancyGrid, localized: Localized, sensed: LocalizationLog, picture: Path, inputs: list[Path]
+    grid: OccupancyGrid, localized: Localized, log_data: LocalizationLog, picture: Path, inputs: list[Path]
 ) -> None:
     from simscen.report.picture.drive_plots import write_localization_picture
 
     save(
         picture,
-        lambda path: write_localization_picture(grid, localized.poses[:, :2], sensed.truth[:, :2], path),
+        lambda path: write_localization_picture(grid, localized.poses[:, :2], log_data.truth[:, :2], path),
         inputs,
     )
 
@@ -163,21 +163,28 @@ def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str
     if errors is None:
         return [*lines, "no reference to compare with"]
     figures = errors.figures()
-    listed = ", ".join(f"{name} {figures[name]:.3f} m" for name in ("median", "rmse", "max", "final"))
-    lines += [f"error: {listed}", f"heading: rmse {figures['yaw_rmse']:.4f} rad"]
-    if errors.compared < MOSTLY_COMPARED:
+    distances = ", ".join(f"{name} {figures[name]:.3f} m" for name in ("median", "rmse", "max", "final"))
+    lines += [f"error: {distances}", f"heading: rmse {figures['yaw_rmse']:.4f} rad"]
+    if errors.compared < MIN_COMPARED_SHARE:
         lines.append(f"compared with the reference: {errors.compared:.1%} of the beliefs")
-    for one in errors.lost:
-        end = "to the end" if one.until is None else f"to {one.until:.1f} s"
-        lines.append(f"lost (more than {lost:g} m off) from {one.since:.1f} s {end}")
-    where = "" if errors.compared > MOSTLY_COMPARED else ", as far as compared"
-    return lines if errors.lost else [*lines, f"never lost (more than {lost:g} m off){where}"]
+    for interval in errors.lost:
+        end = "to the end" if interval.until is None else f"to {interval.until:.1f} s"
+        lines.append(f"lost (more than {lost:g} m off) from {interval.since:.1f} s {end}")
+    restriction = "" if errors.compared > MIN_COMPARED_SHARE else ", as far as compared"
+    return lines if errors.lost else [*lines, f"never lost (more than {lost:g} m off){restriction}"]
 
 
 def _document(localized: Localized, errors: Errors | None, seed: int) -> dict[str, object]:
     document: dict[str, object] = {"scans": localized.scans, "seed": seed, "end": localized.poses[-1].tolist()}
     if errors is None:
         return document | {"error": None}
-    over = [list(row) for row in zip(errors.times.tolist(), errors.distance.tolist(), errors.yaw.tolist(), strict=True)]
+    over_time = [
+        list(row) for row in zip(errors.times.tolist(), errors.distance.tolist(), errors.yaw.tolist(), strict=True)
+    ]
     lost = [{"since": one.since, "until": one.until} for one in errors.lost]
-    return document | {"error": errors.figures(), "compared": errors.compared, "error_over_time": over, "lost": lost}
+    return document | {
+        "error": errors.figures(),
+        "compared": errors.compared,
+        "error_over_time": over_time,
+        "lost": lost,
+    }

@@ -41,20 +41,20 @@ def command(
         next((last.removesuffix(suffix) for suffix in SCENARIO_SUFFIXES if last.endswith(suffix)), last)
     ):
         raise UsageError(f"{name!r} is not a valid scenario name")
-    partial = last == DEFAULTS_FILE or last.endswith(BASE_SUFFIXES)
-    if partial and like:
+    is_base = last == DEFAULTS_FILE or last.endswith(BASE)
+    if is_base and like:
         raise UsageError(f"{name!r} is a base file; --like copies only scenarios")
-    file = Path(name if partial or name.endswith(SCENARIO_SUFFIXES) else f"{name}{SCENARIO_SUFFIXES[0]}")
+    file = Path(name if is_base or name.endswith(SCENARIO) else f"{name}{SCENARIO[0]}")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.open("x").close()
     except FileExistsError:
         raise UsageError(f"{file} already exists; choose another name") from None
     except (OSError, ValueError) as error:
-        why = os_error_reason(error) if isinstance(error, OSError) else "the name cannot be a path"
-        raise UsageError(f"cannot write {name!r}: {why}") from None
+        reason = os_error_reason(error) if isinstance(error, OSError) else "the name cannot be a path"
+        raise UsageError(f"cannot write {name!r}: {reason}") from None
     try:
-        written = _copy(like, file) if like else _starter(file, "base" if partial else "scenario")
+        written = _copy(like, file) if like else _starter(file, "base" if is_base else "scenario")
     except OSError as error:
         file.unlink(missing_ok=True)
         raise UsageError(f"cannot write {name!r}: {os_error_reason(error)}") from None
@@ -63,7 +63,7 @@ def command(
         raise
     for other in written[1:]:
         print_text(f"wrote {escaped(str(other))}")
-    verb = "validate" if partial else "run"
+    verb = "validate" if is_base else "run"
     print_text(f"wrote {escaped(str(file))}; try: simscen {verb} {escaped(str(file))}")
 
 
@@ -77,8 +77,8 @@ def _schema_comment(file: Path, kind: str) -> str:
     """Return the comment that points editors to the schema, or "" if no folder `schemas` above the file has it."""
     home = file.absolute().parent
     root = default_root([file])
-    above = [folder for folder in (home, *home.parents) if folder.is_relative_to(root)]
-    schema = next((one for folder in above if (one := folder / "schemas" / f"{kind}.schema.json").is_file()), None)
+    ancestors = [folder for folder in (home, *home.parents) if folder.is_relative_to(root)]
+    schema = next((one for folder in ancestors if (one := folder / "schemas" / f"{kind}.schema.json").is_file()), None)
     return "" if schema is None else f"# yaml-language-server: $schema={os.path.relpath(schema, home)}\n"
 
 
@@ -86,10 +86,10 @@ def _copy(like: str, file: Path) -> list[Path]:
     from simscen.loading.files.copying import copy_scenario
 
     source = _source(like)
-    found = try_variations(source, default_root([source]))
-    if isinstance(found, list):
-        raise InvalidInput(found)
-    return copy_scenario(found[-1], file, default_root([file]))  # the last variation lists the files of all
+    loaded = try_variations(source, default_root([source]))
+    if isinstance(loaded, list):
+        raise InvalidInput(loaded)
+    return copy_scenario(loaded[-1], file, default_root([file]))  # the last variation lists the files of all
 
 
 def _source(like: str) -> Path:
@@ -97,11 +97,11 @@ def _source(like: str) -> Path:
     if Path(like).is_file():
         return Path(like)
     shipped = shipped_scenarios()
-    means = [path for name, path in shipped.items() if like in (name, name.rpartition("/")[2])]
-    if len(means) == 1:
-        return means[0]
-    if means:
-        names = [name for name, path in shipped.items() if path in means]
+    matches = [path for name, path in shipped.items() if like in (name, name.rpartition("/")[2])]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        names = [name for name, path in shipped.items() if path in matches]
         raise UsageError(f"{quoted(like)} is ambiguous; shipped scenarios: {', '.join(names)}")
     hint = suggestion(like, shipped)
     raise UsageError(f"no file and no shipped scenario is called {quoted(like)}" + (f"; {hint}" if hint else ""))

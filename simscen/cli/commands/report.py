@@ -65,18 +65,20 @@ def write_reports(
     """Write the reports of an output folder from its journal, print the session, and exit with its code."""
     require_writable(junit, folder)
     reports = Reports(folder, junit, junit_family.value, only=only_junit)
-    answers = past.runs
+    finished_runs = past.runs
     with screen(format_) as output:
         output(past.start_event(folder))
-        for answer in answers:
-            output(answer)
-        comparison = compare_stacks((answer.result for answer in answers), past.stacks)
-        study = None if past.study is None else evaluate_study(past.study, (answer.result for answer in answers))
-        written = reports.write(answers, comparison, study)
-        output(reports.finished_event(answers, past.wall, past.interrupted, comparison, study))
+        for finished in finished_runs:
+            output(finished)
+        comparison = compare_stacks((finished.result for finished in finished_runs), past.stacks)
+        study = (
+            None if past.study is None else evaluate_study(past.study, (finished.result for finished in finished_runs))
+        )
+        written = reports.write(finished_runs, comparison, study)
+        output(reports.finished_event(finished_runs, past.wall, past.interrupted, comparison, study))
     if format_ is Format.TEXT:
-        for stack, summary in summaries_by_stack(answers).items():
+        for stack, summary in summaries_by_stack(finished_runs).items():
             line = session_summary_line(summary)
             print_text(f"{stack}: {line}" if stack else line)
-    code = exit_code(answers, study) if written else Exit.INCOMPLETE
+    code = exit_code(finished_runs, study) if written else Exit.INCOMPLETE
     sys.exit(output.exit(code))

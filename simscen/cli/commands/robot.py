@@ -50,14 +50,14 @@ def check(
     file = load_robot_file(robot, root or default_root([Path(robot)]), world_path or ())
     home = file.library.sandbox.root
     try:
-        failed = _checked(file, robot, picture, as_json)
+        failed = _check_and_print(file, robot, picture, as_json)
     except InvalidInput as error:
         raise InvalidInput(from_here(file.library.with_source_where_missing(error.problems), home)) from error
     if failed:
         sys.exit(Exit.FAILED)
 
 
-def _checked(file: RobotFile, named: str, picture: Path | None, as_json: bool) -> int:
+def _check_and_print(file: RobotFile, argument: str, picture: Path | None, as_json: bool) -> int:
     from simscen.cli.process import engine_output_on_stderr
     from simscen.loading.builders import robot_from_file
     from simscen.loading.checks.robot_geometry import geometry_warnings
@@ -72,7 +72,7 @@ def _checked(file: RobotFile, named: str, picture: Path | None, as_json: bool) -
     if as_json:
         print(problems_as_json(notes, **as_data(body, checked)))
     else:
-        print_text("\n".join([escaped(f"{body.name} · {named}"), *as_table(body, checked)]))
+        print_text("\n".join([escaped(f"{body.name} · {argument}"), *as_table(body, checked)]))
         if notes:
             print_text(as_text(notes))
     if picture is not None:

@@ -19,11 +19,11 @@ from simscen.loading.nav2.parameterfile import Nav2Parameters, read_nav2_paramet
 from simscen.ros2.nav2_parameters import Offer
 
 SOCKET = "SIMSCEN_STACK_FD"
-_START = Path(__file__).parents[2] / "ros2" / "start.py"
+_ADAPTER_START = Path(__file__).parents[2] / "ros2" / "start.py"
 _BASE = "base_link"
 
 
-class What(str, Enum):
+class Graph(str, Enum):
     """Kind of the ROS 2 graph."""
 
     GRAPH = "graph"
@@ -48,7 +48,7 @@ class Goals(str, Enum):
 
 
 def command(
-    what: Annotated[What, typer.Argument(help="`nav2` also checks for the nodes that Nav2 needs.")] = What.GRAPH,
+    what: Annotated[Graph, typer.Argument(help="`nav2` also checks for the nodes that Nav2 needs.")] = Graph.GRAPH,
     launch: Annotated[
         str | None, typer.Option(help="Command that starts the nodes for each run; they are stopped after it.")
     ] = None,
@@ -62,7 +62,7 @@ def command(
         Sync.LOCKSTEP
     ),
     factor: Annotated[float, typer.Option(min=0.01, max=1000, help="With paced: speed relative to real time.")] = 1.0,
-    goals: Annotated[Goals, typer.Option(help="Action of Nav2, or topic /goal_pose; auto: whichever exists.")] = (
+    goals: Annotated[Goals, typer.Option(help="Action of Nav2, or topic /goal_pose; auto: the one that exists.")] = (
         Goals.AUTO
     ),
     namespace: Annotated[str, typer.Option(help="Namespace of all topics of the robot, except /clock.")] = "",
@@ -118,7 +118,7 @@ def command(
             "answer": answer,
             "wall_time": wall_time,
         },
-        "nav2": what is What.NAV2,
+        "nav2": what is Graph.NAV2,
         "parameters": parameters.nodes if parameters is not None else None,
         "parameter_file": str(params) if params is not None else "",
     }
@@ -132,11 +132,11 @@ def _read(params: Path) -> Nav2Parameters:
     return parameters
 
 
-def _check_parameters(what: What, parameters: Nav2Parameters | None, bases: list[str]) -> None:
-    """Check a parameter file. Raises UsageError if there is none, since there is no run, either."""
-    if what is not What.NAV2 or parameters is None:
-        words = shlex.join(["simscen", *sys.argv[1:]])
-        raise UsageError(f"no run to connect to; use simscen run SCENARIO --stack mine={shlex.quote(words)}")
+def _check_parameters(what: Graph, parameters: Nav2Parameters | None, bases: list[str]) -> None:
+    """Check a parameter file. Raises UsageError if there is none, because there is nothing else to do without a run."""
+    if what is not Graph.NAV2 or parameters is None:
+        command = shlex.join(["simscen", *sys.argv[1:]])
+        raise UsageError(f"no run to connect to; use simscen run SCENARIO --stack mine={shlex.quote(command)}")
     problems = parameters.problems(Offer(["/scan"], "/odom", bases))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(problems)
@@ -147,9 +147,9 @@ def _check_parameters(what: What, parameters: Nav2Parameters | None, bases: list
 
 def _find_python() -> str:
     """Return the first Python 3 on the PATH that has rclpy, which the environment of simscen usually lacks."""
-    named = os.environ.get("SIMSCEN_ROS_PYTHON")
-    if named:
-        return named
+    configured = os.environ.get("SIMSCEN_ROS_PYTHON")
+    if configured:
+        return configured
     folders = [folder for folder in os.get_exec_path() if folder]
     candidates = [found for folder in folders if (found := shutil.which("python3", path=folder))]
     for candidate in dict.fromkeys([*candidates, "/usr/bin/python3"]):
@@ -161,15 +161,15 @@ def _find_python() -> str:
 
 def _has_rclpy(python: str) -> bool:
     try:
-        tried = subprocess.run([python, "-c", "import rclpy"], capture_output=True, timeout=20, check=False)
+        result = subprocess.run([python, "-c", "import rclpy"], capture_output=True, timeout=20, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return False
-    return tried.returncode == 0
+    return result.returncode == 0
 
 
 def _execute_adapter(python: str, options: Mapping[str, object]) -> NoReturn:
     """Replace this process by the adapter, which inherits the socket to the engine."""
     try:
-        os.execvp(python, [python, str(_START), json.dumps(options)])
+        os.execvp(python, [python, str(_ADAPTER_START), json.dumps(options)])
     except OSError as error:
         raise UsageError(f"cannot run {python}: {error.strerror}") from error

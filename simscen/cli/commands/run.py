@@ -69,7 +69,8 @@ def command(
     format_: FormatOption = Format.TEXT,
     wall_limit: WallLimitOption = 300.0,
     resume: Annotated[
-        Path | None, typer.Option(help="Continue in this output folder: run what has no verdict yet or has changed.")
+        Path | None,
+        typer.Option(help="Continue in this output folder: execute runs without a verdict or with changed files."),
     ] = None,
     shard: Annotated[
         str,

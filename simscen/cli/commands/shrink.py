@@ -54,7 +54,7 @@ def command(
     ] = "",
     keep: Annotated[
         float,
-        typer.Option(min=0, max=1, help="Share of the violation that must be left: 0.5 is half of it."),
+        typer.Option(min=0, max=1, help="Share of the violation that must remain: 0.5 is half of it."),
     ] = 0.5,
     out: Annotated[
         Path | None, typer.Option(help="File to write; default: NAME.minimal.scenario.yaml beside the scenario.")
@@ -64,7 +64,7 @@ def command(
     backend: BackendOption = BackendName.LOCAL,
     address: AddressOption = None,
     keep_world: Annotated[
-        bool, typer.Option("--keep-world", help="Keep the world file instead of writing what is needed of it inline.")
+        bool, typer.Option("--keep-world", help="Keep the world file instead of writing its needed parts inline.")
     ] = False,
     wall_limit: WallLimitOption = 300.0,
     root: RootOption = None,
@@ -73,8 +73,8 @@ def command(
 ) -> None:
     """Find the smallest scenario that still fails in the same way.
 
-    Leaves out events, faults, people, obstacles, goals, and all other parts, one after the other and in groups, as long
-    as the same criterion still fails by enough. Then it rounds numbers. The result is a normal scenario file in which
+    Removes events, faults, people, obstacles, goals, and all other parts, one after the other and in groups, as long as
+    the same criterion still fails by enough. Then it rounds numbers. The result is a normal scenario file in which
     unchanged parts keep their comments. It does not depend on the number of parallel runs.
 
     Exit code 0: the file was written; 1: it was written, but --runs did not suffice; 2: invalid options, or the run did
@@ -106,7 +106,7 @@ def command(
 
 
 class ChosenRun:
-    """The run to reproduce: scenario file, seed, variation, and --stack."""
+    """Run to reproduce: scenario file, seed, variation, and --stack."""
 
     def __init__(self, file: Path, seed: int | None, variation: str, stack: str | None) -> None:
         self.file, self.seed, self.variation, self.stack = file, seed, variation, stack
@@ -137,7 +137,7 @@ def _folder_name(key: RunKey) -> str:
 
 
 def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinking, MappingNode]:
-    """Run the scenario, and make it smaller; return also what it was before. Raises UsageError if it does not fail."""
+    """Run and shrink the scenario; return also the scenario before. Raises UsageError if it does not fail."""
     scenario = candidates.scenario
     (first,) = candidates.results([scenario.tree])
     if first is None:
@@ -147,12 +147,12 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
     tree = only_failing(scenario.tree, failure, candidates.seed)
     if not keep_world and (loaded := candidates.load(tree)) is not None:
         inline = with_inline_world(tree, loaded.world.tree)
-        if inline is not None and candidates.first([inline], failure.is_in) is not None:
+        if inline is not None and candidates.first_accepted([inline], failure.occurs_in) is not None:
             tree = inline
     shrinking = Shrinking(candidates, failure, tree)
     if sys.stderr.isatty():
         candidates.report = lambda: _show_progress(candidates.runs, _size(shrinking.tree))
-    if candidates.first([tree], failure.is_in) is None:
+    if candidates.first_accepted([tree], failure.occurs_in) is None:
         raise UsageError("the run does not fail any more with this criterion alone; this is a bug in simscen")
     nominal = {change.target.keys: _value_at(scenario.unvaried, change.target.keys) for change in scenario.changes}
     shrinking.shrink({keys: value for keys, value in nominal.items() if keys[0] in tree.entries})
@@ -198,8 +198,8 @@ def _failure_text(result: RunResult, failure: Failure) -> str:
 
 def _comment(chosen: ChosenRun, shrinking: Shrinking, seed: int) -> str:
     source = f"{chosen.file.name}, seed {seed}" + (f", {chosen.variation}" if chosen.variation else "")
-    what = shrinking.failure.verdict_id or "an error of the stack"
-    return f"The smallest scenario that simscen shrink found to fail in {what}, from {source}."
+    failure = shrinking.failure.verdict_id or "an error of the stack"
+    return f"The smallest scenario that simscen shrink found to fail in {failure}, from {source}."
 
 
 def _print_summary(shrinking: Shrinking, before: MappingNode, target: Path, stack: str | None) -> None:
@@ -209,7 +209,7 @@ def _print_summary(shrinking: Shrinking, before: MappingNode, target: Path, stac
     ):
         if texts:
             print_text("\n".join([title, *(f"  {escaped(text)}" for text in texts)]))
-    spent = "" if shrinking.is_complete else ", which did not suffice to try everything; see --runs"
-    print_text(f"{_size(shrinking.tree)} values left after {shrinking.runs.runs} runs{spent}")
+    incomplete = "" if shrinking.is_complete else ", which did not suffice to try everything; see --runs"
+    print_text(f"{_size(shrinking.tree)} values left after {shrinking.runs.runs} runs{incomplete}")
     option = "" if stack is None else f" --stack {escaped(stack)}"
     print_text(f"wrote {escaped(str(target))}; try: simscen run {escaped(display_path(target))}{option}")

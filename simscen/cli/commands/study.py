@@ -46,7 +46,8 @@ def command(
     ] = None,
     out: OutOption = None,
     resume: Annotated[
-        Path | None, typer.Option(help="Continue in this output folder: run what has no verdict yet or has changed.")
+        Path | None,
+        typer.Option(help="Continue in this output folder: execute runs without a verdict or with changed files."),
     ] = None,
     workers: JobsOption = None,
     backend: BackendOption = BackendName.LOCAL,

@@ -63,7 +63,7 @@ def command(
         kind = file_kind(file, home)
         checked.add(kind, from_here(_problems(kind, file, checks), home))
     _PRINT[format_](checked)
-    if checked.wrong:
+    if checked.invalid_files:
         sys.exit(Exit.USAGE)
 
 
@@ -76,8 +76,8 @@ def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
     found = check_file(kind, file, checks.root, checks.world_path)
     if kind in (*STACK_KINDS, "base") or any(problem.severity == "error" for problem in found):
         return found
-    built = checks.robot if kind == "robot" else checks.world
-    return [*found, *built(file)]
+    check_built = checks.robot if kind == "robot" else checks.world
+    return [*found, *check_built(file)]
 
 
 @dataclass
@@ -86,25 +86,25 @@ class _Checked:
 
     kinds: Counter[str] = field(default_factory=Counter)
     problems: list[Problem] = field(default_factory=list)
-    wrong: int = 0
+    invalid_files: int = 0
 
     def add(self, kind: str, problems: list[Problem]) -> None:
         self.kinds[kind] += 1
-        self.wrong += any(problem.severity == "error" for problem in problems)
+        self.invalid_files += any(problem.severity == "error" for problem in problems)
         self.problems += [problem for problem in problems if problem not in self.problems]
 
     @property
     def summary(self) -> str:
-        if self.wrong:
+        if self.invalid_files:
             errors = sum(problem.severity == "error" for problem in self.problems)
-            return f"{_count(errors, 'problem')} in {self.wrong} of {_count(self.kinds.total(), 'file')}"
+            return f"{_count(errors, 'problem')} in {self.invalid_files} of {_count(self.kinds.total(), 'file')}"
         counts = [_count(number, kind) for kind, number in self.kinds.items()]
         listed = " and ".join([", ".join(counts[:-1]), counts[-1]] if len(counts) > 1 else counts)
         return f"{listed} {'is' if self.kinds.total() == 1 else 'are'} valid"
 
 
-def _count(number: int, what: str) -> str:
-    noun, of, rest = what.partition(" of ")  # a parameter file of Nav2
+def _count(number: int, kind: str) -> str:
+    noun, of, rest = kind.partition(" of ")  # a parameter file of Nav2
     plural = "studies" if noun == "study" else f"{noun}s"
     return f"{number} {noun if number == 1 else plural}{of}{rest}"
 
@@ -116,7 +116,7 @@ def _text(checked: _Checked) -> None:
 
 
 def _json(checked: _Checked) -> None:
-    print(as_json(checked.problems, valid=not checked.wrong, files=checked.kinds.total()))
+    print(as_json(checked.problems, valid=not checked.invalid_files, files=checked.kinds.total()))
 
 
 def _github(checked: _Checked) -> None:

@@ -55,17 +55,16 @@ def inspect(
 
     Exit code 0; 2: the file or something in it is unusable.
     """
-    from simscen.worlds.built_world import build_world_and_map
-    from simscen.worlds.built_world import inspect_world as inspected
+    from simscen.worlds.built_world import build_world_and_map, inspect_world
 
     home = root or default_root([path])
     source = load_world_file(path, home, world_path or ())
-    built = build_world_and_map(_built(source, home, world_path or [], lenient), height)
-    found = inspected(built)
+    built = build_world_and_map(_build(source, home, world_path or [], lenient), height)
+    summary = inspect_world(built)
     if as_json:
-        print(json.dumps(asdict(found), indent=2))
+        print(json.dumps(asdict(summary), indent=2))
     else:
-        print_text("\n".join([escaped(f"{found.name} · {path}"), *described(found, height, everything)]))
+        print_text("\n".join([escaped(f"{summary.name} · {path}"), *summary_lines(summary, height, everything)]))
         warnings = from_here(world_reader_notes(built.world, source, home), home)
         if warnings:
             print_text(as_text(warnings))
@@ -95,7 +94,7 @@ def export(
 
     home = root or default_root([path])
     source = load_world_file(path, home, world_path or ())
-    grid = build_world_and_map(_built(source, home, world_path or [], lenient), height, resolution).map
+    grid = build_world_and_map(_build(source, home, world_path or [], lenient), height, resolution).map
     save(map_, lambda file: save_map(grid, file), [path])
     rows, columns = grid.shape
     print_text(f"{escaped(str(map_))}: {columns} x {rows} cells of {grid.resolution:g} m")
@@ -118,36 +117,36 @@ def convert(
     """
     home = root or default_root([path])
     source = load_world_file(path, home, world_path or ())
-    spec, changes = _converted(source, home, world_path or [], lenient, height)
+    spec, changes = _convert(source, home, world_path or [], lenient, height)
     if source.map is not None:
         spec = spec.model_copy(update={"map": _relative(source.map.path, out)})
-    write = world_text(spec).encode()
-    save(out, lambda file: write_atomically(file, write), [path])
+    content = world_text(spec).encode()
+    save(out, lambda file: write_atomically(file, content), [path])
     for change in changes:
         print_text(f"changed: {escaped(change)}")
-    things = len(spec.walls) + len(spec.obstacles) + len(spec.objects) + len(spec.doors)
-    print_text(f"{escaped(str(out))}: {things} walls, obstacles, objects, and doors; {len(changes)} changed")
+    count = len(spec.walls) + len(spec.obstacles) + len(spec.objects) + len(spec.doors)
+    print_text(f"{escaped(str(out))}: {count} walls, obstacles, objects, and doors; {len(changes)} changed")
 
 
-def _converted(
+def _convert(
     source: LoadedWorld, home: Path, world_path: list[Path], lenient: bool, height: float
 ) -> tuple[WorldSpec, list[str]]:
     spec = source.spec or WorldSpec(simscen=1, name=source.name)
     if source.sdf is None:
         return spec, []
-    from simscen.worlds.conversion import convert_world as converted
+    from simscen.worlds.conversion import convert_world
 
-    world = _built(replace(source, spec=None, map=None), home, world_path, lenient)
+    world = _build(replace(source, spec=None, map=None), home, world_path, lenient)
     try:
-        done = converted(world, height)
-        return done.merged_into(spec), [*done.changes, *world.notes]
+        conversion = convert_world(world, height)
+        return conversion.merged_into(spec), [*conversion.changes, *world.notes]
     except ValidationError as error:
-        details = "; ".join(f"{'.'.join(map(str, found['loc']))}: {found['msg']}" for found in error.errors()[:3])
+        details = "; ".join(f"{'.'.join(map(str, detail['loc']))}: {detail['msg']}" for detail in error.errors()[:3])
         message = f"the world cannot be written as a world file: {details}"
         raise InvalidInput([Problem(str(source.path), 0, 0, "SC312", message)]) from None
 
 
-def _built(source: LoadedWorld, home: Path, world_path: list[Path], lenient: bool) -> World:
+def _build(source: LoadedWorld, home: Path, world_path: list[Path], lenient: bool) -> World:
     try:
         return world_from_file(source, home, world_path, lenient)
     except InvalidInput as error:
@@ -163,43 +162,43 @@ MAX_SOLIDS = 20
 MAX_NAME_LENGTH = 44
 
 
-def described(found: "WorldSummary", height: float, everything: bool) -> Iterator[str]:
+def summary_lines(summary: "WorldSummary", height: float, everything: bool) -> Iterator[str]:
     """Yield the lines of an inspection, with the first MAX_SOLIDS solids, or all of them if `everything`."""
-    x0, y0, x1, y1 = found.bounds
+    x0, y0, x1, y1 = summary.bounds
     yield f"  bounds    x {x0:.2f} … {x1:.2f} m, y {y0:.2f} … {y1:.2f} m ({x1 - x0:.2f} x {y1 - y0:.2f} m)"
-    kinds = ", ".join(f"{count} {kind}" for kind, count in found.shapes)
-    yield f"  static    {_count(len(found.solids), 'solid')}{f': {kinds}' if kinds else ''}"
-    yield f"  moving    {_count(len(found.bodies), 'object')}"
-    yield f"  triangles {found.triangles}"
-    rows, columns = found.map_size
-    occupied, free, unknown = (f"{100 * share:.1f} %" for share in found.map_shares)
-    yield f"  map       {columns} x {rows} cells of {found.map_resolution:g} m, cut at {height:g} m: " + (
+    kinds = ", ".join(f"{count} {kind}" for kind, count in summary.shapes)
+    yield f"  static    {_count(len(summary.solids), 'solid')}{f': {kinds}' if kinds else ''}"
+    yield f"  moving    {_count(len(summary.bodies), 'object')}"
+    yield f"  triangles {summary.triangles}"
+    rows, columns = summary.map_size
+    occupied, free, unknown = (f"{100 * share:.1f} %" for share in summary.map_shares)
+    yield f"  map       {columns} x {rows} cells of {summary.map_resolution:g} m, cut at {height:g} m: " + (
         f"{occupied} occupied, {free} free, {unknown} unknown"
     )
-    yield from _items("solids", found.solids, len(found.solids) if everything else MAX_SOLIDS)
-    yield from _items("objects", found.bodies, len(found.bodies))
-    for title, names in (("places", found.places), ("regions", found.regions)):
+    yield from _items("solids", summary.solids, len(summary.solids) if everything else MAX_SOLIDS)
+    yield from _items("objects", summary.bodies, len(summary.bodies))
+    for title, names in (("places", summary.places), ("regions", summary.regions)):
         if names:
             yield f"  {title:9} {escaped(', '.join(names))}"
 
 
-def _items(title: str, items: "Sequence[WorldItem]", most: int) -> Iterator[str]:
+def _items(title: str, items: "Sequence[WorldItem]", max_count: int) -> Iterator[str]:
     if items:
         yield f"  {title}"
-    width = max((min(len(escaped(item.name)), MAX_NAME_LENGTH) for item in items[:most]), default=0)
-    yield from (f"    {_item(item, width)}" for item in items[:most])
-    if len(items) > most:
-        yield f"    … and {len(items) - most} more (--all lists them)"
+    width = max((min(len(escaped(item.name)), MAX_NAME_LENGTH) for item in items[:max_count]), default=0)
+    yield from (f"    {_item(item, width)}" for item in items[:max_count])
+    if len(items) > max_count:
+        yield f"    … and {len(items) - max_count} more (--all lists them)"
 
 
 def _item(item: "WorldItem", width: int) -> str:
     x0, y0, z0, x1, y1, z1 = item.extent
     name = escaped(item.name)
-    shown = name if len(name) <= MAX_NAME_LENGTH else f"…{name[1 - MAX_NAME_LENGTH :]}"
+    short_name = name if len(name) <= MAX_NAME_LENGTH else f"…{name[1 - MAX_NAME_LENGTH :]}"
     where = f"x {x0:.2f} … {x1:.2f}  y {y0:.2f} … {y1:.2f}  z {z0:.2f} … {z1:.2f}"
     mass = "" if item.mass is None else f"  {item.mass:g} kg" if item.mass else "  cannot be pushed"
-    return f"{shown:{width}}  {item.shape:9} {item.triangles:7} triangles  {where}{mass}"
+    return f"{short_name:{width}}  {item.shape:9} {item.triangles:7} triangles  {where}{mass}"
 
 
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -31,12 +31,12 @@ class Stopped(Exception):
 
 
 class BudgetSpent(Exception):
-    """The allowed number of runs has been made."""
+    """The maximum number of runs is reached."""
 
 
 @dataclass
 class CandidateRuns:
-    """Runs candidates with one seed. Results are kept by content, so that no candidate runs twice.
+    """Runs candidates with one seed. Results are cached by content, so that no candidate runs twice.
 
     `max_runs` limits the number of runs, and `runs` counts them. `report` is called after each batch.
     """
@@ -49,10 +49,10 @@ class CandidateRuns:
     max_runs: int
     report: Callable[[], None] = lambda: None
     runs: int = 0
-    _known: dict[str, RunResult | None] = field(default_factory=dict)
+    _results: dict[str, RunResult | None] = field(default_factory=dict)
 
-    def first(self, trees: Sequence[MappingNode], accepts: Callable[[RunResult], bool]) -> int | None:
-        """Return the index of the first candidate whose result is accepted, None if there is none.
+    def first_accepted(self, trees: Sequence[MappingNode], accepts: Callable[[RunResult], bool]) -> int | None:
+        """Return the index of the first candidate whose result `accepts` accepts, or None.
 
         Invalid candidates are never accepted. Raises BudgetSpent and Stopped.
         """
@@ -66,17 +66,17 @@ class CandidateRuns:
     def results(self, trees: Sequence[MappingNode]) -> list[RunResult | None]:
         """Return the results of some candidates; None for invalid ones. Raises BudgetSpent and Stopped."""
         keys = [_content_key(tree) for tree in trees]
-        new = {key: tree for key, tree in zip(keys, trees, strict=True) if key not in self._known}
+        new = {key: tree for key, tree in zip(keys, trees, strict=True) if key not in self._results}
         loaded = {key: self.load(tree) for key, tree in new.items()}
         valid = {key: scenario for key, scenario in loaded.items() if scenario is not None}
         if self.runs + len(valid) > self.max_runs:
             raise BudgetSpent
-        self._known |= {key: None for key in loaded if key not in valid}
+        self._results |= {key: None for key in loaded if key not in valid}
         if valid:
-            self._known |= dict(zip(valid, self._run(list(valid.values())), strict=True))
+            self._results |= dict(zip(valid, self._run(list(valid.values())), strict=True))
             self.runs += len(valid)
             self.report()
-        return [self._known[key] for key in keys]
+        return [self._results[key] for key in keys]
 
     def load(self, tree: MappingNode) -> LoadedScenario | None:
         """Load and check a candidate; None if it is invalid."""
@@ -91,10 +91,10 @@ class CandidateRuns:
                 for number, scenario in enumerate(named)
             ]
             with signals_interrupt():
-                answers, stopped = run_session(jobs, self.options, self.backend, lambda _: None)
+                finished_runs, stopped = run_session(jobs, self.options, self.backend, lambda _: None)
         if stopped is not None:
             raise Stopped(stopped)
-        results = {answer.key: answer.result for answer in answers}
+        results = {finished.key: finished.result for finished in finished_runs}
         return [results[job.key] for job in jobs]
 
 

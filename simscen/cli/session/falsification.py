@@ -44,7 +44,7 @@ BATCH = 8
 """Runs between two updates of the search. Fixed, so that a search does not depend on the number of workers."""
 MAX_EMPTY_BATCHES = 50
 """Batches in a row without a valid point after which the search gives up."""
-PLACE_M = 1.0
+SQUARE_SIZE_M = 1.0
 """Failures in the same criterion are different if they are in different squares of this size."""
 CONFIDENCE = 0.95
 
@@ -95,7 +95,7 @@ def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
 
 
 class Falsification:
-    """One search: proposes values, runs them, and keeps the failures that differ."""
+    """Search that proposes values, runs them, and saves the failures that differ."""
 
     def __init__(self, request: FalsifyRequest) -> None:
         """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
@@ -114,13 +114,13 @@ class Falsification:
         self._planned: list[PlannedRun] = []
         self._signatures: set[Signature] = set()
         self._proposed = 0
-        self._problems: list[Problem] = []  # of the last values that make no valid scenario
-        self.answers: list[RunFinished] = []
+        self._problems: list[Problem] = []  # of the last values with which the scenario is invalid
+        self.finished_runs: list[RunFinished] = []
         self.found: list[FoundFailure] = []
 
     def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
         """Search until enough failures are found or the budget is spent. Returns the exit code."""
-        begun, stopped, empty = time.monotonic(), None, 0
+        start, stopped, empty_batches = time.monotonic(), None, 0
 
         def listen(event: SessionEvent) -> None:
             journal(event)
@@ -128,27 +128,27 @@ class Falsification:
 
         workers = self._request.options.workers
         output(SessionStarted(__version__, self._request.runs, 1, workers, str(reports.folder)))
-        while stopped is None and not self._is_done() and empty < MAX_EMPTY_BATCHES:
-            points = self._search.ask(min(BATCH, self._request.runs - len(self.answers)))
-            jobs = self._jobs(points, reports.folder)
+        while stopped is None and not self._is_done() and empty_batches < MAX_EMPTY_BATCHES:
+            points = self._search.ask(min(BATCH, self._request.runs - len(self.finished_runs)))
+            jobs = self._make_jobs(points, reports.folder)
             valid = [job for job in jobs if job is not None]
-            empty = 0 if valid else empty + 1
+            empty_batches = 0 if valid else empty_batches + 1
             self._plan(journal, valid)
             with signals_interrupt():
-                answers, stopped = run_session(valid, self._request.options, backend, listen)
-            by_key = {answer.key: answer for answer in answers}
+                finished_runs, stopped = run_session(valid, self._request.options, backend, listen)
+            by_key = {finished.key: finished for finished in finished_runs}
             ordered = [None if job is None else by_key[job.key] for job in jobs]
-            self.answers += [answer for answer in ordered if answer is not None]
-            self._search.tell(points, [_margin(answer) for answer in ordered])
-            for answer in ordered:
-                if answer is not None and stopped is None:
-                    self._keep(answer)
-        if not self.answers and stopped is None:
+            self.finished_runs += [finished for finished in ordered if finished is not None]
+            self._search.tell(points, [_margin(finished) for finished in ordered])
+            for finished in ordered:
+                if finished is not None and stopped is None:
+                    self._save_failure(finished)
+        if not self.finished_runs and stopped is None:
             raise InvalidInput(self._problems or [self._no_valid_values()])
-        study = evaluate_study(self._study_plan(), (answer.result for answer in self.answers))
-        written = reports.write(self.answers, None, study) if self.answers else True
-        wall = time.monotonic() - begun
-        listen(reports.finished_event(self.answers, wall, stopped is not None, None, study))
+        study = evaluate_study(self._study_plan(), (finished.result for finished in self.finished_runs))
+        written = reports.write(self.finished_runs, None, study) if self.finished_runs else True
+        wall = time.monotonic() - start
+        listen(reports.finished_event(self.finished_runs, wall, stopped is not None, None, study))
         written = reports.write_duration(wall) and written and journal.error is None
         if stopped is not None or not written:
             return stopped or Exit.INCOMPLETE
@@ -163,21 +163,21 @@ class Falsification:
 
     def largest_probability(self) -> float | None:
         """Return the rate of failures that is ruled out with 95 % confidence; None unless the values are random."""
-        counted = [answer for answer in self.answers if is_counted(answer.result)]
+        counted = [finished for finished in self.finished_runs if is_counted(finished.result)]
         if not self.is_random or not counted:
             return None
-        passed = sum(answer.outcome is Outcome.PASSED for answer in counted)
+        passed = sum(finished.outcome is Outcome.PASSED for finished in counted)
         return 1.0 - clopper_pearson_limits(passed, len(counted), CONFIDENCE)[0]
 
     def _is_done(self) -> bool:
         request, bound = self._request, self._request.probability
-        if len(self.found) >= request.failures or len(self.answers) >= request.runs:
+        if len(self.found) >= request.failures or len(self.finished_runs) >= request.runs:
             return True
         largest = self.largest_probability() if bound is not None else None
         return bound is not None and largest is not None and largest <= bound
 
-    def _jobs(self, points: Sequence[Point], folder: Path) -> list[Job | None]:
-        """Return a job for each point; None for values that do not meet the conditions or make no valid scenario."""
+    def _make_jobs(self, points: Sequence[Point], folder: Path) -> list[Job | None]:
+        """Return a job for each point; None for values that violate the conditions or make the scenario invalid."""
         jobs: list[Job | None] = []
         options = self._request.options
         for point in points:
@@ -221,21 +221,21 @@ class Falsification:
         name = self._planned[0].key.scenario if self._planned else self._request.file.stem
         return StudyPlan(name, self.is_random, None, values, stops_early=True)
 
-    def _keep(self, answer: RunFinished) -> None:
+    def _save_failure(self, finished: RunFinished) -> None:
         """Write the scenario of a run that failed in a way that was not found before."""
-        result = answer.result
-        if run_has_passed(result) or not is_counted(result) or (mark := signature(result)) in self._signatures:
+        result = finished.result
+        if run_has_passed(result) or not is_counted(result) or (new := signature(result)) in self._signatures:
             return
         if len(self.found) >= self._request.failures:
             return
-        self._signatures.add(mark)
+        self._signatures.add(new)
         variation = self._variations[result.key.variation]
         tree = with_seed(variation.tree, result.key.seed)
         comment = f"Found by simscen falsify: {self._request.file.name} fails with these values."
         text = changed_text(self._scenario.text, self._scenario.path, tree.plain, comment)
         file = free_file(self._request.file)
         write_atomically(file, text.encode())
-        self.found.append(FoundFailure(file, answer, variation.values))
+        self.found.append(FoundFailure(file, finished, variation.values))
 
     def _no_valid_values(self) -> Problem:
         message = f"none of {self._proposed} proposed values meets the conditions in `require`"
@@ -248,11 +248,11 @@ def run_has_passed(result: RunResult) -> bool:
 
 
 def signature(result: RunResult) -> Signature:
-    """Return what tells failures apart: criteria, events and faults that happened, and the place."""
+    """Return what distinguishes failures: criteria, events and faults that happened, and the place."""
     failed = [verdict for verdict in result.verdicts if verdict.status is Status.FAIL]
     finding = failed[0].tightest if failed else None
     place = None if finding is None or finding.place is None else finding.place
-    square = None if place is None else (math.floor(place[0] / PLACE_M), math.floor(place[1] / PLACE_M))
+    square = None if place is None else (math.floor(place[0] / SQUARE_SIZE_M), math.floor(place[1] / SQUARE_SIZE_M))
     kinds = tuple(sorted({verdict.id for verdict in failed})) or ((result.error.kind,) if result.error else ())
     happened = frozenset(one.disturbance.name for one in result.disturbances if one.fired)
     return kinds, happened, square
@@ -264,14 +264,14 @@ def free_file(scenario: Path) -> Path:
 
 
 def summary_lines(falsification: Falsification) -> list[str]:
-    """Return what was found, in words."""
-    runs = len(falsification.answers)
+    """Return the lines that describe the failures, or that none was found."""
+    runs = len(falsification.finished_runs)
     lines = []
-    for one in falsification.found:
-        values = ", ".join(f"{path} = {value_text(value)}" for path, value in one.values.items())
-        lines += [f"failure: {display_path(one.file)}", f"with {values}"]
-        lines += [f"replay: {one.run.artifacts.replay}"] if one.run.artifacts.replay else []
-        lines += [f"smaller: simscen shrink {display_path(one.file)}", ""]
+    for failure in falsification.found:
+        values = ", ".join(f"{path} = {value_text(value)}" for path, value in failure.values.items())
+        lines += [f"failure: {shown(failure.file)}", f"with {values}"]
+        lines += [f"replay: {failure.run.artifacts.replay}"] if failure.run.artifacts.replay else []
+        lines += [f"smaller: simscen shrink {shown(failure.file)}", ""]
     number = len(falsification.found)
     if number:
         lines.append(f"found {number} {'failure' if number == 1 else 'different failures'} in {runs} runs")
@@ -283,5 +283,5 @@ def summary_lines(falsification: Falsification) -> list[str]:
     return lines
 
 
-def _margin(answer: RunFinished | None) -> float:
-    return math.nan if answer is None or not is_counted(answer.result) else run_margin(answer.result)
+def _margin(finished: RunFinished | None) -> float:
+    return math.nan if finished is None or not is_counted(finished.result) else run_margin(finished.result)

@@ -36,13 +36,13 @@ class LogJudge:
     """
 
     def __init__(
-        self, wanted: ForeignLogOptions, scenario: Path | None, root: Path | None, world_path: Sequence[Path]
+        self, options: ForeignLogOptions, scenario: Path | None, root: Path | None, world_path: Sequence[Path]
     ) -> None:
         self.notes: list[str] = []
         self.foreign = 0
-        self._wanted, self._scenario, self._world_path = wanted, scenario, world_path
+        self._options, self._scenario, self._world_path = options, scenario, world_path
         self._case: Case | None = None
-        self._named: Mapping[str, MaskBlocks] | None = None
+        self._file_masks: Mapping[str, MaskBlocks] | None = None
         self._criteria: LoadedCriteria | None = None
         if scenario is not None:
             home = root if root is not None else default_root([scenario])
@@ -51,12 +51,16 @@ class LogJudge:
             except InvalidInput as error:
                 raise InvalidInput(from_here(error.problems, home)) from error
 
-    def judge(self, log: Path, alone: bool) -> RunFinished:
-        """Evaluate a log. An unusable one raises InvalidInput if it is `alone`; otherwise its result is an error."""
+    def judge(self, log: Path, is_only_log: bool) -> RunFinished:
+        """Evaluate a log. An unusable one raises InvalidInput if `is_only_log`; otherwise its result is an error."""
         try:
-            return self._judge_own_log(log) if _may_be_own(log) and is_simscen_log(log) else self._judge_foreign(log)
+            return (
+                self._judge_own_log(log)
+                if _may_be_simscen_log(log) and is_simscen_log(log)
+                else self._judge_foreign(log)
+            )
         except InvalidInput as error:
-            if alone or isinstance(error, UnusableScenario):
+            if is_only_log or isinstance(error, UnusableScenario):
                 raise
             reason = "; ".join(": ".join(filter(None, (one.message, one.hint))) for one in error.problems)
             result = error_result(RunKey(log.stem, 0), str(log), RunFailure("invalid", reason))
@@ -64,12 +68,12 @@ class LogJudge:
 
     def judge_for_replay(self, log: Path) -> tuple[Log, RunResult]:
         """Return a log with all data for a replay, and its result. Raises InvalidInput."""
-        if _may_be_own(log) and is_simscen_log(log):
-            own = read_run(log, with_sensors=True)
-            return own, recorded_result(own, log) if self._criteria is None else self._judge_own_log(log).result
+        if _may_be_simscen_log(log) and is_simscen_log(log):
+            read = read_run(log, with_sensors=True)
+            return read, recorded_result(read, log) if self._criteria is None else self._judge_own_log(log).result
         self.foreign += 1
         if self._criteria is None:
-            foreign, case = read_foreign_log(log, self._wanted, with_sensors=True), Case(Pose2(0.0, 0.0), ())
+            foreign, case = read_foreign_log(log, self._options, with_sensors=True), Case(Pose2(0.0, 0.0), ())
             result = skipped_result(RunKey(log.stem, 0), "", "not evaluated; set criteria with --scenario")
             result = replace(
                 result, simulated=foreign.trace.seconds(foreign.trace.end), tick_rate=foreign.trace.tick_rate
@@ -125,7 +129,7 @@ class LogJudge:
             criteria = self._criteria.for_robot("")
         case = self._foreign_case()
         goals = tuple(goal.name for goal in case.goals if not goal.via)
-        read = read_foreign_log(log, replace(self._wanted, goals=goals), with_sensors)
+        read = read_foreign_log(log, replace(self._options, goals=goals), with_sensors)
         missing = dict(read.coverage.missing)
         if case.footprint:
             del missing[Evidence.FOOTPRINT]
@@ -134,14 +138,14 @@ class LogJudge:
 
     def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskBlocks]:
         """Return the filter masks that the criteria use; those of the criteria file are read once."""
-        if criteria is self._criteria and self._named is not None:
-            return self._named
+        if criteria is self._criteria and self._file_masks is not None:
+            return self._file_masks
         from simscen.run.preparation import masks_from_criteria
 
         with _scenario_errors(criteria):
-            named = masks_from_criteria(criteria) if criteria.masks else {}
-        self._named = named if criteria is self._criteria else self._named
-        return named
+            masks = masks_from_criteria(criteria) if criteria.masks else {}
+        self._file_masks = masks if criteria is self._criteria else self._file_masks
+        return masks
 
     def _foreign_case(self) -> Case:
         """Return the surroundings of the robot according to the criteria file, which is read once."""
@@ -163,7 +167,7 @@ class LogJudge:
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
 
 
-def _may_be_own(log: Path) -> bool:
+def _may_be_simscen_log(log: Path) -> bool:
     return not log.is_dir() and log.suffix not in (".db3", ".bag")
 
 
@@ -181,19 +185,19 @@ def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
 
 
 def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
-    """Return the runs of output folders that have no log, so that they do not drop out of the evaluation."""
+    """Return the runs of output folders that have no log, so that the evaluation contains them."""
     return [
-        (str(run_folder(folder, answer.key)), _without_log(answer))
+        (str(run_folder(folder, run.key)), _without_log(run))
         for folder in folders
         if (folder / JOURNAL_FILE).is_file()
-        for answer in read_journal(folder).runs
-        if not any((run_folder(folder, answer.key) / log).exists() for log in (COMPLETE_LOG, PARTIAL_LOG))
+        for run in read_journal(folder).runs
+        if not any((run_folder(folder, run.key) / log).exists() for log in (COMPLETE_LOG, PARTIAL_LOG))
     ]
 
 
-def _without_log(answer: RunFinished) -> RunFinished:
-    if answer.outcome is Outcome.SKIPPED:
-        return answer
-    error = answer.result.error
+def _without_log(run: RunFinished) -> RunFinished:
+    if run.outcome is Outcome.SKIPPED:
+        return run
+    error = run.result.error
     failure = RunFailure(error.kind if error else "crashed", "it left no log" + (f": {error.message}" if error else ""))
-    return RunFinished(error_result(answer.key, answer.result.path, failure), file=answer.file)
+    return RunFinished(error_result(run.key, run.result.path, failure), file=run.file)

@@ -15,7 +15,7 @@ from simscen.loading.yaml.textfile import os_error_reason
 from simscen.record.log_reader.read import Log
 
 COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
-BAG = "metadata.yaml"
+BAG_METADATA = "metadata.yaml"
 SUFFIXES = (".mcap", ".db3", ".bag")
 
 
@@ -38,20 +38,20 @@ def find_logs(paths: Sequence[Path]) -> list[Path]:
 
 
 def _logs(path: Path) -> Iterator[Path]:
-    for folder, below, names in os.walk(path):
-        here = Path(folder)
+    for folder, subfolders, names in os.walk(path):
+        current = Path(folder)
         if is_bag(names):
-            below.clear()
-            yield here
+            subfolders.clear()
+            yield current
             continue
-        below[:] = sorted(name for name in below if not name.startswith("."))
+        subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
         logs = sorted(name for name in names if name.endswith(SUFFIXES))
-        yield from (here / name for name in logs if not (name == PARTIAL_LOG and COMPLETE_LOG in logs))
+        yield from (current / name for name in logs if not (name == PARTIAL_LOG and COMPLETE_LOG in logs))
 
 
 def is_bag(names: Sequence[str]) -> bool:
     """Return whether a folder with these files is a rosbag2."""
-    return BAG in names and any(name.endswith((".db3", ".mcap", ".db3.zstd", ".mcap.zstd")) for name in names)
+    return BAG_METADATA in names and any(name.endswith((".db3", ".mcap", ".db3.zstd", ".mcap.zstd")) for name in names)
 
 
 LOGS = ("run.mcap", "run.partial.mcap")

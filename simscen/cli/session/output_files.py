@@ -57,7 +57,7 @@ JunitFamilyOption = Annotated[JunitFamily, typer.Option(help="xunit2 omits what 
 class Reports:
     """Writer of the reports of a session in `folder`, and of the JUnit report `junit`.
 
-    With `only`, no other report than `junit` is written. `used` are the installed packages and external stacks of the
+    With `only`, only `junit` is written. `used` are the installed packages and external stacks of the
     runs.
     """
 
@@ -82,27 +82,27 @@ class Reports:
             raise UsageError(f"cannot use the output folder {self.folder}: {error.strerror}") from error
 
     def write(
-        self, answers: Sequence[RunFinished], comparison: Comparison | None = None, study: Study | None = None
+        self, finished_runs: Sequence[RunFinished], comparison: Comparison | None = None, study: Study | None = None
     ) -> bool:
-        """Write the reports and return whether all were written; the old file of a failed one is kept."""
-        results = map(str.encode, json_parts(answers, str(self.folder), comparison, study))
+        """Write the reports and return whether all were written; if one cannot be written, its old file remains."""
+        results = map(str.encode, json_parts(finished_runs, str(self.folder), comparison, study))
         documents: dict[Path, bytes | Iterable[bytes]] = {}
         if not self._only:
             documents[self.folder / "results.json"] = results
-            documents[self.folder / PAGE] = self._page(answers, comparison, study)
+            documents[self.folder / PAGE] = self._page(finished_runs, comparison, study)
         for path in {self.junit: None} if self._only else {self.folder / "junit.xml": None, self.junit: None}:
-            documents[path] = xml_parts(answers, self._family, study=study)
+            documents[path] = xml_parts(finished_runs, self._family, study=study)
         self._missing = frozenset(path for path, data in documents.items() if not _write(path, data))
         return not self._missing
 
-    def write_live(self, answers: Sequence[RunFinished], live: RunningSession) -> bool:
+    def write_live(self, finished_runs: Sequence[RunFinished], live: RunningSession) -> bool:
         """Write the page of a running session."""
-        page = to_html(Session(answers, self._past, folder=str(self.folder), live=live))
+        page = to_html(Session(finished_runs, self._past, folder=str(self.folder), live=live))
         return _write(self.folder / PAGE, page.encode())
 
-    def _page(self, answers: Sequence[RunFinished], comparison: Comparison | None, study: Study | None) -> bytes:
+    def _page(self, finished_runs: Sequence[RunFinished], comparison: Comparison | None, study: Study | None) -> bytes:
         files = ("results.json", "junit.xml", "run.json")
-        return to_html(Session(answers, self._past, comparison, str(self.folder), files, study=study)).encode()
+        return to_html(Session(finished_runs, self._past, comparison, str(self.folder), files, study=study)).encode()
 
     @cached_property
     def _past(self) -> Sequence[PastSession]:
@@ -114,7 +114,7 @@ class Reports:
 
     def finished_event(
         self,
-        answers: Sequence[RunFinished],
+        finished_runs: Sequence[RunFinished],
         wall: float,
         interrupted: bool,
         comparison: Comparison | None = None,
@@ -122,9 +122,9 @@ class Reports:
     ) -> SessionFinished:
         """Return the last event of a session, without reports that could not be written."""
         count, simulated = Counter[Outcome](), 0.0
-        for answer in answers:
-            count[answer.outcome] += 1
-            simulated += answer.result.simulated
+        for finished in finished_runs:
+            count[finished.outcome] += 1
+            simulated += finished.result.simulated
         return SessionFinished(
             count[Outcome.PASSED],
             count[Outcome.FAILED],
@@ -150,15 +150,15 @@ CLAIM_EXITS = {
 }
 
 
-def exit_code(answers: Sequence[RunFinished], study: Study | None = None) -> Exit:
+def exit_code(finished_runs: Sequence[RunFinished], study: Study | None = None) -> Exit:
     """Return the exit code of a session that was not interrupted; that of the claim if there is one."""
     if study is not None and study.claim is not None:
         return CLAIM_EXITS[study.claim.status]
-    outcomes = {answer.outcome for answer in answers}
+    outcomes = {finished.outcome for finished in finished_runs}
     if outcomes == {Outcome.SKIPPED}:
         return Exit.NOTHING_SELECTED
     if Outcome.ERROR in outcomes:
-        only_skipped = all(a.result.error is None or a.result.error.kind == "not-run" for a in answers)
+        only_skipped = all(a.result.error is None or a.result.error.kind == "not-run" for a in finished_runs)
         return Exit.FAILED if only_skipped and Outcome.FAILED in outcomes else Exit.INCOMPLETE
     return Exit.FAILED if Outcome.FAILED in outcomes else Exit.PASSED
 
@@ -180,12 +180,12 @@ def require_writable(junit: Path | None, folder: Path | None, inputs: Iterable[P
 
 
 def _require_free_name(junit: Path, folder: Path | None) -> None:
-    """Raise OSError if simscen writes another file of this name in the folder of this or another session."""
+    """Raise OSError if simscen writes another file with this name in the folder of this or another session."""
     real = Path(os.path.realpath(junit))
     for home in real.parents:
         is_output = home == (folder and Path(os.path.realpath(folder))) or (home / JOURNAL_FILE).exists()
         if is_output and real.relative_to(home).parts[0] in RESERVED_NAMES:
-            raise OSError(errno.EINVAL, "simscen writes another file of this name there")
+            raise OSError(errno.EINVAL, "simscen writes another file with this name there")
 
 
 def _write(path: Path, data: bytes | Iterable[bytes]) -> bool:
@@ -244,8 +244,8 @@ class LivePage:
     def __init__(self, reports: Reports) -> None:
         self._reports = reports
         self._total, self._due = 0, 0.0
-        self._answers = RunStore()
-        self._under_way: dict[RunKey, None] = {}
+        self._finished_runs = RunStore()
+        self._running: dict[RunKey, None] = {}
 
     def __call__(self, event: SessionEvent) -> None:
         """Update the page after a run if the last update is old enough."""
@@ -255,20 +255,20 @@ class LivePage:
                 self._write()
                 open_page(self._reports.folder / PAGE)
             case RunStarted():
-                self._under_way[event.key] = None
+                self._running[event.key] = None
             case RunFinished():
-                self._under_way.pop(event.key, None)
-                self._answers.append(event)
+                self._running.pop(event.key, None)
+                self._finished_runs.append(event)
                 if time.monotonic() >= self._due:
                     self._write()
             case _:
                 pass
 
     def _write(self) -> None:
-        begun = time.monotonic()
-        self._reports.write_live(self._answers, RunningSession(self._total, tuple(self._under_way)))
+        start = time.monotonic()
+        self._reports.write_live(self._finished_runs, RunningSession(self._total, tuple(self._running)))
         now = time.monotonic()
-        self._due = now + max(MIN_UPDATE_INTERVAL_S, UPDATE_INTERVAL_FACTOR * (now - begun))
+        self._due = now + max(MIN_UPDATE_INTERVAL_S, UPDATE_INTERVAL_FACTOR * (now - start))
 
 
 def open_page(page: Path) -> None:

@@ -1,4 +1,4 @@
-"""Runs that a session has to execute: all, or those that an earlier session in the same folder did not complete."""
+"""Runs that a session executes: all, or those that an earlier session in the same folder did not complete."""
 
 import json
 from collections.abc import Collection, Mapping, Sequence
@@ -19,72 +19,74 @@ from simscen.run.sessions.output_folder import DEFAULT_FOLDER
 from simscen.run.sessions.results import display_path, repeat_command
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
-SAME_IN_LOG = ("scenario", "seed", "variation", "stack_name", "simulated_seconds", "verdicts")
+SHARED_RESULT_KEYS = ("scenario", "seed", "variation", "stack_name", "simulated_seconds", "verdicts")
 """Keys of result.json that the log and the journal both contain."""
 
 
 @dataclass(frozen=True)
 class PendingRuns:
-    """Journal of a session, its jobs to execute, and the `kept` results of an earlier session.
+    """Journal of a session, its jobs to execute, and the `reused` results of an earlier session.
 
-    `stacks` are the NAME=VALUE of the selected stacks.
+    `stacks` are the names of the selected stacks.
     """
 
     journal: Journal
     jobs: Sequence[Job]
-    kept: Sequence[RunFinished]
+    reused: Sequence[RunFinished]
     workers: int
     stacks: tuple[str, ...] = ()
 
     def started(self, folder: Path) -> SessionStarted:
         """Return the first event of the session."""
-        keys = [*(job.key for job in self.jobs), *(answer.key for answer in self.kept)]
+        keys = [*(job.key for job in self.jobs), *(run.key for run in self.reused)]
         return session_started(__version__, keys, self.workers, folder, self.stacks)
 
 
-def begin(journal: Journal, jobs: Sequence[Job], workers: int, shard: tuple[int, int] = (1, 1)) -> PendingRuns:
+def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tuple[int, int] = (1, 1)) -> PendingRuns:
     """Write the plan of the session to its journal and return the pending runs. Raises UsageError if that fails.
 
-    Results of unchanged scenarios are kept unless they are errors; of two runs to be compared, both or neither.
+    Results of unchanged scenarios are reused unless they are errors; of two runs to be compared, both or neither.
     """
     planned = plan_runs(jobs)
-    left, kept = divide_runs(jobs, planned, previous_results(journal))
+    remaining, reused = divide_runs(jobs, planned, previous_results(journal))
     journal.plan(planned, __version__, workers, shard)
-    write_kept(journal, kept)
-    return PendingRuns(journal, left, kept, workers, tuple(dict.fromkeys(run.stack for run in planned if run.stack)))
+    write_reused(journal, reused)
+    return PendingRuns(
+        journal, remaining, reused, workers, tuple(dict.fromkeys(run.stack for run in planned if run.stack))
+    )
 
 
 def plan_runs(jobs: Sequence[Job]) -> list[PlannedRun]:
     """Return the runs of these jobs as the journal lists them."""
     scenarios = {_job_identity(job): job.scenario for job in jobs}
     digests = {identity: scenario_digests(scenario) for identity, scenario in scenarios.items()}
-    return [_planned(job, digests[_job_identity(job)]) for job in jobs]
+    return [_planned_run(job, digests[_job_identity(job)]) for job in jobs]
 
 
 def divide_runs(
     jobs: Sequence[Job], planned: Sequence[PlannedRun], known: Mapping[PlannedRun, RunFinished]
 ) -> tuple[list[Job], list[RunFinished]]:
     """Return the jobs to execute, and the known results of the others."""
-    answers = [known.get(run) for run in planned]
-    kept: list[RunFinished] = []
-    left: list[Job] = []
-    for number, (job, answer) in enumerate(zip(jobs, answers, strict=True)):
-        if answer is not None and answers[_compared_index(jobs, number)] is not None:
-            kept.append(replace(answer, resumed=True))
+    results = [known.get(run) for run in planned]
+    reused: list[RunFinished] = []
+    remaining: list[Job] = []
+    for number, (job, result) in enumerate(zip(jobs, results, strict=True)):
+        if result is not None and results[_compared_index(jobs, number)] is not None:
+            reused.append(replace(result, resumed=True))
         else:
-            left.append(job)
-    return left, kept
+            remaining.append(job)
+    return remaining, reused
 
 
-def write_kept(journal: Journal, kept: Sequence[RunFinished]) -> None:
-    """Write kept results to the journal. Raises UsageError if the journal cannot be written."""
-    for answer in kept:
-        journal(answer)
+def write_reused(journal: Journal, reused: Sequence[RunFinished]) -> None:
+    """Write reused results to the journal. Raises UsageError if the journal cannot be written."""
+    for finished in reused:
+        journal(finished)
     if journal.error:
         raise UsageError(f"cannot write the journal in {journal.folder}: {journal.error.strerror}")
 
 
-def _planned(job: Job, digests: ScenarioDigests) -> PlannedRun:
+def _planned_run(job: Job, digests: ScenarioDigests) -> PlannedRun:
     scenario = job.scenario
     again = repeat_command(scenario, job.key.seed)
     file, stack = display_path(scenario.file), scenario.stack
@@ -99,24 +101,28 @@ def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
         past = read_journal(journal.folder)
     except InvalidInput:  # a new folder
         return {}
-    answers = {run: past.finished[run.key] for run in past.planned if run.key in past.finished}
-    return {run: answer for run, answer in answers.items() if answer.outcome is not Outcome.ERROR and _has_log(answer)}
+    results = {run: past.finished[run.key] for run in past.planned if run.key in past.finished}
+    return {
+        run: finished
+        for run, finished in results.items()
+        if finished.outcome is not Outcome.ERROR and _has_matching_log(finished)
+    }
 
 
-def _has_log(answer: RunFinished) -> bool:
-    """Return whether the log of a run is still there and holds the same verdicts; True if none was written."""
-    if not answer.artifacts.mcap:
+def _has_matching_log(finished: RunFinished) -> bool:
+    """Return whether the log of a run exists and has the same verdicts; True if none was written."""
+    if not finished.artifacts.mcap:
         return True
     from simscen.record.log_file import attached_result  # only a resumed session needs the library
 
-    recorded = attached_result(Path(answer.artifacts.mcap))
-    expected = json.loads(json.dumps(result_data(answer.result)))
-    expected["stack_name"] = answer.key.first.stack_name
-    return recorded is not None and all(recorded.get(key) == expected[key] for key in SAME_IN_LOG)
+    recorded = attached_result(Path(finished.artifacts.mcap))
+    expected = json.loads(json.dumps(result_data(finished.result)))
+    expected["stack_name"] = finished.key.first.stack_name
+    return recorded is not None and all(recorded.get(key) == expected[key] for key in SHARED_RESULT_KEYS)
 
 
 def _compared_index(jobs: Sequence[Job], number: int) -> int:
-    """Return the index of the run to compare with (--check-determinism), or the same index if there is none."""
+    """Return the index of the run to compare with (--check-determinism), or `number` if there is none."""
     twin = number ^ 1
     if twin < len(jobs) and jobs[twin].key != jobs[number].key and jobs[twin].key.first == jobs[number].key.first:
         return twin
@@ -128,7 +134,7 @@ def _job_identity(job: Job) -> tuple[str, str, str]:
     return job.scenario.id, job.scenario.variation, job.scenario.stack_name
 
 
-ALL_RUN = "all selected scenarios run"
+RUN_ALL = "all selected scenarios run"
 
 
 def failed_runs(
@@ -142,18 +148,18 @@ def failed_runs(
     home = DEFAULT_FOLDER if out is None else out.absolute().parent
     last = last_failed(home)
     if last is None:
-        return None, f"there is no earlier session in {home}: {ALL_RUN}"
+        return None, f"there is no earlier session in {home}: {RUN_ALL}"
     if not last.runs:
-        return None, f"nothing failed in the last session, {last.folder}: {ALL_RUN}"
-    chosen = {(one.title, one.stack_name): one for one in scenarios if one.spec.skip is None}
-    found = frozenset(key for key in last.runs if _run_key(key, chosen.get((key.test, key.stack_name)), options))
-    left = len(last.runs) - len(found)
+        return None, f"nothing failed in the last session, {last.folder}: {RUN_ALL}"
+    selected = {(one.title, one.stack_name): one for one in scenarios if one.spec.skip is None}
+    found = frozenset(key for key in last.runs if _is_selected(key, selected.get((key.test, key.stack_name)), options))
+    missing = len(last.runs) - len(found)
     if not found:
-        return None, f"{_runs(last.runs)} failed last, none of them selected: {ALL_RUN}"
-    return found, f"{_runs(last.runs)} failed last" + (f": {len(found)} selected, {left} not" if left else "")
+        return None, f"{_runs(last.runs)} failed last, none of them selected: {RUN_ALL}"
+    return found, f"{_runs(last.runs)} failed last" + (f": {len(found)} selected, {missing} not" if missing else "")
 
 
-def _run_key(key: RunKey, scenario: LoadedScenario | None, options: SessionOptions) -> bool:
+def _is_selected(key: RunKey, scenario: LoadedScenario | None, options: SessionOptions) -> bool:
     if scenario is None:
         return False
     return (options.seed is None and options.repeat == 1) or key.seed in scenario_seeds(scenario, options)

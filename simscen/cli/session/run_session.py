@@ -11,7 +11,7 @@ from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.interrupts import signals_interrupt
 from simscen.cli.session.backends import backend_of
 from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
-from simscen.cli.session.pending_runs import PendingRuns, begin, failed_runs
+from simscen.cli.session.pending_runs import PendingRuns, failed_runs, plan_session
 from simscen.cli.session.selection import Selection, load_all
 from simscen.cli.session.stacks import commands_of
 from simscen.cli.session.terminal import Format, Screen, screen
@@ -46,7 +46,7 @@ class SessionRequest:
     """Options of `simscen run`; each field has the meaning of the option with its name."""
 
     paths: Sequence[Path]
-    wanted: Selection = field(default_factory=Selection)
+    selection: Selection = field(default_factory=Selection)
     options: SessionOptions = field(default_factory=SessionOptions)
     root: Path | None = None
     world_path: Sequence[Path] = ()
@@ -66,7 +66,7 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
     """Run the session and write its reports. Raises InvalidInput, UsageError, and NothingSelected before any run."""
     options = request.options
     scenarios, warnings = load_all(
-        request.paths, request.root, request.world_path, request.lenient, request.wanted, request.stacks
+        request.paths, request.root, request.world_path, request.lenient, request.selection, request.stacks
     )
     if observer is not None:
         observer.loaded(scenarios)
@@ -84,10 +84,10 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
     used = {"plugins": plugin_packages(plugins_of_all(scenarios)), "stacks": commands_of(scenarios)}
     reports = Reports(folder, request.junit, request.junit_family.value, used=used)
     reports.begin()
-    work = begin(journal, plan_jobs(scenarios, options, folder), options.workers, request.wanted.shard)
+    pending = plan_session(journal, plan_jobs(scenarios, options, folder), options.workers, request.selection.shard)
     with screen(request.format_, request.durations) as output:
         listeners: list[Listener] = [*([observer] if observer else []), *([LivePage(reports)] if request.open_ else [])]
-        code = _run(work, options, reports, output, listeners)
+        code = _run(pending, options, reports, output, listeners)
     return output.exit(code)
 
 
@@ -100,10 +100,10 @@ def _last_failed(scenarios: Sequence[LoadedScenario], request: SessionRequest) -
 
 
 def _run(
-    work: PendingRuns, options: SessionOptions, reports: Reports, output: Screen, listeners: Sequence[Listener]
+    pending: PendingRuns, options: SessionOptions, reports: Reports, output: Screen, listeners: Sequence[Listener]
 ) -> Exit:
     """Execute the pending runs, report to journal, screen, listeners, and reports, and return the exit code."""
-    begun = time.monotonic()
+    start = time.monotonic()
 
     def show(event: SessionEvent) -> None:
         output(event)
@@ -111,23 +111,23 @@ def _run(
             each(event)
 
     def listen(event: SessionEvent) -> None:
-        work.journal(event)
+        pending.journal(event)
         show(event)
 
-    show(work.started(reports.folder))
-    for answer in work.kept:
-        show(answer)
+    show(pending.started(reports.folder))
+    for finished in pending.reused:
+        show(finished)
     with signals_interrupt(), backend_of(options) as backend:
-        done, stopped = run_session(work.jobs, options, backend, listen)
-    answers = RunStore(work.kept)
-    answers.extend(done)
-    work.journal.complete(answers)
-    comparison = compare_stacks((answer.result for answer in answers), work.stacks)
-    written = reports.write(answers, comparison)
-    wall = time.monotonic() - begun
-    listen(reports.finished_event(answers, wall, stopped is not None, comparison))
-    written = reports.write_duration(wall) and written and _check_journal(work.journal)
-    code = exit_code(answers)
+        done, stopped = run_session(pending.jobs, options, backend, listen)
+    finished_runs = RunStore(pending.reused)
+    finished_runs.extend(done)
+    pending.journal.complete(finished_runs)
+    comparison = compare_stacks((finished.result for finished in finished_runs), pending.stacks)
+    written = reports.write(finished_runs, comparison)
+    wall = time.monotonic() - start
+    listen(reports.finished_event(finished_runs, wall, stopped is not None, comparison))
+    written = reports.write_duration(wall) and written and _check_journal(pending.journal)
+    code = exit_code(finished_runs)
     if code is Exit.NOTHING_SELECTED:
         print_text("simscen: nothing was run: all selected scenarios are marked with `skip`", sys.stderr)
     return stopped or (code if written else Exit.INCOMPLETE)

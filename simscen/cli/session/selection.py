@@ -29,8 +29,8 @@ from simscen.loading.world_cache import WorldCache
 class Selection:
     """Filter of scenarios: `keyword` and `tags` as in pytest, `shard` (i, n) with 1 <= i <= n.
 
-    `variations` are names of variations; () selects all. `times` are the seconds of scenarios in earlier runs, by which
-    shards are balanced.
+    `variations` are names of variations; () selects all. `times` are the seconds of scenarios in earlier runs; shards
+    are balanced by them.
     """
 
     keyword: str = ""
@@ -51,7 +51,7 @@ def load_all(
     root: Path | None,
     world_path: Sequence[Path],
     lenient: bool,
-    wanted: Selection,
+    selection: Selection,
     stacks: Sequence[str] = (),
 ) -> tuple[list[LoadedScenario], list[Problem]]:
     """Return the selected scenarios, each variation with each of `stacks`, and warnings about them.
@@ -65,17 +65,17 @@ def load_all(
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
     for file, choice in product(discover(paths, home), choices):
-        variations, found = checks.scenario(file, choice, wanted.numbers)
+        variations, found = checks.scenario(file, choice, selection.numbers)
         for scenario in variations:
             loaded.setdefault(scenario.title, []).append(scenario.with_changes(several_stacks=len(choices) > 1))
             warnings.setdefault(scenario.id, []).extend(found)
         problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(from_here(problems, home))
-    firsts = select_variations([stacked[0] for stacked in loaded.values()], wanted.variations)
-    chosen = share_of_scenarios(select(firsts, wanted.keyword, wanted.tags), *wanted.shard, wanted.times)
-    relevant = dict.fromkeys(warning for one in chosen for warning in warnings[one.id])
-    return [stacked for one in chosen for stacked in loaded[one.title]], from_here(relevant, home)
+    unique = select_variations([with_stacks[0] for with_stacks in loaded.values()], selection.variations)
+    selected = share_of_scenarios(select(unique, selection.keyword, selection.tags), *selection.shard, selection.times)
+    relevant = dict.fromkeys(warning for one in selected for warning in warnings[one.id])
+    return [scenario for one in selected for scenario in loaded[one.title]], from_here(relevant, home)
 
 
 def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
@@ -121,12 +121,15 @@ class Checks:
         loaded = try_variations(file, self.root, self.world_path, choice, numbers)
         if isinstance(loaded, list):
             return (), loaded
-        tried = [self.variation(one) for one in loaded]
+        checked = [self.variation(one) for one in loaded]
         problems = merge_problems(
-            [VariationProblems(one.variation, one.set_by, found) for one, (_, found) in zip(loaded, tried, strict=True)]
+            [
+                VariationProblems(one.variation, one.set_by, found)
+                for one, (_, found) in zip(loaded, checked, strict=True)
+            ]
         )
-        usable = [one for one, _ in tried if one is not None]
-        return (usable if len(usable) == len(tried) else ()), problems
+        usable = [one for one, _ in checked if one is not None]
+        return (usable if len(usable) == len(checked) else ()), problems
 
     def variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
         """Return a loaded variation with all its checks passed, or None, and the problems."""
@@ -134,7 +137,7 @@ class Checks:
         if undefined and self.runs:
             return None, [*loaded.notes, *undefined]
         with collect_read_files() as read:
-            problems = [*loaded.notes, *([] if self.fast else checked(loaded, self.cache, self.pictures))]
+            problems = [*loaded.notes, *([] if self.fast else world_problems(loaded, self.cache, self.pictures))]
         problems += [replace(problem, severity="warning") for problem in undefined]
         loaded = loaded.with_changes(read_files=tuple(sorted(read)))
         usable = not any(problem.severity == "error" for problem in problems)
@@ -162,7 +165,9 @@ class Checks:
             return error.problems
 
 
-def checked(scenario: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None) -> list[Problem]:
+def world_problems(
+    scenario: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
+) -> list[Problem]:
     """Return the problems that are found by building the world of a scenario."""
     try:
         return check_in_world(scenario, cache, pictures)

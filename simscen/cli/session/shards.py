@@ -12,9 +12,9 @@ from simscen.loading.loaded import LoadedScenario
 
 
 class _ParallelJob(NamedTuple):
-    """Variables of a system with the number of a job, the number of jobs, and, if there is one, the first number.
+    """Environment variables of a CI system with the number of a job, the number of jobs, and the first number.
 
-    `first` is the first number of a system without such a variable.
+    `first` is the first number in a system without a variable for it.
     """
 
     index_variable: str
@@ -61,8 +61,8 @@ def share_of_scenarios(
     (longest processing time first); a scenario without a time counts as the median.
     """
     if times and count > 1:
-        usual = median(times.values())
-        seconds = [times.get(scenario.title, usual) for scenario in scenarios]
+        default = median(times.values())
+        seconds = [times.get(scenario.title, default) for scenario in scenarios]
         work, shards = [0.0] * count, [0] * len(scenarios)
         for index in sorted(range(len(scenarios)), key=lambda index: -seconds[index]):
             shards[index] = min(range(count), key=work.__getitem__)
@@ -80,10 +80,12 @@ def scenario_times(folders: Sequence[Path]) -> dict[str, float]:
 
     Raises InvalidInput if a folder has no journal.
     """
-    from simscen.report.journal_reader import read_journal  # not needed by light commands, which select scenarios, too
+    from simscen.report.journal_reader import (
+        read_journal,  # light commands, which also select scenarios, do not need it
+    )
 
-    walls = defaultdict(list)
+    wall_times = defaultdict(list)
     for folder in folders:
         for run in read_journal(folder).finished.values():
-            walls[run.key.test].append(run.wall)
-    return {title: sum(own) / len(own) for title, own in walls.items()}
+            wall_times[run.key.test].append(run.wall)
+    return {title: sum(times) / len(times) for title, times in wall_times.items()}

@@ -25,14 +25,14 @@ from simscen.loading.reduction import (
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child
 
 MAX_ROUNDS = 3
-"""Most repetitions of the reduction: rounded numbers may make further parts unnecessary."""
+"""Maximum number of reductions: rounded numbers may make further parts unnecessary."""
 
 Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
 class Failure:
-    """What must stay as it is: the failed criterion, or the error of the stack under test.
+    """Failure to preserve: the failed criterion, or the error of the stack under test.
 
     `max_margin` is the largest margin, below 0, that counts as the same failure; None if the criterion has no margins.
     """
@@ -41,7 +41,7 @@ class Failure:
     verdict_id: str
     max_margin: float | None = None
 
-    def is_in(self, result: RunResult) -> bool:
+    def occurs_in(self, result: RunResult) -> bool:
         """Return whether a run fails in this way."""
         if not self.criterion:
             return result.error is not None and result.error.by_stack
@@ -67,13 +67,13 @@ class Shrinking:
         """Make the scenario as small as possible.
 
         `nominal` are the values, in the scenario without its variation, of the parts that the variation sets; None for
-        parts that are not there. Stops early if the budget of runs is spent.
+        parts that do not exist there. Stops early if the budget of runs is spent.
         """
         try:
             self._restore_nominal(nominal)
             for _ in range(MAX_ROUNDS):
                 before = self.tree
-                self._leave_out()
+                self._remove_parts()
                 self._round()
                 if self.tree.plain == before.plain:
                     break
@@ -88,14 +88,14 @@ class Shrinking:
 
         self.tree = build(self._minimize(parts, build))
 
-    def _leave_out(self) -> None:
-        """Leave out parts, those near the top first, because they may be large."""
+    def _remove_parts(self) -> None:
+        """Remove parts, those near the top first, because they may be large."""
         depth = 1
         while depth <= max_depth(self.tree):
             before, parts = self.tree, removable_parts(self.tree, depth)
 
-            def build(kept: Sequence[Keys], parts: Sequence[Keys] = parts, tree: MappingNode = before) -> MappingNode:
-                return without_parts(tree, [keys for keys in parts if keys not in kept])
+            def build(needed: Sequence[Keys], parts: Sequence[Keys] = parts, tree: MappingNode = before) -> MappingNode:
+                return without(tree, [keys for keys in parts if keys not in needed])
 
             self.tree = build(self._minimize(parts, build))
             depth += 1
@@ -113,18 +113,19 @@ class Shrinking:
             self.tree = build(self._minimize([one.keys for one in changes], build))
 
     def _minimize(self, parts: Sequence[Part], build: Callable[[Sequence[Part]], MappingNode]) -> list[Part]:
-        """Return the parts that must stay. `build` makes the scenario with only some of them."""
+        """Return the parts that the failure needs. `build` returns the scenario with only some of them."""
         if not parts:
             return []
         return minimize(
-            parts, lambda candidates: self.runs.first([build(kept) for kept in candidates], self.failure.is_in)
+            parts,
+            lambda candidates: self.runs.first_accepted([build(part) for part in candidates], self.failure.occurs_in),
         )
 
 
 def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
     """Return the failure of a run in the criterion with this id, or in the first one that failed if "".
 
-    `share` is the part of the violation that must be left. Raises UsageError if the run did not fail in it.
+    `share` is the share of the violation that must remain. Raises UsageError if the run did not fail in it.
     """
     if result.error is not None and result.error.by_stack and not criterion:
         return Failure("", "")
@@ -132,8 +133,8 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
     chosen = next((one for one in failed if criterion in ("", one.id, one.criterion)), None)
     if result.outcome is not Outcome.FAILED or chosen is None:
         names = ", ".join(one.id for one in failed)
-        told = f"did not fail in {criterion}, but in {names}" if failed else f"did not fail: {result.outcome.value}"
-        raise UsageError(f"the run {told}")
+        reason = f"did not fail in {criterion}, but in {names}" if failed else f"did not fail: {result.outcome.value}"
+        raise UsageError(f"the run {reason}")
     margin = smallest_margin(chosen)
     return Failure(chosen.criterion, chosen.id, None if margin is None or margin >= 0.0 else share * margin)
 
@@ -145,16 +146,16 @@ def smallest_margin(verdict: Verdict) -> float | None:
 
 
 def only_failing(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
-    """Return the scenario with this seed, only the failing criterion, and without what does not change the run."""
-    entries = {key: entry for key, entry in tree.entries.items() if key not in UNNEEDED_KEYS}
+    """Return the scenario with this seed, only the failing criterion, and without keys that do not affect the run."""
+    entries = {key: entry for key, entry in tree.entries.items() if key not in NOT_RUN}
     criteria = tree.entries.get("pass")
     if failure.criterion and criteria is not None and isinstance(criteria.value, SequenceNode):
         items = [item for item in criteria.value.items if child(item, failure.criterion) is not None]
         named = [item for item in items if (name := child(item, "id")) and name.plain == failure.verdict_id]
-        kept = named or items
-        if kept:
-            entries["pass"] = Entry(criteria.key, replace(criteria.value, items=tuple(kept)))
-    return with_seed(MappingNode(tree.position, entries), seed)
+        selected = named or items
+        if selected:
+            entries["pass"] = Entry(criteria.key, replace(criteria.value, items=tuple(selected)))
+    return with_seed(MappingNode(tree.place, entries), seed)
 
 
 def with_inline_world(tree: MappingNode, world: MappingNode | None) -> MappingNode | None:

@@ -61,13 +61,13 @@ class Stacks:
         Raises InvalidInput if the configuration is invalid.
         """
         if loaded.robots:
-            tried = {name: self.with_command(view) for name, view in loaded.robots.items()}
-            given = [choice.name for choice in self.chosen if choice.external_command]
+            checked = {name: self.with_command(view) for name, view in loaded.robots.items()}
+            names = [choice.name for choice in self.chosen if choice.runs]
             problems = [
-                *(one for _, found in tried.values() for one in found),
-                *conflicting_stacks(loaded, given, config_file()),
+                *(one for _, found in checked.values() for one in found),
+                *conflicting_stacks(loaded, names, config_file()),
             ]
-            whole = replace(loaded, robots={name: view for name, (view, _) in tried.items()})
+            whole = replace(loaded, robots={name: view for name, (view, _) in checked.items()})
             return whole, list(dict.fromkeys(problems))
         stack = loaded.spec.stack
         if not isinstance(stack, ExternalStackSpec):
@@ -104,7 +104,7 @@ def load_with(
 ) -> LoadedScenario:
     """Load a scenario or one of its variations with the stack of a `--stack` option or its own.
 
-    Raises InvalidInput, and UsageError if the variation does not exist or is not named.
+    Raises InvalidInput, and UsageError if the variation does not exist or is missing.
     """
     home = root or default_root([file])
     stacks = stacks_of([] if stack is None else [stack], home, world_path)
@@ -115,7 +115,7 @@ def load_with(
     return loaded
 
 
-def stacks_of(written: Sequence[str], root: Path, world_path: Sequence[Path] = ()) -> Stacks:
+def stacks_of(arguments: Sequence[str], root: Path, world_path: Sequence[Path] = ()) -> Stacks:
     """Parse the values of --stack.
 
     Raises UsageError for a malformed value, a missing program, or a duplicate name, and InvalidInput for an invalid
@@ -123,15 +123,15 @@ def stacks_of(written: Sequence[str], root: Path, world_path: Sequence[Path] = (
     """
     stacks = Stacks()
     choices: dict[str, StackChoice] = {}
-    for text in written:
-        choice = _choice(text, root, world_path, stacks)
+    for text in arguments:
+        choice = _parse_choice(text, root, world_path, stacks)
         if choice.name.casefold() in choices:
             raise UsageError(f"--stack {escaped(text)}: the name is already used; choose another")
         choices[choice.name.casefold()] = choice
     return Stacks(tuple(choices.values()))
 
 
-def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -> StackChoice:
+def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -> StackChoice:
     name, equals, value = text.partition("=")
     if not _NAME.fullmatch(name):
         hint = "a name consists of letters, digits, `_`, `.`, and `-`"
@@ -151,11 +151,11 @@ def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -
     return StackChoice(name, value, external_command=_command(text, value, bool(equals), stacks))
 
 
-def _command(text: str, value: str, may_be_new: bool, stacks: Stacks) -> ExternalCommand:
+def _command(text: str, value: str, may_be_command: bool, stacks: Stacks) -> ExternalCommand:
     """Return the command of a name in the configuration, or the command written in the option."""
     if _NAME.fullmatch(value) and (known := stacks.command(value)) is not None:
         return known
-    if not may_be_new:
+    if not may_be_command:
         names = [REFERENCE, *(entry.name for entry in entries("stack")), *stacks.config.spec.stacks]
         reason = f"{quoted(value)} is neither a stack type nor a name in {stacks.config.file}"
         hint = suggestion(value, dict.fromkeys(names))

@@ -12,7 +12,7 @@ from simscen.cli.diagnostics import as_text, escaped, print_text
 from simscen.cli.interrupts import signals_interrupt
 from simscen.cli.session.backends import backend_of
 from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
-from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_kept
+from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_reused
 from simscen.cli.session.run_session import output_folder
 from simscen.cli.session.selection import Selection, load_all
 from simscen.cli.session.stacks import commands_of
@@ -42,9 +42,9 @@ from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 SEQUENTIAL_BATCH = 32
-"""Runs between two looks at a sequential claim. Fixed, so that the runs do not depend on the number of workers."""
+"""Runs between two evaluations of a sequential claim. Fixed, so that runs do not depend on the number of workers."""
 BATCH = 256
-"""Runs of which the scenarios are in memory at once, if there is no sequential claim."""
+"""Maximum number of runs whose scenarios are in memory, without a sequential claim."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ class StudyRequest:
 
 
 class StudyRun(NamedTuple):
-    """A run: the number of its variation (None without variations), its place in the order of the seeds, from 0, and
-    the number of variations that were drawn until then."""
+    """A run: the number of its variation (None without variations), the index of its seed, and the number of variations
+    drawn so far."""
 
     number: int | None
     seed_index: int
@@ -90,7 +90,7 @@ def execute_study(request: StudyRequest) -> Exit:
 
 
 class _StudySession:
-    """One study: how its runs are chosen, loaded, and executed in batches."""
+    """Session that chooses, loads, and executes the runs of a study in batches."""
 
     def __init__(self, request: StudyRequest) -> None:
         self._request = request
@@ -102,14 +102,14 @@ class _StudySession:
         self._text = ""
         self._claim: PassRate | None = None
         self._runs: Iterator[StudyRun] = iter(())
-        self._waiting: list[StudyRun] = []
+        self._batch: list[StudyRun] = []
         self._planned: list[PlannedRun] = []
         self._drawn = 0
         self.total = 0
         self.inputs: set[Path] = set()
 
     def load_first_batch(self) -> list[LoadedScenario]:
-        """Load the scenarios of the first runs, and find out how many runs there are. Raises InvalidInput."""
+        """Load the scenarios of the first runs, and determine the number of runs. Raises InvalidInput."""
         request = self._request
         first_number = None if self._space is None else next(_allowed_numbers(self._space, request.file))
         scenario = self._load([first_number])[0]
@@ -122,15 +122,15 @@ class _StudySession:
         self.total = self._count_runs()
         self._base_seed = request.options.seed if request.options.seed is not None else scenario.spec.seed
         seeds = self.total if self._is_random else request.repeat
-        if self._base_seed + seeds - 1 > MAX_SEED:
-            raise UsageError(f"{seeds} runs from seed {self._base_seed} on exceed the largest seed, {MAX_SEED}")
-        self._runs = islice(self._order(), self.total)
-        self._waiting = list(islice(self._runs, self._batch_size))
-        return self._load([run.number for run in self._waiting])
+        if self._base_seed + seeds - 1 > LARGEST_SEED:
+            raise UsageError(f"{seeds} runs from seed {self._base_seed} on exceed the largest seed, {LARGEST_SEED}")
+        self._runs = islice(self._all_runs(), self.total)
+        self._batch = list(islice(self._runs, self._batch_size))
+        return self._load([run.number for run in self._batch])
 
     def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
         """Run all batches and write the reports. Returns the exit code."""
-        begun, answers, stopped = time.monotonic(), RunStore(), None
+        start, finished_runs, stopped = time.monotonic(), RunStore(), None
         invalid: InvalidInput | None = None
         known = previous_results(journal)
         title = next(iter(self._loaded.values())).id
@@ -147,32 +147,32 @@ class _StudySession:
 
         workers = self._request.options.workers
         show(SessionStarted(__version__, self.total, 1, workers, str(reports.folder), (title,)))
-        while self._waiting and stopped is None:
-            jobs = self._jobs(len(answers), reports.folder)
-            left, kept = self._plan(journal, jobs, known)
-            write_kept(journal, kept)
-            for answer in kept:
-                show(answer)
+        while self._batch and stopped is None:
+            jobs = self._jobs(len(finished_runs), reports.folder)
+            remaining, reused = self._plan(journal, jobs, known)
+            write_reused(journal, reused)
+            for finished in reused:
+                show(finished)
             with signals_interrupt():
-                done, stopped = run_session(left, self._request.options, backend, listen)
-            journal.complete([*kept, *done])
-            answers.extend([*kept, *done])
-            if self._is_decided(answers):
+                done, stopped = run_session(remaining, self._request.options, backend, listen)
+            journal.complete([*reused, *done])
+            finished_runs.extend([*reused, *done])
+            if self._is_decided(finished_runs):
                 break
-            self._waiting = list(islice(self._runs, self._batch_size))
+            self._batch = list(islice(self._runs, self._batch_size))
             try:
-                self._load([run.number for run in self._waiting])
-            except InvalidInput as error:  # the values of a later run: report the runs before it
+                self._load([run.number for run in self._batch])
+            except InvalidInput as error:  # the values of a later run are invalid: report the runs before it
                 invalid = error
                 break
-        study = evaluate_study(self._study_plan(), (answer.result for answer in answers))
-        written = reports.write(answers, None, study)
-        wall = time.monotonic() - begun
-        listen(reports.finished_event(answers, wall, stopped is not None, None, study))
+        study = evaluate_study(self._study_plan(), (finished.result for finished in finished_runs))
+        written = reports.write(finished_runs, None, study)
+        wall = time.monotonic() - start
+        listen(reports.finished_event(finished_runs, wall, stopped is not None, None, study))
         written = reports.write_duration(wall) and written and journal.error is None
         if invalid is not None:
             raise invalid
-        return stopped or (exit_code(answers, study) if written else Exit.INCOMPLETE)
+        return stopped or (exit_code(finished_runs, study) if written else Exit.INCOMPLETE)
 
     @property
     def _batch_size(self) -> int:
@@ -187,17 +187,17 @@ class _StudySession:
                 raise UsageError("--runs is for random seeds and values; these variations are run --repeat times each")
             return request.repeat * sum(1 for _ in _allowed_numbers(space, self._request.file))
         if request.repeat != 1:
-            raise UsageError("--repeat is for chosen values; say with --runs how many random runs there are")
+            raise UsageError("--repeat is for chosen values; set the number of random runs with --runs")
         if self._claim is not None:
             return self._claim.max_runs
         if request.runs is not None:
             return request.runs
         if space is not None:
             return space.count
-        raise UsageError("say how many runs there are, with --runs or with `acceptance` in the scenario")
+        raise UsageError("the number of runs is missing; set it with --runs, or with `acceptance` in the scenario")
 
-    def _order(self) -> Iterator[StudyRun]:
-        """Yield the runs: random ones with a new seed each, chosen values with the same seeds each."""
+    def _all_runs(self) -> Iterator[StudyRun]:
+        """Yield the runs: a new seed for each random run, the same seeds for each of the chosen values."""
         space = self._space
         if space is None:
             yield from (StudyRun(None, index, 0) for index in range(self.total))
@@ -234,7 +234,7 @@ class _StudySession:
 
     def _jobs(self, first: int, folder: Path) -> list[Job]:
         options, jobs = self._request.options, []
-        for index, run in enumerate(self._waiting):
+        for index, run in enumerate(self._batch):
             scenario = self._loaded[run.number]
             key = scenario.key(self._base_seed + run.seed_index)
             jobs.append(Job(first + index, scenario, key, run_folder(folder, key), options.wall_limit, options.replay))
@@ -245,16 +245,16 @@ class _StudySession:
     ) -> tuple[list[Job], list[RunFinished]]:
         """Write the runs of a batch to the journal; return the jobs to execute, and the known results of the others."""
         planned = plan_runs(jobs)
-        left, kept = divide_runs(jobs, planned, known)
+        remaining, reused = divide_runs(jobs, planned, known)
         is_first = not self._planned
         self._planned += planned
-        self._drawn = self._waiting[-1].drawn
+        self._drawn = self._batch[-1].drawn
         plan = self._study_plan()
         if is_first:
             journal.plan(planned, __version__, self._request.options.workers, study=plan)
         else:
             journal.add(planned, plan)
-        return left, kept
+        return remaining, reused
 
     def _study_plan(self) -> StudyPlan:
         values = {run.key: run.varied for run in self._planned if run.varied}
@@ -262,10 +262,10 @@ class _StudySession:
         in_pairs = not self._is_random and self._space is not None
         return StudyPlan(scenario, self._is_random, self._claim, values, in_pairs, self._drawn)
 
-    def _is_decided(self, answers: Sequence[RunFinished]) -> bool:
+    def _is_decided(self, finished_runs: Sequence[RunFinished]) -> bool:
         if self._claim is None or self._claim.method == "fixed":
             return False
-        claim = evaluate_claim(self._claim, in_seed_order(answer.result for answer in answers))
+        claim = evaluate_claim(self._claim, in_seed_order(finished.result for finished in finished_runs))
         return claim.status is not ClaimStatus.UNDECIDED
 
 

@@ -48,20 +48,20 @@ class Screen:
     def __call__(self, event: SessionEvent) -> None:
         """Print an event."""
         if self.lost is None:
-            with self.suppressing_errors():
+            with self.suppress_errors():
                 self._printer(event)
 
     @contextmanager
-    def suppressing_errors(self) -> Iterator[None]:
+    def suppress_errors(self) -> Iterator[None]:
         """Record an error of stdout, and discard further output so that the interpreter does not fail when it flushes
         at exit."""
         try:
             yield
         except OSError as error:
             self.lost = self.lost or error
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, sys.stdout.fileno())
-            os.close(nowhere)
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, sys.stdout.fileno())
+            os.close(null)
 
     def append_summary(self, text: str) -> None:
         """Append to the file that GitHub Actions shows as the summary of a step."""
@@ -76,9 +76,9 @@ class Screen:
         lost = {STEP_SUMMARY: self.lost_summary}
         if not isinstance(self.lost, BrokenPipeError):
             lost["to stdout"] = self.lost
-        for what, error in lost.items():
+        for target, error in lost.items():
             if error is not None:
-                print_text(f"simscen: cannot write {what}: {error.strerror}", sys.stderr)
+                print_text(f"simscen: cannot write {target}: {error.strerror}", sys.stderr)
                 code = max(code, Exit.INCOMPLETE)
         return code
 
@@ -97,7 +97,7 @@ def screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
     try:
         yield output
     finally:
-        with output.suppressing_errors():
+        with output.suppress_errors():
             printer.__exit__(*sys.exc_info())
         if summary is not None:
             output.append_summary(summary.getvalue())

@@ -28,16 +28,16 @@ from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
 from simscen.run.simulate import execute_run
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 
-_PREPARED = ScenarioCache(CachedWorldBuilder(DiskCache(cache_folder(os.environ))))
-Image.preinit()  # imports what it would import when the first picture is written
+_SCENARIOS = ScenarioCache(CachedWorldBuilder(DiskCache(cache_folder(os.environ))))
+Image.preinit()  # imports now instead of in every fork that writes a picture
 
 
 def main() -> None:
-    """Serve the supervisor until it closes its end of the connection."""
+    """Serve the supervisor until it closes the connection."""
     *plugin_paths, replies = sys.argv[1:]
     for plugin_path in plugin_paths:
         apply_plugin_path(plugin_path)
-    ForkServer(0, int(replies), _warm_up, _perform).serve()
+    ForkServer(0, int(replies), _warm_up, _execute).serve()
 
 
 def _warm_up(job: Job) -> None:
@@ -45,27 +45,27 @@ def _warm_up(job: Job) -> None:
 
     Clears the caches first if they use more than half of the allowed memory.
     """
-    if _memory() > MAX_MEMORY_BYTES / 2:
-        _PREPARED.clear()
-    prepared = _PREPARED.prepared(job.scenario)
+    if _used_memory() > MAX_MEMORY_BYTES / 2:
+        _SCENARIOS.clear()
+    prepared = _SCENARIOS.prepared(job.scenario)
     import_components(prepared)
     precompute(prepared)
     log_header(prepared, job.key.seed)
     CLIENT_POOL.create_in_advance()
 
 
-def _memory() -> int:
+def _used_memory() -> int:
     """Return the address space in use in bytes (Linux: field 1 of /proc/self/statm, in pages)."""
     return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 
-def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
-    prepared = _PREPARED.prepared(job.scenario)
-    progress = ProgressReporter(prepared.spec.physics.tick_rate, tell)
-    return execute_run(prepared, job.key.seed, job.folder, (progress,), partial(_finish, replay=job.replay))
+def _execute(job: Job, report_progress: Callable[[float], None]) -> dict[str, Any]:
+    prepared = _SCENARIOS.prepared(job.scenario)
+    progress = ProgressReporter(prepared.spec.physics.tick_rate, report_progress)
+    return execute_run(prepared, job.key.seed, job.folder, (progress,), partial(_write_outputs, replay=job.replay))
 
 
-def _finish(prepared: PreparedScenario, run: Run, folder: Path, replay: ReplayMode) -> None:
+def _write_outputs(prepared: PreparedScenario, run: Run, folder: Path, replay: ReplayMode) -> None:
     scene = Scene(run.trace, run.case, prepared.built.map, run.result, world_scenery(prepared))
     robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
     write_picture(scene_with_robots(scene, robots), folder / "map.png")

@@ -156,24 +156,24 @@ def watch_session(request: SessionRequest) -> int:
             raise UsageError(f"--watch and {name} exclude each other: each session has its own folder")
     if request.open_:
         raise UsageError("--watch and --open exclude each other: each session has its own page")
-    if request.wanted.shard != (1, 1):
+    if request.selection.shard != (1, 1):
         raise UsageError("--watch and --shard exclude each other")
     home = request.root or default_root(request.paths)
-    watching = WatchState(lambda: discover(request.paths, home), request.paths)
-    code, seen = _run_in_child(replace(request, root=home), watching)
+    state = WatchState(lambda: discover(request.paths, home), request.paths)
+    code, seen = _run_in_child(replace(request, root=home), state)
     while code not in STOPPED:
-        _print_status(watching)
-        files = _wait_for_changes(watching, seen)
+        _print_status(state)
+        files = _wait_for_changes(state, seen)
         if files is None:
             break
-        again = replace(request, paths=files, root=home, last_failed=False)
-        code, seen = _run_in_child(again, watching)
+        next_request = replace(request, paths=files, root=home, last_failed=False)
+        code, seen = _run_in_child(next_request, state)
     return code
 
 
-def _run_in_child(request: SessionRequest, watching: WatchState) -> tuple[int, FileStamps]:
+def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, FileStamps]:
     """Run a session in a child process. Return its exit code, and the stamps of the files from before it began."""
-    before = file_stamps(watching.files)
+    stamps_before = file_stamps(state.files)
     reading, writing = os.pipe()
     sys.stdout.flush()
     sys.stderr.flush()
@@ -188,73 +188,73 @@ def _run_in_child(request: SessionRequest, watching: WatchState) -> tuple[int, F
                 report.invalid_files(error.problems)
                 raise
     os.close(writing)
-    with _ignoring_interrupts(), os.fdopen(reading, encoding="utf-8") as lines:
-        watching.begin(request.paths)
+    with _ignore_interrupts(), os.fdopen(reading, encoding="utf-8") as lines:
+        state.begin(request.paths)
         for line in lines:
-            watching.update(line)
+            state.update(line)
         code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-    watching.end(code)
-    now = file_stamps(watching.files)
-    return code, {**now, **{file: stamp for file, stamp in before.items() if file in now}}
+    state.end(code)
+    now = file_stamps(state.files)
+    return code, {**now, **{file: stamp for file, stamp in stamps_before.items() if file in now}}
 
 
 @contextmanager
-def _ignoring_interrupts() -> Iterator[None]:
-    """Ignore Ctrl-C in this process, since the session receives it, too, and its exit code tells."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _ignore_interrupts() -> Iterator[None]:
+    """Ignore Ctrl-C in this process, because the session receives it, too, and reports it by its exit code."""
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, previous)
 
 
-def _print_status(watching: WatchState) -> None:
-    failed = len(watching.failed)
+def _print_status(state: WatchState) -> None:
+    failed = len(state.failed)
     keys = f"a = run all, f = run those that did not pass ({failed}), q = quit"
-    print_text(f"watching {len(watching.files)} files of {len(watching.scenarios)} scenarios: {keys}")
+    print_text(f"watching {len(state.files)} files of {len(state.scenarios)} scenarios: {keys}")
     sys.stdout.flush()
 
 
-def _wait_for_changes(watching: WatchState, seen: FileStamps) -> Sequence[Path] | None:
+def _wait_for_changes(state: WatchState, seen: FileStamps) -> Sequence[Path] | None:
     """Return the scenarios to run next once a key is pressed or a file changes; None to quit."""
     with _keys() as keys:
         while True:
             key = keys()
             if key == "q":
                 return None
-            if key == "a" and watching.scenarios:
-                return watching.scenarios
-            if key == "f" and watching.failed:
-                return watching.failed
-            now = file_stamps(watching.files)
+            if key == "a" and state.scenarios:
+                return state.scenarios
+            if key == "f" and state.failed:
+                return state.failed
+            now = file_stamps(state.files)
             if now == seen:
                 continue
-            while (later := _stamps_after_pause(watching)) != now:
+            while (later := _stamps_after_pause(state)) != now:
                 now = later
             changed = {file for file in {*now, *seen} if now.get(file) != seen.get(file)}
             seen = now
-            if affected := watching.scenarios_to_run(changed):
+            if affected := state.scenarios_to_run(changed):
                 return affected
 
 
-def _stamps_after_pause(watching: WatchState) -> FileStamps:
+def _stamps_after_pause(state: WatchState) -> FileStamps:
     """Return the stamps after another pause."""
     select.select([], [], [], POLL_INTERVAL_S)
-    return file_stamps(watching.files)
+    return file_stamps(state.files)
 
 
 @contextmanager
 def _keys() -> Iterator["_Keys"]:
-    """Read single keys without echo, and restore the terminal in the end."""
+    """Read single keys without echo, and restore the terminal at the end."""
     if not os.isatty(0):
         yield _Keys()
         return
-    before = termios.tcgetattr(0)
+    previous = termios.tcgetattr(0)
     tty.setcbreak(0, termios.TCSANOW)
     try:
         yield _Keys()
     finally:
-        termios.tcsetattr(0, termios.TCSANOW, before)
+        termios.tcsetattr(0, termios.TCSANOW, previous)
 
 
 class _Keys:

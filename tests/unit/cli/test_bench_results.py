@@ -100,7 +100,7 @@ def test_unreadable_result_is_a_usage_error(tmp_path: Path, there: bool) -> None
     file = tmp_path / "result.json"
     if there:
         file.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(UsageError, match=r"cannot read .*result\.json: (no text|No such file or directory)"):
+    with pytest.raises(UsageError, match=r"cannot read .*result\.json: (not UTF-8 text|No such file or directory)"):
         read_result(file)
 
 

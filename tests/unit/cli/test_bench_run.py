@@ -7,7 +7,7 @@ import pytest
 from simscen.bench.navigation import office_maps
 from simscen.bench.navigation.experiments import Experiment
 from simscen.cli.benchmarks.navigation import with_stack
-from simscen.cli.benchmarks.navigation_runs import _planned
+from simscen.cli.benchmarks.navigation_runs import _plan_jobs
 
 
 def hall(folder: Path) -> Experiment:
@@ -19,7 +19,7 @@ def test_runs_with_another_stack_have_different_keys(tmp_path: Path) -> None:
     stack.write_text("simscen: 1\nstack: {controller: {desired_linear_vel: 0.3}}\n", encoding="utf-8")
     alike = [hall(tmp_path / "made/wide"), hall(tmp_path / "made/narrow")]
     others = with_stack(stack, alike, tmp_path / "made", tmp_path)
-    jobs, owners = _planned(others, tmp_path / "out")
+    jobs, owners = _plan_jobs(others, tmp_path / "out")
     assert [owners[job.key][0] for job in jobs] == [0, 0, 1, 1]
     assert len({job.folder for job in jobs}) == 4
 
@@ -39,7 +39,7 @@ def test_nav2_parameter_file_is_a_valid_stack_and_ignored_parameters_are_reporte
     file = tmp_path / "mine.yaml"
     file.write_text(NAV2, encoding="utf-8")
     (other,) = with_stack(file, [hall(tmp_path / "made")], tmp_path / "made", tmp_path)
-    jobs, _ = _planned([other], tmp_path / "out")
+    jobs, _ = _plan_jobs([other], tmp_path / "out")
     stack = jobs[0].scenario.spec.stack
     assert stack.controller.type == "regulated_pure_pursuit"
     assert stack.controller.lookahead_dist == 0.77
@@ -49,4 +49,4 @@ def test_nav2_parameter_file_is_a_valid_stack_and_ignored_parameters_are_reporte
 
 def test_experiments_with_duplicate_runs_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="ramp_1"):
-        _planned([hall(tmp_path / "wide"), hall(tmp_path / "narrow")], tmp_path / "out")
+        _plan_jobs([hall(tmp_path / "wide"), hall(tmp_path / "narrow")], tmp_path / "out")

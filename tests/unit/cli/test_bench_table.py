@@ -4,14 +4,14 @@ from dataclasses import replace
 from simscen.bench.localization.campaign import CONSISTENCY_CIRCUMSTANCES, Consistency, Share
 from simscen.bench.localization.campaign import Row as Numbers
 from simscen.bench.navigation.summary import Difference, DriveComparison, Row
-from simscen.cli.benchmarks.localization import SHARES
+from simscen.cli.benchmarks.localization import COLUMN_NAMES
 from simscen.cli.benchmarks.localization import as_text as localization
-from simscen.cli.benchmarks.navigation_runs import Localized, Measured
+from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
 from simscen.cli.benchmarks.navigation_table import as_json, as_text
 
 BARN = Row("BARN", 30, 29 / 30, (0.833, 0.994), 1 / 30, 0.0, 0.0, 0.0, 7.24, 0.476, 1.031, 0.71)
 TOUR = Row("localization, tour", 20, 1.0, None, 0.0, 0.0, 0.0, 0.0, 48.8, None, 0.99, 0.625)
-KNOWN = Localized(0.0301, 0.0402, {5.0: 0.02, 10.0: 2.5}, (2.02, 4.17))
+KNOWN = LocalizationAccuracy(0.0301, 0.0402, {5.0: 0.02, 10.0: 2.5}, (2.02, 4.17))
 
 TABLE = """\
 experiment          runs  success  95 % interval  collision  timeout  failed    time  path    SCT  score
@@ -39,7 +39,7 @@ SLOWER = DriveComparison(
 
 
 def test_table_is_followed_by_localization_comparison_and_published_figures() -> None:
-    assert as_text([Measured(BARN), Measured(TOUR, KNOWN)], [SLOWER]) == TABLE
+    assert as_text([ExperimentResult(BARN), ExperimentResult(TOUR, KNOWN)], [SLOWER]) == TABLE
 
 
 NARROW = """\
@@ -59,21 +59,21 @@ LONG = "BARN, regulated pure pursuit at 0.5 m/s, with nav2_params"
 
 
 def test_lines_fit_a_narrow_terminal_without_splitting_numbers() -> None:
-    assert as_text([Measured(BARN)], [SLOWER], columns=86) == NARROW
-    shown = as_text([Measured(replace(BARN, case=LONG)), Measured(TOUR, KNOWN)], [SLOWER], columns=80)
+    assert as_text([ExperimentResult(BARN)], [SLOWER], columns=86) == NARROW
+    shown = as_text([ExperimentResult(replace(BARN, case=LONG)), ExperimentResult(TOUR, KNOWN)], [SLOWER], columns=80)
     assert max(map(len, shown.splitlines())) <= 80
-    assert as_text([Measured(BARN)], [SLOWER], columns=200) == as_text([Measured(BARN)], [SLOWER])
+    assert as_text([ExperimentResult(BARN)], [SLOWER], columns=200) == as_text([ExperimentResult(BARN)], [SLOWER])
 
 
 def test_json_contains_every_number() -> None:
-    output = json.loads(as_json([Measured(BARN), Measured(TOUR, KNOWN)]))
+    output = json.loads(as_json([ExperimentResult(BARN), ExperimentResult(TOUR, KNOWN)]))
     assert output["experiments"][0]["tally"]["score"] == 0.476
     assert output["experiments"][1]["localized"]["anees"] == {"5.0": 0.02, "10.0": 2.5}
     assert output["dwa_published"]["success"] == 0.85
 
 
 def test_localization_table_fits_a_narrow_terminal() -> None:
-    shares = {name: Share(9, 10, (0.7, 1.0)) for name in SHARES}
+    shares = {name: Share(9, 10, (0.7, 1.0)) for name in COLUMN_NAMES}
     sure = dict.fromkeys(CONSISTENCY_CIRCUMSTANCES, Consistency(1.0, (2.1, 4.2), 0.951, (1.0,) * 5, (0.9, 6.34)))
     row = Numbers("amcl, likelihood_field", shares, 0.029, (0.021, 0.042), sure, 1.5, 189.0)
     lines = localization([row], columns=80).splitlines()

@@ -146,7 +146,7 @@ def test_changed_scenarios_are_refused_unless_allowed(folder: Callable[..., Path
 def test_sessions_without_a_common_run_are_refused(folder: Callable[..., Path]) -> None:
     refused = compare(folder("a", [result(PASS, 1)]), folder("b", [result(PASS, 2)]))
     assert isinstance(refused.exception, InvalidInput)
-    assert "no run has a partner" in str(refused.exception)
+    assert "no run has a counterpart" in str(refused.exception)
 
 
 def test_json_and_markdown(folder: Callable[..., Path]) -> None:

@@ -5,7 +5,7 @@ import re
 import pytest
 import typer
 
-from simscen.cli.catalog.commands_page import EXITS, commands_of, exits, parameters_of, section
+from simscen.cli.catalog.commands_page import EXIT_CODES, commands_of, exit_code_section, parameters_of, section
 from simscen.cli.main import COMMANDS, app
 from simscen.core.errors import Exit
 
@@ -26,7 +26,7 @@ def typers_own(words):
 def test_commands_page_lists_the_options_of_typer(words, function) -> None:
     taken = [parameter for parameter in typers_own(words).params if parameter.name != "help"]
     names = [", ".join(p.opts) if p.param_type_name == "option" else p.name for p in taken]
-    output = [parameter.written for parameter in parameters_of(function)]
+    output = [parameter.spelling for parameter in parameters_of(function)]
     arguments = re.compile(r"^\[?[A-Z_]+\]?…?$")
     assert [name for name in names if name.startswith("-")] == [name for name in output if name.startswith("-")]
     assert len(output) == len(names)
@@ -35,8 +35,8 @@ def test_commands_page_lists_the_options_of_typer(words, function) -> None:
 
 
 def test_every_exit_code_is_documented() -> None:
-    assert set(EXITS) == set(Exit)
-    assert all(f"| {code.value} |" in exits() for code in Exit)
+    assert set(EXIT_CODES) == set(Exit)
+    assert all(f"| {code.value} |" in exit_code_section() for code in Exit)
 
 
 def test_stars_and_brackets_are_escaped() -> None:

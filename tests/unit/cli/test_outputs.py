@@ -120,7 +120,7 @@ def test_junit_cannot_use_reserved_names(simscen, tmp_path: Path, name, before) 
         (tmp_path / "out/events.jsonl").write_text("{}\n")
     ended = simscen("run", "good.scenario.yaml", *options, "--junit", f"out/{name}")
     assert ended.code == 2
-    assert ended.err == f"simscen: cannot write out/{name}: simscen writes another file of this name there\n"
+    assert ended.err == f"simscen: cannot write out/{name}: simscen writes another file with this name there\n"
 
 
 @pytest.mark.parametrize("name", [".", "..", "", "deep/", "deep/.", ".scenario.yaml"])

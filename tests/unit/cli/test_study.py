@@ -169,7 +169,7 @@ def test_a_failed_run_is_repeated_by_its_command(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "options", "told"),
     [
-        ("", [], "say how many runs there are"),
+        ("", [], "the number of runs is missing"),
         ("variations: {grid: {seed: [1, 2]}}\n", ["--runs", 3], "--runs is for random seeds"),
         ("", ["--runs", 3, "--repeat", 2], "--repeat is for chosen values"),
         ("skip: later\n", ["--runs", 3], "is marked with `skip`"),
