@@ -1,1 +1,1 @@
-"""A run as an MCAP log that ROS 2 tools open, and back to the very same Trace."""
+"""Recording of runs to MCAP logs that ROS 2 tools can open, and reading of logs as traces."""

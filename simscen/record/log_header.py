@@ -1,4 +1,4 @@
-"""Metadata and attachments of a log: everything besides the messages that is needed to judge or repeat the run."""
+"""Metadata and attachments of a log: everything except the messages that is needed to judge or repeat the run."""
 
 import json
 from collections.abc import Mapping
@@ -20,8 +20,8 @@ STACK_RECORD = "simscen.stack"
 """Metadata record that describes the external stacks. It is written at the end of the log, when it is complete."""
 _FACT_PREFIX = "fact."
 STACK_FACT, STACK_NAME_FACT, VARIATION_FACT = "stack", "variation", "varied"
-"""Names of facts: NAME=VALUE of the stack that replaced the scenario's stack, the stack's part of the run's name if
-several stacks are compared, and the scenario's variation."""
+"""Names of facts: the --stack NAME=VALUE that replaced the scenario's stack, the name of the stack if several are
+compared, and the scenario's variation."""
 ROBOTS, RESOLUTION, ORIGIN = "robots", "map.resolution", "map.origin"
 """Keys of the metadata record: the names of several robots, and the resolution and origin of a robot's map."""
 END, COUNT_PREFIX = "simscen.end", "messages:"

@@ -1,4 +1,4 @@
-"""Recording of a run to an MCAP log that ROS 2 tools can open, and the buffer of moments in front of it."""
+"""Recording of a run to an MCAP log that ROS 2 tools can open, and a buffer of moments for faster writing."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -83,7 +83,7 @@ class Recorder:
 
 
 MOMENT_DELAY_S = 0.9
-"""Longest time in seconds for which moments are buffered."""
+"""Maximum simulated time for which moments are buffered."""
 
 
 class MomentSink(Protocol):
@@ -146,7 +146,7 @@ class _BufferedSink:
         self._buffer, self._logs = buffer, logs
 
     def append(self, moment: Moment) -> None:
-        """Buffer a moment, and flush the buffer if its oldest moment has waited long enough."""
+        """Buffer a moment, and flush the buffer if its oldest moment is old enough."""
         buffer, tick = self._buffer, moment.tick
         buffer.pending.append((self._logs, moment))
         if tick >= buffer.next_flush_tick:

@@ -18,12 +18,12 @@ MAP = Topic("/map", "nav_msgs/msg/OccupancyGrid", latched=True)
 ROBOT_DESCRIPTION = Topic("/robot_description", "std_msgs/msg/String", latched=True)
 TRUTH = Topic("/ground_truth/odom", "nav_msgs/msg/Odometry")
 FILTERED_ODOMETRY = Topic("/odometry/filtered", "nav_msgs/msg/Odometry")
-"""The name that ekf_node of robot_localization uses."""
+"""Topic name of ekf_node in robot_localization."""
 CLEARANCE = Topic("/simscen/clearance", "std_msgs/msg/Float64")
 BELIEF = Topic("/amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped")
 PARTICLES = Topic("/particle_cloud", "nav2_msgs/msg/ParticleCloud")
 PARTICLE_POSES = Topic("/particlecloud", "geometry_msgs/msg/PoseArray")
-"""The message that AMCL published before Nav2 had its own. Viewers show it without a plug-in."""
+"""Topic of AMCL before Nav2 had its own message type. Viewers show it without a plug-in."""
 PLAN = Topic("/plan", "nav_msgs/msg/Path")
 LOCAL_PLAN = Topic("/local_plan", "nav_msgs/msg/Path")
 GLOBAL_COSTMAP = Topic("/global_costmap/costmap", "nav_msgs/msg/OccupancyGrid", latched=True)
@@ -31,8 +31,8 @@ LOCAL_COSTMAP = Topic("/local_costmap/costmap", "nav_msgs/msg/OccupancyGrid", la
 COMMAND = Topic("/cmd_vel", "geometry_msgs/msg/Twist")
 GOAL = Topic("/goal_pose", "geometry_msgs/msg/PoseStamped")
 EVENTS = Topic("/simscen/events", "std_msgs/msg/String")
-THINGS = Topic("/simscen/things", "visualization_msgs/msg/MarkerArray", latched=True)
-SCENE = Topic("/simscen/scene", "visualization_msgs/msg/MarkerArray", latched=True)
+OBJECT_MARKERS = Topic("/simscen/things", "visualization_msgs/msg/MarkerArray", latched=True)
+SCENE_MARKERS = Topic("/simscen/scene", "visualization_msgs/msg/MarkerArray", latched=True)
 ROSOUT = Topic("/rosout", "rcl_interfaces/msg/Log")
 
 SCAN_TYPE = "sensor_msgs/msg/LaserScan"

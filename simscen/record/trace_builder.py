@@ -154,7 +154,7 @@ class TraceBuilder:
     """
 
     def __init__(self, clock: Clock, thinning: Thinning | None = None) -> None:
-        """Pass the `thinning` of a log that receives each moment next, so that decisions are made only once."""
+        """`thinning` is that of a log that receives each moment next, so that each sample is checked only once."""
         self._clock = clock
         self._thinning = Thinning(clock.rate) if thinning is None else thinning
         self._rows = TraceRows()
@@ -170,7 +170,7 @@ class TraceBuilder:
             buffer = self._truth
             buffer.rows += buffer.pack(tick, *pose, *twist, clearance)
             if objects:
-                self._add_objects(tick, thinning.moved(tick, truth))
+                self._add_objects(tick, thinning.objects_to_keep(tick, truth))
         for reading in moment.readings:
             if type(reading) is Odometry:
                 if thinning.keeps_odometry(reading):

@@ -49,7 +49,10 @@ def _differences(one: Trace, other: Trace) -> Iterator[Difference]:
     yield from _missing("plan", [p.tick for p in one.plans], [p.tick for p in other.plans])
     for event, twin in zip(one.events, other.events, strict=False):
         if repr(event) != repr(twin):
-            yield min(event.tick, twin.tick), f"event: {event.kind} {event.name} against {twin.kind} {twin.name}"
+            yield (
+                min(event.tick, twin.tick),
+                f"event: {event.kind} {event.name} against {twin.kind} {twin.name}",
+            )
     yield from _missing("event", [e.tick for e in one.events], [e.tick for e in other.events])
     if one.end != other.end:
         yield min(one.end, other.end), f"end of the run: tick {one.end} against {other.end}"

@@ -1,4 +1,4 @@
-"""Selection of the samples to keep of a run, shared by the recorder and the TraceBuilder."""
+"""Downsampling of the signals of a run, shared by the recorder and the TraceBuilder."""
 
 from collections.abc import Mapping
 
@@ -15,9 +15,9 @@ STANDSTILL_RATE_HZ = 1
 class Thinning:
     """Drops samples without new information. The clock has `rate` ticks per second.
 
-    A command is kept if it differs from the last one, and otherwise 20 times a second. The pose of a moving object is
-    kept if it has changed, and otherwise once a second. Of several odometry sensors, the first one with a reading is
-    the robot's odometry. Repeated calls for the same tick return the same answer.
+    A command is kept if it differs from the previous one, and otherwise 20 times a second. The pose of a moving object
+    is kept if it has changed, and otherwise once a second. Of several odometry sensors, the first one with a reading is
+    the robot's odometry. Repeated calls for the same tick return the same result.
     """
 
     def __init__(self, rate: int) -> None:
@@ -28,11 +28,11 @@ class Thinning:
         self._command_checked_tick = -1
         self._odometry: str | None = None
         self._kept_poses: dict[str, tuple[int, Pose3]] = {}
-        self._resting: Mapping[str, Pose3] | None = None
-        """The poses of the previous sample: the same object means that nothing has moved since."""
+        self._previous_poses: Mapping[str, Pose3] | None = None
+        """Poses of the previous sample. If the next sample is the same Python object, nothing has moved."""
         self._standstill_due_tick = 0
-        self._moved_tick = -1
-        self._moved: Mapping[str, Pose3] = {}
+        self._selected_tick = -1
+        self._selected: Mapping[str, Pose3] = {}
         self._all_kept: tuple[int, PosesAtTick] | None = None
         """The previous sample if all its objects were kept. It is added to `_kept_poses` only when needed."""
 
@@ -50,15 +50,15 @@ class Thinning:
             self._odometry = odometry.sensor
         return odometry.sensor == self._odometry
 
-    def moved(self, tick: int, truth: Truth) -> Mapping[str, Pose3]:
-        """Return the moving objects whose poses to keep at this tick, by name."""
-        if tick != self._moved_tick:
-            self._moved_tick, self._moved = tick, self._objects_to_keep(tick, truth.objects)
-        return self._moved
+    def objects_to_keep(self, tick: int, truth: Truth) -> Mapping[str, Pose3]:
+        """Return the poses of moving objects to keep at this tick, by object name."""
+        if tick != self._selected_tick:
+            self._selected_tick, self._selected = tick, self._select_objects(tick, truth.objects)
+        return self._selected
 
-    def _objects_to_keep(self, tick: int, objects: Mapping[str, Pose3]) -> Mapping[str, Pose3]:
-        if type(objects) is PosesAtTick and self._all_moved(objects):
-            self._all_kept, self._resting = (tick, objects), objects
+    def _select_objects(self, tick: int, objects: Mapping[str, Pose3]) -> Mapping[str, Pose3]:
+        if type(objects) is PosesAtTick and self._have_all_moved(objects):
+            self._all_kept, self._previous_poses = (tick, objects), objects
             return objects
         if self._all_kept is not None:
             previous_tick, poses = self._all_kept
@@ -67,8 +67,8 @@ class Thinning:
         self._all_kept = (tick, objects) if type(objects) is PosesAtTick and len(kept) == len(objects) else None
         return kept
 
-    def _all_moved(self, objects: PosesAtTick) -> bool:
-        """Return whether all objects have moved since the previous sample, of which all were kept."""
+    def _have_all_moved(self, objects: PosesAtTick) -> bool:
+        """Return whether all objects have moved since the previous sample, whose poses were all kept."""
         if self._all_kept is None:
             return False
         previous, predicted = self._all_kept[1], objects.predicted
@@ -76,17 +76,17 @@ class Thinning:
 
     def _changed_objects(self, tick: int, objects: Mapping[str, Pose3]) -> dict[str, Pose3]:
         kept = dict[str, Pose3]()
-        is_resting = objects is self._resting
-        if is_resting and tick < self._standstill_due_tick:
+        is_stationary = objects is self._previous_poses
+        if is_stationary and tick < self._standstill_due_tick:
             return kept
         for name, pose in objects.items():
-            last = self._kept_poses.get(name)
-            if last is None or last[1] != pose or tick - last[0] >= self._standstill_period:
+            previous = self._kept_poses.get(name)
+            if previous is None or previous[1] != pose or tick - previous[0] >= self._standstill_period:
                 self._kept_poses[name] = (tick, pose)
                 kept[name] = pose
-        self._resting = objects
+        self._previous_poses = objects
         self._standstill_due_tick = 0
-        if is_resting:
+        if is_stationary:
             oldest = min([self._kept_poses[name][0] for name in objects], default=tick)
             self._standstill_due_tick = oldest + self._standstill_period
         return kept

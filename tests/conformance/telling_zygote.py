@@ -19,8 +19,8 @@ from simscen.cli.session import warm_process
 from simscen.stack.localizers import likelihood_field
 
 FLOOD = 200  # MiB
-perform = warm_process._perform
-prepared = warm_process._PREPARED.prepared
+perform = warm_process._execute
+prepared = warm_process._SCENARIOS.prepared
 
 
 def spin():
@@ -137,6 +137,6 @@ def slow_to_prepare(scenario):
 
 
 if __name__ == "__main__":
-    warm_process._perform = misbehave
-    warm_process._PREPARED.prepared = slow_to_prepare
+    warm_process._execute = misbehave
+    warm_process._SCENARIOS.prepared = slow_to_prepare
     warm_process.main()

@@ -12,7 +12,7 @@ from simscen.record.mcap_writer import MAGIC
 
 
 class UnusableLog(ValueError):
-    """The log cannot be used. The message states the reason, and `hint` what to do."""
+    """The log cannot be used. The message states the reason, and `hint` how to fix it."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.hint = hint
@@ -101,8 +101,8 @@ class BagMessages:
     compressed bags need the optional package rosbags.
     """
 
-    def __init__(self, folder: Path, wanted: Container[str]) -> None:
-        self._folder, self._wanted = folder, wanted
+    def __init__(self, folder: Path, topics: Container[str]) -> None:
+        self._folder, self._topics = folder, topics
         self.complete = False
         self.topics: dict[str, str] = {}
 
@@ -135,11 +135,11 @@ class BagMessages:
         try:
             with Reader(self._folder) as reader:
                 self.topics = {connection.topic: connection.msgtype for connection in reader.connections}
-                chosen = [connection for connection in reader.connections if connection.topic in self._wanted]
-                for connection, time, data in reader.messages(chosen) if chosen else ():
+                selected = [connection for connection in reader.connections if connection.topic in self._topics]
+                for connection, time, data in reader.messages(selected) if selected else ():
                     count += 1
                     yield RawMessage(connection.topic, connection.msgtype, "cdr", time, bytes(data))
-                self.complete = count == sum(connection.msgcount for connection in chosen)
+                self.complete = count == sum(connection.msgcount for connection in selected)
         except (UnusableLog, OSError):
             raise
         except Exception as error:  # rosbags does not catch exceptions of SQLite, YAML and zstd
@@ -147,10 +147,10 @@ class BagMessages:
             raise UnusableLog(text, "try `ros2 bag reindex`") from error
 
 
-def open_messages(path: Path, wanted: Container[str]) -> McapMessages | BagMessages:
-    """Open an MCAP file or a rosbag2 folder for reading at least the topics in `wanted`. Raises UnusableLog."""
+def open_messages(path: Path, topics: Container[str]) -> McapMessages | BagMessages:
+    """Open an MCAP file or a rosbag2 folder for reading at least these topics. Raises UnusableLog."""
     if path.is_dir():
-        return BagMessages(path, wanted)
+        return BagMessages(path, topics)
     if path.suffix == ".bag":
         raise UnusableLog("it is a bag of ROS 1", "convert it, e.g. with `rosbags-convert`, whose bags are of ROS 2")
     if path.suffix == ".db3":

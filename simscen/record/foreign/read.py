@@ -76,7 +76,7 @@ SENSOR_TOPICS = (
     *(topic.name for topic in (topics.GLOBAL_COSTMAP, topics.LOCAL_COSTMAP)),
 )
 """Sensor topics to read from SQLite bags. In MCAP files, lidars are found on any topic."""
-BASE = "base_link"
+BASE_FRAME = "base_link"
 
 
 class SensorMessageCollector:
@@ -103,7 +103,7 @@ class SensorMessageCollector:
             handler(tick, message.data)
         links = {pose.child: pose for _, poses in decoded.by_role["tf_static"] for pose in poses}
         for frame in links:
-            if (mount := lidar_mount(frame, BASE, links)) is not None:
+            if (mount := lidar_mount(frame, BASE_FRAME, links)) is not None:
                 self._sensors.mounts[frame] = Pose3.planar(Pose2(*mount.pose))
         return self._sensors
 
@@ -115,7 +115,7 @@ class SensorMessageCollector:
             self._messages.append(message)
 
     def _check(self, message: RawMessage) -> None:
-        """Decode a message once, so that damage is found now and not when the message is drawn."""
+        """Decode a message once, so that a damaged message is reported now and not when it is drawn."""
         match message.type:
             case topics.SCAN_TYPE:
                 self._sensors.scan(message.data)

@@ -12,11 +12,11 @@ from simscen.core.records.trace import Ticks
 from simscen.record.foreign.raw_messages import UnusableLog
 
 MAX_BACKWARD_JUMP_NS = NS_PER_SECOND
-"""Maximum difference to an earlier but newer stamp of the topic. A larger one means that the clock was reset."""
+"""Maximum step back of the stamps of a topic. A larger one means that the clock was reset."""
 MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
-"""Change of a clock that is reported. Smaller ones are within the delays of logging."""
+"""Minimum change of a clock that is reported. Smaller changes are within the delays of logging."""
 MIN_MESSAGES_AROUND_STEP = 20
-"""Messages before and after a change of a clock that are needed to tell it from delayed messages."""
+"""Minimum number of messages before and after a change of a clock, to distinguish it from delayed messages."""
 MAX_LOGGING_DELAY_NS = 10 * NS_PER_SECOND
 """Maximum difference between the stamps of two topics at the same time. A larger one means different clocks."""
 
@@ -47,7 +47,7 @@ class StampedMessages:
             raise UnusableLog(text, "cut the log there, or judge it with --time log")
 
     @property
-    def disorder(self) -> str:
+    def order_problems(self) -> str:
         """Description of late and repeated stamps, or ""."""
         late = int((np.diff(self.stamps) < 0).sum())
         repeated = len(self.stamps) - len(np.unique(self.stamps))
@@ -59,12 +59,12 @@ class StampedMessages:
 
 
 def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
-    """Return the first message after the clock of the stamps was set, and by how many ns; None if it was not.
+    """Return the index of the first message after the clock of the stamps was set, and the change in ns; or None.
 
     Both times are those of one topic, in ns, in the order of logging. No message is logged before its stamp, so the
-    largest difference of stamp and time of logging is that of the clocks. It changes for good only if a clock is set. A
-    delayed or repeated message, a slow recorder, and a paused simulation do not change it for good, or they change the
-    interval of logging rather than that of the stamps.
+    largest difference of stamp and time of logging is that of the clocks. It changes permanently only if a clock
+    is set. A delayed or repeated message, a slow recorder, and a paused simulation do not change it permanently, or
+    they change the interval of logging rather than that of the stamps.
     """
     count = MIN_MESSAGES_AROUND_STEP
     if len(stamps) < 2 * count:
@@ -82,7 +82,7 @@ def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
 
 
 def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int]) -> None:
-    """Raise UnusableLog if the clock of the recorder was set back, and that of the stamps with it, unless unset.
+    """Raise UnusableLog if the clock of the recorder was set back, together with that of the stamps if they are set.
 
     Both times are in ns, in the order of the file. A file whose messages are sorted in another way has many steps back,
     or parts that do not overlap in time.
@@ -154,9 +154,9 @@ def _header_times(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
     if anchor is None:
         return logged
     stamps = np.maximum.accumulate(anchor.stamps)
-    first, begin = int(anchor.logged[0]), int(stamps[0])
-    known = (anchor.logged - first).astype(np.float64)
-    between = np.interp((logged - first).astype(np.float64), known, (stamps - begin).astype(np.float64))
-    beyond = np.minimum(logged - first, 0) + np.maximum(logged - int(anchor.logged[-1]), 0)
-    times: Ticks = begin + np.rint(between).astype(np.int64) + beyond
+    first, start = int(anchor.logged[0]), int(stamps[0])
+    anchor_times = (anchor.logged - first).astype(np.float64)
+    interpolated = np.interp((logged - first).astype(np.float64), anchor_times, (stamps - start).astype(np.float64))
+    outside = np.minimum(logged - first, 0) + np.maximum(logged - int(anchor.logged[-1]), 0)
+    times: Ticks = start + np.rint(interpolated).astype(np.int64) + outside
     return times

@@ -92,7 +92,7 @@ class ForeignTraceReader:
 
     Attributes:
         rows: Signals and events.
-        time: Ticks of the log.
+        time: Conversion of times to ticks.
         missing: Evidence that the log lacks, with the reason.
         partial: Evidence that the log has only for a part of the time, with the reason.
         notes: Remarks for the user.
@@ -175,14 +175,14 @@ class ForeignTraceReader:
             if self.time.anchor is not None:
                 self.notes.append(f"{track.source}: all stamps are zero, so the times of logging are used")
             return self.time.ticks_of_logged(track.logged)
-        if track.stamped.disorder:
-            self.notes.append(f"{track.source}: {track.stamped.disorder}")
+        if track.stamped.order_problems:
+            self.notes.append(f"{track.source}: {track.stamped.order_problems}")
         return self.time.ticks_of_stamped(track.stamped)
 
     def _add_truth(self, track: Track) -> None:
-        ticks, kept = _last_per_tick(self._ticks(track))
-        poses, planar = track.poses[kept], to_planar(track.poses[kept])
-        twists = None if track.twists is None else track.twists[kept]
+        ticks, last = _last_per_tick(self._ticks(track))
+        poses, planar = track.poses[last], to_planar(track.poses[last])
+        twists = None if track.twists is None else track.twists[last]
         if twists is not None and is_twist_missing(twists, planar):
             text = "all twists are zero although the robot moves, so velocities are computed from the poses"
             self.notes.append(f"{track.source}: {text}")
@@ -203,14 +203,16 @@ class ForeignTraceReader:
         return f"from t = {begin:.2f} s to {end:.2f} s"
 
     def _add_belief(self, track: Track) -> None:
-        ticks, kept = _last_per_tick(self._ticks(track))
-        self.rows.belief.extend(ticks, np.column_stack((track.poses[kept], track.covariances[kept])))
+        ticks, last = _last_per_tick(self._ticks(track))
+        self.rows.belief.extend(ticks, np.column_stack((track.poses[last], track.covariances[last])))
         truth_ticks, truth = self.rows.truth.columns()
         before = truth[truth_ticks <= ticks[0], :2]
         moved = float(np.hypot(*np.ptp(before, axis=0))) if len(before) else 0.0
         if moved > MAX_DISTANCE_BEFORE_BELIEF_M:
-            at = ticks[0] / self.time.rate
-            self.partial[Evidence.BELIEF] = f"{track.source} starts at t = {at:.2f} s, after {moved:.2f} m of driving"
+            start = ticks[0] / self.time.rate
+            self.partial[Evidence.BELIEF] = (
+                f"{track.source} starts at t = {start:.2f} s, after {moved:.2f} m of driving"
+            )
 
     def _check_frames(self, truth: Track | None, belief: Track | None) -> None:
         """Set the alignment as missing if ground truth and belief have different frames."""
@@ -239,12 +241,12 @@ class ForeignTraceReader:
         return self._reason_missing(role, self._options.topic(role)).split(";")[0]
 
     def _add_role(self, role: str, ticks: Ticks, values: list[Any]) -> None:
-        kept_ticks, kept = _last_per_tick(ticks)
+        distinct_ticks, last = _last_per_tick(ticks)
         match role:
             case "odom":
-                self.rows.odometry.extend(kept_ticks, np.array([values[k].pose for k in kept]))
+                self.rows.odometry.extend(distinct_ticks, np.array([values[k].pose for k in last]))
             case "cmd_vel":
-                self.rows.command.extend(kept_ticks, np.array([values[k].values for k in kept]))
+                self.rows.command.extend(distinct_ticks, np.array([values[k].values for k in last]))
             case "scan":
                 self.rows.scans.extend(ticks.tolist())
             case "plan":

@@ -36,13 +36,13 @@ class TransformTree:
 
     def add(self, logged: int, links: list[StampedPose], static: bool) -> None:
         """Add one message. If a frame gets another parent, its previous transforms are dropped."""
-        for posed in links:
-            link = self._links.get(posed.child)
-            if link is None or link.parent != posed.frame:
-                link = self._links[posed.child] = _Link(posed.frame, static=static)
+        for transform in links:
+            link = self._links.get(transform.child)
+            if link is None or link.parent != transform.frame:
+                link = self._links[transform.child] = _Link(transform.frame, static=static)
             link.logged.append(logged)
-            link.stamps.append(posed.stamp)
-            link.poses.append(posed.pose)
+            link.stamps.append(transform.stamp)
+            link.poses.append(transform.pose)
 
     def between(self, outer: str, inner: str) -> tuple[StampedMessages, Array] | str:
         """Return the poses (n, 7) of `inner` in `outer` with their times, or the reason why they are unknown.
@@ -58,14 +58,14 @@ class TransformTree:
             return f"tf between {outer} and {inner} never changes"
         times = np.array(moving.stamps, dtype=np.int64)
         begin = max(min(link.stamps) for link in chain if not link.static)
-        kept = times >= begin
-        poses = np.tile([0.0, 0, 0, 0, 0, 0, 1], (int(kept.sum()), 1))
+        is_connected = times >= begin
+        poses = np.tile([0.0, 0, 0, 0, 0, 0, 1], (int(is_connected.sum()), 1))
         for link in chain:
-            poses = _compose(_latest_poses(link, times[kept]), poses)
-        if not kept.any():
-            return f"tf never connects {outer} and {inner} at one time"
-        logged = np.array(moving.logged, dtype=np.int64)[kept]
-        return StampedMessages(f"tf {outer}:{inner}", logged, times[kept]), poses
+            poses = _compose(_latest_poses(link, times[is_connected]), poses)
+        if not is_connected.any():
+            return f"tf never connects {outer} and {inner} at the same time"
+        logged = np.array(moving.logged, dtype=np.int64)[is_connected]
+        return StampedMessages(f"tf {outer}:{inner}", logged, times[is_connected]), poses
 
     def _chain(self, outer: str, inner: str) -> list[_Link] | str:
         """Return the transforms from `inner` up to `outer`, or the reason why there is no such chain."""
@@ -86,15 +86,15 @@ def _latest_poses(link: _Link, times: Ticks) -> Array:
     stamps, poses = np.array(link.stamps, dtype=np.int64), np.array(link.poses)
     order = np.argsort(stamps, kind="stable")
     newest = np.searchsorted(stamps[order], times, side="right") - 1
-    held: Array = poses[order][len(order) - 1 if link.static else np.maximum(newest, 0)]
-    return np.tile(held, (len(times), 1)) if held.ndim == 1 else held
+    latest: Array = poses[order][len(order) - 1 if link.static else np.maximum(newest, 0)]
+    return np.tile(latest, (len(times), 1)) if latest.ndim == 1 else latest
 
 
 def _compose(outer: Array, inner: Array) -> Array:
     """Compose poses (n, 7)."""
     ax, ay, az, aw = outer[:, 3:].T
     bx, by, bz, bw = inner[:, 3:].T
-    turned = np.column_stack(
+    rotations = np.column_stack(
         (
             aw * bx + ax * bw + ay * bz - az * by,
             aw * by - ax * bz + ay * bw + az * bx,
@@ -103,12 +103,12 @@ def _compose(outer: Array, inner: Array) -> Array:
         )
     )
     axis, w = outer[:, 3:6], outer[:, 6:7]
-    across = 2 * np.cross(axis, inner[:, :3])
-    moved = inner[:, :3] + w * across + np.cross(axis, across)
-    return np.column_stack((outer[:, :3] + moved, turned))
+    cross = 2 * np.cross(axis, inner[:, :3])
+    rotated = inner[:, :3] + w * cross + np.cross(axis, cross)
+    return np.column_stack((outer[:, :3] + rotated, rotations))
 
 
-_BASES = ("base_link", "base_footprint")
+_BASE_FRAMES = ("base_link", "base_footprint")
 
 
 class LidarMount(NamedTuple):
@@ -123,15 +123,15 @@ def lidar_mount(frame: str, base: str, links: Mapping[str, StampedPose]) -> Lida
 
     `links` are the static transforms by child frame.
     """
-    pose, seen, nearest = Pose3(0, 0, 0, 0, 0, 0, 1), set(), None
+    pose, visited, nearest = Pose3(0, 0, 0, 0, 0, 0, 1), set(), None
     while True:
         if frame == base:
             return _planar_mount(pose)
-        if nearest is None and frame.rpartition("/")[2] in _BASES:
+        if nearest is None and frame.rpartition("/")[2] in _BASE_FRAMES:
             nearest = _planar_mount(pose)
-        if frame not in links or frame in seen:
+        if frame not in links or frame in visited:
             return nearest
-        seen.add(frame)
+        visited.add(frame)
         link = links[frame]
         pose, frame = Pose3(*link.pose).compose(pose), link.frame
 

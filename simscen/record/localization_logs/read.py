@@ -51,8 +51,8 @@ def read_localization_log(path: Path, odometry: str, scan: str, reference: str |
             rows = read_carmen_rows(path)
         else:
             rows = read_rosbag_rows(path, odometry, scan, reference)
-        for kind, found in (("odometry", rows.odometry), ("scans", rows.scans)):
-            if not found:
+        for kind, kind_rows in (("odometry", rows.odometry), ("scans", rows.scans)):
+            if not kind_rows:
                 raise UnusableLog(f"it has no {kind}", rows.hint)
         return _to_log(rows)
     except UnusableLog as error:
@@ -112,5 +112,5 @@ def _check_readings(readings: Sequence[Odometry | Scan]) -> Iterator[str]:
 
 
 def _scan(row: ScanRow, tick: int) -> Scan:
-    first, increment, least, most = row.layout
-    return Scan("lidar", tick, row.ranges, first, increment, least, most, Pose2(*row.mount))
+    first, increment, range_min, range_max = row.layout
+    return Scan("lidar", tick, row.ranges, first, increment, range_min, range_max, Pose2(*row.mount))

@@ -7,7 +7,7 @@ from simscen.core.geometry import Array
 
 TICK_RATE_HZ = 1000
 MAX_TIME_S, MAX_COORDINATE_M = 1e11, 1e6
-"""Limits for valid times and coordinates. Squares of larger numbers, as broken sensors measure them, could overflow."""
+"""Limits for valid times and coordinates. Squares of larger numbers, as from broken sensors, could overflow."""
 Triple = tuple[float, float, float]
 """Pose x, y, yaw."""
 
@@ -51,6 +51,6 @@ class LocalizationRows:
     notes: list[str] = field(default_factory=list)
 
 
-def all_within(values: Iterable[float], largest: float) -> bool:
-    """Return whether all values are numbers within ±`largest`."""
-    return all(-largest < value < largest for value in values)
+def all_within(values: Iterable[float], limit: float) -> bool:
+    """Return whether all values are numbers within ±`limit`."""
+    return all(-limit < value < limit for value in values)

@@ -38,15 +38,15 @@ def read_csv_rows(path: Path) -> LocalizationRows:
     rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), (0.0, 0.0, 0.0)
     with path.open(encoding="utf-8", newline="") as lines:
         for number, row in _numbered_rows(lines, rows.hint):
-            words = [word.strip() for word in row]
-            if not words or not words[0] or words[0].startswith("#"):
+            cells = [cell.strip() for cell in row]
+            if not cells or not cells[0] or cells[0].startswith("#"):
                 continue
             try:
-                values = [float(word) for word in words[1:] if word]
-                if words[0] == "mount":
-                    mount = _finite(values, 3)
+                values = [float(cell) for cell in cells[1:] if cell]
+                if cells[0] == "mount":
+                    mount = _checked_pose(values, 3)
                 else:
-                    _add_row(rows, words[0], number, values, mount)
+                    _add_row(rows, cells[0], number, values, mount)
             except ValueError as error:
                 raise UnusableLog(f"line {number}: {error}", rows.hint) from error
     return rows
@@ -67,13 +67,13 @@ def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float],
             time, pose = (values or [math.nan])[0], values[1:]
             target = rows.odometry if kind == "odom" else rows.truth
             _check_time(time)
-            target.append(PoseRow(time, order, _finite(pose, 3)))
+            target.append(PoseRow(time, order, _checked_pose(pose, 3)))
         case "scan":
             if len(values) < 6 or not all(math.isfinite(value) for value in values[:5]):
                 raise ValueError("a scan needs TIME, ANGLE_MIN, ANGLE_INCREMENT, RANGE_MIN, RANGE_MAX and ranges")
-            time, first, step, least, most = values[:5]
+            time, first, step, range_min, range_max = values[:5]
             _check_time(time)
-            rows.scans.append(ScanRow(time, order, np.array(values[5:]), (first, step, least, most), mount))
+            rows.scans.append(ScanRow(time, order, np.array(values[5:]), (first, step, range_min, range_max), mount))
         case _:
             raise ValueError(f"unknown kind of row {kind!r}; use odom, scan, truth or mount")
 
@@ -83,7 +83,7 @@ def _check_time(time: float) -> None:
         raise ValueError(f"{time} is not a valid time")
 
 
-def _finite(values: list[float], count: int) -> Triple:
+def _checked_pose(values: list[float], count: int) -> Triple:
     if len(values) != count or not all(math.isfinite(value) for value in values):
         raise ValueError(f"expected {count} numbers, got {values}")
     if not all_within(values, MAX_COORDINATE_M):
@@ -102,23 +102,23 @@ def read_carmen_rows(path: Path) -> LocalizationRows:
     with path.open(encoding="utf-8", errors="strict") as lines:
         for number, line in enumerate(lines, 1):
             words = line.split()
-            if words and words[0] in _LINES:
+            if words and words[0] in _LINE_PARSERS:
                 try:
-                    _LINES[words[0]](rows, number, words)
+                    _LINE_PARSERS[words[0]](rows, number, words)
                 except (ValueError, IndexError) as error:
                     raise UnusableLog(f"line {number} is not a {words[0]} line: {error}") from error
     return rows
 
 
-def _odom(rows: LocalizationRows, order: int, words: list[str]) -> None:
+def _parse_odom(rows: LocalizationRows, order: int, words: list[str]) -> None:
     rows.odometry.append(PoseRow(_time(words[-3]), order, _pose(words[1:4])))
 
 
-def _truepos(rows: LocalizationRows, order: int, words: list[str]) -> None:
+def _parse_truepos(rows: LocalizationRows, order: int, words: list[str]) -> None:
     rows.truth.append(PoseRow(_time(words[-3]), order, _pose(words[1:4])))
 
 
-def _flaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
+def _parse_flaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
     """Read `FLASER n r… x y theta odom_x odom_y odom_theta time host logger_time`."""
     count = int(words[1])
     ranges, rest = _ranges(words[2 : 2 + count], count), words[2 + count :]
@@ -126,19 +126,19 @@ def _flaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
     step = math.pi / max(1, count - 1) if count % 2 else math.pi / count
     rows.odometry.append(PoseRow(time, order, _pose(rest[3:6])))
     mount = _relative_pose(_pose(rest[3:6]), _pose(rest[:3]))
-    mounted = mount if math.hypot(*mount[:2]) < 1.0 else (0.0, 0.0, 0.0)  # some logs have corrected poses here
-    rows.scans.append(ScanRow(time, order, ranges, (-math.pi / 2, step, 0.0, DEFAULT_MAX_RANGE_M), mounted))
+    mount = mount if math.hypot(*mount[:2]) < 1.0 else (0.0, 0.0, 0.0)  # some logs have corrected poses here
+    rows.scans.append(ScanRow(time, order, ranges, (-math.pi / 2, step, 0.0, DEFAULT_MAX_RANGE_M), mount))
 
 
-def _robotlaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
+def _parse_robotlaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
     """Read `ROBOTLASER1 type start fov step max accuracy mode n r… m remission… laser robot … time host time`."""
-    first, _, step, most = (_parse_finite(word) for word in words[2:6])
+    first, _, step, range_max = (_parse_finite(word) for word in words[2:6])
     count = int(words[8])
     ranges = _ranges(words[9 : 9 + count], count)
     rest = words[10 + count + int(words[9 + count]) :]
     time, laser, robot = _time(words[-3]), _pose(rest[:3]), _pose(rest[3:6])
     rows.odometry.append(PoseRow(time, order, robot))
-    rows.scans.append(ScanRow(time, order, ranges, (first, step, 0.0, most), _relative_pose(robot, laser)))
+    rows.scans.append(ScanRow(time, order, ranges, (first, step, 0.0, range_max), _relative_pose(robot, laser)))
 
 
 def _ranges(words: list[str], count: int) -> "np.ndarray[tuple[int, ...], np.dtype[np.float64]]":
@@ -171,4 +171,9 @@ def _parse_finite(word: str) -> float:
     return value
 
 
-_LINES = {"ODOM": _odom, "FLASER": _flaser, "ROBOTLASER1": _robotlaser, "TRUEPOS": _truepos}
+_LINE_PARSERS = {
+    "ODOM": _parse_odom,
+    "FLASER": _parse_flaser,
+    "ROBOTLASER1": _parse_robotlaser,
+    "TRUEPOS": _parse_truepos,
+}

@@ -73,7 +73,7 @@ class LogContents:
             case records.Channel():
                 self._add_channel(record)
             case _:
-                pass  # indices and statistics
+                pass  # indexes and statistics
 
     def header(self) -> LogHeader:
         """Return the description of the run. Raises NotSimscenLog if the log has none."""
@@ -115,7 +115,7 @@ class LogContents:
         return {name: contents.trace() for name, contents in self.robots.items()}
 
     def coverage(self) -> LogCoverage:
-        """Return the evidence that is missing because the log holds fewer messages than were recorded."""
+        """Return the evidence that is missing because the log has fewer messages than were recorded."""
         return LogCoverage() if self.end is None else self._counts.coverage()
 
     def result(self) -> str:
@@ -160,53 +160,53 @@ class LogContents:
         message_type = self._types.get(channel.schema_id, "")
         self._counts.add_channel(channel.id, channel.topic, message_type)
         by_topic: dict[tuple[str, str], Handler] = {
-            topics.TRUTH[:2]: self._truth,
+            topics.TRUTH[:2]: self._add_truth,
             topics.CLEARANCE[:2]: lambda tick, data: self._rows.clearance.add(tick, *MessageReader(data).take("d")),
-            topics.BELIEF[:2]: self._belief,
-            topics.COMMAND[:2]: self._command,
-            topics.PLAN[:2]: self._plan,
-            topics.EVENTS[:2]: self._event,
-            topics.TF[:2]: self._transforms,
-            topics.TF_STATIC[:2]: self._mounts,
+            topics.BELIEF[:2]: self._add_belief,
+            topics.COMMAND[:2]: self._add_command,
+            topics.PLAN[:2]: self._add_plan,
+            topics.EVENTS[:2]: self._add_event,
+            topics.TF[:2]: self._add_object_poses,
+            topics.TF_STATIC[:2]: self._set_mounts,
             topics.MAP[:2]: self._set_map,
             topics.ROBOT_DESCRIPTION[:2]: self._set_robot_description,
-            ("/odom", topics.ODOMETRY_TYPE): self._odometry,
+            ("/odom", topics.ODOMETRY_TYPE): self._add_odometry,
         }
-        handler = self._scan if message_type == topics.SCAN_TYPE else by_topic.get((channel.topic, message_type))
+        handler = self._add_scan if message_type == topics.SCAN_TYPE else by_topic.get((channel.topic, message_type))
         sensor_handler = self.sensors.handler(channel.topic, message_type) if self._with_sensors else None
-        if handlers := [each for each in (handler, sensor_handler) if each is not None]:
+        if handlers := [one for one in (handler, sensor_handler) if one is not None]:
             self._handlers[channel.id] = handlers[0] if len(handlers) == 1 else _call_all(handlers)
 
-    def _truth(self, tick: int, data: bytes) -> None:
+    def _add_truth(self, tick: int, data: bytes) -> None:
         odometry = decode.odometry(MessageReader(data))
         self._rows.truth.add(tick, *odometry.pose, *(odometry.twist or ()))
 
-    def _odometry(self, tick: int, data: bytes) -> None:
+    def _add_odometry(self, tick: int, data: bytes) -> None:
         self._rows.odometry.add(tick, *decode.odometry(MessageReader(data)).pose)
 
-    def _belief(self, tick: int, data: bytes) -> None:
+    def _add_belief(self, tick: int, data: bytes) -> None:
         belief = decode.pose_with_covariance_stamped(MessageReader(data))
         self._rows.belief.add(tick, *belief.pose, *belief.covariance)
 
-    def _command(self, tick: int, data: bytes) -> None:
+    def _add_command(self, tick: int, data: bytes) -> None:
         self._rows.command.add(tick, *decode.twist(MessageReader(data)).values)
 
-    def _scan(self, tick: int, _: bytes) -> None:
+    def _add_scan(self, tick: int, _: bytes) -> None:
         self._rows.scans.append(tick)
 
-    def _plan(self, _: int, data: bytes) -> None:
+    def _add_plan(self, _: int, data: bytes) -> None:
         path = decode.path(MessageReader(data))
         self._rows.plans.append((self._time.tick(path.stamp), path.poses))
 
-    def _event(self, _: int, data: bytes) -> None:
+    def _add_event(self, _: int, data: bytes) -> None:
         self._rows.events.append(event_text.from_json(MessageReader(data).string()))
 
-    def _transforms(self, tick: int, data: bytes) -> None:
+    def _add_object_poses(self, tick: int, data: bytes) -> None:
         for link in decode.transforms(MessageReader(data)):
             if (name := frame_names.object_in_frame(link.child)) is not None:
                 self._rows.object(name).add(tick, *link.pose)
 
-    def _mounts(self, _: int, data: bytes) -> None:
+    def _set_mounts(self, _: int, data: bytes) -> None:
         self._frames = self.sensors.mounts = {
             self.sensors.frames.stack_frame(link.child): Pose3(*link.pose)
             for link in decode.transforms(MessageReader(data))
@@ -225,7 +225,7 @@ def _call_all(handlers: list[Handler]) -> Handler:
     """Return a handler that calls several handlers."""
 
     def handle(tick: int, data: bytes) -> None:
-        for each in handlers:
-            each(tick, data)
+        for handler in handlers:
+            handler(tick, data)
 
     return handle

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from simscen.core.records.verdict import Evidence, LogCoverage
 from simscen.record import log_header, topics
 
-NO_COUNTS = "the log does not say how many messages were recorded: an older simscen wrote it, or its end was edited"
+NO_COUNTS = "the log has no message counts: an older simscen wrote it, or its end was edited"
 
 _EVENTS = frozenset(
     {Evidence.CONTACTS, Evidence.NAVIGATION, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES}
@@ -54,7 +54,7 @@ class MessageCounts:
             }
 
     def coverage(self) -> LogCoverage:
-        """Return the evidence with missing messages, with their numbers."""
+        """Return the evidence with missing messages, and the number of messages as the reason."""
         if self._expected is None:
             return LogCoverage(partial=dict.fromkeys(Evidence, NO_COUNTS))
         found = {topic: self._found.get(channel, 0) for channel, topic in self._topics.items()}

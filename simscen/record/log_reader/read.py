@@ -42,11 +42,11 @@ class Log:
 
     Attributes:
         header: Description of the run.
-        trace: What happened.
+        trace: Signals and events of the run.
         result: Result of the run (JSON), or "" if there is none.
         complete: False if the run was aborted; the trace then ends with the last message.
         sensors: Messages that are not part of the trace. Empty unless requested.
-        coverage: Evidence that is missing because the log holds fewer messages than were recorded.
+        coverage: Evidence that is missing because the log has fewer messages than were recorded.
     """
 
     header: LogHeader
@@ -120,7 +120,7 @@ def invalid_log(path: Path, code: str, message: str, hint: str = "") -> InvalidI
 
 
 def recover(path: Path) -> bool:
-    """Rewrite the log of an aborted run with an index, which other tools need. Return False if it has one already.
+    """Rewrite the log of an aborted run with an index, which other tools need. Return False if it already has one.
 
     The log keeps its name, and remains the log of an aborted run. Raises InvalidInput if the file cannot be read or is
     not MCAP, RunError of kind "output" if the new file cannot be written.
@@ -152,9 +152,9 @@ def _ends_with_magic(stream: IO[bytes]) -> bool:
         raise NotSimscenLog("it is not an MCAP file")
     size = stream.seek(0, os.SEEK_END)
     stream.seek(max(len(MAGIC), size - len(MAGIC)))
-    ends = stream.read() == MAGIC
+    is_complete = stream.read() == MAGIC
     stream.seek(0)
-    return ends
+    return is_complete
 
 
 def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
@@ -180,7 +180,7 @@ def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
             case records.Metadata():
                 writer.add_metadata(record.name, record.metadata)
             case _:
-                pass  # indices are written again
+                pass  # indexes are written again
     if writer is None:
         raise NotSimscenLog("it has no header")
     writer.finish()

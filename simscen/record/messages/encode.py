@@ -68,13 +68,13 @@ def odometry_with_covariance(frame: str, child: str) -> Template:
 
 
 def imu(frame: str) -> Template:
-    """Return the layout of sensor_msgs/msg/Imu: stamp, turn, turn_variance, force, force_variance.
+    """Return the layout of sensor_msgs/msg/Imu: stamp, angular velocity, variance, linear acceleration, variance.
 
-    `turn` is the angular velocity and `force` the linear acceleration; each has the same variance for all axes. The
-    first orientation covariance is -1, because there is no orientation.
+    Each vector has the same variance for all axes. The first orientation covariance is -1, because there is no
+    orientation.
     """
     message = _stamped(frame).put("4d", *_NO_ROTATION).put("9d", -1.0, *[0.0] * 8)
-    for vector in ("turn", "force"):
+    for vector in ("angular_velocity", "linear_acceleration"):
         message.slot("3d", f"*{vector}")
         for _ in range(2):
             message.slot("d24x", f"{vector}_variance")
@@ -92,20 +92,20 @@ def pose_stamped(frame: str) -> Template:
     return _stamped(frame).slot("7d", "*pose")
 
 
-def transforms(links: Sequence[tuple[str, str, str]], more: int = 0, size: int = 0) -> Template:
+def transforms(links: Sequence[tuple[str, str, str]], packed_count: int = 0, packed_bytes: int = 0) -> Template:
     """Return the layout of tf2_msgs/msg/TFMessage: stamp, the poses of the links, and packed.
 
     Each link is a frame, its child frame, and the name of the field for the child's pose. The field `packed` exists if
-    there are `more` links, serialized already, with `size` bytes in total.
+    there are `packed_count` more links that are already serialized, with `packed_bytes` in total.
     """
-    message = Template().put("I", len(links) + more)
+    message = Template().put("I", len(links) + packed_count)
     for frame, child, pose in links:
         message.slot("iI", "*stamp")
         message.string(frame)
         message.string(child)
         message.slot("7d", f"*{pose}")
-    if more:
-        message.slot(f"{size}s", "packed")
+    if packed_count:
+        message.slot(f"{packed_bytes}s", "packed")
     return message
 
 

@@ -75,8 +75,8 @@ class PathPacker:
         head = self._pack(stamp, len(points))
         if not len(points):
             return head
-        poses, when = planar_poses(points).astype("<f8"), struct.pack("<iI", *stamp)
-        first, other = when + self._first, when + self._next
+        poses, stamp_bytes = planar_poses(points).astype("<f8"), struct.pack("<iI", *stamp)
+        first, other = stamp_bytes + self._first, stamp_bytes + self._next
         rest = np.empty((len(points) - 1, len(other) + 56), dtype=np.uint8)
         rest[:, : len(other)] = np.frombuffer(other, dtype=np.uint8)
         rest[:, len(other) :] = poses[1:].view(np.uint8).reshape(-1, 56)
@@ -104,33 +104,33 @@ class TransformsPacker:
     """
 
     def __init__(self) -> None:
-        self._firsts: dict[tuple[str, str, int], Callable[[Stamp, Pose3], bytes]] = {}
-        self._others: dict[tuple[str, str], Callable[[Stamp, Pose3], bytes]] = {}
+        self._first_packers: dict[tuple[str, str, int], Callable[[Stamp, Pose3], bytes]] = {}
+        self._other_packers: dict[tuple[str, str], Callable[[Stamp, Pose3], bytes]] = {}
 
     def __call__(self, links: list[Link]) -> bytes:
-        """Encode some links."""
+        """Encode links."""
         if not links:
             return HEADER + bytes(4)
         frame, child, stamp, pose = links[0]
         key = frame, child, len(links)
-        known = self._firsts.get(key)
-        if known is None:
-            known = self._firsts[key] = _transform(frame, child, HEADER + struct.pack("<I", len(links)), 4)
-        message = known(stamp, pose)
-        return message if len(links) == 1 else b"".join((message, *map(self._other, links[1:])))
+        pack = self._first_packers.get(key)
+        if pack is None:
+            pack = self._first_packers[key] = _transform_packer(frame, child, HEADER + struct.pack("<I", len(links)), 4)
+        message = pack(stamp, pose)
+        return message if len(links) == 1 else b"".join((message, *map(self._pack_other, links[1:])))
 
-    def _other(self, link: Link) -> bytes:
+    def _pack_other(self, link: Link) -> bytes:
         frame, child, stamp, pose = link
-        known = self._others.get((frame, child))
-        if known is None:
-            known = self._others[frame, child] = _transform(frame, child, b"", 0)
-        return known(stamp, pose)
+        pack = self._other_packers.get((frame, child))
+        if pack is None:
+            pack = self._other_packers[frame, child] = _transform_packer(frame, child, b"", 0)
+        return pack(stamp, pose)
 
 
-def _transform(frame: str, child: str, before: bytes, start: int) -> Callable[[Stamp, Pose3], bytes]:
+def _transform_packer(frame: str, child: str, prefix: bytes, start: int) -> Callable[[Stamp, Pose3], bytes]:
     """Return a packer of geometry_msgs/msg/TransformStamped that starts `start` bytes after a multiple of eight."""
     return (
-        Template(prefix=before, start=start)
+        Template(prefix=prefix, start=start)
         .slot("iI", "*stamp")
         .string(frame)
         .string(child)

@@ -1,4 +1,4 @@
-"""Destinations of messages: channels of a log, with batches that are packed in one call for speed."""
+"""Destinations of messages: channels of a log, and batches that are packed in one call for speed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
@@ -43,7 +43,7 @@ class TopicWriter:
 
 
 class BatchWriter:
-    """Packs several messages with the same time. A field name stands for the same value in all messages."""
+    """Packs several messages with the same time. Fields with the same name have the same value in all messages."""
 
     def __init__(self, out: MessageSink, layouts: Layouts) -> None:
         self._out = out

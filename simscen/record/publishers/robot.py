@@ -114,7 +114,7 @@ class StackPublisher:
         self._command = out.batch_writer([(topics.COMMAND, encode.twist())])
         self._belief = out.batch_writer([(topics.BELIEF, encode.pose_with_covariance(frame_names.MAP))])
         self._particle_times = Throttle(time.rate, PARTICLE_RATE_HZ)
-        self._poses_times = Throttle(time.rate, POSE_ARRAY_RATE_HZ)
+        self._pose_array_times = Throttle(time.rate, POSE_ARRAY_RATE_HZ)
         self._local_plan_times = Throttle(time.rate, LOCAL_PLAN_RATE_HZ)
 
     def write(self, now: int, tick: int, decision: Decision) -> None:
@@ -142,13 +142,13 @@ class StackPublisher:
         self._belief.write(now, stamp, pose, belief.covariance.ravel().tolist())
         if len(belief.particles) and self._particle_times.passes(tick):
             self._out.publish(topics.PARTICLES, now, self._particles(stamp, belief.particles))
-        if len(belief.particles) and self._poses_times.passes(tick):
-            some = belief.particles[:: -(-len(belief.particles) // MAX_ARRAY_POSES)]
-            self._out.publish(topics.PARTICLE_POSES, now, encode_arrays.pose_array(frame_names.MAP, stamp, some))
+        if len(belief.particles) and self._pose_array_times.passes(tick):
+            subset = belief.particles[:: -(-len(belief.particles) // MAX_ARRAY_POSES)]
+            self._out.publish(topics.PARTICLE_POSES, now, encode_arrays.pose_array(frame_names.MAP, stamp, subset))
 
 
 MAX_LAYOUTS = 16
-"""Maximum number of sets of moving objects with a precomputed layout. Most runs have few such sets."""
+"""Maximum number of sets of moving objects with a cached message layout. Most runs have few such sets."""
 
 
 class TruthPublisher:
@@ -159,31 +159,31 @@ class TruthPublisher:
     ) -> None:
         self._out, self._time, self._thinning, self._frame = out, time, thinning, frames.truth
         truth = (topics.TRUTH, encode.odometry(frame_names.MAP, frames.truth)), (topics.CLEARANCE, encode.float64())
-        self._always = ((topics.CLOCK, encode.clock()), *truth) if clock else truth
-        self._without_tf = out.batch_writer(self._always)
+        self._common_layouts = ((topics.CLOCK, encode.clock()), *truth) if clock else truth
+        self._without_tf = out.batch_writer(self._common_layouts)
         self._layouts: dict[tuple[str, ...], BatchWriter] = {}
         self._pack_transforms, self._tf_writer = TransformsPacker(), out.topic_writer(topics.TF)
         self._precomputed: _PrecomputedBatch | None = None
 
     def write(self, now: int, tick: int, truth: Truth) -> None:
         """Publish the sample of `tick`, which is at `now` nanoseconds."""
-        moved = self._thinning.moved(tick, truth) if truth.objects else {}
+        poses = self._thinning.objects_to_keep(tick, truth) if truth.objects else {}
         stamp, fields = self._time.stamp(tick), (truth.pose, truth.twist, truth.clearance)
-        if type(moved) is PosesAtTick:
+        if type(poses) is PosesAtTick:
             batch = self._precomputed
-            if batch is None or batch.predicted is not moved.predicted:
-                batch = self._precomputed = self._precompute(moved.predicted)
-            batch.layout.write(now, stamp, *fields, batch.packed[moved.row].tobytes())
+            if batch is None or batch.predicted is not poses.predicted:
+                batch = self._precomputed = self._precompute(poses.predicted)
+            batch.layout.write(now, stamp, *fields, batch.packed[poses.row].tobytes())
             return
-        names = tuple(moved)
+        names = tuple(poses)
         layout = self._layouts.get(names)
         if layout is None and len(self._layouts) < MAX_LAYOUTS:
             layout = self._layouts[names] = self._layout(names)
         if layout is not None:
-            layout.write(now, stamp, *fields, *moved.values())
+            layout.write(now, stamp, *fields, *poses.values())
             return
         self._without_tf.write(now, stamp, *fields)
-        links = [(frame_names.MAP, frame_names.object_frame(name), stamp, pose) for name, pose in moved.items()]
+        links = [(frame_names.MAP, frame_names.object_frame(name), stamp, pose) for name, pose in poses.items()]
         self._tf_writer.write(now, self._pack_transforms([(frame_names.MAP, self._frame, stamp, truth.pose), *links]))
 
     def _precompute(self, predicted: PredictedPoses) -> "_PrecomputedBatch":
@@ -194,15 +194,15 @@ class TruthPublisher:
         else:
             transforms = PrecomputedTransforms([(frame_names.MAP, frame_names.object_frame(name)) for name in names])
             tf = encode.transforms([(frame_names.MAP, self._frame, "pose")], len(names), transforms.size)
-            layout = self._out.batch_writer((*self._always, (topics.TF, tf)))
+            layout = self._out.batch_writer((*self._common_layouts, (topics.TF, tf)))
         stamps = [self._time.stamp(tick) for tick in predicted.ticks]
         return _PrecomputedBatch(predicted, transforms, layout, transforms(stamps, predicted.table))
 
-    def _layout(self, moved: Iterable[str]) -> BatchWriter:
+    def _layout(self, names: Iterable[str]) -> BatchWriter:
         """Return a writer for the messages with the poses of the robot and of these objects on /tf."""
-        links = [(frame_names.MAP, frame_names.object_frame(name), f"object{k}") for k, name in enumerate(moved)]
+        links = [(frame_names.MAP, frame_names.object_frame(name), f"object{k}") for k, name in enumerate(names)]
         tf = encode.transforms([(frame_names.MAP, self._frame, "pose"), *links])
-        return self._out.batch_writer((*self._always, (topics.TF, tf)))
+        return self._out.batch_writer((*self._common_layouts, (topics.TF, tf)))
 
 
 class _PrecomputedBatch(NamedTuple):

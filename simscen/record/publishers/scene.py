@@ -44,10 +44,10 @@ def marker_array(markers: Iterable[Marker]) -> bytes:
 
     Stamps are zero and frames locked, so that each marker moves with its frame.
     """
-    shown = list(markers)
-    message = Template().put("I", len(shown) + 1)
+    markers = list(markers)
+    message = Template().put("I", len(markers) + 1)
     _put(message, Marker("map", "", ARROW, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0, _DELETE_ALL)
-    for number, marker in enumerate(shown):
+    for number, marker in enumerate(markers):
         _put(message, marker, number, _ADD)
     return bytes(message.buffer)
 
@@ -93,7 +93,7 @@ PLACE_COLOR: Color = (0.44, 0.45, 0.49, 1.0)
 RAMP_COLOR: Color = (0.66, 0.58, 0.43, 1.0)
 TRUTH_COLOR: Color = (0.0, 0.44, 0.34, 1.0)
 BELIEF_COLOR: Color = (0.8, 0.2, 0.5, 1.0)
-"""The colors of Okabe and Ito, as on pages and pictures."""
+"""Colors of Okabe and Ito, as on pages and pictures."""
 LINE_SCALE, TEXT_SCALE = (0.03, 0.0, 0.0), (0.0, 0.0, 0.25)
 """Scales in m: width of lines and height of letters."""
 MAX_MASK_BLOCKS = 2000
@@ -112,16 +112,16 @@ class ScenePublisher:
         own_zones = (zone for zone in scenery.zones if zone.robot == robot)
         self._zones: dict[tuple[str, str], FilterZone] = {(zone.filter, zone.region): zone for zone in own_zones}
         self.has_published = False
-        """Afterwards, `write` must be called only for ticks with events."""
+        """Whether `write` was called. If so, it must be called again only for ticks with events."""
 
     def write(self, now: int, events: Sequence[Event]) -> None:
         """Update the markers after events, and publish them at `now` nanoseconds if they have changed."""
         objects_changed = [self._update_objects(event) for event in events]
         zones_changed = [self._update_zones(event) for event in events]
         if any(objects_changed) or not self.has_published:
-            self._out.publish(topics.THINGS, now, marker_array(self._object_markers()))
+            self._out.publish(topics.OBJECT_MARKERS, now, marker_array(self._object_markers()))
         if any(zones_changed) or not self.has_published:
-            self._out.publish(topics.SCENE, now, marker_array(self._scene_markers()))
+            self._out.publish(topics.SCENE_MARKERS, now, marker_array(self._scene_markers()))
         self.has_published = True
 
     def _update_objects(self, event: Event) -> bool:

@@ -25,14 +25,14 @@ def test_only_the_first_odometry_is_the_robots() -> None:
 
 def test_things_that_stand_still_are_kept_once_a_second() -> None:
     thinning = Thinning(240)
-    still = [thinning.moved(tick, Truth(Pose3(), STOP, 1.0, {"box": Pose3()})) for tick in range(0, 480, 6)]
+    still = [thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, {"box": Pose3()})) for tick in range(0, 480, 6)]
     assert sum(map(len, still)) == 2
 
 
 def test_where_nothing_has_moved_each_thing_is_kept_a_second_after_it_was_last() -> None:
     thinning, box, both = Thinning(240), {"box": Pose3()}, {"box": Pose3(), "cart": Pose3()}
     seen = [(0, box), *((tick, both) for tick in range(6, 600, 6))]
-    kept = {tick: set(thinning.moved(tick, Truth(Pose3(), STOP, 1.0, things))) for tick, things in seen}
+    kept = {tick: set(thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, things))) for tick, things in seen}
     expected = {0: {"box"}, 6: {"cart"}, 240: {"box"}, 246: {"cart"}, 480: {"box"}, 486: {"cart"}}
     assert {tick: names for tick, names in kept.items() if names} == expected
 
@@ -41,7 +41,7 @@ def test_things_that_move_are_always_kept() -> None:
     thinning = Thinning(240)
     for tick in range(5):
         pose = Pose3(x=float(tick))
-        assert thinning.moved(tick, Truth(Pose3(), STOP, 1.0, {"cart": pose})) == {"cart": pose}
+        assert thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, {"cart": pose})) == {"cart": pose}
 
 
 def test_a_throttle_lets_pass_at_its_rate_and_at_once() -> None:
