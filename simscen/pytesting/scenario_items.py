@@ -9,7 +9,7 @@ import pytest
 from _pytest._code.code import ReprEntryNative, ReprExceptionInfo, ReprFileLocation, ReprTraceback
 
 from simscen.cli.diagnostics import as_text
-from simscen.cli.session.selection import Checks, checked
+from simscen.cli.session.selection import Checks, world_problems
 from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import InvalidInput, SimscenError, UsageError
 from simscen.core.records.run_result import Outcome
@@ -86,7 +86,7 @@ class ScenarioRun(pytest.Item):
 
     def runtest(self) -> None:
         """Run the scenario in its own process."""
-        _raise_errors(checked(self._scenario))
+        _raise_errors(world_problems(self._scenario))
         run = runner_of(self.config).run(self._scenario, self._seed)
         self.user_properties += _properties(run)
         if run.outcome is Outcome.FAILED_AS_EXPECTED:

@@ -1,1 +1,1 @@
-"""What a person or another program reads of a session: console, JUnit, JSON, pictures, a page."""
+"""Reports of a session: console lines, JUnit, JSON, Parquet, pictures, and HTML pages."""

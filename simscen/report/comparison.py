@@ -1,4 +1,4 @@
-"""Comparison of stacks or sessions in words and as console lines."""
+"""Texts and console lines that compare stacks or sessions."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -47,8 +47,8 @@ def session_comparison_lines(comparison: Comparison, links: Links, is_worse: boo
     yield from _comparison_section(comparison.baseline, with_changed_metrics(against), "", links)
     yield from _outcome_table(comparison, "", None, changed_only=True)
     yield (StyledText(""),)
-    lost = any(flip.failed == against.stack for flip in against.flips)
-    yield (StyledText(session_verdict(against, is_worse), "bad" if is_worse else "warning" if lost else "good"),)
+    newly_fails = any(flip.failed == against.stack for flip in against.flips)
+    yield (StyledText(session_verdict(against, is_worse), "bad" if is_worse else "warning" if newly_fails else "good"),)
 
 
 def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
@@ -58,11 +58,11 @@ def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
 
 def session_verdict(against: BaselineComparison, is_worse: bool) -> str:
     """Return in one sentence whether a session is worse than the baseline."""
-    lost = sum(flip.failed == against.stack for flip in against.flips)
+    newly_failed = sum(flip.failed == against.stack for flip in against.flips)
     if is_worse:
         return f"{against.stack} is significantly worse"
-    runs = "1 run fails that passed" if lost == 1 else f"{lost} runs fail that passed"
-    more = f"; {runs} before, which may be chance" if lost else ""
+    runs = "1 run fails that passed" if newly_failed == 1 else f"{newly_failed} runs fail that passed"
+    more = f"; {runs} before, which may be chance" if newly_failed else ""
     return f"{against.stack} is not significantly worse in {pairs_text(against.pairs)}{more}"
 
 
@@ -91,14 +91,14 @@ def unfinished_text(against: BaselineComparison) -> str:
 
 def comparison_headline(baseline: str, against: BaselineComparison) -> str:
     """Return the result of the comparison in one line: pairs, better and worse outcomes, p-value."""
-    won = sum(flip.passed == against.stack for flip in against.flips)
-    lost = len(against.flips) - won
+    better = sum(flip.passed == against.stack for flip in against.flips)
+    worse = len(against.flips) - better
     text = f"{against.stack} against {baseline}: {pairs_text(against.pairs)} of the same scenario and seed"
     if not against.pairs:
         return f"{against.stack} against {baseline}: nothing to compare"
     if not against.flips:
         return f"{text}, all with equal outcomes"
-    return f"{text}, {won} better, {lost} worse (p = {against.p:.2g})"
+    return f"{text}, {better} better, {worse} worse (p = {against.p:.2g})"
 
 
 def change_text(change: ScenarioChange, prefix: str = "") -> str:
@@ -125,7 +125,7 @@ def difference_columns(one: MetricDifference) -> tuple[str, str, str, str]:
 
 
 def listed_outcomes(comparison: Comparison, changed_only: bool) -> dict[str, Mapping[str, OutcomeCounts]]:
-    """Return the outcomes by scenario; with `changed_only`, not of those in which as many runs pass as before."""
+    """Return the outcomes by scenario; with `changed_only`, only those with a changed number of passed runs."""
     return {name: row for name, row in comparison.outcomes.items() if not changed_only or len(set(row.values())) > 1}
 
 
@@ -138,8 +138,8 @@ def _outcome_table(
     ]
     if len(comparison.outcomes) > 1 or not rows:
         rows.append(("all", [outcome_text(comparison.total(name)) for name in comparison.stacks]))
-    heads = [shorten(name) for name in comparison.stacks]
-    widths = [max([len(head), *(len(cells[number]) for _, cells in rows)]) + 3 for number, head in enumerate(heads)]
+    headings = [shorten(name) for name in comparison.stacks]
+    widths = [max([len(head), *(len(cells[number]) for _, cells in rows)]) + 3 for number, head in enumerate(headings)]
     available = None if columns is None else max(MIN_NAME_COLUMNS, columns - 2 - sum(widths))
     names = [shorten(name, available) if available else name for name, _ in rows]
     longest = max(len(name) for name in ("passed", *names))
@@ -147,7 +147,7 @@ def _outcome_table(
     def row(name: str, cells: Sequence[str]) -> str:
         return f"  {name:{longest}}" + "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
 
-    yield (StyledText(row("passed", heads), "quiet"),)
+    yield (StyledText(row("passed", headings), "quiet"),)
     for name, (_, cells) in zip(names, rows, strict=True):
         yield (StyledText(row(name, cells)),)
     if any(row[name].errors for row in comparison.outcomes.values() for name in row):
@@ -215,9 +215,9 @@ def _differences(baseline: str, against: BaselineComparison) -> Iterator[StyledL
         yield (StyledText(f"    {'  '.join((first, *cells))}".rstrip(), "plain" if number else "quiet"),)
 
 
-def shorten(text: str, most: int = MAX_STACK_NAME) -> str:
-    """Shorten text to `most` characters by removing its middle."""
-    return text if len(text) <= most else f"{text[: (most - 1) // 2]}…{text[-(most // 2) :]}"
+def shorten(text: str, max_length: int = MAX_STACK_NAME) -> str:
+    """Shorten text to `max_length` characters by removing its middle."""
+    return text if len(text) <= max_length else f"{text[: (max_length - 1) // 2]}…{text[-(max_length // 2) :]}"
 
 
 def pairs_text(number: int) -> str:

@@ -33,18 +33,18 @@ _HEAD = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "-/=/+", "p")
 def as_html(comparison: Comparison) -> str:
     """Return the comparison as a section of the report."""
     names = "".join(
-        f"<th>{_html_text(name)}<div class='quiet'>{_html_text(given)}</div></th>"
-        for name, given in comparison.stacks.items()
+        f"<th>{_html_text(name)}<div class='quiet'>{_html_text(value)}</div></th>"
+        for name, value in comparison.stacks.items()
     )
     rows = "".join(
         f"<tr><td>{_html_text(scenario)}</td>{''.join(_cell(row[name]) for name in comparison.stacks)}</tr>"
         for scenario, row in comparison.outcomes.items()
     )
     total = "".join(_cell(comparison.total(name)) for name in comparison.stacks)
-    whole = f"<tr><td><b>all</b></td>{total}</tr>" if len(comparison.outcomes) > 1 else ""
+    total_row = f"<tr><td><b>all</b></td>{total}</tr>" if len(comparison.outcomes) > 1 else ""
     return (
         f'<section class="in"><h2>{_html_text(" and ".join(comparison.stacks))}</h2><p class="quiet">{EXPLANATION}</p>'
-        f"<table><tr><th>passed</th>{names}</tr>{rows}{whole}</table>"
+        f"<table><tr><th>passed</th>{names}</tr>{rows}{total_row}</table>"
         f"{''.join(_against_html(comparison.baseline, one) for one in comparison.against)}</section>"
     )
 
@@ -52,12 +52,12 @@ def as_html(comparison: Comparison) -> str:
 def session_comparison_markdown(comparison: Comparison, links: Links, is_worse: bool) -> list[str]:
     """Return the comparison of a session with the baseline as lines of Markdown, for a pull request."""
     (against,) = comparison.against
-    shown = replace(comparison, against=(with_changed_metrics(against),))
-    return [f"### simscen: {session_verdict(against, is_worse)}", *as_markdown(shown, links, changed_only=True)]
+    reduced = replace(comparison, against=(with_changed_metrics(against),))
+    return [f"### simscen: {session_verdict(against, is_worse)}", *as_markdown(reduced, links, changed_only=True)]
 
 
 def as_markdown(comparison: Comparison, links: Links = NO_LINKS, changed_only: bool = False) -> list[str]:
-    """Return the comparison as lines of Markdown; `changed_only` omits scenarios in which as many runs pass."""
+    """Return the comparison as lines of Markdown; `changed_only` omits scenarios with as many passed runs as before."""
     cell = markdown_cell
     names = [cell(name) for name in comparison.stacks]
     lines = ["", f"| passed | {' | '.join(names)} |", f"|---|{'---:|' * len(names)}"]
@@ -100,8 +100,8 @@ def markdown_cell(text: str) -> str:
 
 
 def _cell(outcomes: OutcomeCounts) -> str:
-    look = "odd" if outcomes.errors else "bad" if outcomes.failed else "good"
-    return f'<td class="count {look}">{outcome_text(outcomes)}</td>'
+    css_class = "odd" if outcomes.errors else "bad" if outcomes.failed else "good"
+    return f'<td class="count {css_class}">{outcome_text(outcomes)}</td>'
 
 
 def _against_html(baseline: str, against: BaselineComparison) -> str:
@@ -113,8 +113,8 @@ def _against_html(baseline: str, against: BaselineComparison) -> str:
         f"<td>{_html_text(flip.why)}</td></tr>"
         for flip in against.flips
     )
-    _, *named = (_html_text(head.format(baseline, against.stack)) for head in _HEAD)
-    heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in named)
+    _, *headings = (_html_text(head.format(baseline, against.stack)) for head in _HEAD)
+    heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in headings)
     rows = "".join(_difference(one) for one in against.differences)
     changes = "".join(
         f'<tr class="{"bad" if one.is_worse else ""}"><td>{change_verdict(one)}</td>'
@@ -137,9 +137,9 @@ def _against_html(baseline: str, against: BaselineComparison) -> str:
 
 def _difference(one: MetricDifference) -> str:
     name, *cells = _cells(one)
-    clear = one.interval is not None and not one.interval[0] <= 0.0 <= one.interval[1]
+    is_significant = one.interval is not None and not one.interval[0] <= 0.0 <= one.interval[1]
     listed = "".join(f'<td class="margin">{cell}</td>' for cell in cells)
-    return f"<tr{' class=clear' if clear else ''}><td>{name}</td>{listed}</tr>"
+    return f"<tr{' class=clear' if is_significant else ''}><td>{name}</td>{listed}</tr>"
 
 
 def _cells(one: MetricDifference) -> tuple[str, ...]:

@@ -86,22 +86,22 @@ def markdown(runs: Sequence[RunFinished], session: SessionFinished, pictures: st
         Outcome.PASSED: "✅",
     }
     order = list(symbols)
-    first = nsmallest(MAX_ROWS, runs, key=lambda run: (order.index(run.outcome), run.result.path, run.key))
+    listed = nsmallest(MAX_ROWS, runs, key=lambda run: (order.index(run.outcome), run.result.path, run.key))
     errors = "error" if session.errors == 1 else "errors"
     more = f", {session.expected} failed as expected" if session.expected else ""
     more += f", {session.skipped} skipped" if session.skipped else ""
     head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}{more}"
-    compared = [] if session.comparison is None else as_markdown(session.comparison)
+    comparison = [] if session.comparison is None else as_markdown(session.comparison)
     rows = [
         f"| {symbols[run.outcome]} | {markdown_cell(short_run_name(run.key))} "
         f"| {run.result.simulated:.1f} s | {_reason_cell(run)} |"
-        for run in first
+        for run in listed
     ]
-    if len(first) < len(runs):
-        rows.append(f"| | and {len(runs) - len(first)} more | | |")
-    shown = _picture_lines(first, session.folder, pictures) if pictures else []
+    if len(listed) < len(runs):
+        rows.append(f"| | and {len(runs) - len(listed)} more | | |")
+    picture_lines = _picture_lines(listed, session.folder, pictures) if pictures else []
     table = ["| | scenario | simulated | |", "|---|---|---:|---|", *rows]
-    return "\n".join([head, "", *table, *compared, "", *shown, ""])
+    return "\n".join([head, "", *table, *comparison, "", *picture_lines, ""])
 
 
 def _picture_lines(runs: list[RunFinished], folder: str, pictures: str) -> list[str]:

@@ -32,9 +32,9 @@ BLOCK_BYTES = 1 << 20
 class Journal:
     """Writes the events of a session in `folder`, and locks the folder until the process ends.
 
-    With `resume`, the folder may contain a journal. With `sync`, each line is on the disk before the session
-    continues. Raises UsageError if the folder belongs to another session, OSError
-    if the file cannot be opened. If a line cannot be written later, sets `error` and lets the session continue.
+    With `resume`, the folder may contain a journal. With `sync`, each line is on the disk before the session continues.
+    Raises UsageError if the folder belongs to another session, and OSError if the file cannot be opened. If a line
+    cannot be written later, sets `error` and lets the session continue.
     """
 
     def __init__(self, folder: Path, resume: bool = False, sync: bool = True) -> None:
@@ -59,7 +59,7 @@ class Journal:
     ) -> None:
         """Start a session with these runs. Previous lines of the journal no longer count.
 
-        `shard` (i, n) says that these are the runs of part i of n. `study` says that they are a study.
+        `shard` (i, n) means that these are the runs of part i of n. `study` is the plan if they are a study.
         """
         self._numbers, self._finished = {run.key: number for number, run in enumerate(runs)}, set()
         facts = {
@@ -123,14 +123,14 @@ class Journal:
 
 def _truncate_to_complete_lines(file: int) -> int:
     """Remove an incomplete last line, which a killed process left, and return the remaining size."""
-    whole = size = os.fstat(file).st_size
+    full_size = size = os.fstat(file).st_size
     while size:
         start = max(0, size - BLOCK_BYTES)
         end = os.pread(file, size - start, start).rfind(b"\n") + 1
         size = start + end
         if end:
             break
-    if size < whole:
+    if size < full_size:
         os.ftruncate(file, size)
     return size
 

@@ -27,8 +27,8 @@ class PlannedRun:
     """A run of a session that may not have started yet. `path` is the scenario file.
 
     `digest` is a hash of everything that the result depends on, so that a result is reused only if nothing has changed;
-    `definition` is one of the scenario without its stacks, so that versions of a stack can be compared.
-    `again` and `file` have the same meaning as in RunFinished, `stack` as in RunResult. `varied` are the varied values
+    `definition` is a hash of the scenario without its stacks, so that versions of a stack can be compared.
+    `again`, `file`, and `stack` have the same meaning as in RunFinished and RunResult. `varied` has the varied values
     by path.
     """
 
@@ -116,7 +116,7 @@ class JournaledSession:
     """The last session in a journal.
 
     Attributes:
-        shard: Which part (i, n) of the selected scenarios it ran.
+        shard: Part i of n of the selected scenarios that it ran.
         planned: All runs of the session.
         finished: Finished runs by key.
         started: Runs that had at least started.
@@ -264,7 +264,7 @@ UNDECIDED_KINDS = frozenset({"interrupted", "not-run"})
 
 @dataclass(frozen=True)
 class LastFailed:
-    """The `runs` whose latest outcome was a failure, and the `folder` of the newest session."""
+    """Runs whose latest outcome was a failure, and the `folder` of the newest session."""
 
     folder: Path
     runs: frozenset[RunKey]
@@ -276,7 +276,9 @@ def sessions_in(folder: Path) -> list[Path]:
         return []
     sessions = [each for each in folder.iterdir() if (each / JOURNAL_FILE).is_file() and not each.is_symlink()]
     return sorted(
-        sessions, key=lambda each: (_written(each), (each / JOURNAL_FILE).stat().st_mtime_ns, each.name), reverse=True
+        sessions,
+        key=lambda each: (_session_time(each), (each / JOURNAL_FILE).stat().st_mtime_ns, each.name),
+        reverse=True,
     )
 
 
@@ -295,7 +297,7 @@ def last_failed(folder: Path) -> LastFailed | None:
 
 
 def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
-    """Yield each finished run and whether it had the desired outcome. Yields nothing for an invalid journal."""
+    """Yield each finished run and whether it passed or failed as expected. Yields nothing for an invalid journal."""
     try:
         runs = read_journal(session).runs
     except InvalidInput:
@@ -305,7 +307,7 @@ def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
             yield run.key, run.outcome.good
 
 
-def _written(session: Path) -> str:
+def _session_time(session: Path) -> str:
     """Return the time of the session from run.json (ISO 8601), or "" if it is unknown."""
     try:
         document = json.loads((session / "run.json").read_text(encoding="utf-8"))

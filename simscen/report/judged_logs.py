@@ -15,8 +15,8 @@ from simscen.report.violations import error_summary, excuse_text, first_violatio
 
 def full_log_lines(run: RunFinished, name: str) -> Iterator[StyledLine]:
     """Yield the length and outcome of a log, then all violations."""
-    nearest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
-    note = f"tightest: {one_line(nearest)}" if nearest else excuse_text(run)
+    tightest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
+    note = f"tightest: {one_line(tightest)}" if tightest else excuse_text(run)
     yield (*_head(run.result, name), *((StyledText(f"   {note}", "quiet"),) if note else ()))
     yield from violation_lines(run)
 
@@ -27,8 +27,8 @@ def short_log_line(run: RunFinished, name: str) -> StyledLine:
         return (*_head(run.result, name), StyledText(f"   {error_summary(run)}", "warning"))
     if excuse := excuse_text(run):
         return (*_head(run.result, name), StyledText(f"   {excuse}", "quiet"))
-    nearest = one_line(tightest_margin(run.result.verdicts))
-    reason = first_violation(run) or (f"tightest: {nearest}" if nearest else "")
+    tightest = one_line(tightest_margin(run.result.verdicts))
+    reason = first_violation(run) or (f"tightest: {tightest}" if tightest else "")
     return (*_head(run.result, name), StyledText(f"   {reason}".rstrip(), "quiet"))
 
 
@@ -39,23 +39,23 @@ def margin_table(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[StyledLine
     columns = list(zip(["log", *ids], *rows, strict=True))
     widths = [max(len(text) for text in column) for column in columns]
 
-    def aligned(row: Sequence[str]) -> str:
+    def align(row: Sequence[str]) -> str:
         first, *others = (text.ljust(width) for text, width in zip(row, widths, strict=True))
         return "   ".join((first, *others))
 
-    yield (StyledText(f"    {aligned(['log', *ids])}", "quiet"),)
+    yield (StyledText(f"    {align(['log', *ids])}", "quiet"),)
     for row, (_, run) in zip(rows, runs, strict=True):
         symbol, role = SYMBOLS[run.outcome]
-        yield (StyledText("  "), StyledText(symbol, role), StyledText(f" {aligned(row)}"))
+        yield (StyledText("  "), StyledText(symbol, role), StyledText(f" {align(row)}"))
     yield from (((StyledText(f"  {text}", "quiet"),)) for text in _reasons(runs))
 
 
 def summary_line(runs: Sequence[RunFinished]) -> StyledLine:
     """Return the numbers of outcomes, for example "12 passed, 1 failed"."""
     count = Counter(run.outcome for run in runs)
-    words = [(Outcome.PASSED, "passed"), (Outcome.FAILED, "failed"), (Outcome.ERROR, "could not be judged")]
-    words += [(Outcome.FAILED_AS_EXPECTED, "failed as expected"), (Outcome.SKIPPED, "skipped")]
-    parts = [f"{count[outcome]} {word}" for outcome, word in words if count[outcome] or outcome is Outcome.PASSED]
+    labels = [(Outcome.PASSED, "passed"), (Outcome.FAILED, "failed"), (Outcome.ERROR, "could not be judged")]
+    labels += [(Outcome.FAILED_AS_EXPECTED, "failed as expected"), (Outcome.SKIPPED, "skipped")]
+    parts = [f"{count[outcome]} {word}" for outcome, word in labels if count[outcome] or outcome is Outcome.PASSED]
     return (StyledText(", ".join(parts)),)
 
 

@@ -54,29 +54,29 @@ def xml_parts(
         yield _claim_xml(root, study, study.claim, ordered, family)
         return
     counts = _counts_by_file(ordered)
-    everything = SuiteCounts()
+    total = SuiteCounts()
     for suite in counts.values():
-        everything.add(suite)
-    everything.write(root)
+        total.add(suite)
+    total.write(root)
     yield b"<?xml version='1.0' encoding='utf-8'?>\n"
     if not counts:
         yield ElementTree.tostring(root) + b"\n"
         return
     yield _opening_tag(root)
-    path, used = None, set[str]()
+    path, used_names = None, set[str]()
     for run in ordered:
         if run.result.path != path:
             yield b"" if path is None else b"\n  </testsuite>"
-            path, used = run.result.path, set()
+            path, used_names = run.result.path, set()
             element = Element("testsuite", {"name": escape_control(scenario_file(run))})
             counts[path].write(element)
             element.set("skipped", str(counts[path].skipped))
             yield b"\n  " + _opening_tag(element)
-        holder = Element("testsuite")
-        _add_case(holder, run, _unique(_case_name(run), used), family)
-        ElementTree.indent(holder[0], level=2)
-        holder[0].tail = None
-        yield b"\n    " + ElementTree.tostring(holder[0], encoding="utf-8")
+        parent = Element("testsuite")
+        _add_case(parent, run, _unique(_case_name(run), used_names), family)
+        ElementTree.indent(parent[0], level=2)
+        parent[0].tail = None
+        yield b"\n    " + ElementTree.tostring(parent[0], encoding="utf-8")
     yield b"\n  </testsuite>\n</testsuites>\n"
 
 
@@ -137,7 +137,7 @@ def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[R
 
     An undecided claim is an error of the type `simscen.undecided`, since JUnit has no other element for it.
     """
-    broken = [run for run in runs if run.outcome is Outcome.ERROR]
+    incomplete = [run for run in runs if run.outcome is Outcome.ERROR]
     suite = SubElement(root, "testsuite", {"name": escape_control(scenario_file(runs[0]))})
     name = one_line(f"{study.scenario.rpartition('/')[2]} [{claim_title(claim)}]")
     seconds = f"{sum(run.wall for run in runs):.3f}"
@@ -154,14 +154,14 @@ def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[R
             SubElement(case, "error", {"type": kind, "message": message}).text = details
         case ClaimStatus.HELD:
             SubElement(case, "system-out").text = details
-    used = {name}
-    for run in broken:
-        _add_case(suite, run, _unique(_case_name(run), used), family)
+    used_names = {name}
+    for run in incomplete:
+        _add_case(suite, run, _unique(_case_name(run), used_names), family)
     for element in (root, suite):
-        element.set("tests", str(1 + len(broken)))
+        element.set("tests", str(1 + len(incomplete)))
         element.set("failures", str(int(claim.status is ClaimStatus.REFUTED)))
         undecided = claim.status in (ClaimStatus.UNDECIDED, ClaimStatus.BLOCKED)
-        element.set("errors", str(int(undecided) + len(broken)))
+        element.set("errors", str(int(undecided) + len(incomplete)))
         element.set("time", seconds)
     suite.set("skipped", "0")
     return _document(root)
@@ -181,7 +181,7 @@ def _add_case(suite: Element, run: RunFinished, name: str, family: Family) -> No
             _add_error(case, run)
         case Outcome.SKIPPED:
             SubElement(case, "skipped", {"type": "simscen.skip", "message": escape_control(run.result.reason)})
-        case Outcome.FAILED_AS_EXPECTED:  # as pytest does for xfail
+        case Outcome.FAILED_AS_EXPECTED:  # as pytest reports xfail
             SubElement(case, "skipped", {"type": "simscen.expected-failure", "message": excuse_text(run)})
         case Outcome.PASSED:
             pass
@@ -257,9 +257,9 @@ def _case_name(run: RunFinished) -> str:
     return one_line(f"{run.key.scenario.rpartition('/')[2]} [{', '.join(part for part in parts if part)}]")
 
 
-def _unique(name: str, used: set[str]) -> str:
+def _unique(name: str, used_names: set[str]) -> str:
     candidate, number = name, 2
-    while candidate in used:
+    while candidate in used_names:
         candidate, number = f"{name} #{number}", number + 1
-    used.add(candidate)
+    used_names.add(candidate)
     return candidate

@@ -25,13 +25,13 @@ from simscen.report.styled_line import StyledLine, TerminalStyle, plain_text
 from simscen.report.text_reporters import PlainReporter, SessionFormatter
 
 MIN_FINISHED_RUNS = 2
-"""Number of runs that must have ended before the remaining time is estimated."""
+"""Minimum number of finished runs for an estimate of the remaining time."""
 
 
 class ProgressEstimate:
     """Estimates the remaining time of a session from its events. `clock` returns seconds.
 
-    Runs that were kept from an earlier session do not count.
+    Runs that are reused from an earlier session do not count.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -72,7 +72,7 @@ class ProgressEstimate:
 
 
 def _round_duration(seconds: float) -> str:
-    """Format a duration, rounded so that the text does not change all the time."""
+    """Format a duration, rounded so that the text does not change constantly."""
     if seconds < 90:
         return f"{max(5, 5 * round(seconds / 5))} s"
     minutes = round(seconds / 60)

@@ -14,9 +14,9 @@ from simscen.report.journal_reader import JournaledSession, read_journal
 
 
 def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, JournaledSession]:
-    """Read the journals of shards. Raises InvalidInput if one is missing, or if they do not fit together."""
+    """Read the journals of shards. Raises InvalidInput if one is missing, or if they are not shards of one session."""
     sessions = {folder: read_journal(folder) for folder in folders}
-    owners: dict[RunKey, Path] = {}
+    folders_by_key: dict[RunKey, Path] = {}
     problems = [] if allow_missing else _missing_shards(sessions)
     first = next(iter(sessions.values()))
     for folder, session in sessions.items():
@@ -24,8 +24,8 @@ def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, Jour
             message = f"it was written by simscen {session.version}, the first shard by {first.version}"
             problems.append(_problem(folder, message))
         for run in session.planned:
-            if owners.setdefault(run.key, folder) != folder:
-                message = f"{run.key.test}, seed {run.key.seed} is in {owners[run.key]} as well"
+            if folders_by_key.setdefault(run.key, folder) != folder:
+                message = f"{run.key.test}, seed {run.key.seed} is in {folders_by_key[run.key]} as well"
                 problems.append(_problem(folder, message))
     if problems:
         raise InvalidInput(problems)
@@ -33,12 +33,12 @@ def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, Jour
 
 
 def _missing_shards(sessions: dict[Path, JournaledSession]) -> list[Problem]:
-    """Return a problem for each part of n that no session ran."""
+    """Return a problem for each shard that no session ran."""
     count = max(session.shard[1] for session in sessions.values())
-    given = {session.shard[0] for session in sessions.values() if session.shard[1] == count}
+    present = {session.shard[0] for session in sessions.values() if session.shard[1] == count}
     folder = next(folder for folder, session in sessions.items() if session.shard[1] == count)
     hint = "add its output folder, or use --allow-missing if it had no scenarios"
-    missing = sorted(set(range(1, count + 1)) - given)
+    missing = sorted(set(range(1, count + 1)) - present)
     return [_problem(folder, f"shard {number}/{count} is missing", hint) for number in missing]
 
 
@@ -66,7 +66,7 @@ def merge_shards(sessions: dict[Path, JournaledSession], folder: Path, runs_fold
             for key in sorted(session.started):
                 journal(RunStarted(key, paths[key]))
             for key in sorted(session.finished):
-                journal(_moved(session.finished[key], source, folder))
+                journal(_with_files_in(session.finished[key], source, folder))
         interrupted = any(session.interrupted for session in sessions.values())
         wall = max(session.wall for session in sessions.values())
         journal(SessionFinished(0, 0, 0, simulated=0.0, wall=wall, interrupted=interrupted))
@@ -83,7 +83,7 @@ def _link_or_copy(source: str, target: str) -> None:
         shutil.copy2(source, target)
 
 
-def _moved(run: RunFinished, source: Path, folder: Path) -> RunFinished:
+def _with_files_in(run: RunFinished, source: Path, folder: Path) -> RunFinished:
     """Return the run with its files in `folder` instead of `source`."""
     files = (
         str(folder / Path(file).relative_to(source)) if file and Path(file).is_relative_to(source) else file

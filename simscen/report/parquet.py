@@ -12,8 +12,8 @@ from simscen.report.results_json import in_order
 from simscen.spec.quantities import si_number
 
 RUNS, VERDICTS = "runs.parquet", "verdicts.parquet"
-ROWS_PER_GROUP = 10_000
-"""Runs of which the rows are in memory at once."""
+RUNS_PER_GROUP = 10_000
+"""Maximum number of runs whose rows are in memory."""
 
 
 def write_parquet(folder: Path, runs: Sequence[RunFinished], values: Mapping[RunKey, Mapping[str, Any]]) -> list[Path]:
@@ -63,8 +63,8 @@ def _fields(pa: Any, text: str) -> list[Any]:
 
 def _groups(runs: RunStore) -> Iterator[Iterator[tuple[int, RunFinished]]]:
     """Yield groups of runs with their numbers; one empty group if there are none."""
-    for start in range(0, max(len(runs), 1), ROWS_PER_GROUP):
-        yield enumerate(runs[start : start + ROWS_PER_GROUP], start)
+    for start in range(0, max(len(runs), 1), RUNS_PER_GROUP):
+        yield enumerate(runs[start : start + RUNS_PER_GROUP], start)
 
 
 def _run_row(number: int, run: RunFinished, values: Mapping[str, Any], numeric: set[str]) -> dict[str, Any]:

@@ -32,11 +32,11 @@ def json_parts(
 ) -> Iterator[str]:
     """Yield the parts of the document, one for each run."""
     ordered = in_order(runs)
-    head, tail = _dumped(_document(ordered, comparison, study)).split(_NO_RUNS)
+    head, tail = _dump(_document(ordered, comparison, study)).split(_NO_RUNS)
     yield head + _NO_RUNS[:-1]
     separator = "\n    "
     for run in ordered:
-        yield separator + _dumped(_run_data(run, folder)).replace("\n", "\n    ")
+        yield separator + _dump(_run_data(run, folder)).replace("\n", "\n    ")
         separator = ",\n    "
     yield f"{'' if not ordered else chr(10) + '  '}]{tail}\n"
 
@@ -44,7 +44,7 @@ def json_parts(
 _NO_RUNS = '\n  "runs": []'
 
 
-def _dumped(data: dict[str, Any]) -> str:
+def _dump(data: dict[str, Any]) -> str:
     return json.dumps(data, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
 
 
@@ -81,19 +81,19 @@ def _run_data(run: RunFinished, folder: str) -> dict[str, Any]:
 
 def _summaries(runs: Iterable[RunFinished]) -> dict[str, Any]:
     """Return `suite`, or `suites` by name for several stacks, which are never pooled."""
-    found = {stack: session_summary_data(summary) for stack, summary in summaries_by_stack(runs).items()}
-    if len(found) > 1:
-        return {"suites": found}
-    return {"suite": next(iter(found.values()), session_summary_data(SessionFigures().summary()))}
+    summaries = {stack: session_summary_data(summary) for stack, summary in summaries_by_stack(runs).items()}
+    if len(summaries) > 1:
+        return {"suites": summaries}
+    return {"suite": next(iter(summaries.values()), session_summary_data(SessionFigures().summary()))}
 
 
 def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]:
     """Return the statistics by stack in order of appearance, without the second runs of --check-determinism."""
-    found: dict[str, SessionFigures] = {}
+    figures_by_stack: dict[str, SessionFigures] = {}
     for run in runs:
         if not run.key.repeats:
-            found.setdefault(run.key.stack_name, SessionFigures()).add(run.result)
-    return {stack: figures.summary() for stack, figures in found.items()}
+            figures_by_stack.setdefault(run.key.stack_name, SessionFigures()).add(run.result)
+    return {stack: figures.summary() for stack, figures in figures_by_stack.items()}
 
 
 def in_order(runs: Sequence[RunFinished]) -> RunStore:
@@ -114,8 +114,8 @@ def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
 
 def relative(path: str, folder: str) -> str:
     """Return the path of a file relative to `folder` if the file is in there, otherwise the path itself."""
-    inside = folder and PurePath(path).is_relative_to(folder)
-    return PurePath(path).relative_to(folder).as_posix() if inside else PurePath(path).as_posix()
+    is_inside = folder and PurePath(path).is_relative_to(folder)
+    return PurePath(path).relative_to(folder).as_posix() if is_inside else PurePath(path).as_posix()
 
 
 def json_reporter(out: TextIO) -> Reporter:

@@ -1,4 +1,4 @@
-"""Lines of text on a session: header, runs, violations, failures, and footer."""
+"""Console lines of a session: header, runs, violations, failures, and footer."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -121,32 +121,32 @@ def violation_lines(run: RunFinished) -> Iterator[StyledLine]:
         yield from artifact_lines(run)
 
 
-def session_footer(session: SessionFinished, left: Mapping[str, int]) -> Iterator[StyledLine]:
+def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
     """Yield a line such as "13 passed, 1 failed · 402 s simulated in 4.1 s · junit.xml", and a line with the report.
 
-    `left` are numbers of runs that were not finished, by description.
+    `unfinished` are numbers of runs that were not finished, by description.
     """
-    yield (*outcome_counts(session, left), *_timing_and_junit(session))
+    yield (*outcome_counts(session, unfinished), *_timing_and_junit(session))
     if session.page:
         yield (StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page))
 
 
-def outcome_counts(session: SessionFinished, left: Mapping[str, int]) -> Iterator[StyledText]:
+def outcome_counts(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledText]:
     """Yield the numbers of outcomes, for example "13 passed, 1 failed, 2 errors, 3 not run".
 
-    Runs in `left` have errors in the reports, but are counted separately here.
+    Runs in `unfinished` have errors in the reports, but are counted separately here.
     """
     counts: list[tuple[int, str, Role]] = [
         (session.passed, "passed", "good"),
         (session.failed, "failed", "bad"),
-        (session.errors - sum(left.values()), "errors", "warning"),
+        (session.errors - sum(unfinished.values()), "errors", "warning"),
         (session.expected, "failed as expected", "warning"),
         (session.skipped, "skipped", "warning"),
-        *((number, word, "warning") for word, number in left.items()),
+        *((number, word, "warning") for word, number in unfinished.items()),
     ]
-    shown = [(number, word, role) for number, word, role in counts if number or word == "passed"]
-    for nth, (number, word, role) in enumerate(shown):
-        if nth:
+    nonzero = [(number, word, role) for number, word, role in counts if number or word == "passed"]
+    for index, (number, word, role) in enumerate(nonzero):
+        if index:
             yield StyledText(", ")
         yield StyledText(f"{number} {'error' if word == 'errors' and number == 1 else word}", role)
 
@@ -167,10 +167,10 @@ def _summary(run: RunFinished) -> tuple[StyledText, ...]:
     times = f"{run.result.simulated:6.1f} s simulated in {run.wall:.2f} s{', kept' if run.resumed else ''}"
     if run.outcome is Outcome.FAILED_AS_EXPECTED:
         return (StyledText(f"{times}   {excuse_text(run)}", "quiet"),)
-    nearest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
+    tightest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
     return (
         StyledText(times, "quiet"),
-        *((StyledText(f"   tightest: {one_line(nearest)}", "quiet"),) if nearest else ()),
+        *((StyledText(f"   tightest: {one_line(tightest)}", "quiet"),) if tightest else ()),
     )
 
 
@@ -184,9 +184,9 @@ def _error_lines(run: RunFinished) -> Iterator[StyledLine]:
 def _disturbance_lines(run: RunFinished) -> Iterator[StyledLine]:
     """Yield the disturbances that happened. Missing ones are among the violations."""
     happened = [each for each in run.result.disturbances if each.happened]
-    fired = [one_line(disturbance_line(each, run.result.tick_rate)) for each in happened]
-    more = [f"and {len(fired) - MAX_DISTURBANCES} more"] if len(fired) > MAX_DISTURBANCES else []
-    for number, text in enumerate((*fired[:MAX_DISTURBANCES], *more)):
+    texts = [one_line(disturbance_line(each, run.result.tick_rate)) for each in happened]
+    more = [f"and {len(texts) - MAX_DISTURBANCES} more"] if len(texts) > MAX_DISTURBANCES else []
+    for number, text in enumerate((*texts[:MAX_DISTURBANCES], *more)):
         yield (StyledText(f"      {'' if number else 'happened':9} ", "quiet"), StyledText(text))
 
 
@@ -241,9 +241,9 @@ def failed_runs(runs: Sequence[RunFinished], name: Name) -> Iterator[StyledLine]
             yield from artifact_lines(run)
 
 
-def slowest_runs(runs: Sequence[RunFinished], most: int, name: Name) -> Iterator[StyledLine]:
-    """Yield the runs with the longest wall time, the longest first; `most` 0 lists all."""
-    ordered = nsmallest(most or len(runs), (run for run in runs if run.wall), key=lambda run: (-run.wall, run.key))
+def slowest_runs(runs: Sequence[RunFinished], max_count: int, name: Name) -> Iterator[StyledLine]:
+    """Yield the runs with the longest wall time, the longest first; `max_count` 0 lists all."""
+    ordered = nsmallest(max_count or len(runs), (run for run in runs if run.wall), key=lambda run: (-run.wall, run.key))
     yield (StyledText("slowest:", "quiet"),)
     for run in ordered:
         wall = f"{run.wall:8.2f} s"
@@ -255,8 +255,8 @@ def log_comparison(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
     """Yield the result of --check-determinism: whether the logs of repeated runs are equal."""
     if not any(run.key.repeats for run in runs):
         return
-    firsts = {run.key: run for run in runs if not run.key.repeats}
-    pairs = [(firsts[run.key.first], run) for run in runs if run.key.repeats and run.key.first in firsts]
+    first_runs = {run.key: run for run in runs if not run.key.repeats}
+    pairs = [(first_runs[run.key.first], run) for run in runs if run.key.repeats and run.key.first in first_runs]
     compared = [pair for pair in pairs if all(run.artifacts.mcap for run in pair)]
     if not compared:
         return
@@ -264,13 +264,13 @@ def log_comparison(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
     pairs_text = f"{len(compared)} pair{'s' if len(compared) > 1 else ''} of runs, byte for byte"
     if differ:
         yield (StyledText(f"logs differ: in {differ} of {pairs_text}", "warning"),)
-        yield (StyledText(f"  {_spread(compared)}", "quiet"),)
+        yield (StyledText(f"  {_difference_text(compared)}", "quiet"),)
     else:
         yield (StyledText(f"logs equal: {pairs_text}", "good"),)
 
 
-def _spread(pairs: Sequence[tuple[RunFinished, RunFinished]]) -> str:
-    """Return by how much the runs of pairs differ, e.g. for a stack that is not deterministic."""
+def _difference_text(pairs: Sequence[tuple[RunFinished, RunFinished]]) -> str:
+    """Return by how much the runs of each pair differ, e.g. for a stack that is not deterministic."""
     equal = sum(_statuses(first) == _statuses(second) for first, second in pairs)
     parts = [f"verdicts equal in {equal} of {len(pairs)}"]
     for metric, name, unit in (("time_to_goal", "time to goal", "s"), ("path_length", "path length", "m")):
@@ -285,9 +285,9 @@ def _statuses(run: RunFinished) -> list[tuple[str, str]]:
     return [(verdict.id, verdict.status.value) for verdict in run.result.verdicts]
 
 
-def interruption_lines(session: SessionFinished, left: Mapping[str, int]) -> Iterator[StyledLine]:
+def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
     """Yield a line with the numbers of outcomes, and a line with the report and the option to resume the session."""
-    yield (StyledText("interrupted: ", "warning"), *outcome_counts(session, left))
+    yield (StyledText("interrupted: ", "warning"), *outcome_counts(session, unfinished))
     page = (
         [StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page)] if session.page else []
     )

@@ -1,4 +1,4 @@
-"""Result of a study in words and as console lines."""
+"""Texts and console lines of the result of a study."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
@@ -21,7 +21,7 @@ CLAIM_ROLES: dict[ClaimStatus, Role] = {
 
 
 def study_lines(study: Study) -> Iterator[StyledLine]:
-    """Yield pass rates by parameter, effects, smallest margins, and at last the pass rate and the claim."""
+    """Yield pass rates by parameter, effects, smallest margins, and finally the pass rate and the claim."""
     yield from _rate_table(study.rates)
     yield from _effect_table(study)
     yield from _worst_margins(study)
@@ -43,7 +43,7 @@ def pass_rate_text(study: Study) -> str:
 
 
 def notes(study: Study) -> list[str]:
-    """Return what else must be known to read the pass rate."""
+    """Return remarks on how to interpret the pass rate."""
     texts = []
     if not study.is_random:
         texts.append(
@@ -57,23 +57,23 @@ def notes(study: Study) -> list[str]:
 
 
 def claim_title(claim: ClaimResult) -> str:
-    """Return the claim in a few words: "pass rate >= 95 % (confidence 95 %)"."""
+    """Return a short form of the claim: "pass rate >= 95 % (confidence 95 %)"."""
     return f"pass rate >= {claim.min_rate:.6g} (confidence {claim.confidence:.6g})"
 
 
 def claim_text(claim: ClaimResult) -> str:
     """Return the claim and its result in one sentence."""
-    about = f"claim: pass rate of at least {_percent(claim.min_rate)} with {_percent(claim.confidence)} confidence"
+    statement = f"claim: pass rate of at least {_percent(claim.min_rate)} with {_percent(claim.confidence)} confidence"
     runs = f"{claim.passed} of {runs_text(claim.runs)} passed{limits_text(claim)}"
     match claim.status:
         case ClaimStatus.HELD:
-            return f"{about}: held, {runs}"
+            return f"{statement}: held, {runs}"
         case ClaimStatus.REFUTED:
-            return f"{about}: refuted, {runs}"
+            return f"{statement}: refuted, {runs}"
         case ClaimStatus.UNDECIDED:
-            return f"{about}: undecided, {runs}; {undecided_hint(claim)}"
+            return f"{statement}: undecided, {runs}; {undecided_hint(claim)}"
         case ClaimStatus.BLOCKED:
-            return f"{about}: open, because {runs_text(claim.errors)} could not be completed; {runs}"
+            return f"{statement}: open, because {runs_text(claim.errors)} could not be completed; {runs}"
 
 
 def undecided_hint(claim: ClaimResult) -> str:
@@ -116,11 +116,11 @@ def significant_effects(study: Study) -> Sequence[ParameterEffect]:
 def _rate_table(rates: Sequence[RateRow]) -> Iterator[StyledLine]:
     if not rates:
         return
-    shown = rates[:MAX_ROWS]
-    width = max(len(row.value) for row in shown)
+    listed = rates[:MAX_ROWS]
+    width = max(len(row.value) for row in listed)
     yield ()
     yield (StyledText("pass rate by parameter"),)
-    for path, rows in groupby(shown, key=lambda row: row.path):
+    for path, rows in groupby(listed, key=lambda row: row.path):
         yield (StyledText(f"  {one_line(path)}", "name"),)
         for row in rows:
             rate = f"{row.passed} of {row.runs}"

@@ -25,13 +25,13 @@ WIDTH, HEIGHT, MARGIN = 420, 220, 44
 
 def study_html(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
     """Return the section. Points of the plots are links to replay or log in `folder`."""
-    about = "".join(f'<p class="quiet">{html_text(text)}</p>' for text in notes(study))
+    remarks = "".join(f'<p class="quiet">{html_text(text)}</p>' for text in notes(study))
     claim = ""
     if study.claim is not None:
         claim = f'<p class="claim {study.claim.status.value}">{html_text(claim_text(study.claim))}</p>'
     return (
         f'<section id="study" aria-label="study"><h2>Study</h2><p>{html_text(pass_rate_text(study))}</p>'
-        f"{about}{claim}{_rates(study)}{_effects(study)}{_plots(study, runs, folder)}</section>"
+        f"{remarks}{claim}{_rates(study)}{_effects(study)}{_plots(study, runs, folder)}</section>"
     )
 
 
@@ -70,9 +70,9 @@ def _effects(study: Study) -> str:
 
 def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
     """Return a plot of margin against parameter for the strongest effects, one for each parameter."""
-    chosen = {one.path: one.criterion for one in reversed(study.effects) if one.is_ordered}
-    order = [path for path in dict.fromkeys(one.path for one in study.effects) if path in chosen]
-    plots = "".join(_plot(path, chosen[path], study, runs, folder) for path in order[:MAX_PLOTS])
+    criterion_of = {one.path: one.criterion for one in reversed(study.effects) if one.is_ordered}
+    order = [path for path in dict.fromkeys(one.path for one in study.effects) if path in criterion_of]
+    plots = "".join(_plot(path, criterion_of[path], study, runs, folder) for path in order[:MAX_PLOTS])
     return f'<h3>Margins</h3><div class="plots">{plots}</div>' if plots else ""
 
 
@@ -92,9 +92,9 @@ def _plot(path: str, criterion: str, study: Study, runs: Sequence[RunFinished], 
     if not points:
         return ""
     x_range, y_range = _range([x for x, _, _ in points]), _range([0.0, *(y for _, y, _ in points)])
-    zero = _scaled(0.0, y_range, HEIGHT - MARGIN, 12)
+    zero = _scale(0.0, y_range, HEIGHT - MARGIN, 12)
     dots = "".join(
-        _dot(_scaled(x, x_range, MARGIN, WIDTH - 12), _scaled(y, y_range, HEIGHT - MARGIN, 12), run, folder)
+        _dot(_scale(x, x_range, MARGIN, WIDTH - 12), _scale(y, y_range, HEIGHT - MARGIN, 12), run, folder)
         for x, y, run in reversed(points)
     )
     labels = (
@@ -127,5 +127,5 @@ def _range(values: Sequence[float]) -> tuple[float, float]:
     return (low, high) if low < high else (low - 0.5, high + 0.5)
 
 
-def _scaled(value: float, limits: tuple[float, float], start: float, end: float) -> float:
+def _scale(value: float, limits: tuple[float, float], start: float, end: float) -> float:
     return start + (value - limits[0]) / (limits[1] - limits[0]) * (end - start)

@@ -65,45 +65,45 @@ class _LineWrapper:
         self._columns, self._indent = columns, indent
         self._lines: list[StyledLine] = []
         self._line: list[StyledText] = []
-        self._used = 0
+        self._used_columns = 0
 
     def lines(self, line: StyledLine) -> list[StyledLine]:
         for number, piece in enumerate(line):
             punctuation = number + 1 < len(line) and re.match(r"[^\s\w]+", line[number + 1].text)
             self._add_piece(piece, display_width(punctuation[0]) if punctuation else 0)
-        self._end()
+        self._finish_line()
         return self._lines
 
     def _add_piece(self, piece: StyledText, reserved: int) -> None:
         """Add a piece, and keep `reserved` columns for the punctuation that follows it."""
         text = piece.text
-        if self._used + display_width(text.rstrip()) + reserved <= self._columns:
-            self._put(piece, text)
+        if self._used_columns + display_width(text.rstrip()) + reserved <= self._columns:
+            self._append(piece, text)
         elif text.startswith("  ") and self._indent + display_width(text.strip()) + reserved <= self._columns:
-            self._next(piece, text.strip())
+            self._start_line(piece, text.strip())
         else:
             for blank, word, last in _words(piece):
                 tail = reserved if last else len(_LINE_CONTINUATION) if piece.shell else 0
-                if self._used + display_width(blank + word) + tail <= self._columns or not self._used:
-                    self._put(piece, blank + word)
+                if self._used_columns + display_width(blank + word) + tail <= self._columns or not self._used_columns:
+                    self._append(piece, blank + word)
                 else:
-                    self._next(piece, word, tail)
+                    self._start_line(piece, word, tail)
 
-    def _put(self, piece: StyledText, text: str) -> None:
+    def _append(self, piece: StyledText, text: str) -> None:
         self._line.append(replace(piece, text=text))
-        self._used += display_width(text)
+        self._used_columns += display_width(text)
 
-    def _next(self, piece: StyledText, text: str, tail: int = 0) -> None:
+    def _start_line(self, piece: StyledText, text: str, tail: int = 0) -> None:
         """Continue in the next line. Text that is too long for the indentation starts further to the left."""
         if piece.shell and self._line and self._line[-1].shell:
-            self._put(piece, _LINE_CONTINUATION)
+            self._append(piece, _LINE_CONTINUATION)
         indent = max(0, min(self._indent, self._columns - display_width(text) - tail))
-        self._end()
+        self._finish_line()
         self._line.append(StyledText(" " * indent))
-        self._used = indent
-        self._put(piece, text)
+        self._used_columns = indent
+        self._append(piece, text)
 
-    def _end(self) -> None:
+    def _finish_line(self) -> None:
         self._lines.append(tuple(self._line))
         self._line = []
 

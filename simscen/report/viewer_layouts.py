@@ -11,18 +11,18 @@ from simscen.record.frame_names import RobotFrames
 from simscen.record.log_reader.read import Log
 
 _SCAN, _ROBOT = "/scan", "robot"
-_SHARED_TOPICS = (topics.MAP.name, topics.GLOBAL_COSTMAP.name, topics.THINGS.name)
+_SHARED_TOPICS = (topics.MAP.name, topics.GLOBAL_COSTMAP.name, topics.OBJECT_MARKERS.name)
 """Topics of each robot that are visible for the first robot only."""
 
 
 def rviz_config() -> str:
     """Return a configuration for RViz. Topics are relative to the namespace in which rviz2 is started."""
-    return _shipped("simscen.rviz")
+    return _read_shipped("simscen.rviz")
 
 
 def foxglove_layout(log: Log | None = None) -> str:
     """Return a layout for Foxglove and Lichtblick (JSON), with the robots and lidars of a log if given."""
-    layout = json.loads(_shipped("foxglove.json"))
+    layout = json.loads(_read_shipped("foxglove.json"))
     if log is not None:
         logs = log.robots or {"": log}
         scans = {name: list(robot_log.sensors.scans) for name, robot_log in logs.items()}
@@ -30,7 +30,7 @@ def foxglove_layout(log: Log | None = None) -> str:
     return json.dumps(layout, indent=2) + "\n"
 
 
-def _shipped(name: str) -> str:
+def _read_shipped(name: str) -> str:
     return files("simscen").joinpath(f"data/viewers/{name}").read_text("utf-8")
 
 

@@ -1,4 +1,4 @@
-"""Texts on a finished run that all reporters share: violations, errors, names and locations."""
+"""Texts about a finished run that all reporters share: violations, errors, names and locations."""
 
 from dataclasses import dataclass
 

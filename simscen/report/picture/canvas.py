@@ -1,6 +1,6 @@
 """Drawing of anti-aliased shapes and text in world coordinates with Pillow.
 
-The canvas also lists what was drawn, so that tests can compare pictures by their contents.
+The canvas also lists the drawn parts, so that tests can compare pictures by their contents.
 """
 
 import math
@@ -123,20 +123,20 @@ class Canvas:
         points = np.array([corner for outline in corners for corner in outline]).reshape(-1, 2)
         if not len(points):
             return
-        (left, top), (right, low) = np.floor(points.min(axis=0)), np.ceil(points.max(axis=0))
+        (left, top), (right, bottom) = np.floor(points.min(axis=0)), np.ceil(points.max(axis=0))
         left, top = max(left, 0), max(top, 0)
-        wide, high = int(min(right, self.samples[0]) - left) + 1, int(min(low, self.samples[1]) - top) + 1
-        if wide < 1 or high < 1:
+        width_px, height_px = int(min(right, self.samples[0]) - left) + 1, int(min(bottom, self.samples[1]) - top) + 1
+        if width_px < 1 or height_px < 1:
             return
-        inside, lines = Image.new("L", (wide, high), 0), Image.new("L", (wide, high), 0)
+        inside, lines = Image.new("L", (width_px, height_px), 0), Image.new("L", (width_px, height_px), 0)
         pen, fill = ImageDraw.Draw(lines), ImageDraw.Draw(inside)
         for outline in corners:
             fill.polygon([(u - left, v - top) for u, v in outline], fill=255)
         step = gap * SUPERSAMPLING
-        first = -high - ((left + (top if rising else -top)) % step)  # aligned between all polygons of the canvas
-        for at in np.arange(first, wide + high, step).tolist():
-            ends = [(at, 0), (at - high, high)] if rising else [(at, 0), (at + high, high)]
-            pen.line(ends, fill=color[3] if len(color) > 3 else 255, width=_line_width(width))
+        first = -height_px - ((left + (top if rising else -top)) % step)  # aligned between all polygons of the canvas
+        for offset in np.arange(first, width_px + height_px, step).tolist():
+            top_end, bottom_end = (offset, 0), (offset - height_px if rising else offset + height_px, height_px)
+            pen.line([top_end, bottom_end], fill=color[3] if len(color) > 3 else 255, width=_line_width(width))
         lines.paste(0, (0, 0), inside.point(lambda value: 255 - value))
         self._image.paste(color[:3], (int(left), int(top)), lines)
 
@@ -160,8 +160,8 @@ class Canvas:
         strokes = np.arange(0.0, lengths[-1], 2.0)
         ends = np.column_stack((strokes, np.minimum(strokes + 1, lengths[-1]))).ravel()
         corners = self._corners(np.column_stack([np.interp(ends, lengths, points[:, axis]) for axis in (0, 1)]))
-        for here, there in zip(corners[::2], corners[1::2], strict=True):
-            self._draw.line((here, there), fill=color, width=_line_width(width))
+        for start, end in zip(corners[::2], corners[1::2], strict=True):
+            self._draw.line((start, end), fill=color, width=_line_width(width))
 
     def disc(
         self,
@@ -175,8 +175,8 @@ class Canvas:
     ) -> None:
         """Draw a disc of `radius` pixels at a point in meters."""
         u, v = (SUPERSAMPLING * part for part in self.pixel(x, y))
-        reach = SUPERSAMPLING * radius
-        box = (u - reach, v - reach, u + reach, v + reach)
+        r = SUPERSAMPLING * radius
+        box = (u - r, v - r, u + r, v + r)
         self._draw.ellipse(box, fill=fill, outline=outline, width=_line_width(width))
         if busy:
             self._busy_draw.ellipse([part / SUPERSAMPLING / LABEL_CELL_PX for part in box], fill=255)
@@ -187,10 +187,10 @@ class Canvas:
         self._draw.polygon([((u + dx) * SUPERSAMPLING, (v + dy) * SUPERSAMPLING) for dx, dy in offsets], fill=fill)
         self._busy_draw.polygon([((u + dx) / LABEL_CELL_PX, (v + dy) / LABEL_CELL_PX) for dx, dy in offsets], fill=255)
 
-    def leader(self, here: tuple[float, float], there: tuple[float, float], color: Color) -> None:
+    def leader(self, start: tuple[float, float], end: tuple[float, float], color: Color) -> None:
         """Draw a thin line between two pixels, from a label to its object."""
         self._draw.line(
-            [(u * SUPERSAMPLING, v * SUPERSAMPLING) for u, v in (here, there)], fill=color, width=_line_width(0.8)
+            [(u * SUPERSAMPLING, v * SUPERSAMPLING) for u, v in (start, end)], fill=color, width=_line_width(0.8)
         )
 
     def text(self, item: TextItem) -> None:

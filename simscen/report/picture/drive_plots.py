@@ -33,8 +33,8 @@ def _panel(
     title: str, trial: DriveTrial, footprint: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]"
 ) -> Image.Image:
     name, *paths = trial
-    drawn = [end.apply(footprint) for end in (paths[2][0], paths[2][-1])]
-    points = np.concatenate([*drawn, *(_points(path) for path in paths)])
+    footprints = [end.apply(footprint) for end in (paths[2][0], paths[2][-1])]
+    points = np.concatenate([*footprints, *(_points(path) for path in paths)])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     half = float(np.ptp(points, axis=0).max()) / 2 + PANEL_MARGIN_M
     x, y = middle.tolist()
@@ -43,7 +43,7 @@ def _panel(
         canvas.line(np.array([(line, y - half), (line, y + half)]), RULE, 0.5)
     for line in map_picture.grid_coordinates(y - half, y + half, GRID_SPACING_M):
         canvas.line(np.array([(x - half, line), (x + half, line)]), RULE, 0.5)
-    for corners in drawn:
+    for corners in footprints:
         canvas.polygon(corners, None, ROBOT, 1.0)
     canvas.line(_points(paths[2]), GREEN, 3.0)
     canvas.line(_points(paths[1]), AMBER, 1.5)

@@ -17,7 +17,7 @@ from simscen.report.picture.palette import Color
 from simscen.report.picture.path_layer import driven_segments
 from simscen.report.picture.scene import Scene
 
-_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
+_GOAL_END_KINDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def error_code_text(event: Event) -> str:
 
 def goal_outcome(goal: Goal, scene: Scene) -> GoalOutcome:
     """Return the outcome of a goal. It has failed if the robot reports success, but the criterion is violated."""
-    ends = [event for event in scene.trace.of_kind(*_ENDS) if event.name == goal.name]
+    ends = [event for event in scene.trace.of_kind(*_GOAL_END_KINDS) if event.name == goal.name]
     if not ends:
         if any(event.name == goal.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)):
             return GoalOutcome("not reached", palette.AMBER, "not reached")
@@ -69,28 +69,28 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     names: dict[tuple[float, float], list[str]] = {}
     for goal in goals:
         outcome = goal_outcome(goal, scene)
-        there = names.setdefault((goal.pose.x, goal.pose.y), [])
-        known = any(matches_goal_name(goal.name, other.partition(":")[0]) for other in there)
+        entries = names.setdefault((goal.pose.x, goal.pose.y), [])
+        known = any(matches_goal_name(goal.name, other.partition(":")[0]) for other in entries)
         if not known or outcome.text:  # goals of a second loop have the same position
-            there.append(f"{goal.name}: {outcome.text}" if outcome.text else goal.name)
+            entries.append(f"{goal.name}: {outcome.text}" if outcome.text else goal.name)
     for goal in goals:
         outcome = goal_outcome(goal, scene)
         x, y, yaw = goal.pose
-        reach = max(goal.xy_tolerance * canvas.scale, 5.0)
-        hollow = outcome.word in ("not tried", "canceled")
-        canvas.disc(x, y, reach, None if hollow else (*outcome.color, 46), outcome.color, 1.8, busy=True)
-        tip = (reach + 10) / canvas.scale
+        radius = max(goal.xy_tolerance * canvas.scale, 5.0)
+        is_hollow = outcome.word in ("not tried", "canceled")
+        canvas.disc(x, y, radius, None if is_hollow else (*outcome.color, 46), outcome.color, 1.8, busy=True)
+        tip = (radius + 10) / canvas.scale
         heading = np.array([(x, y), (x + tip * math.cos(yaw), y + tip * math.sin(yaw))])
         canvas.line(heading, outcome.color, 2.2, busy=True)
         if outcome.word == "failed":
-            bar = 0.72 * reach / canvas.scale
+            bar = 0.72 * radius / canvas.scale
             for dy in (bar, -bar):
                 canvas.line(np.array([(x - bar, y - dy), (x + bar, y + dy)]), outcome.color, 2.0)
         else:
             canvas.disc(x, y, 2.6, outcome.color)
         canvas.add_part(f"goal {scene.label(goal.name)} {outcome.word}", heading)
         if texts := names.pop((x, y), None):
-            rim = max(reach, 8.0)
+            rim = max(radius, 8.0)
             yield Label(1, x, y, printable(scene.label(", ".join(texts))), outcome.color, 14, rim)
 
 
@@ -106,10 +106,10 @@ def draw_fault_bands(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw a wide band under the path where a fault was active."""
     for start, ended, name in _faults(scene):
         for piece in driven_segments(scene):
-            on = (piece.ticks >= start) & (piece.ticks <= ended)
-            canvas.line(piece.values[on, :2], palette.FAULTY, 11.0)
-            if on.any():
-                canvas.add_part(f"fault {scene.label(name)}", piece.values[on][[0, -1], :2])
+            is_active = (piece.ticks >= start) & (piece.ticks <= ended)
+            canvas.line(piece.values[is_active, :2], palette.FAULTY, 11.0)
+            if is_active.any():
+                canvas.add_part(f"fault {scene.label(name)}", piece.values[is_active][[0, -1], :2])
     yield from ()
 
 
@@ -129,13 +129,13 @@ def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 def _faults(scene: Scene) -> list[tuple[int, int, str]]:
     """Return the start tick, end tick and name of each fault."""
     ended = list(scene.trace.of_kind(EventKind.FAULT_ENDED))
-    found = []
+    faults = []
     for event in scene.trace.of_kind(EventKind.FAULT_STARTED):
-        own = [end for end in ended if end.name == event.name and end.tick >= event.tick]
-        found.append((event.tick, own[0].tick if own else scene.trace.end, event.name))
-        if own:
-            ended.remove(own[0])
-    return found
+        matching = [end for end in ended if end.name == event.name and end.tick >= event.tick]
+        faults.append((event.tick, matching[0].tick if matching else scene.trace.end, event.name))
+        if matching:
+            ended.remove(matching[0])
+    return faults
 
 
 def draw_events(canvas: Canvas, scene: Scene) -> Iterator[Label]:
@@ -188,9 +188,9 @@ def draw_violations(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw a small diamond with the name for each place that is not a goal."""
     goals = [goal.pose for robot in scene.each for goal in robot.case.every_goal]
-    taken = {(round(pose.x, 3), round(pose.y, 3)) for pose in goals}
+    goal_positions = {(round(pose.x, 3), round(pose.y, 3)) for pose in goals}
     for name, pose in sorted(scene.scenery.places.items()):
-        if (round(pose.x, 3), round(pose.y, 3)) not in taken and canvas.shows(pose.x, pose.y):
+        if (round(pose.x, 3), round(pose.y, 3)) not in goal_positions and canvas.shows(pose.x, pose.y):
             canvas.symbol(pose.x, pose.y, [(0, -4), (4, 0), (0, 4), (-4, 0)], palette.PLACE)
             canvas.add_part(f"place {name}", np.array([(pose.x, pose.y)]))
             yield Label(9, pose.x, pose.y, printable(name), palette.FAINT_INK, 11, 5.0, optional=True)

@@ -1,4 +1,4 @@
-"""Placement of labels next to their objects such that they cover no path, robot, goal, or other label."""
+"""Placement of labels next to their objects without covering paths, robots, goals, or other labels."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ _DISTANCES_PX = (4.0, 12.0, 22.0, 36.0, 54.0, 76.0, 104.0, 140.0)
 _ANGLES = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 150, 330, 210, 60, 120, 300, 240))
 _LEADER_DISTANCE_PX = 16.0
 """Distance from which a line connects the label with its object."""
-_WALL_WEIGHT, _FAR_WEIGHT = 0.25, 0.0015
+_WALL_WEIGHT, _DISTANCE_WEIGHT = 0.25, 0.0015
 """Costs of covering walls, and of each pixel of distance, relative to covering a path."""
 _MAX_COVERED_SHARE = 0.2
 """Maximum cost of an optional label; more expensive ones are omitted."""
@@ -42,26 +42,26 @@ class Label:
 
 def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
     """Place all labels. `walls` is the share 0 to 1 of walls in each label cell of the canvas."""
-    taken = canvas.busy + _WALL_WEIGHT * walls
+    occupied = canvas.busy + _WALL_WEIGHT * walls
     for label in sorted(labels, key=lambda label: label.rank):
         if not canvas.shows(label.x, label.y):
             continue
-        cost, (left, top, right, low) = _best_box(canvas, label, taken)
+        cost, (left, top, right, bottom) = _best_box(canvas, label, occupied)
         if label.optional and cost > _MAX_COVERED_SHARE:
             continue
         rows, columns = (
-            slice(int(top // LABEL_CELL_PX), int(low // LABEL_CELL_PX) + 1),
+            slice(int(top // LABEL_CELL_PX), int(bottom // LABEL_CELL_PX) + 1),
             slice(int(left // LABEL_CELL_PX), int(right // LABEL_CELL_PX) + 1),
         )
-        taken[rows, columns] = 3.0
+        occupied[rows, columns] = 3.0
         u, v = canvas.pixel(label.x, label.y)
-        end = min(max(u, left), right), min(max(v, top), low)
+        end = min(max(u, left), right), min(max(v, top), bottom)
         distance = math.dist((u, v), end)
         if distance > label.rim + _LEADER_DISTANCE_PX:
             share = label.rim / distance
             canvas.leader((u + share * (end[0] - u), v + share * (end[1] - v)), end, label.plate or label.color)
         halo = None if label.plate else palette.FREE
-        middle = (left + right) / 2, (top + low) / 2
+        middle = (left + right) / 2, (top + bottom) / 2
         canvas.text(TextItem(*middle, label.text, label.size, label.color, "mm", label.plate, halo))
         canvas.add_part(f"label {label.text}", [(label.x, label.y)])
 
@@ -70,40 +70,40 @@ Box = tuple[float, float, float, float]
 """Left, top, right and bottom in pixels."""
 
 
-def _best_box(canvas: Canvas, label: Label, taken: Array) -> tuple[float, Box]:
+def _best_box(canvas: Canvas, label: Label, occupied: Array) -> tuple[float, Box]:
     """Return the box of a label with the lowest cost, and the cost."""
-    sums = np.zeros((taken.shape[0] + 1, taken.shape[1] + 1))
-    sums[1:, 1:] = taken.cumsum(axis=0).cumsum(axis=1)
-    wide, high = text_size(label.text, label.size)
-    wide, high = wide + 10, high + 10
+    sums = np.zeros((occupied.shape[0] + 1, occupied.shape[1] + 1))
+    sums[1:, 1:] = occupied.cumsum(axis=0).cumsum(axis=1)
+    width, height = text_size(label.text, label.size)
+    width, height = width + 10, height + 10
     u, v = canvas.pixel(label.x, label.y)
-    best: tuple[float, Box] = (math.inf, (u, v, u + wide, v + high))
-    for away in _DISTANCES_PX:
-        if best[0] <= _FAR_WEIGHT * away:
+    best: tuple[float, Box] = (math.inf, (u, v, u + width, v + height))
+    for distance in _DISTANCES_PX:
+        if best[0] <= _DISTANCE_WEIGHT * distance:
             break  # boxes at larger distances cannot be better
         for number, angle in enumerate(_ANGLES):
-            box = _box(canvas, (u, v), angle, label.rim + away, (wide, high))
-            cost = _covered(sums, box) + _FAR_WEIGHT * (away + number / 4)
+            box = _box(canvas, (u, v), angle, label.rim + distance, (width, height))
+            cost = _covered_share(sums, box) + _DISTANCE_WEIGHT * (distance + number / 4)
             if cost < best[0]:
                 best = (cost, box)
     return best
 
 
-def _box(canvas: Canvas, at: tuple[float, float], angle: float, away: float, size: tuple[float, float]) -> Box:
+def _box(canvas: Canvas, center: tuple[float, float], angle: float, distance: float, size: tuple[float, float]) -> Box:
     """Return the box at a distance and angle from a pixel, moved onto the canvas."""
     c, s = math.cos(angle), -math.sin(angle)
-    middle = at[0] + c * (away + abs(c) * size[0] / 2), at[1] + s * (away + abs(s) * size[1] / 2)
+    middle = center[0] + c * (distance + abs(c) * size[0] / 2), center[1] + s * (distance + abs(s) * size[1] / 2)
     if abs(c) > 0.1 and abs(s) > 0.1:  # diagonal: next to the object, not above it
-        middle = at[0] + math.copysign(away * abs(c) + size[0] / 2, c), middle[1]
+        middle = center[0] + math.copysign(distance * abs(c) + size[0] / 2, c), middle[1]
     left = min(max(middle[0] - size[0] / 2, 2.0), max(2.0, canvas.width - size[0] - 2.0))
     top = min(max(middle[1] - size[1] / 2, 2.0), max(2.0, canvas.height - size[1] - 2.0))
     return left, top, left + size[0], top + size[1]
 
 
-def _covered(sums: Array, box: Box) -> float:
+def _covered_share(sums: Array, box: Box) -> float:
     """Return the share of a box that is occupied. `sums` are cumulative sums over the label cells."""
-    left, top, right, low = (int(part // LABEL_CELL_PX) for part in box)
-    right, low = min(right + 1, sums.shape[1] - 1), min(low + 1, sums.shape[0] - 1)
-    inside = float(sums[low, right] - sums[top, right] - sums[low, left] + sums[top, left])
-    cells: int = max(1, (right - left) * (low - top))
+    left, top, right, bottom = (int(part // LABEL_CELL_PX) for part in box)
+    right, bottom = min(right + 1, sums.shape[1] - 1), min(bottom + 1, sums.shape[0] - 1)
+    inside = float(sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left])
+    cells: int = max(1, (right - left) * (bottom - top))
     return inside / cells

@@ -1,4 +1,4 @@
-"""map.png: a run at one glance."""
+"""Picture of a run, map.png: header, map with paths and events, and sidebar."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -27,7 +27,7 @@ from simscen.report.picture.canvas import (
 )
 from simscen.report.picture.labels import Label, place_labels
 from simscen.report.picture.scene import Scene
-from simscen.report.picture.sidebar import WIDTH, sidebar
+from simscen.report.picture.sidebar import WIDTH_PX, sidebar
 
 HEADER_HEIGHT_PX = 66
 MAX_MAP_SIZE_PX = (1000, 800)
@@ -63,7 +63,7 @@ def draw_map_picture(scene: Scene) -> Image.Image:
     width = LEFT_MARGIN_PX + map_.width + _MARGIN_PX
     height = _MARGIN_PX + map_.height + BOTTOM_MARGIN_PX
     side = sidebar(scene, [part.name for part in canvas.parts], height)
-    image = Image.new("RGB", (width + WIDTH, HEADER_HEIGHT_PX + max(height, side.height)), palette.PAGE)
+    image = Image.new("RGB", (width + WIDTH_PX, HEADER_HEIGHT_PX + max(height, side.height)), palette.PAGE)
     left, top = LEFT_MARGIN_PX, HEADER_HEIGHT_PX + _MARGIN_PX
     image.paste(map_, (left, top))
     image.paste(side, (width, HEADER_HEIGHT_PX))
@@ -88,10 +88,10 @@ def _map(scene: Scene) -> Canvas:
     canvas = Canvas(bounds, _scale(bounds), None)
     draw_map(canvas, scene.map)
     draw_grid(canvas)
-    labels = [label for draw_all in _GROUND_LAYERS for label in draw_all(canvas, scene)]
-    labels += [label for draw_one in _LAYERS_BELOW_ROBOT for robot in scene.each for label in draw_one(canvas, robot)]
-    labels += [label for draw_all in _OBJECT_LAYERS for label in draw_all(canvas, scene)]
-    labels += [label for draw_one in _LAYERS_ABOVE_ROBOT for robot in scene.each for label in draw_one(canvas, robot)]
+    labels = [label for draw in _GROUND_LAYERS for label in draw(canvas, scene)]
+    labels += [label for draw in _LAYERS_BELOW_ROBOT for robot in scene.each for label in draw(canvas, robot)]
+    labels += [label for draw in _OBJECT_LAYERS for label in draw(canvas, scene)]
+    labels += [label for draw in _LAYERS_ABOVE_ROBOT for robot in scene.each for label in draw(canvas, robot)]
     labels += event_layer.draw_violations(canvas, scene)
     place_labels(canvas, labels, _walls(canvas, scene))
     return canvas
@@ -103,8 +103,8 @@ def _walls(canvas: Canvas, scene: Scene) -> Array:
     v, u = np.mgrid[:rows, :columns] * LABEL_CELL_PX + LABEL_CELL_PX / 2
     x, y = canvas.bounds[0] + u / canvas.scale, canvas.bounds[3] - v / canvas.scale
     values = scene.map.values_at(np.column_stack((x.ravel(), y.ravel())))
-    taken: Array = (values > 50).reshape(rows, columns).astype(np.float64)
-    return taken
+    occupied: Array = (values > 50).reshape(rows, columns).astype(np.float64)
+    return occupied
 
 
 def _required_points(scene: Scene) -> Array:
@@ -122,15 +122,15 @@ def _scale(bounds: Bounds) -> float:
 def _header(image: Image.Image, scene: Scene) -> None:
     result, pen = scene.result, ImageDraw.Draw(image)
     word, color = result.outcome.value.replace("-", " ").upper(), palette.OUTCOMES[result.outcome]
-    wide = math.ceil(font(16).getlength(word)) + 24
-    pen.rounded_rectangle((16, 16, 16 + wide, 46), 6, fill=color)
-    draw_text(pen, TextItem(16 + wide / 2, 31, word, 16, palette.PAGE, "mm"))
-    draw_text(pen, TextItem(32 + wide, 23, printable(result.key.scenario), 18, palette.INK))
-    draw_text(pen, TextItem(32 + wide, 45, _facts(scene), 13, palette.FAINT_INK))
+    width = math.ceil(font(16).getlength(word)) + 24
+    pen.rounded_rectangle((16, 16, 16 + width, 46), 6, fill=color)
+    draw_text(pen, TextItem(16 + width / 2, 31, word, 16, palette.PAGE, "mm"))
+    draw_text(pen, TextItem(32 + width, 23, printable(result.key.scenario), 18, palette.INK))
+    draw_text(pen, TextItem(32 + width, 45, _facts_text(scene), 13, palette.FAINT_INK))
     pen.line([(0, HEADER_HEIGHT_PX - 1), (image.width, HEADER_HEIGHT_PX - 1)], fill=palette.RULE)
 
 
-def _facts(scene: Scene) -> str:
+def _facts_text(scene: Scene) -> str:
     result = scene.result
     length = result.metrics.get("path_length")
     key = result.key
@@ -146,8 +146,8 @@ def end_reason(scene: Scene) -> str:
     reasons = [scene.result.ended]
     for robot in scene.each:
         for event in robot.trace.of_kind(EventKind.NAVIGATION_ENDED)[-1:]:
-            status = " ".join(part for part in (event.name, event_layer.error_code_text(event)) if part)
-            reasons += [robot.label(status)] if event.name != "SUCCEEDED" else []
+            text = " ".join(part for part in (event.name, event_layer.error_code_text(event)) if part)
+            reasons += [robot.label(text)] if event.name != "SUCCEEDED" else []
     return ", ".join(reason for reason in reasons if reason)
 
 
@@ -174,8 +174,11 @@ def draw_map(canvas: Canvas, grid: OccupancyGrid) -> None:
     per_pixel = 1 / (canvas.scale * SUPERSAMPLING)
     x0, _, _, y1 = canvas.bounds
     corners = np.array([[x0, y1], [x0 + per_pixel, y1], [x0, y1 - per_pixel]])
-    at, right, down = grid.origin.inverse().apply(corners) / resolution
-    affine = (right[0] - at[0], down[0] - at[0], at[0], right[1] - at[1], down[1] - at[1], at[1])
+    origin, right, down = grid.origin.inverse().apply(corners) / resolution
+    affine = (
+        *(right[0] - origin[0], down[0] - origin[0], origin[0]),
+        *(right[1] - origin[1], down[1] - origin[1], origin[1]),
+    )
     canvas.set_image(
         image.transform(canvas.samples, Image.Transform.AFFINE, tuple(map(float, affine)), fillcolor=palette.UNKNOWN)
     )
@@ -217,9 +220,9 @@ _MIN_GRID_SPACING_PX = 55
 
 def grid_spacing(canvas: Canvas) -> float:
     """Return a round distance of grid lines in m: 1, 2, 5, 10, … times a power of ten."""
-    least = _MIN_GRID_SPACING_PX / canvas.scale
-    power = 10.0 ** math.floor(math.log10(least))
-    return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= least)
+    min_spacing = _MIN_GRID_SPACING_PX / canvas.scale
+    power = 10.0 ** math.floor(math.log10(min_spacing))
+    return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= min_spacing)
 
 
 def grid_coordinates(low: float, high: float, step: float) -> list[float]:

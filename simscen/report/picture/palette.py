@@ -52,9 +52,9 @@ _STOPS = ((40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 15
 
 def time_color(share: float) -> Color:
     """Return the color for a share 0 to 1 of the duration of the run, from dark blue to orange."""
-    at = min(max(share, 0.0), 1.0) * (len(_STOPS) - 1)
-    low = min(int(at), len(_STOPS) - 2)
-    r, g, b = (round(a + (at - low) * (z - a)) for a, z in zip(_STOPS[low], _STOPS[low + 1], strict=True))
+    position = min(max(share, 0.0), 1.0) * (len(_STOPS) - 1)
+    low = min(int(position), len(_STOPS) - 2)
+    r, g, b = (round(a + (position - low) * (z - a)) for a, z in zip(_STOPS[low], _STOPS[low + 1], strict=True))
     return r, g, b
 
 
@@ -66,7 +66,7 @@ DARK = {
     "page": "#15181c", "panel": "#1e2329", "rule": "#363d46", "ink": "#e7eaee", "quiet": "#a3abb6",
     "good": "#4fc9a2", "bad": "#ff8a66", "odd": "#e9b44c", "link": "#7cc4f5", "focus": "#7cc4f5",
 }  # fmt: skip
-"""Light and dark theme of the pages. Text colors have a contrast of 4.5 to 1 on `page` and `panel`."""
+"""Light and dark theme of the pages; `odd` is the color of warnings and errors. Text has a contrast of 4.5 to 1."""
 
 
 def css_variables() -> str:

@@ -22,24 +22,24 @@ _LIFTED_SYMBOL = [(-6, -2), (0, -9), (6, -2), (2, -2), (2, 6), (-2, 6), (-2, -2)
 _SET_DOWN_SYMBOL = [(-6, 2), (0, 9), (6, 2), (2, 2), (2, -6), (-2, -6), (-2, 2)]
 
 
-def split_at_jumps(samples: Samples, tick_rate: int, placed: tuple[int, ...] = ()) -> list[Samples]:
-    """Split poses at jumps, and at the ticks at which the object was `placed` elsewhere."""
+def split_at_jumps(samples: Samples, tick_rate: int, placement_ticks: tuple[int, ...] = ()) -> list[Samples]:
+    """Split poses at jumps, and at the ticks at which the object was placed elsewhere."""
     if len(samples) < 2:
         return [samples] if len(samples) else []
-    far = np.hypot(*np.diff(samples.values[:, :2], axis=0).T)
+    distances = np.hypot(*np.diff(samples.values[:, :2], axis=0).T)
     seconds = np.diff(samples.ticks) / tick_rate
-    cuts = {*(np.flatnonzero((far > MIN_JUMP_M) & (far > MAX_SPEED_M_S * seconds)) + 1).tolist()}
-    for tick in placed:
+    cuts = {*(np.flatnonzero((distances > MIN_JUMP_M) & (distances > MAX_SPEED_M_S * seconds)) + 1).tolist()}
+    for tick in placement_ticks:
         near = max(0, int(np.searchsorted(samples.ticks, tick)) - 1)
-        cuts.add(near + 1 + int(far[near : near + 2].argmax()) if near < len(far) else len(samples))
+        cuts.add(near + 1 + int(distances[near : near + 2].argmax()) if near < len(distances) else len(samples))
     edges = sorted({0, *cuts, len(samples)})
     return [Samples(samples.ticks[a:b], samples.values[a:b]) for a, b in pairwise(edges)]
 
 
 def driven_segments(scene: Scene) -> list[Samples]:
     """Split the true path where the robot was moved elsewhere."""
-    placed = tuple(event.tick for event in scene.trace.of_kind(EventKind.ROBOT_PLACED))
-    return split_at_jumps(scene.trace.truth, scene.trace.tick_rate, placed)
+    placement_ticks = tuple(event.tick for event in scene.trace.of_kind(EventKind.ROBOT_PLACED))
+    return split_at_jumps(scene.trace.truth, scene.trace.tick_rate, placement_ticks)
 
 
 def draw_plans(canvas: Canvas, scene: Scene) -> Iterator[Label]:
@@ -53,18 +53,20 @@ def draw_plans(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw the true path, colored by time, with dots at round seconds and gaps where the robot was carried."""
+    """Draw the true path, colored by time, with dots at round seconds and gaps where the robot was kidnapped."""
     trace, pieces = scene.trace, driven_segments(scene)
     edges = np.linspace(0, trace.end, _BANDS + 1)
     for piece in pieces:
         points = piece.values[:, :2]
         canvas.add_part(scene.label("path"), points[[0, -1]])
         if len(scene.robots) > 1:
-            canvas.line(_thinned(points, canvas), palette.ROBOTS[scene.robot_index % len(palette.ROBOTS)], 6.4)
+            canvas.line(
+                _drop_close_points(points, canvas), palette.ROBOTS[scene.robot_index % len(palette.ROBOTS)], 6.4
+            )
         for k in range(_BANDS):
             first, last = np.searchsorted(piece.ticks, (edges[k], edges[k + 1]), side="left")
             band = points[max(first - 1, 0) : last + 1]
-            canvas.line(_thinned(band, canvas), palette.time_color((k + 0.5) / _BANDS), 3.2, busy=True)
+            canvas.line(_drop_close_points(band, canvas), palette.time_color((k + 0.5) / _BANDS), 3.2, busy=True)
     step = round_time_step(trace.seconds(trace.end))
     for number in range(1, int(trace.seconds(trace.end) / step) + 1) if pieces else ():
         tick = round(number * step * trace.tick_rate)
@@ -89,7 +91,7 @@ def draw_kidnapping(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 def draw_belief(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw the believed path with gaps at jumps."""
     for piece in split_at_jumps(scene.trace.belief, scene.trace.tick_rate):
-        canvas.dashes(_thinned(piece.values[:, :2], canvas), palette.BELIEF, 1.2, 4.0)
+        canvas.dashes(_drop_close_points(piece.values[:, :2], canvas), palette.BELIEF, 1.2, 4.0)
         canvas.add_part(scene.label("belief"), piece.values[[0, -1], :2])
     yield from ()
 
@@ -99,16 +101,19 @@ def draw_robot(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     if not len(scene.trace.truth):
         return
     first, last = (Pose2(*row) for row in scene.trace.truth.values[[0, -1]].tolist())
-    hull = np.array(scene.case.footprint) if len(scene.case.footprint) > 2 else _DOT
-    reach = float(np.hypot(*hull.T).max()) * canvas.scale
-    nose = np.array([(0.35, -0.4), (0.85, 0.0), (0.35, 0.4)]) * (float(hull[:, 0].max()), float(hull[:, 1].max()))
-    moved = first.distance(last) * canvas.scale > reach
+    footprint = np.array(scene.case.footprint) if len(scene.case.footprint) > 2 else _DOT
+    radius = float(np.hypot(*footprint.T).max()) * canvas.scale
+    nose = np.array([(0.35, -0.4), (0.85, 0.0), (0.35, 0.4)]) * (
+        float(footprint[:, 0].max()),
+        float(footprint[:, 1].max()),
+    )
+    has_moved = first.distance(last) * canvas.scale > radius
     for pose, color, opacity, text in ((first, palette.START, 40, "start"), (last, palette.ROBOT, 170, "end")):
-        canvas.polygon(pose.apply(hull), (*color, opacity), color, busy=True)
+        canvas.polygon(pose.apply(footprint), (*color, opacity), color, busy=True)
         canvas.polygon(pose.apply(nose), palette.PAGE if opacity > 100 else color)
-        canvas.add_part(scene.label(f"robot at the {text}"), pose.apply(hull))
-        if text == "end" or moved:
-            yield Label(3, pose.x, pose.y, printable(scene.label(text)), color, 12, reach + 1)
+        canvas.add_part(scene.label(f"robot at the {text}"), pose.apply(footprint))
+        if text == "end" or has_moved:
+            yield Label(3, pose.x, pose.y, printable(scene.label(text)), color, 12, radius + 1)
 
 
 def round_time_step(seconds: float) -> float:
@@ -119,12 +124,12 @@ def round_time_step(seconds: float) -> float:
     return next(power * factor for factor in (1, 2, 5, 10) if seconds / (power * factor) <= 10)
 
 
-def _thinned(points: Array, canvas: Canvas) -> Array:
+def _drop_close_points(points: Array, canvas: Canvas) -> Array:
     """Return points at least one pixel apart, and the last one, to save time."""
     if len(points) < 3:
         return points
     pixels = np.floor(points * canvas.scale)
     keep = np.concatenate(([True], np.any(np.diff(pixels, axis=0) != 0, axis=1)))
     keep[-1] = True
-    kept: Array = points[keep]
-    return kept
+    result: Array = points[keep]
+    return result

@@ -14,45 +14,49 @@ from simscen.report.picture.palette import Color
 from simscen.report.picture.path_layer import round_time_step
 from simscen.report.picture.scene import Scene
 
-WIDTH = 360
-_PAD = 18
-_LINE = 17
+WIDTH_PX = 360
+_PADDING_PX = 18
+_LINE_HEIGHT_PX = 17
 _ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
 Pen = ImageDraw.ImageDraw
-Sample = Callable[[Pen, float, float], None]
+DrawSymbol = Callable[[Pen, float, float], None]
 Row = tuple[Status, Color, list[str]]
 
 
 def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
     """Draw the sidebar with at least `height` pixels. The legend explains the `parts` of the map."""
     reasons, rows = _reasons(scene), _criteria(scene)
-    legend = [entry[1:] for entry in _legend(round_time_step(scene.result.simulated)) if _is_on(parts, entry[0])]
-    text_height = len(reasons) * _LINE + (14 if reasons else 0) + sum(_LINE * len(lines) + 8 for _, _, lines in rows)
-    needed = 54 + text_height + 26 + 20 * len(legend) + 62
-    image = Image.new("RGB", (WIDTH, max(height, needed)), palette.PAGE)
+    legend = [entry[1:] for entry in _legend(round_time_step(scene.result.simulated)) if _is_drawn(parts, entry[0])]
+    text_height = (
+        len(reasons) * _LINE_HEIGHT_PX
+        + (14 if reasons else 0)
+        + sum(_LINE_HEIGHT_PX * len(lines) + 8 for _, _, lines in rows)
+    )
+    min_height = 54 + text_height + 26 + 20 * len(legend) + 62
+    image = Image.new("RGB", (WIDTH_PX, max(height, min_height)), palette.PAGE)
     draw = ImageDraw.Draw(image, "RGBA")
     _criteria_list(draw, reasons, rows)
     top = image.height - 20 * len(legend) - 50
-    for number, (text, sample) in enumerate(legend):
+    for number, (text, draw_symbol) in enumerate(legend):
         y = top + 20 * number
-        sample(draw, _PAD, y)
-        draw_text(draw, TextItem(_PAD + 34, y, text, 12, palette.FAINT_INK))
+        draw_symbol(draw, _PADDING_PX, y)
+        draw_text(draw, TextItem(_PADDING_PX + 34, y, text, 12, palette.FAINT_INK))
     _time_bar(draw, scene, image.height - 30)
     return image
 
 
-def _is_on(parts: Sequence[str], wanted: str) -> bool:
-    """Return whether the name of a part starts or ends with a word of the legend."""
-    return any(part.startswith(wanted) or part.endswith(f" {wanted}") for part in parts)
+def _is_drawn(parts: Sequence[str], word: str) -> bool:
+    """Return whether a part of the map has a name that starts or ends with this word of the legend."""
+    return any(part.startswith(word) or part.endswith(f" {word}") for part in parts)
 
 
 def _reasons(scene: Scene) -> list[str]:
     """Return the lines with an error, or the reason of a skipped or expectedly failed run."""
     result = scene.result
     if result.error is not None:
-        return _wrapped(printable(f"{result.error.kind}: {result.error.message}"), _PAD)
+        return _wrap(printable(f"{result.error.kind}: {result.error.message}"), _PADDING_PX)
     if result.outcome in (Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED):
-        return _wrapped(printable(f"{result.outcome.value.replace('-', ' ')}: {result.reason}"), _PAD)
+        return _wrap(printable(f"{result.outcome.value.replace('-', ' ')}: {result.reason}"), _PADDING_PX)
     return []
 
 
@@ -64,35 +68,35 @@ def _criteria(scene: Scene) -> list[Row]:
         is_warning = verdict.severity == "warn" and verdict.status is not Status.PASS
         color = palette.AMBER if is_warning else palette.STATUSES[verdict.status]
         if finding is None:
-            rows.append((verdict.status, color, _wrapped(f"{printable(verdict.id)}: checked nothing")))
+            rows.append((verdict.status, color, _wrap(f"{printable(verdict.id)}: checked nothing")))
             continue
         failed = verdict.status is not Status.PASS
         where = time_and_place(finding, scene.result.tick_rate) if failed else ""
         text = ", ".join(part for part in (f"{subject(verdict, finding)}: {comparison(finding)}", where) if part)
         texts = [f"warning: {text}" if is_warning else text, *(finding.detail if failed else ())]
-        rows.append((verdict.status, color, [line for text in texts for line in _wrapped(printable(text))]))
+        rows.append((verdict.status, color, [line for text in texts for line in _wrap(printable(text))]))
     return rows
 
 
 def _criteria_list(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
     y = 24.0
     for line in reasons:
-        draw_text(draw, TextItem(_PAD, y, line, 13, palette.INK))
-        y += _LINE
+        draw_text(draw, TextItem(_PADDING_PX, y, line, 13, palette.INK))
+        y += _LINE_HEIGHT_PX
     y += 14 if reasons else 0
-    draw_text(draw, TextItem(_PAD, y, "criteria", 12, palette.FAINT_INK))
+    draw_text(draw, TextItem(_PADDING_PX, y, "criteria", 12, palette.FAINT_INK))
     y += 22
     for status, color, lines in rows:
-        (_tick if status is Status.PASS else _cross)(draw, _PAD + 5, y, color)
+        (_check_mark if status is Status.PASS else _cross)(draw, _PADDING_PX + 5, y, color)
         for line in lines:
-            draw_text(draw, TextItem(_PAD + 20, y, line, 13, palette.INK))
-            y += _LINE
+            draw_text(draw, TextItem(_PADDING_PX + 20, y, line, 13, palette.INK))
+            y += _LINE_HEIGHT_PX
         y += 8
 
 
-def _wrapped(text: str, left: int = _PAD + 20, size: int = 13) -> list[str]:
+def _wrap(text: str, left: int = _PADDING_PX + 20, size: int = 13) -> list[str]:
     """Wrap a text. Words that are longer than a line are split."""
-    available = WIDTH - left - 12
+    available = WIDTH_PX - left - 12
     lines, current = [], ""
     for word in text.split(" "):
         longer = f"{current} {word}".strip()
@@ -100,16 +104,16 @@ def _wrapped(text: str, left: int = _PAD + 20, size: int = 13) -> list[str]:
             lines.append(current)
             longer = word
         while font(size).getlength(longer) > available:
-            fits = next(
+            length = next(
                 k for k in range(len(longer) - 1, 0, -1) if k == 1 or font(size).getlength(longer[:k]) <= available
             )
-            lines.append(longer[:fits])
-            longer = longer[fits:]
+            lines.append(longer[:length])
+            longer = longer[length:]
         current = longer
     return [*lines, current]
 
 
-def _tick(draw: Pen, x: float, y: float, color: Color) -> None:
+def _check_mark(draw: Pen, x: float, y: float, color: Color) -> None:
     draw.line([(x - 5, y), (x - 1, y + 4), (x + 5, y - 5)], fill=color, width=2)
 
 
@@ -118,7 +122,7 @@ def _cross(draw: Pen, x: float, y: float, color: Color) -> None:
     draw.line([(x - 4, y + 4), (x + 4, y - 4)], fill=color, width=2)
 
 
-def _legend(step: float) -> list[tuple[str, str, Sample]]:
+def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
     """Return the entries of the legend: start of the name of a part, text, and function that draws the symbol."""
     return [
         ("", f"true path, a dot every {step:g} s", _path),
@@ -163,22 +167,22 @@ def _arrow(draw: Pen, x: float, y: float) -> None:
     draw.polygon([(x + 7, y - 2), (x + 12, y - 8), (x + 17, y - 2)], fill=palette.AMBER)
 
 
-def _ring(color: Color, crossed: bool) -> Sample:
-    def sample(draw: Pen, x: float, y: float) -> None:
+def _ring(color: Color, crossed: bool) -> DrawSymbol:
+    def draw_symbol(draw: Pen, x: float, y: float) -> None:
         draw.ellipse((x + 5, y - 7, x + 19, y + 7), fill=(*color, 46), outline=color, width=2)
         if crossed:
             _cross(draw, x + 12, y, color)
         else:
             draw.line([(x + 12, y), (x + 25, y)], fill=color, width=2)
 
-    return sample
+    return draw_symbol
 
 
-def _block(color: Color) -> Sample:
-    def sample(draw: Pen, x: float, y: float) -> None:
+def _block(color: Color) -> DrawSymbol:
+    def draw_symbol(draw: Pen, x: float, y: float) -> None:
         draw.rectangle((x + 3, y - 6, x + 21, y + 6), fill=(*color, 110), outline=color)
 
-    return sample
+    return draw_symbol
 
 
 def _door(draw: Pen, x: float, y: float) -> None:
@@ -192,12 +196,12 @@ def _person(draw: Pen, x: float, y: float) -> None:
     draw.line([(x + 12, y), (x + 23, y)], fill=palette.PERSON, width=2)
 
 
-def _hatched(color: Color, down: float) -> Sample:
-    def sample(draw: Pen, x: float, y: float) -> None:
+def _hatched(color: Color, down: float) -> DrawSymbol:
+    def draw_symbol(draw: Pen, x: float, y: float) -> None:
         for k in range(3):
             draw.line([(x + 7 * k, y + down), (x + 7 * k + 9, y - down)], fill=color, width=1)
 
-    return sample
+    return draw_symbol
 
 
 def _band(draw: Pen, x: float, y: float) -> None:
@@ -213,8 +217,8 @@ def _diamond(draw: Pen, x: float, y: float) -> None:
 def _time_bar(draw: Pen, scene: Scene, y: float) -> None:
     """Draw the color scale of the path, from the start to the end of the run."""
     end = f"{scene.result.simulated:.0f} s"
-    left, right = _PAD + 34, WIDTH - _PAD - math.ceil(font(12).getlength(end)) - 8
-    draw_text(draw, TextItem(_PAD, y, "0 s", 12, palette.FAINT_INK))
+    left, right = _PADDING_PX + 34, WIDTH_PX - _PADDING_PX - math.ceil(font(12).getlength(end)) - 8
+    draw_text(draw, TextItem(_PADDING_PX, y, "0 s", 12, palette.FAINT_INK))
     for x in range(left, right):
         draw.line([(x, y - 4), (x, y + 4)], fill=palette.time_color((x - left) / (right - left)))
     draw_text(draw, TextItem(right + 8, y, end, 12, palette.FAINT_INK))

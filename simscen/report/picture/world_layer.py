@@ -35,15 +35,15 @@ def draw_ground(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def _chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> None:
-    steep = math.hypot(*ground.uphill)
-    if steep < 0.01:
+    slope = math.hypot(*ground.uphill)
+    if slope < 0.01:
         return
-    up = np.array(ground.uphill) / steep
+    up = np.array(ground.uphill) / slope
     across, middle = np.array((-up[1], up[0])), outline.mean(axis=0)
     length, width = np.ptp(outline @ up), np.ptp(outline @ across)
     size = min(width, length / 2) / 6
-    for part in (-0.25, 0.05, 0.35):
-        tip = middle + part * length * up
+    for share in (-0.25, 0.05, 0.35):
+        tip = middle + share * length * up
         canvas.line(np.array([tip - size * (up - across), tip, tip - size * (up + across)]), palette.FAINT_INK, 1.6)
 
 
@@ -95,12 +95,12 @@ def draw_zones(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
     """Yield the zones that were enabled at any time, each with its text."""
-    own = {(str(zone.filter), zone.region): zone for zone in scene.scenery.zones if zone.robot == scene.name}
+    initial = {(str(zone.filter), zone.region): zone for zone in scene.scenery.zones if zone.robot == scene.name}
     switched: dict[tuple[str, str], list[Event]] = {}
     for event in scene.trace.of_kind(EventKind.ZONE_SWITCHED):
         switched.setdefault((str(event.data["filter"]), event.name), []).append(event)
-    for key in dict.fromkeys((*own, *switched)):
-        zone = own.get(key) or _added_zone(scene, key)
+    for key in dict.fromkeys((*initial, *switched)):
+        zone = initial.get(key) or _added_zone(scene, key)
         if zone is not None:
             yield zone, _zone_text(scene, zone, switched.get(key, []))
 
@@ -124,8 +124,8 @@ def _zone_text(scene: Scene, zone: FilterZone, events: list[Event]) -> str:
 def _mask_outlines(zone: FilterZone) -> list[Array]:
     """Return the blocks of a mask with a restriction, as rectangles."""
     cells = zone.cells or MaskBlocks(1.0)
-    wanted = [block for block in cells.blocks if block[4] == 100 or zone.filter == "speed"]
-    boxes = [[(c, r), (c + w, r), (c + w, r + h), (c, r + h)] for c, r, w, h, _ in wanted]
+    restricted = [block for block in cells.blocks if block[4] == 100 or zone.filter == "speed"]
+    boxes = [[(c, r), (c + w, r), (c + w, r + h), (c, r + h)] for c, r, w, h, _ in restricted]
     return [cells.origin.apply(np.array(box, dtype=np.float64) * cells.resolution) for box in boxes]
 
 
@@ -134,7 +134,7 @@ def _label_distance(canvas: Canvas, outline: Array) -> float:
     return float(np.ptp(outline, axis=0).min()) * canvas.scale / 2
 
 
-_EARLIER_POSES = 6
+_EARLIER_POSE_COUNT = 6
 _MIN_MOTION = 0.02
 """Minimum motion in m or rad for drawing a path."""
 
@@ -164,25 +164,27 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             last = spawn_pose(event)
         else:
             continue
-        gone = removed.get(name, -1) >= (event.tick if event else 0)
-        placed = [last.apply(outline) for outline in shapes[name]]
-        for outline in placed:
-            canvas.polygon(outline, None if gone else (*color, 150), color, 1.0 if gone else 1.5, busy=not gone)
-            canvas.add_part(f"{kind} {name}{' gone' if gone else ''}", outline)
+        is_removed = removed.get(name, -1) >= (event.tick if event else 0)
+        outlines = [last.apply(outline) for outline in shapes[name]]
+        for outline in outlines:
+            canvas.polygon(
+                outline, None if is_removed else (*color, 150), color, 1.0 if is_removed else 1.5, busy=not is_removed
+            )
+            canvas.add_part(f"{kind} {name}{' removed' if is_removed else ''}", outline)
         if person:
-            _heading_line(canvas, last, placed[0])
-        corners = np.concatenate(placed)
+            _heading_line(canvas, last, outlines[0])
+        corners = np.concatenate(outlines)
         x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
-        text = f"{name} (gone at {trace.seconds(removed[name]):.1f} s)" if gone else name
+        text = f"{name} (removed at {trace.seconds(removed[name]):.1f} s)" if is_removed else name
         rim = float(np.ptp(corners, axis=0).min()) * canvas.scale / 2 + 2
         yield Label(4, x, y, printable(text), color, 12, min(rim, 40.0))
 
 
 def _object_path(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines) -> None:
     """Draw the path of a moving object as a dotted line, and its earlier poses."""
-    for stretch in split_at_jumps(samples, scene.trace.tick_rate):
-        if np.ptp(stretch.values[:, :2], axis=0).max() > _MIN_MOTION:
-            canvas.dashes(stretch.values[:, :2], palette.PLACE, 1.0, 2.5)
+    for segment in split_at_jumps(samples, scene.trace.tick_rate):
+        if np.ptp(segment.values[:, :2], axis=0).max() > _MIN_MOTION:
+            canvas.dashes(segment.values[:, :2], palette.PLACE, 1.0, 2.5)
     for k in _earlier_poses(samples):
         color = palette.time_color(int(samples.ticks[k]) / max(scene.trace.end, 1))
         for outline in shape:
@@ -200,19 +202,19 @@ def _door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -> Non
 
 def _heading_line(canvas: Canvas, pose: Pose2, outline: Array) -> None:
     """Draw the heading of a pedestrian."""
-    reach = float(np.hypot(*(outline - (pose.x, pose.y)).T).max())
-    canvas.line(pose.apply(np.array([(0.0, 0.0), (1.5 * reach, 0.0)])), palette.PERSON, 2.0)
+    radius = float(np.hypot(*(outline - (pose.x, pose.y)).T).max())
+    canvas.line(pose.apply(np.array([(0.0, 0.0), (1.5 * radius, 0.0)])), palette.PERSON, 2.0)
 
 
 def _earlier_poses(samples: Samples) -> list[int]:
     """Return indices of samples, evenly spread over the path of an object without its end; empty if it did not move."""
     steps = np.diff(samples.values[:, :3], axis=0)
-    moved = np.hypot(steps[:, 0], steps[:, 1]) + 0.3 * np.abs(np.angle(np.exp(1j * steps[:, 2])))
-    lengths = np.concatenate(([0.0], np.cumsum(moved)))
+    distances = np.hypot(steps[:, 0], steps[:, 1]) + 0.3 * np.abs(np.angle(np.exp(1j * steps[:, 2])))
+    lengths = np.concatenate(([0.0], np.cumsum(distances)))
     if lengths[-1] < _MIN_MOTION:
         return []
-    chosen = np.searchsorted(lengths, np.linspace(0, lengths[-1], _EARLIER_POSES)[:-1], side="right") - 1
-    return sorted(set(chosen.tolist()))
+    indices = np.searchsorted(lengths, np.linspace(0, lengths[-1], _EARLIER_POSE_COUNT)[:-1], side="right") - 1
+    return sorted(set(indices.tolist()))
 
 
 def _pose(samples: Samples, k: int) -> Pose2:

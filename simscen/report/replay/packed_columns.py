@@ -14,7 +14,7 @@ INFINITE_STEPS = 2**30
 """Number of steps that stands for infinity; one more stands for nan."""
 
 Column = list[float]
-"""Position of a column in the bytes, count of its numbers, and step."""
+"""Offset of a column in the bytes, count of its numbers, and step."""
 
 
 class PackedColumns:
@@ -27,17 +27,17 @@ class PackedColumns:
 
     def add(self, values: "npt.ArrayLike", step: float = 1.0) -> Column:
         """Add numbers, rounded to multiples of `step`, and return the reference to the column."""
-        whole = quantize(np.asarray(values, dtype=np.float64).ravel(), step)
-        data = varints(zigzag(np.diff(whole, prepend=0)))
-        begin = self._size
+        steps = quantize(np.asarray(values, dtype=np.float64).ravel(), step)
+        data = varints(zigzag(np.diff(steps, prepend=0)))
+        start = self._size
         self._parts.append(data)
         self._size += len(data)
-        return [begin, len(whole), step]
+        return [start, len(steps), step]
 
-    def note_reduction(self, name: str, kept: int, total: int) -> None:
-        """Note that only a part of some data was kept, if that is the case."""
-        if kept < total:
-            self.left_out.append(f"{name}: {kept} of {total}")
+    def note_reduction(self, name: str, count: int, total: int) -> None:
+        """Add a note to `left_out` if only `count` of `total` items are on the page."""
+        if count < total:
+            self.left_out.append(f"{name}: {count} of {total}")
 
     @property
     def data(self) -> bytes:
@@ -52,9 +52,9 @@ def quantize(values: Array, step: float) -> npt.NDArray[np.int64]:
         -INFINITE_STEPS,
         INFINITE_STEPS,
     )
-    whole: npt.NDArray[np.int64] = np.rint(bounded).astype(np.int64)
-    whole[np.isnan(values)] = INFINITE_STEPS + 1
-    return whole
+    steps: npt.NDArray[np.int64] = np.rint(bounded).astype(np.int64)
+    steps[np.isnan(values)] = INFINITE_STEPS + 1
+    return steps
 
 
 def zigzag(numbers: npt.NDArray[np.int64]) -> npt.NDArray[np.uint64]:
@@ -74,38 +74,38 @@ def varints(numbers: npt.NDArray[np.uint64]) -> bytes:
     for place in range(int(sizes.max())):
         long = sizes > place
         low = (numbers[long] >> np.uint64(7 * place)) & np.uint64(0x7F)
-        follows = (sizes[long] > place + 1).astype(np.uint64) << np.uint64(7)
-        out[begins[long] + place] = (low | follows).astype(np.uint8)
+        continuation = (sizes[long] > place + 1).astype(np.uint64) << np.uint64(7)
+        out[begins[long] + place] = (low | continuation).astype(np.uint8)
     return out.tobytes()
 
 
-Chosen = npt.NDArray[np.int64]
+Indices = npt.NDArray[np.int64]
 """Indices of samples."""
 
 
-def evenly_spaced(count: int, most: int) -> Chosen:
-    """Return at most `most` evenly spaced indices below `count`, including the first and the last."""
-    if count <= most:
+def evenly_spaced(count: int, max_count: int) -> Indices:
+    """Return at most `max_count` evenly spaced indices below `count`, including the first and the last."""
+    if count <= max_count:
         return np.arange(count)
-    return np.unique(np.rint(np.linspace(0, count - 1, max(most, 1))).astype(np.int64))
+    return np.unique(np.rint(np.linspace(0, count - 1, max(max_count, 1))).astype(np.int64))
 
 
-def spaced_in_time(ticks: Ticks, period: int) -> Chosen:
+def spaced_in_time(ticks: Ticks, period: int) -> Indices:
     """Return samples at least `period` ticks apart, and also the last sample before each pause."""
-    kept: list[int] = []
+    indices: list[int] = []
     last = None
     for k, tick in enumerate(ticks.tolist()):
         pause = k + 1 == len(ticks) or int(ticks[k + 1]) - tick > 2 * period
         if last is None or tick - last >= period or pause:
-            kept.append(k)
+            indices.append(k)
             last = tick
-    return np.array(kept, dtype=np.int64)
+    return np.array(indices, dtype=np.int64)
 
 
-def keep_extremes(values: Array, most: int) -> Chosen:
-    """Return at most `most` samples, with the minimum and the maximum of each segment."""
-    if len(values) <= most:
+def keep_extremes(values: Array, max_count: int) -> Indices:
+    """Return at most `max_count` samples, with the minimum and the maximum of each segment."""
+    if len(values) <= max_count:
         return np.arange(len(values))
-    segments = np.array_split(np.arange(len(values)), max(1, most // 2))
-    chosen = [(s[int(np.argmin(values[s]))], s[int(np.argmax(values[s]))]) for s in segments]
-    return np.unique(np.array(chosen).ravel())
+    segments = np.array_split(np.arange(len(values)), max(1, max_count // 2))
+    extremes = [(s[int(np.argmin(values[s]))], s[int(np.argmax(values[s]))]) for s in segments]
+    return np.unique(np.array(extremes).ravel())

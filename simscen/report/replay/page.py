@@ -1,4 +1,4 @@
-"""The replay page, replay.html: a single file that plays one run, or two runs side by side, and the data of a run.
+"""Replay page, replay.html: a single file that plays one run, or two runs side by side.
 
 HTML, CSS and JavaScript modules are package data. The modules are joined to one script in the order of their imports.
 Tests import them one by one.
@@ -31,16 +31,16 @@ from simscen.report.replay.timeline import disturbance_data, read_source_lines, 
 FOLDER = PACKAGE / "data" / "replay"
 FORMAT = 1
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./([a-z]+)\.js";\n', re.MULTILINE)
-_LEVEL = 6
+_COMPRESSION_LEVEL = 6
 
 
 def replay_page(runs: Sequence[tuple[Log, RunResult]]) -> bytes:
     """Return the page of one run, or of two runs to compare. Equal logs give equal bytes."""
     columns = PackedColumns()
-    described = [run_data(log, result, columns) for log, result in runs]
-    document = {"format": FORMAT, "runs": described, "leftOut": list(dict.fromkeys(columns.left_out))}
+    data_of_runs = [run_data(log, result, columns) for log, result in runs]
+    document = {"format": FORMAT, "runs": data_of_runs, "leftOut": list(dict.fromkeys(columns.left_out))}
     data = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    title = " against ".join(_title(run) for run in described)
+    title = " against ".join(_title(run) for run in data_of_runs)
     return page(title, data.encode(), columns.data).encode()
 
 
@@ -51,16 +51,17 @@ def write_replay(path: Path, runs: Sequence[tuple[Log, RunResult]]) -> None:
 
 def page(title: str, data: bytes, numbers: bytes) -> str:
     """Return the HTML with compressed data, and a content security policy that allows only its own script and style."""
-    packed = zlib.compress(struct.pack("<I", len(data)) + data + numbers, _LEVEL)[2:-4]  # deflate without header
+    compressed = zlib.compress(struct.pack("<I", len(data)) + data + numbers, _COMPRESSION_LEVEL)
+    packed = compressed[2:-4]  # deflate without header
     parts = {name: (FOLDER / f"page.{name}").read_text(encoding="utf-8") for name in ("html", "css")}
     parts = {**parts, "css": css_variables() + parts["css"], "js": script()}
     policy = (
         f"default-src 'none'; script-src '{_digest(parts['js'])}'; style-src '{_digest(parts['css'])}'; "
         "img-src data:; base-uri 'none'; form-action 'none'; require-trusted-types-for 'script'"
     )
-    filled = {"policy": policy, "title": escape(title), "style": parts["css"], "script": parts["js"]}
-    filled["data"] = base64.b64encode(packed).decode("ascii")
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: filled[match[1]], parts["html"])
+    values = {"policy": policy, "title": escape(title), "style": parts["css"], "script": parts["js"]}
+    values["data"] = base64.b64encode(packed).decode("ascii")
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: values[match[1]], parts["html"])
 
 
 @lru_cache(maxsize=1)
@@ -73,16 +74,16 @@ def script() -> str:
 
 def _in_order(texts: Mapping[str, str]) -> list[str]:
     """Return the names of the modules, each after the modules that it imports."""
-    done: list[str] = []
+    ordered: list[str] = []
 
     def visit(name: str) -> None:
-        if name not in done:
-            for needed in _IMPORT.findall(texts[name]):
-                visit(needed)
-            done.append(name)
+        if name not in ordered:
+            for imported in _IMPORT.findall(texts[name]):
+                visit(imported)
+            ordered.append(name)
 
     visit("main")
-    return done
+    return ordered
 
 
 def _title(run: Mapping[str, Any]) -> str:

@@ -38,8 +38,8 @@ def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, column
     first = sensors.scan(messages[0][1])
     stride = -(-max(1, len(first.ranges)) // MAX_BEAMS)
     beams = -(-len(first.ranges) // stride)
-    kept = evenly_spaced(len(messages), max(1, MAX_RANGES // max(1, beams))).tolist()
-    scans = [(messages[k][0], sensors.scan(messages[k][1])) for k in kept]
+    indices = evenly_spaced(len(messages), max(1, MAX_RANGES // max(1, beams))).tolist()
+    scans = [(messages[k][0], sensors.scan(messages[k][1])) for k in indices]
     scans = [(tick, scan) for tick, scan in scans if len(scan.ranges) == len(first.ranges)]
     columns.note_reduction(f"scans on {one_line(topic)}", len(scans), len(messages))
     columns.note_reduction(f"beams of a scan on {one_line(topic)}", beams, len(first.ranges))
@@ -63,15 +63,15 @@ def particles_of(sensors: SensorMessages, columns: PackedColumns) -> dict[str, A
     """Return the particle clouds, each reduced to evenly spaced particles."""
     if not sensors.particles:
         return None
-    kept = evenly_spaced(len(sensors.particles), MAX_CLOUDS).tolist()
-    clouds = [(sensors.particles[k][0], sensors.cloud(sensors.particles[k][1])) for k in kept]
-    chosen = [cloud[evenly_spaced(len(cloud), MAX_PARTICLES)] for _, cloud in clouds]
-    table = np.concatenate(chosen)
+    indices = evenly_spaced(len(sensors.particles), MAX_CLOUDS).tolist()
+    clouds = [(sensors.particles[k][0], sensors.cloud(sensors.particles[k][1])) for k in indices]
+    subsets = [cloud[evenly_spaced(len(cloud), MAX_PARTICLES)] for _, cloud in clouds]
+    table = np.concatenate(subsets)
     columns.note_reduction("particle clouds", len(clouds), len(sensors.particles))
-    columns.note_reduction("particles of a cloud", max(map(len, chosen)), max(len(cloud) for _, cloud in clouds))
+    columns.note_reduction("particles of a cloud", max(map(len, subsets)), max(len(cloud) for _, cloud in clouds))
     return {
         "ticks": columns.add([tick for tick, _ in clouds]),
-        "numbers": columns.add([len(cloud) for cloud in chosen]),
+        "numbers": columns.add([len(cloud) for cloud in subsets]),
         "x": columns.add(table[:, 0], _CENTIMETER),
         "y": columns.add(table[:, 1], _CENTIMETER),
         "yaw": columns.add(table[:, 2], 0.02),
@@ -85,16 +85,16 @@ def plans_of(plans: Sequence[Path], columns: PackedColumns) -> dict[str, Any] | 
 
 def local_plans_of(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
     """Return the local plans of the controller."""
-    kept = evenly_spaced(len(sensors.local_plans), MAX_LOCAL_PLANS).tolist()
-    columns.note_reduction("local plans", len(kept), len(sensors.local_plans))
-    return _paths([(sensors.local_plans[k][0], sensors.path(sensors.local_plans[k][1])) for k in kept], columns)
+    indices = evenly_spaced(len(sensors.local_plans), MAX_LOCAL_PLANS).tolist()
+    columns.note_reduction("local plans", len(indices), len(sensors.local_plans))
+    return _paths([(sensors.local_plans[k][0], sensors.path(sensors.local_plans[k][1])) for k in indices], columns)
 
 
 def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, Any] | None:
     if not paths:
         return None
-    most = max(8, min(MAX_PLAN_POINTS, MAX_PATH_POINTS // len(paths)))
-    points = [path[evenly_spaced(len(path), most)] for _, path in paths]
+    max_points = max(8, min(MAX_PLAN_POINTS, MAX_PATH_POINTS // len(paths)))
+    points = [path[evenly_spaced(len(path), max_points)] for _, path in paths]
     table = np.concatenate(points)
     return {
         "ticks": columns.add([tick for tick, _ in paths]),
@@ -126,17 +126,17 @@ def _costmap(
 ) -> dict[str, Any]:
     """Return the grids of a topic; a grid with the same origin as the previous one is stored as differences."""
     _, first = sensors.costmap(messages[0][1])
-    kept = evenly_spaced(len(messages), max(1, MAX_GRID_CELLS // max(1, first.cells.size))).tolist()
-    columns.note_reduction(f"grids on {one_line(topic)}", len(kept), len(messages))
+    indices = evenly_spaced(len(messages), max(1, MAX_GRID_CELLS // max(1, first.cells.size))).tolist()
+    columns.note_reduction(f"grids on {one_line(topic)}", len(indices), len(messages))
     grids = []
     previous: OccupancyGrid | None = None
-    for tick, data in (messages[k] for k in kept):
+    for tick, data in (messages[k] for k in indices):
         frame, grid = sensors.costmap(data)
-        same = previous is not None and previous.shape == grid.shape and previous.origin == grid.origin
-        cells = grid.cells.astype(np.int64) - previous.cells if previous is not None and same else grid.cells
+        is_same_grid = previous is not None and previous.shape == grid.shape and previous.origin == grid.origin
+        cells = grid.cells.astype(np.int64) - previous.cells if previous is not None and is_same_grid else grid.cells
         origin = grid.origin if frame == frame_names.MAP else map_from_odom(trace, tick).compose(grid.origin)
-        data_of_grid = grid_of(OccupancyGrid(cells, grid.resolution, origin), columns)
-        grids.append({"tick": tick, "changes": same, **data_of_grid})
+        grid_data = grid_of(OccupancyGrid(cells, grid.resolution, origin), columns)
+        grids.append({"tick": tick, "changes": is_same_grid, **grid_data})
         previous = grid
     return {"name": one_line(topic), "grids": grids}
 
@@ -146,9 +146,10 @@ def map_from_odom(trace: Trace, tick: int) -> Pose2:
     if not len(trace.belief) or not len(trace.odometry):
         return Pose2(0.0, 0.0)
     newest = trace.belief.ticks[max(int(np.searchsorted(trace.belief.ticks, tick, side="right")) - 1, 0)]
-    at = np.array([newest])
-    believed, odometry = Pose2(*trace.belief.at(at)[0, :3].tolist()), Pose2(*trace.odometry.at(at)[0, :3].tolist())
-    return believed.compose(odometry.inverse())
+    ticks = np.array([newest])
+    belief = Pose2(*trace.belief.at(ticks)[0, :3].tolist())
+    odometry = Pose2(*trace.odometry.at(ticks)[0, :3].tolist())
+    return belief.compose(odometry.inverse())
 
 
 def _rounded(pose: Sequence[float]) -> list[float]:
@@ -190,7 +191,7 @@ def robot_data(
 
 
 def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
-    """Return each goal once, also if it is repeated in several loops."""
+    """Return each goal once, even if it is repeated in several loops."""
     goals: dict[tuple[str, float, float], dict[str, Any]] = {}
     for goal in case.every_goal:
         base = goal.name.partition("#")[0] if goal.name.partition("#")[0] in lines.goals else goal.name
@@ -209,11 +210,11 @@ def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
 
 
 def _poses(samples: Samples, columns: PackedColumns) -> dict[str, Any]:
-    kept = evenly_spaced(len(samples), MAX_POSES)
-    columns.note_reduction("poses", len(kept), len(samples))
-    x, y, yaw = samples.values[kept, :3].T
+    indices = evenly_spaced(len(samples), MAX_POSES)
+    columns.note_reduction("poses", len(indices), len(samples))
+    x, y, yaw = samples.values[indices, :3].T
     return {
-        "ticks": columns.add(samples.ticks[kept]),
+        "ticks": columns.add(samples.ticks[indices]),
         "x": columns.add(x, MILLIMETER),
         "y": columns.add(y, MILLIMETER),
         "yaw": columns.add(np.unwrap(yaw) if np.isfinite(yaw).all() else yaw, MILLIRADIAN),
@@ -223,10 +224,10 @@ def _poses(samples: Samples, columns: PackedColumns) -> dict[str, Any]:
 def _belief(samples: Samples, columns: PackedColumns) -> dict[str, Any] | None:
     if not len(samples):
         return None
-    kept = evenly_spaced(len(samples), MAX_POSES)
-    xx, xy, _, yy, _, aa = samples.values[kept, 3:9].T
-    more = {"xx": (xx, 1e-5), "xy": (xy, 1e-5), "yy": (yy, 1e-5), "aa": (aa, 1e-5)}
-    return {**_poses(samples, columns), **{key: columns.add(part, step) for key, (part, step) in more.items()}}
+    indices = evenly_spaced(len(samples), MAX_POSES)
+    xx, xy, _, yy, _, aa = samples.values[indices, 3:9].T
+    covariance = {"xx": (xx, 1e-5), "xy": (xy, 1e-5), "yy": (yy, 1e-5), "aa": (aa, 1e-5)}
+    return {**_poses(samples, columns), **{key: columns.add(part, step) for key, (part, step) in covariance.items()}}
 
 
 def moving_objects(trace: Trace, columns: PackedColumns, robots: frozenset[str]) -> list[dict[str, Any]]:
@@ -235,6 +236,8 @@ def moving_objects(trace: Trace, columns: PackedColumns, robots: frozenset[str])
     for name, samples in sorted(trace.objects.items()):
         if name in robots or not len(samples):
             continue
-        kept = spaced_in_time(samples.ticks, max(1, trace.tick_rate // 20))
-        objects.append({"name": one_line(name), **_poses(Samples(samples.ticks[kept], samples.values[kept]), columns)})
+        indices = spaced_in_time(samples.ticks, max(1, trace.tick_rate // 20))
+        objects.append(
+            {"name": one_line(name), **_poses(Samples(samples.ticks[indices], samples.values[indices]), columns)}
+        )
     return objects

@@ -83,14 +83,14 @@ def _plot_data(plot: SignalPlot, trace: Trace, case: Case, columns: PackedColumn
         return None
     if not len(values) or not np.isfinite(values).any():
         return None
-    kept = keep_extremes(np.nan_to_num(values), MAX_SAMPLES)
+    indices = keep_extremes(np.nan_to_num(values), MAX_SAMPLES)
     return {
         "name": plot.name,
         "text": signal.text,
         "unit": signal.unit,
         "asks": signal.is_boolean,
-        "ticks": columns.add(trace.truth.ticks[kept]) if len(kept) < len(values) else None,
-        "values": columns.add(values[kept], _step(signal.unit, values)),
+        "ticks": columns.add(trace.truth.ticks[indices]) if len(indices) < len(values) else None,
+        "values": columns.add(values[indices], _step(signal.unit, values)),
     }
 
 

@@ -28,7 +28,7 @@ _LANES = {
     K.COLLISION_ENDED: "failures", K.FAULT_STARTED: "faults", K.FAULT_TOOK_EFFECT: "faults", K.FAULT_ENDED: "faults",
     K.ROBOT_HELD: "recoveries", K.ROBOT_RELEASED: "recoveries",
 }  # fmt: skip
-_PAIRS = {
+_INTERVAL_KINDS = {
     K.GOAL_ACCEPTED: (K.GOAL_REACHED, K.GOAL_PASSED, K.GOAL_FAILED, K.GOAL_CANCELED),
     K.RECOVERY_STARTED: (K.RECOVERY_ENDED,),
     K.ROBOT_HELD: (K.ROBOT_RELEASED,),
@@ -37,9 +37,9 @@ _PAIRS = {
     K.EVENT_STARTED: (K.EVENT_ENDED,),
 }
 """Events that start an interval, with the events that end it."""
-_BAD = {K.GOAL_FAILED, K.COLLISION_STARTED, K.PLAN_FAILED}
-_QUIET = {"tick", "entry", "parts", "points", "waypoints", "times", "index", "effects"}
-"""Data of events that are not shown as text."""
+_FAILURE_KINDS = {K.GOAL_FAILED, K.COLLISION_STARTED, K.PLAN_FAILED}
+_HIDDEN_KEYS = {"tick", "entry", "parts", "points", "waypoints", "times", "index", "effects"}
+"""Keys of event data that are not shown as text."""
 
 
 @dataclass(frozen=True)
@@ -69,18 +69,18 @@ class TimelineEntry:
 def timeline_entries(trace: Trace, lines: SourceLines, with_world: bool) -> list[TimelineEntry]:
     """Return the events of a robot in order, and with `with_world` also the events of the world."""
     entries: list[TimelineEntry] = []
-    open_: dict[tuple[EventKind, str], int] = {}
+    open_intervals: dict[tuple[EventKind, str], int] = {}
     for event in trace.events:
         if _is_world_event(event) and not with_world:
             continue
-        for begin, ends in _PAIRS.items():
-            index = open_.pop((begin, event.name), None) if event.kind in ends else None
+        for start, ends in _INTERVAL_KINDS.items():
+            index = open_intervals.pop((start, event.name), None) if event.kind in ends else None
             if index is not None:
                 entries[index] = replace(entries[index], until=event.tick, ended=str(event.kind))
-        if event.kind in _PAIRS:
-            open_[event.kind, event.name] = len(entries)
+        if event.kind in _INTERVAL_KINDS:
+            open_intervals[event.kind, event.name] = len(entries)
         entries.append(_entry(event, lines))
-    for index in open_.values():
+    for index in open_intervals.values():
         entries[index] = replace(entries[index], until=trace.end)
     return entries
 
@@ -99,7 +99,7 @@ def _entry(event: Event, lines: SourceLines) -> TimelineEntry:
         lane=_LANES.get(event.kind, "events"),
         name=one_line(event.name),
         text=one_line(details),
-        bad=event.kind in _BAD,
+        bad=event.kind in _FAILURE_KINDS,
         line=_line(event, lines),
         place=place,
         about=event.data if event.kind == K.ZONE_SWITCHED else {},
@@ -111,7 +111,7 @@ def _details(event: Event) -> Iterator[str]:
     if isinstance(effects, list):
         yield from (str(one["what"]) for one in effects if isinstance(one, dict) and one.get("what"))
     for key, value in event.data.items():
-        if key not in _QUIET and value not in ("", None) and not isinstance(value, list | dict):
+        if key not in _HIDDEN_KEYS and value not in ("", None) and not isinstance(value, list | dict):
             yield f"{key.replace('_', ' ')} {_short(value)}"
 
 
@@ -142,9 +142,9 @@ def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[d
     data, numbers = [], {"event": 0, "fault": 0}
     first = next(iter(lines.values()))
     for one in result.disturbances:
-        number = numbers[one.disturbance.kind]
-        numbers[one.disturbance.kind] += 1
-        known = first.events if one.disturbance.kind == "event" else first.faults
+        number = numbers[one.ordered.kind]
+        numbers[one.ordered.kind] += 1
+        line_numbers = first.events if one.ordered.kind == "event" else first.faults
         data.append(
             {
                 "kind": one.disturbance.kind,
@@ -155,7 +155,7 @@ def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[d
                 "happened": one.happened,
                 "missing": one.missing,
                 "effect": one_line(one.effect),
-                "line": known.get(number, one.disturbance.line) if len(lines) == 1 else one.disturbance.line,
+                "line": line_numbers.get(number, one.ordered.line) if len(lines) == 1 else one.ordered.line,
             }
         )
     return data
@@ -233,14 +233,14 @@ def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, Scenario
 
 
 def _goal_names(spec: ScenarioSpec) -> list[str]:
-    """As ScenarioSpec.goal_names, of a specification in which places are still names."""
-    taken, names = {goal.name for goal in spec.goals}, list[str]()
+    """Return the names as ScenarioSpec.goal_names does, for a specification in which places are still names."""
+    used_names, names = {goal.name for goal in spec.goals}, list[str]()
     for number, goal in enumerate(spec.goals, start=1):
         pose: Any = goal.pose
         default = pose if isinstance(pose, str) else f"goal-{number}"
-        others = (name for again in count(2) if (name := f"{default}-{again}") not in taken)
-        names.append(goal.name or (default if default not in taken else next(others)))
-        taken.add(names[-1])
+        others = (name for number in count(2) if (name := f"{default}-{number}") not in used_names)
+        names.append(goal.name or (default if default not in used_names else next(others)))
+        used_names.add(names[-1])
     return names
 
 

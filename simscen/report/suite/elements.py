@@ -32,7 +32,7 @@ def count(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def pill(outcome: Outcome) -> str:
+def outcome_badge(outcome: Outcome) -> str:
     """Return an outcome with its symbol, so that it does not depend on color."""
     word = outcome.value.replace("-", " ")
     return f'<span class="pill {outcome.value}"><span aria-hidden="true">{SIGNS[outcome]} </span>{word}</span>'

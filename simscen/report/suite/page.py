@@ -1,4 +1,4 @@
-"""The HTML report: a single file that loads nothing from the network, with filters, history and runs."""
+"""HTML report: a single file that loads nothing from the network, with filters, history and runs."""
 
 import base64
 import hashlib
@@ -23,7 +23,7 @@ from simscen.report.suite.run_entry import full_run_name, run_element, theme
 
 ORDER = (Outcome.ERROR, Outcome.FAILED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED, Outcome.PASSED)
 MAX_MARKS = 200
-"""Maximum number of runs of a scenario of which the heading shows a mark each."""
+"""Maximum number of runs of a scenario with a mark for each run in the heading."""
 MAX_LISTED = 2000
 """Maximum number of runs on the page."""
 _FILES = ("report.html", "junit.xml", "results.json", "run.json", "console.txt")
@@ -71,12 +71,12 @@ def to_html(session: Session) -> str:
     pictures = elements.embedded_pictures(
         [run for group in groups for run in sorted(group, key=_severity_order)], session.folder
     )
-    groups_html = "\n".join(_group(group, session, totals, pictures) for group in groups)
+    groups_html = "\n".join(_group_element(group, session, totals, pictures) for group in groups)
     style, script = css_variables() + _asset("suite.css"), _asset("suite.js")
     counts = _outcome_counts(totals)
-    compared = "" if session.comparison is None else as_html(session.comparison)
+    comparison = "" if session.comparison is None else as_html(session.comparison)
     if session.study is not None:
-        compared += study_html(session.study, listed, session.folder)
+        comparison += study_html(session.study, listed, session.folder)
     return (
         f'<!doctype html>\n<html lang="en"{" data-live" if session.live else ""}>\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -85,7 +85,7 @@ def to_html(session: Session) -> str:
         f"{'<noscript><meta http-equiv=refresh content=3></noscript>' if session.live else ''}"
         f"<title>{html_text(session.title)}: {counts}</title>\n<style>{style}</style>\n</head>\n<body>\n"
         f"<header>{_headline(session, totals, counts, len(listed))}</header>\n<main>\n"
-        f"{history_section(listed, session.past)}{compared}\n"
+        f"{history_section(listed, session.past)}{comparison}\n"
         f"{filter_form(listed, session.past)}\n"
         f'<section id="runs" aria-label="runs">\n{groups_html}\n</section>\n'
         '<p id="nothing" class="quiet" hidden>No run matches. <button type="button" id="all">Show all</button></p>\n'
@@ -114,9 +114,9 @@ def listed_runs(runs: Sequence[RunFinished]) -> Sequence[RunFinished]:
         return runs
     bad, good = list[int](), list[int]()
     for index, run in enumerate(runs):
-        found = good if run.outcome.good else bad
-        if len(found) < MAX_LISTED:
-            found.append(index)
+        target = good if run.outcome.good else bad
+        if len(target) < MAX_LISTED:
+            target.append(index)
     return [runs[index] for index in (*bad, *good)[:MAX_LISTED]]
 
 
@@ -153,7 +153,7 @@ def _progress(live: RunningSession, done: int) -> str:
     )
 
 
-def _group(group: list[RunFinished], session: Session, totals: Totals, pictures: dict[RunKey, str]) -> str:
+def _group_element(group: list[RunFinished], session: Session, totals: Totals, pictures: dict[RunKey, str]) -> str:
     """Return the runs of a scenario, with a heading if there are several variations, seeds or stacks."""
     ranked = sorted(group, key=_severity_order)
     elements = "\n".join(
@@ -164,8 +164,8 @@ def _group(group: list[RunFinished], session: Session, totals: Totals, pictures:
         return f'<div class="group">{elements}</div>'
     name = group[0].key.scenario
     good, number = totals.good[name], totals.runs[name]
-    flipped = sum(outcome_change(run, session.past) != "" for run in group)
-    summary = f"{good} of {number} as expected" + (f", {flipped} changed" if flipped else "")
+    changed = sum(outcome_change(run, session.past) != "" for run in group)
+    summary = f"{good} of {number} as expected" + (f", {changed} changed" if changed else "")
     opened = "" if good == number else " open"
     marks = outcome_marks([run.outcome for run in group], "runs") if number <= MAX_MARKS else ""
     return (
@@ -237,12 +237,12 @@ def filter_form(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str
     )
 
 
-def _select(name: str, found: Counter[str]) -> str:
-    named = sorted(value for value in found if value)
-    if not named or len(found) < 2:
+def _select(name: str, counts: Counter[str]) -> str:
+    named = sorted(value for value in counts if value)
+    if not named or len(counts) < 2:
         return ""
     options = "".join(
-        f'<option value="{html_text(value)}">{html_text(value)} ({found[value]})</option>' for value in named
+        f'<option value="{html_text(value)}">{html_text(value)} ({counts[value]})</option>' for value in named
     )
     return f'<label>{name} <select name="{name}"><option value="">all</option>{options}</select></label>'
 

@@ -19,7 +19,7 @@ from simscen.judge.finding_text import (
 from simscen.report.display_text import escape_control, shell_command_text
 from simscen.report.session_lines import violation_lines
 from simscen.report.styled_line import plain_text
-from simscen.report.suite.elements import anchor, html_text, link, outcome_marks, pill, sparkline
+from simscen.report.suite.elements import anchor, html_text, link, outcome_badge, outcome_marks, sparkline
 from simscen.report.suite.history import PastOutcome
 from simscen.report.violations import error_details, error_summary, excuse_text, first_violation, source_location
 
@@ -32,28 +32,28 @@ def full_run_name(key: RunKey) -> str:
 
 
 def run_element(
-    run: RunFinished, folder: str, picture: str, before: Sequence[PastOutcome | None], one_of_many: bool = False
+    run: RunFinished, folder: str, picture: str, past: Sequence[PastOutcome | None], is_one_of_many: bool = False
 ) -> str:
     """Return the entry of a run. Failures are expanded."""
     extra = ", ".join(part for part in (f"seed {run.key.seed}", run.key.stack_name) if part)
-    name = (run.key.variation or extra) if one_of_many else run.key.test
-    outcomes = [None if past is None else past.outcome for past in before]
+    name = (run.key.variation or extra) if is_one_of_many else run.key.test
+    outcomes = [None if one is None else one.outcome for one in past]
     marks = outcome_marks([*outcomes, run.outcome], "earlier sessions and this one") if any(outcomes) else ""
     return (
         f'<details class="run" id="{anchor(run.key)}"{"" if run.outcome.good else " open"} '
-        f"{_data_attributes(run, before)}>"
-        f'<summary>{pill(run.outcome)}<span class="name">{html_text(name)}</span>'
+        f"{_data_attributes(run, past)}>"
+        f'<summary>{outcome_badge(run.outcome)}<span class="name">{html_text(name)}</span>'
         f'<span class="quiet">{html_text(extra if name != extra else "")}</span>{marks}'
         f'<span class="quiet near">{html_text(_headline(run))}</span>'
         f'<span class="time">{"kept · " if run.resumed else ""}{run.result.simulated:.1f} s</span></summary>'
         f'<div class="in">{_error_section(run)}{_criteria_table(run)}{_disturbance_table(run)}'
-        f"{_links(run, folder)}{picture}{_details(run, before)}</div></details>"
+        f"{_links(run, folder)}{picture}{_details(run, past)}</div></details>"
     )
 
 
-def _data_attributes(run: RunFinished, before: Sequence[PastOutcome | None]) -> str:
+def _data_attributes(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
     """Return the attributes by which the script of the page filters and sorts."""
-    known = [past.outcome.good for past in before if past is not None]
+    known = [one.outcome.good for one in past if one is not None]
     values = {
         "status": run.outcome.value,
         "tags": " ".join(run.tags),
@@ -76,10 +76,10 @@ def theme(key: RunKey) -> str:
 def smallest_margin(run: RunFinished) -> float | None:
     """Return the smallest margin of all criteria relative to the limit, negative if violated; None without margins."""
     findings = [finding for verdict in run.result.verdicts for finding in verdict.findings]
-    return min((share for finding in findings if (share := _share(finding)) is not None), default=None)
+    return min((share for finding in findings if (share := _relative_margin(finding)) is not None), default=None)
 
 
-def _share(finding: Finding) -> float | None:
+def _relative_margin(finding: Finding) -> float | None:
     if finding.margin is None or finding.value is None or not finding.unit:
         return None
     return relative_margin(finding)
@@ -89,8 +89,8 @@ def _headline(run: RunFinished) -> str:
     """Return the tightest margin of a passed run, or the first reason of a failure."""
     match run.outcome:
         case Outcome.PASSED:
-            nearest = tightest_margin(run.result.verdicts)
-            return f"tightest: {nearest}" if nearest else ""
+            tightest = tightest_margin(run.result.verdicts)
+            return f"tightest: {tightest}" if tightest else ""
         case Outcome.FAILED:
             return first_violation(run)
         case Outcome.ERROR:
@@ -120,14 +120,14 @@ def _criteria_table(run: RunFinished) -> str:
 
 def _criterion_row(run: RunFinished, verdict: Verdict, finding: Finding, line: int) -> str:
     failed, warning = finding.status is not Status.PASS, verdict.severity == "warn"
-    look = "" if not failed else "bad" if finding.status is Status.FAIL and not warning else "odd"
+    css_class = "" if not failed else "bad" if finding.status is Status.FAIL and not warning else "odd"
     word = "warning" if failed and warning else finding.status.value
     margin = "" if finding.margin is None else f"{finding.margin:+.3g} {finding.unit}".rstrip()
     where = time_and_place(finding, run.result.tick_rate) if failed else ""
     measured = f"{comparison(finding)}, {where}" if where else comparison(finding)
     reasons = "".join(f"<li>{html_text(reason)}</li>" for reason in finding.detail)
     return (
-        f'<tr class="{look}"><td>{word}</td><td>{html_text(subject(verdict, finding))}</td>'
+        f'<tr class="{css_class}"><td>{word}</td><td>{html_text(subject(verdict, finding))}</td>'
         f"<td>{html_text(measured)}{f'<ul class=why>{reasons}</ul>' if reasons else ''}</td>"
         f'<td class="margin">{html_text(margin)}</td>'
         f'<td class="quiet">{html_text(source_location(run, line))}</td></tr>'
@@ -167,29 +167,33 @@ def _has_content(path: str) -> bool:
     return file.is_file() and file.stat().st_size > 0
 
 
-def _details(run: RunFinished, before: Sequence[PastOutcome | None]) -> str:
+def _details(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
     """Return the command to repeat a run, its history, tags, metrics, and console output."""
     again = f'<p class="again">again: <code>{escape(shell_command_text(run.again))}</code></p>' if run.again else ""
     tags = "".join(f'<span class="tag">{html_text(tag)}</span> ' for tag in run.tags)
     known = [f"{name} {value:.4g}" for name, value in sorted(run.result.metrics.items()) if value is not None]
-    metrics = _folded("metrics", f"<p>{html_text(' · '.join(known))}</p>") if known else ""
+    metrics = _collapsible("metrics", f"<p>{html_text(' · '.join(known))}</p>") if known else ""
     tag_line = f"<p>{tags}</p>" if tags else ""
-    return again + _duration_sparkline(run, before) + tag_line + metrics + _console_output(run)
+    return again + _duration_sparkline(run, past) + tag_line + metrics + _console_output(run)
 
 
 def _console_output(run: RunFinished) -> str:
     """Return the console output for a run, to be copied."""
     text = "\n".join(plain_text(line).rstrip() for line in violation_lines(run))
-    return _folded("console output", f'<pre tabindex="0">{escape(escape_control(dedent(text)))}</pre>') if text else ""
+    return (
+        _collapsible("console output", f'<pre tabindex="0">{escape(escape_control(dedent(text)))}</pre>')
+        if text
+        else ""
+    )
 
 
-def _folded(title: str, inside: str) -> str:
+def _collapsible(title: str, inside: str) -> str:
     return f'<details class="metrics"><summary>{title}</summary>{inside}</details>'
 
 
-def _duration_sparkline(run: RunFinished, before: Sequence[PastOutcome | None]) -> str:
-    """Return a line chart of simulated seconds in the last sessions, or "" for less than three."""
-    known = [past.simulated for past in before if past is not None] + [run.result.simulated]
+def _duration_sparkline(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
+    """Return a line chart of simulated seconds in the last sessions, or "" for fewer than three."""
+    known = [one.simulated for one in past if one is not None] + [run.result.simulated]
     if len(known) < 3:
         return ""
     values = ", ".join(f"{value:.1f}" for value in known)

@@ -64,7 +64,7 @@ def test_each_run_is_a_row_with_its_metrics_and_values(tmp_path: Path) -> None:
 
 def test_groups_of_rows_are_one_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = parquet.write_parquet(tmp_path / "whole", runs(25), {})
-    monkeypatch.setattr(parquet, "ROWS_PER_GROUP", 10)
+    monkeypatch.setattr(parquet, "RUNS_PER_GROUP", 10)
     parts = parquet.write_parquet(tmp_path / "parts", runs(25), {})
     for one, two in zip(whole, parts, strict=True):
         assert pq.read_table(one) == pq.read_table(two)

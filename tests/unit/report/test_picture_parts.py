@@ -161,7 +161,7 @@ def test_labels_keep_off_ways_robots_goals_and_each_other():
 
 def test_no_reason_is_cut_off_beside_the_map():
     long = " ".join(f"reason{k}" for k in range(60)) + " " + "x" * 90
-    assert " ".join(sidebar._wrapped(long)).replace(" ", "") == long.replace(" ", "")
+    assert " ".join(sidebar._wrap(long)).replace(" ", "") == long.replace(" ", "")
     scene = everything()
     verdicts = tuple(
         replace(v, findings=tuple(replace(f, detail=(long,) * 5) for f in v.findings)) for v in scene.result.verdicts

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.cli.session.selection import checked
+from simscen.cli.session.selection import world_problems
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
@@ -29,6 +29,6 @@ def test_sill_blocks_the_route_if_and_only_if_the_hull_hits_it(tmp_path, robot, 
     file = tmp_path / "sill.scenario.yaml"
     file.write_text(SCENARIO.format(robot=robot, height=UNDERSIDE_M[robot] + offset))
     loaded = load_scenario(file, tmp_path)
-    found = [problem.code for problem in checked(loaded)]
+    found = [problem.code for problem in world_problems(loaded)]
     collided = bool(simulate(prepare(loaded), 1).result.metrics["collisions"])
     assert ("SC302" in found) is collided is (offset > 0)
