@@ -202,7 +202,7 @@ def test_content_security_policy_allows_only_own_parts(open_page: Opener, one: P
     opened.forgive("console: ")  # the refusal is told there
 
 
-def test_it_opens_within_a_second(open_page: Opener, one: Path, record_property, capsys) -> None:
+def test_page_opens_within_a_second(open_page: Opener, one: Path, record_property, capsys) -> None:
     """The time is printed but not checked, because the machine may be busy."""
     opened = ready(open_page(one))
     took = int(opened.page.evaluate("document.documentElement.dataset.ready"))

@@ -74,7 +74,7 @@ def test_shipped_scenarios_pass_with_it_twice_with_equal_logs(
     assert record["plugins"].keys() == {used}
 
 
-def test_its_keys_are_explained_and_in_the_schema(call) -> None:
+def test_keys_of_the_package_are_explained_and_in_the_schema(call) -> None:
     assert "Lazy Theta*" in call("-c", SIMSCEN, "explain", "theta_star").stdout
     assert "Room that is kept around the hull." in call("-c", SIMSCEN, "explain", "vfh_plus").stdout
     schema = call("-c", SIMSCEN, "schema").stdout

@@ -31,7 +31,7 @@ def start(spec: StackSpec, *goals: Goal) -> Drive:
 
 @pytest.mark.sample(1)
 @every
-def test_it_reaches_a_goal_around_an_unmapped_obstacle_without_contact(spec: StackSpec) -> None:
+def test_stack_reaches_a_goal_around_an_unmapped_obstacle(spec: StackSpec) -> None:
     d = start(spec, Goal("g", Pose2(5, 1, 0.5))).run(60)
     assert d.result == "SUCCEEDED"
     assert d.pose.distance(Pose2(5, 1)) <= 0.25

@@ -20,7 +20,7 @@ def test_a_name_is_what_it_says(name: str) -> None:
         assert inspect.getdoc(value)
 
 
-def test_what_type_checkers_see_is_what_there_is() -> None:
+def test_type_checkers_see_the_existing_names() -> None:
     source = inspect.getsource(public)
     seen = source[source.index("if TYPE_CHECKING") : source.index("__all__")]
     for module, names in public._NAMES_BY_MODULE.items():
@@ -30,7 +30,7 @@ def test_what_type_checkers_see_is_what_there_is() -> None:
     assert sorted(public._MODULE_OF) == sorted(public.__all__)
 
 
-def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+def test_missing_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'Nonsense'"):
         public.Nonsense  # noqa: B018
 

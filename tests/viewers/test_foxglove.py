@@ -54,9 +54,7 @@ def log(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     return log
 
 
-def test_a_viewer_reads_every_message_and_shows_truth_and_things_where_they_were(
-    log: Path, seen_by_viewers: Seen
-) -> None:
+def test_viewer_reads_all_messages_and_shows_correct_poses(log: Path, seen_by_viewers: Seen) -> None:
     seen, read = seen_by_viewers(log), read_run(log)
     assert all(topic["count"] for topic in seen["topics"].values())
     assert set(_topics_of(json.loads(foxglove_layout(read)))) <= set(seen["topics"])
@@ -73,7 +71,7 @@ def test_a_viewer_reads_every_message_and_shows_truth_and_things_where_they_were
             drawn_where_it_was(seen["links"], robot, f"object/{thing}", samples)
 
 
-def test_what_changes_is_shown_from_then_on(log: Path, seen_by_viewers: Seen) -> None:
+def test_changes_are_shown_from_their_time_on(log: Path, seen_by_viewers: Seen) -> None:
     seen = seen_by_viewers(log)
     if log.parent.name.startswith("several"):
         assert {link["child"] for link in seen["links"]} >= {"b/base_link", "object_/base_link", "object/b"}

@@ -99,7 +99,7 @@ def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(tmp_path: Path) 
         (["a.scenario.yaml", "--variation", "x"], "has no variations"),
     ],
 )
-def test_what_cannot_be_shrunk_is_an_error(tmp_path: Path, options: list[str], told: str) -> None:
+def test_unshrinkable_run_is_an_error(tmp_path: Path, options: list[str], told: str) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     (tmp_path / "good.scenario.yaml").write_text(SCENARIO.replace("min: 1 m", "min: 10 cm"))
     done = simscen(tmp_path, "shrink", *options)
@@ -166,7 +166,7 @@ def test_no_failure_is_a_bound_on_the_rate_of_failures_for_random_values(tmp_pat
         (RANGES, ["--method", "sobol", "--probability", "0.1"], "--probability needs --method random"),
     ],
 )
-def test_what_cannot_be_searched_is_an_error(tmp_path: Path, ranges: str, options: list[str], told: str) -> None:
+def test_unsearchable_scenario_is_an_error(tmp_path: Path, ranges: str, options: list[str], told: str) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + ranges)
     done = simscen(tmp_path, "falsify", "a.scenario.yaml", *options)
     assert done.returncode == 2

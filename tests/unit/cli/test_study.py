@@ -178,7 +178,7 @@ def test_a_failed_run_is_repeated_by_its_command(tmp_path: Path) -> None:
         ("variations: {grid: {seed: [1, 2]}, require: ['seed > 2']}\n", [], "no variation meets the conditions"),
     ],
 )
-def test_studies_that_make_no_sense_are_refused(tmp_path: Path, more: str, options: list[object], told: str) -> None:
+def test_invalid_studies_are_refused(tmp_path: Path, more: str, options: list[object], told: str) -> None:
     done = study(tmp_path, SCENARIO + more, *options)
     assert done.returncode in (2, 5)
     assert told in done.stderr

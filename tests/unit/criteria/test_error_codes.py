@@ -19,7 +19,7 @@ def test_anything_else_is_refused_with_the_names(written):
         ADAPTER.validate_python(written)
 
 
-def test_its_schema_lists_names_and_numbers():
+def test_schema_of_error_codes_lists_names_and_numbers():
     allowed = ADAPTER.json_schema()["enum"]
     assert "GOAL_OCCUPIED" in allowed
     assert 206 in allowed

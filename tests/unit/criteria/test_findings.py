@@ -30,12 +30,12 @@ def test_as_many_digits_as_tell_the_two_apart(value, limit, measured, told):
 
 
 @pytest.mark.parametrize(("value", "detail"), [(0.4, ()), (0.5, ()), (0.6, ("why",))])
-def test_the_reason_is_told_only_for_a_violation(value, detail):
+def test_the_reason_is_reported_only_for_a_violation(value, detail):
     assert at_most("x", value, 0.5, "m", detail=["why"]).detail == detail
     assert at_least("x", -value, -0.5, "m", detail=["why"]).detail == detail
 
 
-def test_what_the_limit_holds_for_follows_it():
+def test_scope_of_a_limit_follows_it():
     assert at_most("x", 1.0, 2.0, "s", context="after lidar.off").limit == "≤ 2.00 s after lidar.off"
     assert at_least("x", 1.0, 2.0, "").limit == "≥ 2.00"
 

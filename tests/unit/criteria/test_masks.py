@@ -153,7 +153,7 @@ def test_a_mask_that_the_log_does_not_have_is_no_pass():
         ),
     ],
 )
-def test_what_contradicts_itself_is_refused(criterion, words):
+def test_contradictory_values_are_refused(criterion, words):
     with pytest.raises(ValueError, match=words):
         AnyCriterion.model_validate(criterion)
 

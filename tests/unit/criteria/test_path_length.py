@@ -52,7 +52,7 @@ def test_a_goal_nearby_has_a_ratio_too():
     assert found({"max_ratio": 1.0}, case=case, step=0.25, steps=2).margin == 0.0
 
 
-def test_what_cannot_be_compared_is_told_in_order():
+def test_reasons_without_a_comparison_are_in_order():
     twice = {
         "goals": [{"name": n, "pose": [4, 0]} for n in "gfedcbagfedcba"],
         "shortest": dict.fromkeys("abcdefg", 1.0),

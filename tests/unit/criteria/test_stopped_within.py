@@ -91,7 +91,7 @@ def test_moving_when_the_fault_and_the_time_end_together_decides_nothing():
         (1.775, "drove 0.00 m blind at 0.00 m/s; the newest scan was 0.2 s old"),
     ],
 )
-def test_a_scan_older_than_two_periods_is_told(scan, told):
+def test_a_scan_older_than_two_periods_is_reported(scan, told):
     (finding,) = found([MOVING] * 20 + [STILL] * 5, (1.0, None), scans=[scan])
     assert finding.detail[0] == told
 

@@ -27,7 +27,7 @@ def test_a_sector_may_go_through_the_back():
     assert answered({"from": "0 deg", "to": "360 deg"}) == []
 
 
-def test_a_sector_of_no_width_makes_no_sense():
+def test_sector_without_width_is_refused():
     assert unsuitable_key({"sector": {"from": 1, "to": 1}}, "Scan")[0] == "to"
 
 

@@ -8,7 +8,7 @@ VALUES = {"nan": np.nan, "inf": np.inf, "zero": 0.0, "negative": -1.0, "huge": 1
 
 
 @pytest.mark.parametrize("what", VALUES)
-def test_every_value_of_a_message_is_what_is_said(what):
+def test_garbage_values_have_the_given_types(what):
     spec, value = {"garbage": {"value": what}}, VALUES[what]
     np.testing.assert_array_equal(begun(spec, "Scan").reading(scan([1.0, 2.0])).ranges, [value] * 2)
     np.testing.assert_array_equal(begun(spec, "Odometry").reading(odometry()).pose, [value] * 3)
@@ -23,7 +23,7 @@ def test_a_message_can_be_cut_off_or_empty():
     assert unsuitable_key({"garbage": {"value": "short"}}, "Odometry")[0] == "value"
 
 
-def test_the_share_of_garbage_is_what_is_said_and_all_else_is_untouched():
+def test_garbage_has_the_given_share_and_other_messages_are_unchanged():
     work, good = begun({"garbage": {"probability": "30 %"}}, "Imu"), imu()
     got = [work.reading(good) for _ in range(4000)]
     assert sum(one is not good for one in got) / 4000 == pytest.approx(0.3, abs=0.03)

@@ -12,7 +12,7 @@ from simscen.core.geometry.kinematics import Twist
 MANY = 10_000
 
 
-def test_depths_and_colors_are_noisy_by_what_is_said_and_stay_what_they_can_be():
+def test_camera_noise_has_the_given_strength_and_stays_in_range():
     seen = begun({"noise": {"std": "5 cm", "colour": "4 %"}}, "Image").reading(image(np.full((100, 100), 2.0)))
     assert seen.depth.std() == pytest.approx(0.05, rel=0.05)
     assert seen.rgb.std() == pytest.approx(0.04 * 255, rel=0.05)
@@ -74,7 +74,7 @@ def test_a_bias_is_added_to_what_is_measured_and_to_nothing_else():
     assert (seen.rgb == 255).all()
 
 
-def test_what_is_scaled_beyond_the_range_of_a_lidar_is_no_hit():
+def test_range_scaled_beyond_the_maximum_is_no_hit():
     told = begun({"scale": {"factor": 2}}, "Scan").reading(scan([1.0, 7.0, np.inf, np.nan])).ranges
     assert told == pytest.approx([2.0, np.inf, np.inf, np.nan], nan_ok=True)
 
@@ -128,5 +128,5 @@ def test_a_belief_that_drifts_slides_along_the_heading_of_when_it_began():
         ({"extrinsic": {"x": 1}}, "Imu", "x"),
     ],
 )
-def test_a_key_of_another_sensor_makes_no_sense(fault, kind, key):
+def test_key_of_another_sensor_type_is_refused(fault, kind, key):
     assert unsuitable_key(fault, kind)[0] == key

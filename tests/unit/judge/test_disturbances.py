@@ -109,7 +109,7 @@ def test_every_action_of_an_event_has_to_take_effect_but_not_each_time():
     assert [one.happened for one in judged([*twice(True, False), *twice(False, True)], EVENT).disturbances] == [True]
 
 
-def test_entries_of_one_name_are_told_apart():
+def test_entries_with_the_same_name_are_distinguished():
     trace = synthetic_trace({**WORDS, "events": fault(3, 3, 4, 10, entry=1)})
     case = synthetic_case({"disturbances": [FAULT, EVENT, {**FAULT, "line": 10}]})
     assert [(one.disturbance.line, one.happened) for one in disturbance_outcomes(trace, case)] == [

@@ -26,7 +26,7 @@ def verdict(status, severity="fail"):
     return Verdict("clearance", "clearance", severity, (Finding(status, "clearance", "", ""),))
 
 
-def test_every_criterion_is_answered_in_order_under_its_own_name():
+def test_every_criterion_has_a_verdict_in_order():
     verdicts = judge(
         [
             criterion(clearance={"min": 0.1}),

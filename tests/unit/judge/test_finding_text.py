@@ -79,7 +79,7 @@ def test_where_the_robot_stopped_at_a_goal_and_how_long_it_stayed_are_never_the_
     ],
     ids=["of zero there are no shares", "at least", "nobody said what was measured", "without end"],
 )
-def test_the_margin_is_told_as_a_share_where_there_is_one(finding, told):
+def test_margin_is_reported_as_a_share_if_possible(finding, told):
     assert tightest_margin([verdict(finding, "own", "own")]) == told
 
 
@@ -103,7 +103,7 @@ def test_shares_of_a_limit_compare_bounds(tight, loose):
         assert tightest_margin(verdicts).startswith(tight.id)
 
 
-def test_what_keeps_a_verdict_from_passing_is_all_but_its_passes():
+def test_verdict_lists_all_findings_that_did_not_pass():
     passed, undecided = Finding(Status.PASS, "a", "", ""), Finding(Status.INCONCLUSIVE, "b", "", "")
     assert violations(Verdict("result", "result", "fail", (passed, STOP, undecided))) == (STOP, undecided)
 
@@ -117,7 +117,7 @@ def test_what_keeps_a_verdict_from_passing_is_all_but_its_passes():
         ((0, 240, 480, 720, 960, 1200, 1440), "t = 0.00 s, 1.00 s, 2.00 s, 3.00 s, 4.00 s and 2 more"),
     ],
 )
-def test_of_times_the_first_five_are_told(ticks, text):
+def test_first_five_times_are_listed(ticks, text):
     assert disturbance_times(DisturbanceOutcome(Disturbance("gust", "event"), ticks, True, ""), 240) == text
 
 
@@ -129,7 +129,7 @@ def test_of_times_the_first_five_are_told(ticks, text):
         ((), False, "gust: pushed it, so it did not happen"),
     ],
 )
-def test_a_disturbance_is_told_in_a_line(ticks, happened, text):
+def test_a_disturbance_is_reported_in_a_line(ticks, happened, text):
     assert disturbance_line(DisturbanceOutcome(Disturbance("gust", "event"), ticks, happened, "pushed it"), 240) == text
 
 

@@ -82,7 +82,7 @@ NEAR_PEOPLE = {"min_person_distance", "intrusion_intimate", "intrusion_personal"
         (Evidence.VELOCITY, {"max_speed", "time_not_moving", "mean_jerk", "max_jerk", "sparc", "ldlj"}),
     ],
 )
-def test_what_a_log_lacks_leaves_these_metrics_out_and_no_others(lacking, left_out):
+def test_missing_evidence_removes_exactly_these_metrics(lacking, left_out):
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
     whole = compute_metrics(trace, synthetic_case({}))
     for coverage in (LogCoverage({lacking: ""}), LogCoverage(partial={lacking: "not after t = 1 s"})):

@@ -30,13 +30,13 @@ def test_the_file_is_sorted_indented_by_two_and_written_in_plain_letters():
     assert "≤ 1.00 m/s" in text
 
 
-def test_its_format_is_the_second_and_one_of_another_is_refused():
+def test_result_file_has_format_2_and_other_formats_are_refused():
     assert result_data(FAILED)["format"] == 2
     with pytest.raises(ValueError, match="format 3; this version reads 2"):
         from_json(json.dumps({**result_data(FAILED), "format": 3}))
 
 
-def test_ticks_are_told_in_seconds_too():
+def test_ticks_have_times_in_seconds():
     data = result_data(FAILED)
     assert data["disturbances"][0]["times"] == [2.0, 2.5]
     assert data["verdicts"][0]["findings"][0]["time"] == 2.5

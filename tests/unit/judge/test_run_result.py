@@ -74,7 +74,7 @@ def test_one_sample_that_is_no_number_breaks_the_run_whatever_judges_it(signal, 
     assert judge_run(RunKey("a", 7), "a", criteria, trace, synthetic_case({})).outcome is Outcome.ERROR
 
 
-def test_a_thing_without_a_place_breaks_the_run():
+def test_object_without_pose_makes_the_run_an_error():
     result = conclude({**TRACE, "objects": {"cart": [[0, 0, 0], [2, math.nan, 0]]}}, {"collisions": {}})
     assert result.outcome is Outcome.ERROR
     assert "the pose of cart is not finite" in result.error.message

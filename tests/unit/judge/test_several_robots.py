@@ -72,7 +72,7 @@ def test_the_worst_outcome_decides(one: Outcome, two: Outcome, whole: Outcome) -
     assert combine_robots({"a": result(one), "b": result(two)}, TRACES).outcome is whole
 
 
-def test_the_first_error_is_told_with_its_robot() -> None:
+def test_the_first_error_is_reported_with_its_robot() -> None:
     whole = combine_robots({"a": result(), "b": result(Outcome.ERROR), "c": result(Outcome.ERROR)}, TRACES)
     assert whole.error == RunFailure("invalid", "b: broken")
 

@@ -179,7 +179,7 @@ def test_the_effect_of_a_number_is_the_rank_correlation_of_scipy() -> None:
     assert (effect.effect, effect.p) == pytest.approx((expected.statistic, expected.pvalue), rel=1e-9)
 
 
-def test_the_effect_of_a_word_is_epsilon_squared_of_the_kruskal_wallis_test() -> None:
+def test_effect_of_a_category_is_epsilon_squared_of_kruskal_wallis() -> None:
     words = ["oak", "pine", "ash"] * 5
     margins = [float(word == "ash") + 0.01 * k for k, word in enumerate(words)]
     groups = [[margin for word, margin in zip(words, margins, strict=True) if word == one] for one in set(words)]

@@ -142,7 +142,7 @@ CUTS = {
 @pytest.mark.parametrize("cut", CUTS)
 @pytest.mark.parametrize("coverage", [COMPLETE_COVERAGE, FOREIGN], ids=["own", "foreign"])
 @pytest.mark.parametrize("signal", ["truth", "clearance"])
-def test_what_covers_only_a_part_of_the_run_does_not_pass(cut, coverage, signal):
+def test_partial_coverage_does_not_pass(cut, coverage, signal):
     trace = drive(EVEN, wobble(EVEN))
     kept = CUTS[cut](EVEN)
     names = ("truth", "velocity") if signal == "truth" else ("clearance",)

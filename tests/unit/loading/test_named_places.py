@@ -79,9 +79,7 @@ def test_the_estimate_may_be_a_place_or_unknown(load, scenario: str) -> None:
         ("goals: [desk]\nevents: [{when: {time: 1}, do: {move: {name: cart, through: [disk], speed: 1}}}]", "5:62"),
     ],
 )
-def test_an_unknown_place_is_told_where_it_stands_with_the_one_that_was_meant(
-    told, scenario: str, text: str, place: str
-) -> None:
+def test_unknown_place_is_reported_with_a_suggestion(told, scenario: str, text: str, place: str) -> None:
     assert told(scenario.replace("goals: [{pose: desk}]", text)) == [f"{place} SC030 did you mean `desk`?"]
 
 

@@ -126,7 +126,7 @@ def test_every_problem_is_raised_at_once(write: Write, scenario: str, tmp_path: 
     assert "a.scenario.yaml:4:1: unknown key `gaols`" in str(raised.value)
 
 
-def test_problems_of_scenario_and_world_are_told_together(write: Write, scenario: str, tmp_path: Path) -> None:
+def test_problems_of_scenario_and_world_are_reported_together(write: Write, scenario: str, tmp_path: Path) -> None:
     write("room.world.yaml", "simscen: 1\nwals: []")
     problems = try_scenario(write("a.scenario.yaml", scenario + "sed: 1"), tmp_path)
     assert isinstance(problems, list)

@@ -66,7 +66,7 @@ def test_every_file_is_python_3_8(file: Path) -> None:
         assert "from __future__ import annotations" in file.read_text() or file.name == "__init__.py"
 
 
-def test_it_imports_nothing_but_the_standard_library() -> None:
+def test_peer_imports_only_the_standard_library() -> None:
     imported = set()
     for file in FILES:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):

@@ -147,7 +147,7 @@ def test_workers_leave_all_in_one_folder_and_what_failed_is_known(run, project: 
         pytest.param("simscen_seed = seven", (), "simscen_seed: 'seven' is not a whole", marks=pytest.mark.slow),
     ],
 )
-def test_a_stack_and_a_seed_that_cannot_be_are_told_in_words(run, project: Path, ini: str, arguments, why: str) -> None:
+def test_invalid_stack_and_seed_are_usage_errors(run, project: Path, ini: str, arguments, why: str) -> None:
     (project / "pytest.ini").write_text(f"[pytest]\nsimscen_paths = scenarios\n{ini}\n")
     code, told = run("-p", "no:xdist", "scenarios/good.scenario.yaml", *arguments)
     assert code == 2 and why in told and "Traceback" not in told

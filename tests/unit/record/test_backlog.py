@@ -58,7 +58,7 @@ def test_without_ticks_nothing_waits() -> None:
         assert told[-1][1] == moment.tick
 
 
-def test_the_file_is_told_each_time_that_all_which_waited_has_come() -> None:
+def test_file_is_notified_after_each_flush() -> None:
     told: list[tuple[str, int]] = []
 
     class File:
@@ -73,7 +73,7 @@ def test_the_file_is_told_each_time_that_all_which_waited_has_come() -> None:
     assert all(later - earlier == 48 for earlier, later in pairwise(settled))
 
 
-def test_each_log_of_a_robot_is_told_all() -> None:
+def test_log_of_each_robot_is_complete() -> None:
     told: list[tuple[str, int]] = []
     backlog = MomentBuffer(60)
     log = backlog.sink(Heard("trace", told), Heard("log", told))

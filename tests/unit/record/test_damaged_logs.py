@@ -100,7 +100,7 @@ def problem(path: Path) -> str:
         (lambda data: data[:60], "SC801 not a log of simscen: it has no description of its run"),
     ],
 )
-def test_a_wrong_file_is_told_as_such(
+def test_file_of_another_type_is_reported(
     tmp_path: Path, log: Path, change: Callable[[bytes], bytes], expected: str
 ) -> None:
     path = tmp_path / "run.mcap"
@@ -108,11 +108,11 @@ def test_a_wrong_file_is_told_as_such(
     assert problem(path) == expected
 
 
-def test_a_missing_file_is_told_as_such(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     assert problem(tmp_path / "run.mcap") == "SC800 cannot read the log: No such file or directory"
 
 
-def test_a_log_of_somebody_else_is_told_as_such(tmp_path: Path) -> None:
+def test_log_of_another_recorder_is_reported(tmp_path: Path) -> None:
     with Path(tmp_path / "run.mcap").open("wb") as stream:
         writer = Writer(stream)
         writer.start("ros2", "rosbag2")

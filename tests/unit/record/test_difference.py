@@ -38,14 +38,14 @@ def test_difference_of_one_bit_is_found_with_tick_and_field(trace: Trace) -> Non
     assert first_difference(trace, other) == f"tick 24 (t = 0.100 s): truth.y: {was!r} against {now!r}"
 
 
-def test_the_earliest_difference_is_told(trace: Trace) -> None:
+def test_the_earliest_difference_is_reported(trace: Trace) -> None:
     other = dataclasses.replace(
         trace, truth=changed(trace.truth, 9, 0, 1.0), odometry=changed(trace.odometry, 3, 2, 1.0)
     )
     assert (first_difference(trace, other) or "").startswith("tick 18 (t = 0.075 s): odometry.yaw: ")
 
 
-def test_at_the_same_tick_the_cause_is_told(trace: Trace) -> None:
+def test_at_the_same_tick_the_cause_is_reported(trace: Trace) -> None:
     other = dataclasses.replace(trace, truth=changed(trace.truth, 4, 2, 1.0), belief=changed(trace.belief, 1, 0, 1.0))
     assert "truth.yaw" in (first_difference(trace, other) or "")
 

@@ -99,7 +99,7 @@ EDITS: dict[str, tuple[Keep, set[str]]] = {
 
 
 @pytest.mark.parametrize("edit", EDITS)
-def test_what_an_edited_log_no_longer_holds_is_not_passed(log: Path, tmp_path: Path, edit: str) -> None:
+def test_edited_log_does_not_pass_without_its_evidence(log: Path, tmp_path: Path, edit: str) -> None:
     keep, affected = EDITS[edit]
     read = read_log(edited(log, tmp_path / "edited.mcap", keep))
     result = judged(read)

@@ -281,13 +281,13 @@ def test_a_log_of_ros_1_is_refused(refused: Callable[..., str], tmp_path: Path) 
         read_foreign_log(tmp_path / "a.bag", MOCAP)
 
 
-def test_what_is_of_another_type_is_left_out_and_told(read: Callable[..., ForeignLog]) -> None:
+def test_topic_of_another_type_is_ignored_with_a_note(read: Callable[..., ForeignLog]) -> None:
     renamed = [replace(one, topic="/amcl_pose") for one in drive() if one.topic == "/scan"]
     log = read([*(one for one in drive() if one.topic != "/amcl_pose"), *renamed])
     assert log.coverage.missing[Evidence.BELIEF].startswith("/amcl_pose is a sensor_msgs/msg/LaserScan, expected ")
 
 
-def test_messages_that_are_no_cdr_are_left_out_and_told(refused: Callable[..., str]) -> None:
+def test_messages_that_are_not_cdr_are_ignored_with_a_note(refused: Callable[..., str]) -> None:
     assert "/mocap is encoded as json, not as CDR" in refused(drive(), encoding="json")
 
 
@@ -360,7 +360,7 @@ def test_a_bag_without_rosbags_says_what_to_install(tmp_path: Path, monkeypatch:
 
 
 @pytest.mark.parametrize("spoil", ["cut", "empty", "no metadata", "not yaml"])
-def test_a_damaged_bag_is_told_without_a_traceback(tmp_path: Path, spoil: str) -> None:
+def test_a_damaged_bag_is_reported_without_a_traceback(tmp_path: Path, spoil: str) -> None:
     bag = write_bag(tmp_path / "bag", drive())
     (database,) = bag.glob("*.db3")
     match spoil:

@@ -39,7 +39,7 @@ def test_something_else_than_a_case_is_refused() -> None:
         log_header.case_from_json('{"start": "here"}')
 
 
-def test_facts_of_a_run_are_told_apart_from_the_log_s_own() -> None:
+def test_facts_of_a_run_have_a_separate_namespace() -> None:
     facts = log_header.run_metadata(about(), Clock(240))
     assert facts["seed"] == "7"
     assert log_header.extra_facts(facts) == {"simscen": "0.1.0"}
@@ -54,5 +54,5 @@ def test_a_file_cannot_take_the_place_of_the_log_s_own() -> None:
     ("name", "expected"),
     [("map.pgm", "image/x-portable-graymap"), ("a/b.json", "application/json"), ("x", "application/octet-stream")],
 )
-def test_media_types_are_told_by_suffix(name: str, expected: str) -> None:
+def test_media_types_are_determined_by_suffix(name: str, expected: str) -> None:
     assert log_header.media_type(name) == expected

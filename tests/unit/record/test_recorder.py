@@ -190,7 +190,7 @@ def test_a_log_has_its_name_only_when_it_is_whole(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["run.mcap"]
 
 
-def test_a_full_disk_is_told_as_such(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported(tmp_path: Path) -> None:
     full = Path("/dev/full")
     if not full.exists():
         pytest.skip("this system has no /dev/full")
@@ -200,12 +200,12 @@ def test_a_full_disk_is_told_as_such(tmp_path: Path) -> None:
     assert caught.value.kind == "output"
 
 
-def test_a_folder_that_is_not_there_is_told_as_such(tmp_path: Path) -> None:
+def test_missing_folder_is_reported(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"cannot write .*: No such file"):
         Recorder(tmp_path / "no" / "run.mcap", CLOCK, about())
 
 
-def test_what_an_external_stack_was_stands_in_a_record_of_its_own_at_the_end() -> None:
+def test_external_stack_has_a_metadata_record() -> None:
     stream = io.BytesIO()
     Recorder(stream, CLOCK, about(7)).close(0, stack={"name": "mine"})
     log = stream.getvalue()

@@ -92,7 +92,7 @@ def test_a_run_that_breaks_off_by_itself_leaves_a_log_that_opens(tmp_path: Path)
 
 
 @pytest.mark.parametrize("content", [b"", b"no log", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" + bytes(100)])
-def test_what_is_no_log_is_left_as_it_is(tmp_path: Path, content: bytes) -> None:
+def test_file_that_is_no_log_is_unchanged(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "x.partial.mcap"
     path.write_bytes(content)
     with pytest.raises(InvalidInput):

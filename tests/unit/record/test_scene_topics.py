@@ -65,7 +65,7 @@ def groups(markers: list[Any]) -> set[tuple[str, str]]:
     return {(marker.ns, marker.text) for marker in markers[1:]}
 
 
-def test_things_are_said_once_and_again_when_one_comes_or_goes() -> None:
+def test_objects_are_published_again_when_one_appears_or_disappears() -> None:
     square = [list(corner) for corner in SQUARE]
     here = [spawned("gate", [square]), spawned("anna", [square], person=True)]
     box, gone = spawned("box", [square, square[:3]]), Event(0, EventKind.OBJECT_REMOVED, "anna")
@@ -86,12 +86,12 @@ def test_things_are_said_once_and_again_when_one_comes_or_goes() -> None:
 
 
 @pytest.mark.parametrize("parts", [None, "round", [3, []], [[["x", "y"]] * 3], [[[1.0, 2.0]]]])
-def test_a_thing_whose_outline_a_plugin_tells_wrongly_has_its_name_only(parts: Any) -> None:
+def test_object_with_an_invalid_outline_shows_only_its_name(parts: Any) -> None:
     ((_, markers),) = said("/simscen/things", (0, [spawned("odd", parts)]))
     assert [(marker.ns, len(marker.points)) for marker in markers[1:]] == [("names", 0)]
 
 
-def test_zones_are_those_of_the_robot_and_are_said_again_when_one_is_switched() -> None:
+def test_zones_are_published_again_when_one_is_switched() -> None:
     def switch(region: str, what: str, enabled: bool, **more: float) -> Event:
         return Event(0, EventKind.ZONE_SWITCHED, region, {"filter": what, "enabled": enabled, **more})
 

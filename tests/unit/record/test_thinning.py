@@ -29,7 +29,7 @@ def test_things_that_stand_still_are_kept_once_a_second() -> None:
     assert sum(map(len, still)) == 2
 
 
-def test_where_nothing_has_moved_each_thing_is_kept_a_second_after_it_was_last() -> None:
+def test_resting_objects_are_recorded_every_second() -> None:
     thinning, box, both = Thinning(240), {"box": Pose3()}, {"box": Pose3(), "cart": Pose3()}
     seen = [(0, box), *((tick, both) for tick in range(6, 600, 6))]
     kept = {tick: set(thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, things))) for tick, things in seen}

@@ -60,7 +60,7 @@ def test_the_command_at_any_beat_is_the_one_that_was_decided(trace: Trace) -> No
     assert held.tolist() == [list(m.decision.command) for m in RUN]
 
 
-def test_a_thing_at_any_beat_is_where_it_really_was(trace: Trace) -> None:
+def test_object_pose_at_a_cycle_is_the_true_pose(trace: Trace) -> None:
     seen = [(m.tick, m.truth.objects) for m in RUN if m.truth and m.truth.objects]
     assert list(trace.objects) == ["a box", "cart"]
     for name, samples in trace.objects.items():

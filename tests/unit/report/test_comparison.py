@@ -79,7 +79,7 @@ def test_a_long_name_keeps_its_ends() -> None:
     assert shorten("short", 16) == "short"
 
 
-def test_of_many_flips_the_first_are_told_and_the_rest_counted(comparison) -> None:
+def test_first_changed_outcomes_are_listed_and_the_rest_counted(comparison) -> None:
     many = BaselineComparison("mine", 30, 0, 0, 0, (FLIP,) * 25, 0.0, ())
     told = lines(Comparison(comparison.stacks, comparison.outcomes, (many,)))
     assert sum("worse " in line for line in told) == 11  # ten, and the heading
@@ -122,7 +122,7 @@ def test_in_results_json_it_is_data(comparison, passed) -> None:
     assert "comparison" not in json.loads(to_json([passed]))
 
 
-def test_what_is_small_has_a_digit_more() -> None:
+def test_small_numbers_have_one_more_digit() -> None:
     near = MetricDifference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
     assert difference_columns(near) == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
     assert difference_columns(TIME) == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")

@@ -122,7 +122,7 @@ def test_a_terminal_gets_the_same_facts_in_color_and_user_text_is_no_markup(sess
             assert line.strip() in plain
 
 
-def test_runs_of_one_scenario_are_told_apart_by_their_seeds(passed):
+def test_runs_of_one_scenario_show_their_seeds(passed):
     out = io.StringIO()
     other = of(passed, key=RunKey("navigation/goal", 2))
     told(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 1, 1), passed, other])

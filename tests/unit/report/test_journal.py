@@ -57,7 +57,7 @@ def test_files_are_kept_relative_to_the_folder_so_that_it_can_be_moved(tmp_path,
     assert read_journal(tmp_path / "new").runs[0].artifacts.mcap == str(tmp_path / "new" / "a" / "run.mcap")
 
 
-def test_what_was_planned_but_not_answered_is_an_error(tmp_path, runs):
+def test_planned_run_without_result_is_an_error(tmp_path, runs):
     journal = Journal(tmp_path)
     journal.plan(planned(runs), "0.1.0", 2)
     journal(runs[0])

@@ -44,7 +44,7 @@ def test_every_text_of_a_picture_can_be_read_on_it(color):
     assert contrast(color, palette.PAGE) >= 4.5
 
 
-def test_good_and_bad_differ_for_who_does_not_see_green():
+def test_pass_and_fail_colors_are_distinguishable_with_color_blindness():
     apart = sum((a - b) ** 2 for a, b in zip(deuteranope(palette.GREEN), deuteranope(palette.RED), strict=True)) ** 0.5
     assert apart > 60
 

@@ -150,7 +150,7 @@ def test_thin_walls_of_a_huge_map_stay_whole():
     assert (row < 3 * 200).all()
 
 
-def test_all_parts_of_a_thing_are_its_outline_and_the_unknown_is_a_disc():
+def test_outline_has_all_parts_and_unknown_shapes_are_discs():
     legs = (((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), ((2.0, 0.0), (3.0, 0.0), (2.0, 1.0)))
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "objects": {"ghost": [[0, 1, 1, 0]]}})
     found = object_outlines(trace, [MovableObject("table", Pose2(0, 0), legs)])

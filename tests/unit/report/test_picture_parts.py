@@ -141,7 +141,7 @@ def test_a_goal_that_only_the_robot_believes_reached_has_failed():
     assert "goal shelf failed" in {name for name, _ in drawn_parts(everything(events=events))}
 
 
-def test_a_failure_is_told_with_the_code_and_name_that_nav2_gives_it():
+def test_a_failure_is_reported_with_the_code_and_name_that_nav2_gives_it():
     assert map_picture.end_reason(everything()) == "navigation ended, FAILED NO_VALID_PATH (208)"
     assert any("shelf: failed, NO_VALID_PATH (208)" in name for name, _ in drawn_parts(everything()))
 

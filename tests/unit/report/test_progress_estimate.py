@@ -57,5 +57,5 @@ def test_a_single_run_counts_nothing():
 @pytest.mark.parametrize(
     ("seconds", "told"), [(0.4, "5 s"), (42, "40 s"), (89, "90 s"), (100, "2 min"), (5000, "83 min"), (9000, "2.5 h")]
 )
-def test_times_are_told_in_steps(seconds, told):
+def test_times_are_rounded(seconds, told):
     assert _round_duration(seconds) == told

@@ -164,7 +164,7 @@ def test_equal_runs_give_equal_bytes_and_two_runs_one_page() -> None:
     assert [run["seed"] for run in Read(replay_page([(log, result_of()), (log, result_of())])).runs] == [7, 7]
 
 
-def test_what_is_thinned_keeps_ends_pauses_and_extremes() -> None:
+def test_thinning_keeps_ends_pauses_and_extremes() -> None:
     assert evenly_spaced(3, 10).tolist() == [0, 1, 2] and evenly_spaced(100, 3).tolist() == [0, 50, 99]
     ticks = np.array([0, 6, 12, 18, 24, 264, 504, 510])
     kept = ticks[spaced_in_time(ticks, 12)].tolist()
@@ -175,7 +175,7 @@ def test_what_is_thinned_keeps_ends_pauses_and_extremes() -> None:
     assert len(chosen) <= 100 and {1234, 7777} <= set(chosen.tolist())
 
 
-def test_its_script_is_one_module_without_imports_and_never_makes_markup_of_text() -> None:
+def test_script_is_one_module_and_never_creates_markup_from_text() -> None:
     text = script()
     assert not re.search(r"^(import|export) ", text, re.MULTILINE)
     assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function", text)

@@ -28,7 +28,7 @@ def test_artifacts_are_relative_to_the_session_so_that_the_folder_may_move(faile
     assert run["artifacts"] == {"mcap": "x/run.mcap", "picture": "x/map.png", "result": "x/result.json"}
 
 
-def test_neither_wall_time_nor_order_shows(passed, failed):
+def test_results_do_not_depend_on_wall_time_or_order(passed, failed):
     assert to_json([passed, failed]) == to_json([replace(failed, wall=99.0), passed])
 
 

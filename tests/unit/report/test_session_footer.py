@@ -138,13 +138,13 @@ def test_second_runs_stand_in_the_same_column(passed):
     assert first.index("18.2 s") == second.index("18.2 s")
 
 
-def test_equal_logs_are_said_to_be_equal(session, failed, passed):
+def test_equal_logs_are_reported_as_equal(session, failed, passed):
     pair = [failed, keyed(failed, 7, again=True)]
     assert "logs equal: 1 pair of runs, byte for byte" in told([*pair, session[-1]])
     assert not any(line.startswith("logs") for line in told([passed, session[-1]]))
 
 
-def test_logs_that_differ_are_never_said_to_be_equal(session, failed):
+def test_different_logs_are_never_reported_as_equal(session, failed):
     other = of(
         keyed(failed, 7, again=True),
         outcome=Outcome.ERROR,
@@ -156,7 +156,7 @@ def test_logs_that_differ_are_never_said_to_be_equal(session, failed):
     assert not any(line.startswith("logs equal") for line in lines)
 
 
-def test_the_spread_of_runs_that_differ_is_told(session, failed):
+def test_spread_of_different_runs_is_reported(session, failed):
     pairs = []
     for seed, arrival in ((7, 31.75), (8, 32.5)):
         second = of(keyed(failed, seed, again=True), metrics={"time_to_goal": arrival, "path_length": None})
@@ -211,7 +211,7 @@ def test_forced_colors_come_without_moving_the_cursor(session):
     assert "\x1b]8" not in text
 
 
-def test_what_a_ci_might_obey_has_no_colors_that_could_hide_it(session):
+def test_lines_that_ci_could_interpret_have_no_colors(session):
     text = shown(session, TerminalStyle(color=True, live=False, terminal=False), ColorReporter)
     assert not re.search(r"^\s*::|##\[", text, re.MULTILINE)
 
@@ -258,7 +258,7 @@ def test_a_forced_color_reaches_a_pipe():
     assert "\x1b[32m1 passed" in stream.getvalue()
 
 
-def test_a_finding_that_checked_nothing_is_told_in_a_recap_as_well(session, passed, failed):
+def test_vacuous_finding_is_in_the_recap(session, passed, failed):
     nothing = Verdict("own", "own", "fail", (Finding(Status.INCONCLUSIVE, "own", "too short", ""),))
     lines = told([passed, of(failed, verdicts=(nothing,), lines=(3,)), session[-1]])
     assert "      own: inconclusive: too short" in lines[lines.index("did not pass:") :]

@@ -74,7 +74,7 @@ def test_each_violated_criterion_has_a_line_with_its_reason_and_where_it_is_writ
     assert "<td>warning</td><td>speed</td>" in html
 
 
-def test_what_the_console_said_of_a_failure_is_there_to_be_copied(passed, failed):
+def test_console_text_of_a_failure_can_be_copied(passed, failed):
     assert "console output" not in to_html(Session([passed]))
     said = to_html(Session([failed])).partition("console output")[2].partition("</pre>")[0]
     assert "stopped_within: 0.84 s &gt; 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)\n" in said
@@ -198,7 +198,7 @@ def sessions(tmp_path, passed, failed):
     return out
 
 
-def test_sessions_before_it_are_told_the_newest_first_and_what_has_changed(sessions, passed):
+def test_earlier_sessions_are_listed_with_changes(sessions, passed):
     past = past_sessions(sessions / "three")
     assert [session.name for session in past] == ["two", "one"]
     html = to_html(Session([called(passed, "a/flaky"), called(passed, "a/steady")], past))

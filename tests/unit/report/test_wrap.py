@@ -62,7 +62,7 @@ def test_a_path_is_longer_than_a_line_rather_than_broken():
     assert texts(line, len(path) + 2) == ["      picture", f"  {path}"]
 
 
-def test_what_follows_a_word_without_a_blank_stays_with_it():
+def test_wrapping_breaks_only_at_spaces():
     line = (
         StyledText("1 passed", "good"),
         StyledText(", "),

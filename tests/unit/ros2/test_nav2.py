@@ -146,7 +146,7 @@ def test_a_call_outside_a_run_is_a_usage_error() -> None:
         CliRunner().invoke(app, ["ros2", "--launch", "node"], catch_exceptions=False)
 
 
-def test_the_page_on_nav2_shows_what_is_said(tmp_path: Path) -> None:
+def test_page_on_nav2_shows_the_real_messages(tmp_path: Path) -> None:
     page = (Path(__file__).parents[3] / "docs/tutorials/my-nav2.md").read_text(encoding="utf-8")
     text = """\
 amcl:

@@ -23,7 +23,7 @@ def test_the_folder_is_where_caches_of_the_platform_are_and_can_be_moved_or_left
     assert cache_folder({}) is None
 
 
-def test_what_was_kept_is_found_by_the_next_session_in_a_folder_of_ones_own(tmp_path: Path) -> None:
+def test_cache_is_found_by_the_next_session(tmp_path: Path) -> None:
     folder = tmp_path / "cache" / CACHE_FORMAT
     assert DiskCache(folder).get(KEY) is None
     DiskCache(folder).put(KEY, b"content")
@@ -34,7 +34,7 @@ def test_what_was_kept_is_found_by_the_next_session_in_a_folder_of_ones_own(tmp_
 
 
 @pytest.mark.parametrize("damage", ["empty", "cut", "changed", "swapped", "link", "folder", "fifo"])
-def test_what_is_damaged_counts_as_not_there_and_is_written_anew(tmp_path: Path, damage: str) -> None:
+def test_damaged_cache_file_is_replaced(tmp_path: Path, damage: str) -> None:
     kept = DiskCache(tmp_path / "c")
     kept.put(KEY, b"content")
     kept.put(OTHER, b"of another")
@@ -72,7 +72,7 @@ def test_a_folder_into_which_others_may_write_is_left_alone(tmp_path: Path) -> N
     assert not is_private_folder(tmp_path / "nowhere")
 
 
-def test_what_was_not_used_for_longest_goes_first(tmp_path: Path) -> None:
+def test_least_recently_used_cache_file_is_deleted_first(tmp_path: Path) -> None:
     keys = [f"{number:064x}" for number in range(6)]
     kept = DiskCache(tmp_path, max_bytes=500)
     for number, key in enumerate(keys[:4]):

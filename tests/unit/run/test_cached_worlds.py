@@ -48,7 +48,7 @@ def test_logs_are_the_same_with_a_cold_a_warm_and_a_damaged_cache(tmp_path: Path
     assert without == cold == warm == log(DiskCache(cache))
 
 
-def test_what_is_sound_and_means_nothing_counts_as_not_there(tmp_path: Path) -> None:
+def test_readable_but_invalid_cache_file_is_ignored(tmp_path: Path) -> None:
     files = DiskCache(tmp_path)
     kept = CachedWorldBuilder(files)
     world = World("w", (Solid(Box((4.0, 0.2, 1.0)), Pose3(0.0, 2.0, 0.5), "wall"),), bounds=(-3.0, -3.0, 3.0, 3.0))

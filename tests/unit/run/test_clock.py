@@ -9,7 +9,7 @@ ANOTHER = "events: [{when: {time: 1 s}, do: {new_goal: {name: b, pose: {x: 2, y:
 
 @pytest.mark.parametrize("extra", [CANCEL, ANOTHER])
 @pytest.mark.parametrize("controller", [20, 5])
-def test_what_an_event_makes_the_stack_do_is_logged_at_the_tick_of_the_event(play, extra, controller):
+def test_stack_reaction_is_logged_at_the_tick_of_the_event(play, extra, controller):
     trace = play(extra, stack=f"{{controller_frequency: {controller} Hz}}")
     (cause,), effect = trace.of_kind("event.started"), trace.of_kind("goal.canceled")[0]
     assert cause.tick == effect.tick == 240

@@ -12,7 +12,7 @@ def test_the_stack_sends_at_its_rate_and_at_once_when_it_wants_something_else():
     assert [tick for tick, command in enumerate(wanted) if link.sends_message(tick, command)] == [0, 12, 15, 24]
 
 
-def test_a_base_that_hears_nothing_keeps_the_last_command_and_stops_after_its_timeout():
+def test_base_without_commands_keeps_the_last_one_and_stops_after_its_timeout():
     link = CommandLink(12, 120)
     link.receive(24, GO)
     assert [link.active_command(tick) for tick in (24, 100, 144, 145, 500)] == [GO, GO, GO, STOP, STOP]

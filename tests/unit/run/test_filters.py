@@ -35,7 +35,7 @@ def test_zones_come_in_the_order_in_which_they_were_named():
     assert some.zones.keepout == (WET, DRY)
 
 
-def test_speed_limits_hold_as_last_said():
+def test_last_speed_limit_applies():
     some = filters(**STACK)
     assert some.zones.speed == ((SLOW, 0.2),)
     order(some, "speed", True, "slow", 0.1)

@@ -112,7 +112,7 @@ def test_a_fault_that_is_over_leaves_the_draws_of_all_others_alone(kind, other, 
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_fault_that_begins_again_draws_anew(kind):
+def test_restarted_fault_has_new_random_numbers(kind):
     again = rig({**LATER, **kind})
     drawn = []
     for _ in range(3):
@@ -165,7 +165,7 @@ def test_streams_are_named_by_what_entries_are_called_or_say_never_by_their_plac
     assert names(push, pull)[1:] == names({**pull, "when": {"time": "1000 ms"}})
 
 
-def test_what_installed_packages_add_is_part_of_what_an_entry_says(yardwork):
+def test_keys_of_packages_are_part_of_the_stream_name(yardwork):
     slow, fast = ({"when": {"reversing": speed}, "do": {"turn_robot": {"by": 1.0}}} for speed in (0.1, 0.2))
     other = {**slow, "do": {"turn_robot": {"by": 2.0}}}
     names = stream_names([EventEntry.model_validate(words) for words in (slow, fast, other)])

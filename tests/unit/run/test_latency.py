@@ -81,14 +81,14 @@ def test_a_scenario_that_asks_for_it_has_the_latencies_of_its_robot(tmp_path: Pa
 
 
 @pytest.mark.parametrize("said", [", latency: {}", ", latency: robot", ", latency: {planner: 0 s, controller: 1 ms}"])
-def test_no_latency_at_all_is_bit_identical_to_none_said(tmp_path: Path, said: str) -> None:
+def test_zero_latency_is_bit_identical_to_no_latency(tmp_path: Path, said: str) -> None:
     plain, zero = moments(tmp_path, 80), moments(tmp_path, 80, said, ", latency: 0 s")
     for one, other in zip(plain, zero, strict=True):
         assert (one.tick, one.truth, one.decision.command) == (other.tick, other.truth, other.decision.command)
         assert one.decision.events == other.decision.events
 
 
-def test_a_latency_of_a_sensor_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_latency_of_a_missing_sensor_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="`latency` names `sonar`, which is not a sensor of the robot"):
         moments(tmp_path, 1, latency="latency: {sensors: {sonar: 1 ms}}")
 

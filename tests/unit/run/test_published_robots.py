@@ -113,14 +113,14 @@ def test_a_package_is_where_the_robots_file_says(published):
     assert published("packages: {cart_parts: vendor/parts}", parts="vendor/parts").wheels
 
 
-def test_a_package_that_is_nowhere_is_told_at_the_line_that_names_it(refusal):
+def test_missing_package_is_reported_at_its_line(refusal):
     problem = refusal(parts="vendor/parts")
     assert (problem.path, problem.line) == ("repo/cart_description/urdf/cart.urdf.xacro", 4)
     assert problem.message == "$(find cart_parts): there is no package 'cart_parts'"
     assert "--world-path" in problem.hint and "packages: {cart_parts: path}" in problem.hint
 
 
-def test_all_that_is_missing_is_told_at_once_and_nothing_that_follows_from_it(published):
+def test_all_missing_packages_are_reported_at_once(published):
     def also(text):
         find = '<xacro:include filename="$(find {})/x.xacro"/>'
         return text.replace("<link", find.format("sensors") + find.format("cart_parts") + "<link", 1)
@@ -167,7 +167,7 @@ def test_an_argument_is_in_place_of_its_default(published, written, length):
     assert base.shape.size[0] == length
 
 
-def test_an_argument_that_is_not_declared_is_told_at_its_line_with_the_one_that_is_meant(refusal):
+def test_undeclared_argument_is_reported_with_a_suggestion(refusal):
     problem = refusal("arguments:\n  plate: true\n  lenght: 0.6")
     assert (problem.path, problem.line, problem.col, problem.code) == ("cart.robot.yaml", 6, 3, "SC403")
     assert problem.message == "`cart.urdf.xacro` declares no argument `lenght`"

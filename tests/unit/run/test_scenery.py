@@ -31,7 +31,7 @@ def test_a_door_is_drawn_from_its_hinge_to_its_post_when_closed():
     assert (door.opened.x, door.opened.y) == (9.5, 4.1)
 
 
-def test_ramps_and_sills_and_wet_floors_are_told_with_how_high_they_are(tmp_path):
+def test_scenery_contains_ramps_sills_and_wet_floors_with_heights(tmp_path):
     file = tmp_path / "dock.scenario.yaml"
     file.write_text("""\
 simscen: 1

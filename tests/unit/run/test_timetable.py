@@ -15,7 +15,7 @@ def test_every_tick_at_which_something_is_due_is_visited_and_no_other(periods):
 
 
 @given(st.lists(st.tuples(st.sampled_from([3, 4, 6, 12, 24]), st.integers(0, 60)), min_size=1, max_size=4))
-def test_what_comes_later_than_a_multiple_of_its_period_is_visited_when_it_comes(later):
+def test_phase_shifted_events_are_visited_at_their_tick(later):
     table, tick, visited = TickSchedule([24], later), 0, []
     while tick < 300:
         tick += table.until_next(tick)

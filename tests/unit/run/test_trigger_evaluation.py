@@ -72,11 +72,11 @@ def test_interruption_resets_the_duration():
     assert firings(LASTING, [0, 1, 1, 1, 0, 1, 1, 1, 1]) == [0, 0, 0, 0, 0, 0, 0, 0, 1]
 
 
-def test_what_holds_from_the_start_lasts_from_the_start():
+def test_duration_counts_from_the_start_of_the_run():
     assert firings(LASTING, [1, 1, 1, 1, 1]) == [0, 0, 0, 1, 0]
 
 
-def test_what_lasted_falls_when_it_stops_and_what_did_not_never_does():
+def test_falling_edge_with_duration_needs_a_lasting_condition():
     falling = {**LASTING, "edge": "falling"}
     assert firings(falling, [0, 1, 1, 1, 1, 1, 0, 0]) == [0, 0, 0, 0, 0, 0, 1, 0]
     assert firings(falling, [0, 1, 1, 1, 0, 0, 0, 0]) == [0] * 8

@@ -23,7 +23,7 @@ def test_level_imu_at_rest_measures_gravity():
     assert reading.angular_velocity == (0.0, 0.0, 0.0)
 
 
-def test_it_feels_the_change_of_velocity_in_its_own_frame():
+def test_imu_measures_acceleration_in_its_own_frame():
     view = Puppet(Pose3.from_rpy(0, 0, 0, 0, 0, math.pi / 2))
     sensor = imu(view, **EXACT)
     view.linear = (0.0, 0.02, 0.0)  # along the world's y, which is straight ahead

@@ -20,7 +20,7 @@ def test_bodies_do_not_meet_within_the_guaranteed_time():
             assert thing in found.pushable
 
 
-def test_what_is_far_apart_is_left_alone_and_what_jumps_meets_everybody():
+def test_distant_bodies_are_skipped_and_jumping_bodies_are_checked():
     far = BoundingDiscs.of([((9.0, 0.0, 0.0), 0.3, 0.0)])
     assert find_candidates(BoundingDiscs.of([((0.0, 0.0, 0.0), 0.3, 1.0)]), far, 1.0) == ((), (), HORIZON_S)
     assert find_candidates(BoundingDiscs.of([((0.0, 0.0, 0.0), 0.3, np.inf)]), far, 1.0) == ((0,), (0,), NEAR_CONTACT_S)

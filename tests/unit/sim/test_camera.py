@@ -53,7 +53,7 @@ def test_the_same_picture_twice_is_equal(simulate):
     assert (rgb == again).all() and (depth == deep).all()
 
 
-def test_what_no_picture_is_taken_of_moves_no_differently(simulate):
+def test_camera_does_not_change_the_motion(simulate):
     path = MotionPath((0.0, 1.0), (Pose2(5, 0), Pose2(3, 0)))
     cart = Body("cart", (box("cart", 0, 0, 0.2, 2, 2),), Pose3(5), path=path)
     seen, unseen = (

@@ -85,7 +85,7 @@ def test_things_that_come_from_afar_or_wake_there_count_as_soon_as_they_are_near
     assert min(nearest) < 0.3
 
 
-def test_what_sleeps_is_as_wide_as_it_lies_not_as_it_would_stand(simulate):
+def test_sleeping_object_has_the_extents_of_its_pose(simulate):
     """A fallen post reaches to the robot from where an upright one could not, nearer than the wall."""
     post = (Solid(Box((0.2, 0.2, 2.4)), Pose3(), "post"),)
     fallen = Body("fallen", post, Pose3.from_rpy(0.0, 2.0, 0.1, math.pi / 2, 0.0, 0.0), mass=20.0)
@@ -103,7 +103,7 @@ def test_clearance_is_negative_where_hull_and_obstacle_overlap(simulate):
     assert simulate(solids=[wall]).truth().clearance == pytest.approx(-0.01, abs=MILLIMETER)
 
 
-def test_what_hangs_above_the_robot_is_as_far_as_it_is_high(simulate):
+def test_clearance_to_an_overhead_obstacle_is_vertical(simulate):
     shelf = Solid(box("shelf", 0, 0, 2, 2, 0.1).shape, Pose3(z=0.75), "shelf")
     assert simulate(solids=[shelf]).truth().clearance == pytest.approx(0.7 - 0.21, abs=MILLIMETER)
 

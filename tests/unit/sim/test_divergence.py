@@ -41,7 +41,7 @@ def test_body_outside_the_world_is_a_divergence(simulate, name, place, told):
     assert ('"box"' if name else "the robot") in str(error.value)
 
 
-def test_a_thing_too_heavy_for_the_engine_is_an_error_rather_than_gone(simulate):
+def test_too_heavy_object_is_an_error(simulate):
     simulation = simulate(bodies=[Body("anvil", BOX, Pose3(2.0), 1e12)])
     with pytest.raises(RunError, match='"anvil" is below the floor'):
         for _ in range(40):

@@ -55,7 +55,7 @@ def test_one_side_on_oil_turns_a_robot_that_brakes(simulate):
     assert simulation.truth().pose.yaw < -math.radians(5)  # towards the side that holds
 
 
-def test_what_is_laid_later_lies_on_top_and_dries_up(simulate):
+def test_newer_friction_patch_covers_older_ones_and_ends(simulate):
     simulation = simulate("turtlebot")
     simulation.add_friction_patch("wet", Patch(EVERYWHERE, 0.3))
     simulation.add_friction_patch("oil", Patch(disc_outline((0.0, 0.0), 1.0), 0.1, until=24))

@@ -163,7 +163,7 @@ def test_walls_leave_the_ground_flat(simulate):
     assert abs(simulation.truth().pose.z) < 1e-4
 
 
-def test_a_thing_is_put_on_the_platform_that_is_there_and_a_robot_is_set_down_on_it(on_ground):
+def test_objects_and_robots_are_placed_on_top_of_a_platform(on_ground):
     """A crate that is spawned on a platform stands on it, and lies still."""
     simulation = on_ground("turtlebot", [box("platform", 3.0, 0, 2.0, 2.0, 0.03)])
     crate = (Solid(Box((0.2, 0.2, 0.2)), Pose3(z=0.1), "crate"),)

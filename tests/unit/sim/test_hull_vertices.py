@@ -22,7 +22,7 @@ ROUND = {
 
 
 @pytest.mark.parametrize("shape", ROUND)
-def test_what_is_left_out_stands_out_by_less_than_a_millimeter(shape):
+def test_removed_vertices_are_within_a_millimeter_of_the_hull(shape):
     """Brute force: the distance of every vertex to each plane of the hull of those that are kept."""
     full = ROUND[shape].vertices
     kept = reduce_hull_vertices(ROUND[shape])
@@ -41,12 +41,12 @@ def test_a_hull_of_few_corners_is_kept_whole():
     assert len(reduce_hull_vertices(mesh(box))) < 100
 
 
-def test_what_is_flat_is_kept_whole():
+def test_flat_point_set_is_kept_whole():
     flat = Mesh(BALL.vertices * [1, 1, 0], BALL.faces)
     assert reduce_hull_vertices(flat) is flat.vertices
 
 
-def test_a_thing_of_80_000_faces_can_be_pushed_and_filmed(simulate):
+def test_object_with_80_000_faces_can_be_pushed_and_rendered(simulate):
     """Bullet's commands take 131 072 vertices, and its renderer three for each face."""
     fine = mesh(trimesh.creation.cylinder(0.3, 0.6, sections=20_000))
     told = []

@@ -38,7 +38,7 @@ def drive(simulate, every, looking):
     return simulation, np.array(scans)
 
 
-def test_who_else_looks_changes_not_one_bit_of_a_scan(simulate):
+def test_scan_does_not_depend_on_other_lidars(simulate):
     """Things that are pushed leave their homes, and are at home again where they come to rest."""
     other, at_home = [], []
 
@@ -57,7 +57,7 @@ def test_who_else_looks_changes_not_one_bit_of_a_scan(simulate):
     assert at_home[-1] == {"late", *(body.name for body in CRATES[:5])}, "where it has come to rest"
 
 
-def test_a_scan_sees_what_it_would_see_of_each_thing_alone(simulate):
+def test_scan_equals_the_minimum_over_single_objects(simulate):
     apart = []
 
     def look(simulation):

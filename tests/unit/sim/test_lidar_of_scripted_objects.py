@@ -34,7 +34,7 @@ def carts() -> list[Body]:
     return [*bodies, Body("shelf", PARTS, Pose3(1.0, 1.0)), Body("late", PARTS, Pose3(-6.0, 6.0))]
 
 
-def test_a_scan_is_that_of_a_scene_that_was_told_of_everything(simulate, monkeypatch) -> None:
+def test_scan_equals_that_of_a_complete_scene(simulate, monkeypatch) -> None:
     """Whoever else looks, from wherever and however far; also once something is given a script."""
     monkeypatch.setattr(ray_caster, "REFRESH_DISTANCE_M", 0.5)
     simulation, rng = simulate(solids=[WALL], bodies=carts(), drive=(0.02, 0.0, 0.1)), np.random.default_rng(2)

@@ -45,7 +45,7 @@ def test_a_force_accelerates_by_newton_and_friction_and_no_longer_than_it_lasts(
     assert simulation.object_pose("crate").x - begin == pytest.approx(way, rel=0.05)
 
 
-def test_what_has_long_been_lying_is_pushed_too(simulate):
+def test_long_resting_object_can_be_pushed(simulate):
     simulation = simulate(bodies=[crate()])
     simulation.step(240 * 6)
     before = simulation.object_pose("crate").x
@@ -61,7 +61,7 @@ def test_a_pushed_crate_that_hits_the_robot_is_felt(simulate):
     assert [event.name for event in simulation.collisions()][:1] == ["crate"]
 
 
-def test_what_cannot_be_pushed_or_is_gone_is_not(simulate):
+def test_push_of_an_unmovable_or_removed_object_fails(simulate):
     simulation = simulate(bodies=[crate(mass=0.0)])
     assert simulation.mass("crate") == 0.0
     simulation.push_object("crate", (10.0, 0.0))
@@ -72,7 +72,7 @@ def test_what_cannot_be_pushed_or_is_gone_is_not(simulate):
     simulation.step(24)
 
 
-def test_what_is_set_down_elsewhere_stands_there_and_keeps_its_mass(simulate):
+def test_teleported_object_keeps_its_mass(simulate):
     simulation = simulate(bodies=[crate()])
     simulation.push_object("crate", (10.0, 0.0))
     simulation.step(10)

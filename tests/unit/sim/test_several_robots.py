@@ -77,7 +77,7 @@ def test_a_collision_names_the_other_robot_on_both_sides_and_whose_doing_it_was(
     assert simulation.robots["b"].base_pose().x > 1.0, "it is pushed"
 
 
-def test_each_is_among_the_things_that_the_other_sees(meet):
+def test_each_robot_is_an_object_for_the_other(meet):
     simulation = meet(a=("turtlebot", 0.0, 0.0, 0.0), b=("turtlebot", 2.0, 0.0, 0.0))
     a = simulation.robots["a"]
     assert list(a.truth().objects) == ["b"]

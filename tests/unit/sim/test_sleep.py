@@ -37,14 +37,14 @@ def test_resting_object_does_not_creep(simulate):
     assert simulation.object_pose("crate") == before
 
 
-def test_what_rests_when_a_run_begins_sleeps_from_its_first_tick_on(simulate):
+def test_resting_object_sleeps_from_the_first_tick(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 5.0), Body("ball", BALL, Pose3(3.0), 1.0)])
     before = engine_pose(simulation, "crate"), engine_pose(simulation, "ball")
     run(simulation, 60)
     assert (engine_pose(simulation, "crate"), engine_pose(simulation, "ball")) == before
 
 
-def test_what_only_begins_to_tip_over_when_a_run_begins_does_tip_over(simulate):
+def test_unstable_object_tips_over(simulate):
     """0.2 mrad beyond its balance, at less than 1 mm/s for the first quarter of a second."""
     plank, lean = (box("plank", 0, 0, 0.2, 0.2, 2.0),), math.atan2(0.1, 1.0) + 2e-4
     pose = Pose3.from_rpy(3.0, 0.0, 0.1 * math.sin(lean), 0.0, lean, 0.0)
@@ -62,7 +62,7 @@ def test_what_only_begins_to_tip_over_when_a_run_begins_does_tip_over(simulate):
         ([0.0, 0.0, 0.0, 0.0, 0.0], True),
     ],
 )
-def test_what_rests_is_slow_at_every_look_and_not_faster_at_each(monkeypatch, speeds, rests):
+def test_resting_object_is_slow_and_not_accelerating_at_each_check(monkeypatch, speeds, rests):
     seen = iter(speeds)
     monkeypatch.setattr(pybullet, "getBaseVelocity", lambda *_: ((next(seen), 0.0, 0.0), (0.0, 0.0, 0.0)))
     settling = RestDetector(0, [7])
@@ -92,7 +92,7 @@ def test_a_robot_that_comes_slowly_wakes_and_pushes_what_sleeps(simulate):
     assert simulation.object_pose("crate").x > before + 0.2
 
 
-def test_what_is_told_is_what_the_engine_says_at_every_sample(simulate):
+def test_sleeping_poses_equal_those_of_the_engine(simulate):
     simulation = simulate("amr", bodies=[Body("crate", CRATE, Pose3(1.6), 3.0)])
     run(simulation, LONG)
     for tick in range(0, 8 * 240, 6):
@@ -127,7 +127,7 @@ def test_a_scripted_cart_pushes_what_slept(simulate):
     assert simulation.object_pose("crate").x > 4.3
 
 
-def test_what_is_put_onto_something_asleep_wakes_it(simulate):
+def test_object_placed_on_a_sleeping_one_wakes_it(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 0.5)])
     run(simulation, LONG)
     simulation.spawn(Body("anvil", CRATE, Pose3(2.3, 0.0, 0.5), 50.0))
@@ -139,7 +139,7 @@ def test_what_is_put_onto_something_asleep_wakes_it(simulate):
 FAR_CART = Body("far cart", CRATE, Pose3(-8.0), path=MotionPath((0.0, 60.0), (Pose2(-8, 0), Pose2(-8, 6))))
 
 
-def test_what_lies_sleeps_though_a_script_moves_something_elsewhere(simulate):
+def test_object_sleeps_while_a_script_moves_a_distant_object(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 5.0), FAR_CART])
     run(simulation, LONG)
     before = engine_pose(simulation, "crate")
@@ -168,7 +168,7 @@ def test_a_whole_stack_that_is_pushed_at_its_bottom_moves(simulate):
     assert [simulation.object_pose(f"crate{k}").x for k in range(3)] == pytest.approx([4.4] * 3, abs=0.05)
 
 
-def test_what_is_pushed_by_something_that_is_pushed_moves(simulate):
+def test_pushed_object_pushes_another_one(simulate):
     cart = Body("cart", CRATE, Pose3(-1.0), path=MotionPath((0.0, 20.0), (Pose2(-1, 3), Pose2(4, 3))))
     row = [Body(f"crate{k}", CRATE, Pose3(3.0 + 0.5 * k, 3.0), 3.0) for k in range(3)]
     simulation = simulate(bodies=[*row, cart])
@@ -176,7 +176,7 @@ def test_what_is_pushed_by_something_that_is_pushed_moves(simulate):
     assert [simulation.object_pose(f"crate{k}").x for k in range(3)] == pytest.approx([4.4, 4.8, 5.2], abs=0.03)
 
 
-def test_what_lies_on_something_that_a_script_takes_away_falls(simulate):
+def test_object_falls_when_a_script_moves_its_support(simulate):
     """A drawer that is pulled out after everything has gone to sleep, faster than what lies on it could follow."""
     path = MotionPath((0.0, 0.1), (Pose2(2.0, 3.0), Pose2(4.0, 3.0)), start=6.0)
     drawer = Body("drawer", CRATE, Pose3(2.0, 3.0), path=path)
@@ -187,7 +187,7 @@ def test_what_lies_on_something_that_a_script_takes_away_falls(simulate):
     assert simulation.object_pose("crate").z == pytest.approx(0.0, abs=5e-3)
 
 
-def test_what_lies_where_a_script_puts_something_down_gives_way(simulate):
+def test_object_is_pushed_away_by_a_scripted_placement(simulate):
     """A path that jumps: nothing comes along on the way there."""
     path = MotionPath((0.0, 1.0, 1.0, 2.0), (Pose2(-6, 3), Pose2(-6, 3), Pose2(2.3, 3), Pose2(2.3, 3)), start=6.0)
     simulation = simulate(

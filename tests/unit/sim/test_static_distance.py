@@ -146,7 +146,7 @@ def test_the_top_of_a_tilted_robot_may_be_nearest_to_what_its_base_is_far_from()
     made.close()
 
 
-def test_what_stands_behind_nearer_solids_is_not_built():
+def test_distant_solids_are_built_only_when_needed():
     rows = [box(f"{y} {k}", 1.0 * k, y, 1.1, 0.4) for y in (-0.8, 0.8, -1.4, 1.4) for k in range(30)]
     made = StaticDistance(merge_solids(rows), drum_robot(0.2, 0.4), 2.0)
     for k in range(200):

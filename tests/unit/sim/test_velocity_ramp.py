@@ -27,7 +27,7 @@ def test_no_command_makes_it_faster_or_harder_than_the_limits(commands):
         before = now
 
 
-def test_it_reaches_the_command_and_says_when_there_is_nothing_to_do():
+def test_velocity_ramp_reaches_the_command_and_then_stops():
     ramp = VelocityRamp(LIMITS, PERIOD, holonomic=False)
     ramp.command(Twist(0.25, 0.0, 0.0))
     assert [ramp.advance() for _ in range(4)] == [True, True, True, False]

@@ -200,7 +200,7 @@ def test_silence_is_a_lidar_unheard_for_the_timeout_or_blind() -> None:
     assert guard.silent(181)
 
 
-def test_a_robot_does_not_drive_off_before_its_lidar_has_been_heard() -> None:
+def test_robot_waits_for_its_first_scan() -> None:
     guard = monitor(source_timeout=0.3)
     guard.start(12)
     assert guard.silent(12)
@@ -211,7 +211,7 @@ def test_a_robot_does_not_drive_off_before_its_lidar_has_been_heard() -> None:
     assert not guard.silent(60)
 
 
-def test_why_a_lidar_counts_as_silent_is_told() -> None:
+def test_silent_lidar_has_a_reason() -> None:
     guard = monitor(source_timeout=0.3)
     guard.start(0)
     assert guard.silence_reason(240) == "lidar `lidar` has been silent for 1.00 s; source_timeout is 0.3 s"
@@ -259,7 +259,7 @@ def with_posts(*posts: tuple[float, float]) -> CostmapView:
 
 
 @pytest.mark.parametrize("robot", [box_robot(0.42, 0.42), round_robot(0.21)])
-def test_who_touches_one_thing_may_not_drive_into_another(robot: RobotModel) -> None:
+def test_robot_in_contact_cannot_drive_into_another_obstacle(robot: RobotModel) -> None:
     """It seems to be 4 cm deep in a post at its left, and backs up: to the post behind it, no further."""
     footprint, beside, behind = Footprint(robot, 0.05), (0.025, 0.175), (-0.375, 0.025)
     back = Twist(-0.15, 0.0, 0.0)
@@ -325,7 +325,7 @@ def test_recoveries_are_handed_out_in_turn_until_the_retries_are_used_up() -> No
 @pytest.mark.parametrize(
     ("anew", "there_are"), [(True, [True, True, False, True, True, False]), (False, [True, True, *[False] * 4])]
 )
-def test_the_retries_count_anew_for_who_has_come_a_meter_nearer(anew: bool, there_are: list[bool]) -> None:
+def test_progress_of_a_meter_resets_the_retries(anew: bool, there_are: list[bool]) -> None:
     robin = BehaviorSequence(
         [Wait(WaitSpec(), setting(round_robot()))], Recovery(number_of_retries=2, retries_since_progress=anew)
     )
@@ -342,9 +342,7 @@ def test_the_retries_count_anew_for_who_has_come_a_meter_nearer(anew: bool, ther
         (299, True, True),
     ],
 )
-def test_recoveries_help_after_the_codes_that_are_named_and_after_codes_that_nobody_knows(
-    code: int, advanced: bool, nav2: bool
-) -> None:
+def test_recoveries_follow_the_listed_and_unknown_codes(code: int, advanced: bool, nav2: bool) -> None:
     failure = NavigationFailure(code, "")
     assert BehaviorSequence([], Recovery()).helps(failure) == nav2
     assert BehaviorSequence([], StackSpec(profile="advanced").recovery).helps(failure) == advanced

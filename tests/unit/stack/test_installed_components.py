@@ -251,7 +251,7 @@ def test_a_planner_of_a_package_is_chosen_by_its_type_and_drives(odd) -> None:
         ("{type: still, patiance: 1}", "unknown key `patiance` in `stack`"),
     ],
 )
-def test_a_mistake_is_told_at_its_place(odd, tmp_path: Path, stack: str, told: str) -> None:
+def test_a_mistake_is_reported_at_its_position(odd, tmp_path: Path, stack: str, told: str) -> None:
     with pytest.raises(InvalidInput) as wrong:
         load_scenario(scenario(tmp_path, stack), tmp_path)
     (problem,) = wrong.value.problems
@@ -310,7 +310,7 @@ def test_every_role_is_named_where_it_breaks(odd, stack: dict, told: str) -> Non
         (lambda *asked: 1 / 0, "crashed", "ZeroDivisionError: division by zero (navigator.py:"),
     ],
 )
-def test_what_ships_is_looked_at_in_what_the_stack_decides(monkeypatch, command, kind: str, told: str) -> None:
+def test_shipped_components_are_validated_by_the_decision(monkeypatch, command, kind: str, told: str) -> None:
     monkeypatch.setattr(RegulatedPurePursuit, "command", command)
     with pytest.raises(RunError) as broken:
         driven().run(1)
@@ -360,7 +360,7 @@ def test_a_behavior_of_a_package_is_named_in_triggers_criteria_and_the_schema(od
     assert subprocess.run(checked, check=False, capture_output=True).returncode == 1
 
 
-def test_what_one_component_draws_changes_no_other(odd) -> None:
+def test_components_have_independent_random_streams(odd) -> None:
     own, others = driven(Pose2(5, 1)), driven(Pose2(5, 1), planner={"type": "careful"})
     assert own.run(20).commands == others.run(20).commands
 
@@ -376,7 +376,7 @@ def test_a_stack_of_a_package_is_checked_beat_by_beat(odd, tmp_path: Path) -> No
         build_stack(spec, driven_setting(), Streams(1), Clock(RATE)).decide(120, ())
 
 
-def test_a_stack_of_a_package_that_takes_no_zones_is_known_before_it_is_told(odd, tmp_path: Path) -> None:
+def test_stack_without_zone_support_is_detected_before_switching(odd, tmp_path: Path) -> None:
     spec = load_scenario(scenario(tmp_path, "{type: still, keepout: []}"), tmp_path).spec.stack
     assert not build_stack(spec, driven_setting(), Streams(1), Clock(RATE)).can_switch_zones
     assert build_stack(StackSpec(), driven_setting(), Streams(1), Clock(RATE)).can_switch_zones

@@ -53,6 +53,6 @@ def test_costmaps_go_through_as_they_are() -> None:
         (CostGrid("global", "map", FLAT), "a global costmap whose cells are no"),
     ],
 )
-def test_what_is_no_costmap_is_named(costmap: Any, told: str) -> None:
+def test_invalid_costmap_is_named(costmap: Any, told: str) -> None:
     with pytest.raises(RunError, match=told):
         decided(costmap)

@@ -34,7 +34,7 @@ def start(world: Flatland | None = None, seed: int = 1, mapped: bool = True, **l
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("zero", [{}, dict.fromkeys(Latency.model_fields, 0.0), {"planner": 0.001, "costmap": 0.002}])
-def test_no_latency_is_bit_identical_to_none_said(seed: int, zero: dict[str, float]) -> None:
+def test_zero_latency_is_bit_identical_to_unset_latency(seed: int, zero: dict[str, float]) -> None:
     """Less than half a tick is none."""
     world = Flatland(discs=[(4.0 + 0.3 * seed, 1.0, 0.3), (6.5, 1.2, 0.2)])
     said, unsaid = start(world, seed, **zero).run(12), start(world, seed)
@@ -110,7 +110,7 @@ def test_a_localizer_is_handed_scans_when_it_would_be_done_with_them_with_the_ti
     assert {now - then for now, then in heard} == {12}
 
 
-def test_what_is_under_way_is_there_after_its_time_and_in_order() -> None:
+def test_delayed_results_arrive_in_order_after_their_latency() -> None:
     underway = LatencyQueue[str](5)
     underway.put(0, "a")
     underway.put(3, "b")

@@ -86,7 +86,7 @@ def test_the_local_costmap_rolls_with_the_robot_and_knows_no_map() -> None:
     assert (mapped.distance(lethal(costmaps(d).global_costmap.view)) < 0.05).all()
 
 
-def test_its_size_resolution_and_rate_are_nav2s_or_what_is_asked_for() -> None:
+def test_local_costmap_has_the_values_of_nav2_or_the_given_ones() -> None:
     def shape(**options: float) -> tuple[tuple[int, int], float]:
         spec = StackSpec(localizer=TRUTH, local_costmap=LocalCostmap(**options))
         view = costmaps(drive(CORRIDOR, START, GOAL, grid=None, spec=spec)).local_costmap.view
@@ -104,7 +104,7 @@ def test_a_robot_that_is_faster_sees_as_far_as_it_looks_ahead() -> None:
     assert view.costs.shape[1] * view.resolution / 2 > 1.7 * 3.0 + 0.22
 
 
-def test_what_the_local_costmap_does_not_say_itself_it_takes_from_the_global_one() -> None:
+def test_local_costmap_inherits_unset_parameters() -> None:
     shared = Costmap(inflation_radius=0.3, obstacle_max_range=1.0)
     assert LocalCostmap(track_unknown_space=True).completed(shared) == shared
     own = LocalCostmap(inflation_radius=0.5, update_frequency=10.0).completed(shared)

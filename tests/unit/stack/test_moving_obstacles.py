@@ -10,7 +10,7 @@ from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
 from simscen.testing.flatland import round_robot
 
 
-def test_what_is_told_to_come_no_nearer_comes_no_nearer_whichever_way_one_goes() -> None:
+def test_minimum_distance_bound_holds_for_every_path() -> None:
     rng, times = np.random.default_rng(5), np.linspace(0.0, 3.0, 3001)
     for _ in range(200):
         x, y, vx, vy = rng.normal(0.0, 2.0, 4).tolist()
@@ -38,7 +38,7 @@ def test_arrays_are_what_it_was_made_of_and_turn_with_the_frame() -> None:
     )
 
 
-def test_what_is_told_at_once_to_stay_off_a_way_stays_off_it_at_each_moment() -> None:
+def test_quick_check_agrees_with_each_moment() -> None:
     """Robots that brake, speed up and drive backward, beside a bent path, among things on all sides."""
     rng, robot, clear, off = np.random.default_rng(7), round_robot(), 0, 0
     along = np.linspace(0.0, 5.0, 101)

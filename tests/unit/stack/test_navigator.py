@@ -42,7 +42,7 @@ def reasons(drive: Drive) -> list[object]:
     return [event.data["reason"] for event in drive.kinds("plan.made")]
 
 
-def test_it_drives_through_a_door_to_the_goal_and_stands_there() -> None:
+def test_navigator_drives_through_a_door_and_stops_at_the_goal() -> None:
     d = start(rooms()).run(60)
     assert d.result == "SUCCEEDED"
     assert d.pose.distance(FAR.pose) < 0.2
@@ -53,7 +53,7 @@ def test_it_drives_through_a_door_to_the_goal_and_stands_there() -> None:
     assert set(d.commands[-30:]) == {STOP}
 
 
-def test_it_visits_goals_in_order() -> None:
+def test_navigator_visits_goals_in_order() -> None:
     d = start(rooms(), Goal("a", Pose2(3, 5)), Goal("b", Pose2(8, 3)), Goal("c", Pose2(1, 1))).run(120)
     assert [e.name for e in d.kinds("goal.reached")] == ["a", "b", "c"]
     assert [e.data["index"] for e in d.kinds("goal.accepted")] == [0, 1, 2]
@@ -152,7 +152,7 @@ def test_a_robot_that_does_not_move_is_found_out() -> None:
     assert codes(d) == ["FAILED_TO_MAKE_PROGRESS"]
 
 
-def test_a_plan_that_fails_now_and_then_is_made_anew_each_time_without_a_recovery() -> None:
+def test_sporadic_planning_failures_cause_no_recovery() -> None:
     """Nav2's RecoveryNode counts its retries from the last success on."""
     d = start(rooms(), spec=StackSpec(localizer=TRUTH, planner=OmplPlanner(replanning="rate", replanning_rate=1.0)))
     planner, calls = d.stack.inner._navigator.plans.planner, []
@@ -215,7 +215,7 @@ def no_command(*_: object) -> Twist:
     raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "nothing is free")
 
 
-def test_after_a_failed_goal_it_stops_or_goes_on_as_told() -> None:
+def test_on_goal_failure_stops_or_continues() -> None:
     goals = Goal("bad", Pose2(30, 1)), Goal("good", Pose2(2.5, 1.0))
     stopped = start(rooms(), *goals).run(30)
     assert [e.name for e in stopped.kinds("goal.accepted")] == ["bad"]
@@ -283,14 +283,14 @@ def test_nav2_replans_through_poses_at_a_third_of_its_usual_rate() -> None:
     assert reasons(start(rooms(), *through, spec=spec).run(6.5)).count("rate") == 2
 
 
-def test_it_drives_without_a_map() -> None:
+def test_navigator_drives_without_a_map() -> None:
     world = Flatland(discs=[(3.0, 0.1, 0.3), (5.0, -0.4, 0.4), (4.0, 1.0, 0.3)])
     d = drive(world, Pose2(0, 0), Goal("g", Pose2(8.0, 0.0)), grid=None).run(60)
     assert d.result == "SUCCEEDED"
     assert d.min_clearance > 0.02
 
 
-def test_it_drives_without_a_map_to_a_goal_beyond_the_rolling_window() -> None:
+def test_navigator_reaches_a_goal_beyond_the_rolling_window_without_a_map() -> None:
     spec = StackSpec(localizer=TRUTH, costmap=Costmap(rolling_size=6.0))
     d = drive(Flatland(discs=[(3.0, 0.1, 0.3)]), Pose2(0, 0), Goal("g", Pose2(9.0, 0.0)), grid=None, spec=spec).run(60)
     assert d.result == "SUCCEEDED"
@@ -336,7 +336,7 @@ def test_a_car_drives_to_a_goal_behind_it() -> None:
     assert all(abs(c.wz) <= abs(c.vx) / 0.6 * 1.5 + 0.05 for c in d.commands)
 
 
-def test_what_only_the_collision_monitor_sees_is_a_failure_soon_not_after_the_progress_checker() -> None:
+def test_obstacle_seen_only_by_the_collision_monitor_fails_soon() -> None:
     """The costmap marks nothing beyond 5 cm: the monitor alone stops the robot before the wall that is not mapped."""
     spec = StackSpec(localizer=TRUTH, costmap=Costmap(obstacle_max_range=0.05))
     d = start(rooms(DOOR), grid=rooms(), spec=spec).run(14)
@@ -390,7 +390,7 @@ def test_a_dead_end_that_was_seen_is_not_forgotten_when_control_fails_out_of_its
 
 
 @pytest.mark.parametrize("off", [0.04, -0.04])
-def test_it_gets_round_the_end_of_a_wall_that_stands_a_few_centimeters_off_the_map(off: float) -> None:
+def test_navigator_passes_a_wall_that_is_off_the_map_by_centimeters(off: float) -> None:
     """As for a robot whose belief is off by as much; it has been told to take the shortest way, not the roomiest."""
     mapped, world = (Flatland([(2.5 + x, 2.7, 9.5, 2.8)]).room(12, 5) for x in (0.0, off))
     spec = StackSpec(

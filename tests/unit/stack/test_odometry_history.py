@@ -40,7 +40,7 @@ def test_outside_of_the_readings_there_is_nothing_to_interpolate() -> None:
     assert not both.reaches(21)
 
 
-def test_where_the_robot_was_is_told_in_the_frame_in_which_it_is_told_where_it_is() -> None:
+def test_past_poses_are_in_the_current_frame() -> None:
     before = straight(0, 6, 12).past_pose(Pose2(5.0, 5.0, 1.5707963267948966), 6)
     assert before == pytest.approx((5.0, 4.4, 1.5707963267948966))
 
@@ -54,7 +54,7 @@ def test_before_any_reading_it_is_at_the_origin() -> None:
     assert not nothing.reaches(0)
 
 
-def test_what_is_older_than_tf_keeps_is_forgotten() -> None:
+def test_readings_older_than_the_tf_buffer_are_dropped() -> None:
     long = straight(*range(0, 1000, 10))
     oldest = 990 - HISTORY_S * RATE
     assert long.at(oldest - 1) is None
@@ -76,7 +76,7 @@ def test_a_reading_that_is_not_a_place_is_refused(bad: float, part: int) -> None
     assert not given.add(20, Pose2(*(bad if part == k else 0.0 for k in range(3))))
 
 
-def test_the_way_reaches_farther_back_than_what_can_be_looked_up_and_begins_anew_with_another_odometry() -> None:
+def test_path_is_longer_than_the_lookup_buffer_and_restarts_with_new_odometry() -> None:
     kept = OdometryHistory(RATE, trail=60)
     for tick in range(0, 1000, 10):
         kept.add(tick, Pose2(0.1 * tick, 0.0, 0.0))

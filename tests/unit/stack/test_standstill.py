@@ -15,7 +15,7 @@ def kinds(events: tuple[Event, ...]) -> list[tuple[str, str]]:
     return [(str(event.kind), event.name) for event in events]
 
 
-def test_a_reason_is_told_once_after_a_second_and_its_end_as_well() -> None:
+def test_a_reason_is_reported_once_after_a_second_and_its_end_as_well() -> None:
     standstill = StandstillReporter(240)
     assert [kinds(standstill.report_hold(tick, "planner", lambda: "why")) for tick in (12, 251, 252, 264)] == [
         [], [], [("robot.held", "planner")], [],

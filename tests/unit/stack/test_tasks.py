@@ -77,7 +77,7 @@ def test_a_drive_fails_as_a_whole_and_the_next_one_follows():
 
 
 @pytest.mark.parametrize("how", ["preempt", "cancel"])
-def test_what_ends_a_drive_ends_all_of_it(how):
+def test_end_of_a_drive_ends_all_its_goals(how):
     drive, journal = task(A, B, C, D)
     drive.next(1)
     drive.preempt(2, Goal("x", Pose2(5, 5))) if how == "preempt" else drive.cancel(2)
@@ -167,7 +167,7 @@ def test_a_goal_in_another_frame_is_the_same_but_for_its_pose() -> None:
     assert goal.at(Pose2(5, 6, 7)) == replace(goal, pose=Pose2(5, 6, 7))
 
 
-def test_a_task_keeps_no_list_of_others_and_says_so_to_who_hands_it_one():
+def test_task_refuses_a_mutable_list_of_goals():
     with pytest.raises(TypeError):
         Task(True, [])
     begun = Task(True)

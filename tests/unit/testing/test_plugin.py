@@ -76,7 +76,7 @@ def test_the_name_of_a_shipped_type_and_workers_do_as_well(run) -> None:
     assert "1 passed" in told
 
 
-def test_with_workers_a_mistake_is_told_in_words_as_well(run) -> None:
+def test_mistake_is_readable_with_xdist_workers(run) -> None:
     code, told = run("-n1", "--simscen-contract", "headless")
     assert code == 4, told
     assert told.strip().splitlines()[-1].startswith("ERROR: --simscen-contract headless: no installed package")
@@ -117,7 +117,7 @@ def refused(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, st
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("target", REFUSED)
-def test_what_cannot_be_tried_is_an_error_in_words(refused, target: str) -> None:
+def test_untestable_target_is_a_readable_error(refused, target: str) -> None:
     code, told = refused[target]
     assert code == 4
     assert REFUSED[target] in told

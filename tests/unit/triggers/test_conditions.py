@@ -73,7 +73,7 @@ def test_a_speed_is_over_ground_and_neither_below_nor_above_itself(twist, below,
 
 
 @pytest.mark.parametrize(("x", "expected"), [(0.99, False), (1.0, True), (1.01, True), (5.01, False)])
-def test_what_remains_is_measured_to_the_goal_as_the_crow_flies(x, expected):
+def test_distance_remaining_is_euclidean(x, expected):
     goal = Goal("desk", Pose2(3.0, 2.0))
     assert holds({"distance_remaining": 2}, robot=Pose2(x, 2.0), goal=goal) is expected
 
@@ -93,7 +93,7 @@ def test_without_a_belief_nothing_is_in_error():
 
 
 @pytest.mark.parametrize(("x", "expected"), [(0.99, False), (1.0, True), (5.01, False)])
-def test_what_the_robot_thinks_remains_is_measured_from_where_it_believes_to_be(x, expected):
+def test_believed_distance_remaining_uses_the_estimate(x, expected):
     goal, belief = Goal("desk", Pose2(3.0, 2.0)), Belief(Pose2(x, 2.0), np.eye(3))
     words = {"believed_distance_remaining": 2}
     assert holds(words, robot=Pose2(-50.0, 2.0), goal=goal, belief=belief) is expected
@@ -112,7 +112,7 @@ def test_a_turn_has_a_rate_and_no_side(rate, below, above, side):
 @pytest.mark.parametrize(
     ("clearance", "expected"), [(None, False), (0.31, False), (0.3, False), (0.29, True), (-1, True)]
 )
-def test_what_is_near_is_nearer_than_the_bound(clearance, expected):
+def test_clearance_below_compares_strictly(clearance, expected):
     assert holds({"clearance_below": "30 cm"}, clearance=clearance) is expected
 
 
@@ -169,12 +169,12 @@ def test_a_point_has_both_its_coordinates():
     assert not holds({"robot_within": {"of": [5, 7], "distance": 1}}, robot=Pose2(7.0, 5.0))
 
 
-def test_nothing_is_near_an_object_that_is_not_there():
+def test_nothing_is_near_a_missing_object():
     assert not holds({"robot_within": {"object": "cart", "distance": 1000}})
 
 
 @pytest.mark.parametrize("words", [{}, {"of": [1, 1], "object": "cart"}, {"object": "cart", "region": "hall"}])
-def test_near_to_one_thing_only(words):
+def test_robot_within_needs_exactly_one_target(words):
     with pytest.raises(ValidationError, match="exactly one of: of, object, region"):
         Trigger.model_validate({"robot_within": {**words, "distance": 1}})
 
@@ -189,7 +189,7 @@ LOGGED = {
 
 
 @pytest.mark.parametrize("kind", LOGGED)
-def test_what_was_logged_counts_by_kind_and_name(kind):
+def test_logged_events_count_by_kind_and_name(kind):
     words, logged = LOGGED[kind]
     name = next(value for key, value in words.items() if key in ("name", "with"))
     assert not holds({kind: words})
@@ -261,13 +261,13 @@ def test_conditions_combine(words, expected):
     assert holds(words, tick=240) is expected
 
 
-def test_unless_it_is_said_otherwise_a_trigger_fires_once_at_once_and_for_sure():
+def test_default_trigger_fires_once_immediately_and_certainly():
     usual = Trigger.model_validate({"time": 1})
     assert (usual.edge, usual.delay, usual.times, usual.probability) == ("rising", 0.0, 1, 1.0)
 
 
 @pytest.mark.parametrize("words", [{"times": 0}, {"times": 10_001}, {"delay": -1}, {"probability": 1.5}])
-def test_what_no_trigger_can_do_is_refused(words):
+def test_impossible_trigger_is_refused(words):
     with pytest.raises(ValidationError):
         Trigger.model_validate({"time": 1, **words})
 

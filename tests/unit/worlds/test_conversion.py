@@ -59,7 +59,7 @@ def test_a_box_on_any_of_its_sides_is_the_same_box(size, x, y, side, yaw):
     assert_same_corners(world.solids, [solid], 1e-4)
 
 
-def test_cylinders_and_prisms_are_the_same_and_need_no_word():
+def test_cylinders_and_prisms_are_converted_exactly():
     solids = (
         Solid(Cylinder(0.3, 1.2), Pose3(1.0, 2.0, 0.6), "pillar"),
         Solid(Extrusion(((0, 0), (2, 0), (0, 1)), 0.8), Pose3.planar(Pose2(3, 1, 0.7), 0.5), "wedge"),
@@ -70,7 +70,7 @@ def test_cylinders_and_prisms_are_the_same_and_need_no_word():
     assert [solid.name for solid in world.solids] == ["pillar", "wedge"]
 
 
-def test_what_is_below_the_ground_is_cut_off():
+def test_geometry_below_the_ground_is_cut_off():
     world, changes = converted(
         Solid(Box((1, 1, 1)), Pose3(z=0.25), "sunk"), Solid(Box((9, 9, 1)), Pose3(z=-0.5), "floor")
     )
@@ -89,7 +89,7 @@ def test_what_is_below_the_ground_is_cut_off():
         (Cylinder(0.2, 2.0), Pose3.from_rpy(0, 0, 0.2, math.pi / 2, 0, 0.3), "a cylinder"),
     ],
 )
-def test_what_leans_or_bulges_keeps_its_cut_and_is_told(shape, pose, kind):
+def test_tilted_or_round_solids_become_prisms_with_a_note(shape, pose, kind):
     solid = Solid(shape, pose, "thing")
     world, changes = converted(solid, height=0.25)
     assert changes == [f"thing: {kind}; replaced by an upright prism over its cross section at 0.25 m"]
@@ -97,7 +97,7 @@ def test_what_leans_or_bulges_keeps_its_cut_and_is_told(shape, pose, kind):
     assert before.symmetric_difference(after).area < 1e-4
 
 
-def test_a_mesh_of_upright_walls_is_the_same_without_a_word():
+def test_mesh_of_upright_walls_is_converted_exactly():
     ring = triangulate(Extrusion(((0, 0), (5, 0), (5, 4), (3, 4), (3, 1), (0, 1)), 2.0))
     solid = Solid(Mesh(ring.vertices, ring.faces), Pose3.planar(Pose2(1, 2, 0.3)), "wall")
     world, changes = converted(solid)
@@ -105,7 +105,7 @@ def test_a_mesh_of_upright_walls_is_the_same_without_a_word():
     assert_same_corners(world.solids, [solid])
 
 
-def test_a_mesh_that_is_open_is_left_out_and_told():
+def test_open_mesh_is_left_out_with_a_note():
     box = triangulate(Box((1, 1, 1)))
     solid = Solid(Mesh(box.vertices, box.faces[2:][:-1]), Pose3(z=0.5), "torn")
     world, changes = converted(solid)
@@ -128,7 +128,7 @@ def test_bodies_keep_mass_and_motion():
     np.testing.assert_allclose(cart.path.poses, path.poses, atol=1e-9)
 
 
-def test_motion_and_shape_that_cannot_be_said_are_told():
+def test_unsupported_motions_and_shapes_are_reported():
     disc = (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),)
     poses = (Pose2(0, 0), Pose2(1, 0), Pose2(2, 0))
     off = (Solid(Cylinder(0.3, 1.0), Pose3(x=1.0, z=0.5)),)
@@ -144,7 +144,7 @@ def test_motion_and_shape_that_cannot_be_said_are_told():
 
 
 @pytest.mark.parametrize("mode", ["once", "back_and_forth"])
-def test_a_motion_at_changing_speed_is_said_in_keyframes(mode):
+def test_motion_with_changing_speed_becomes_keyframes(mode):
     disc = (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),)
     poses = (Pose2(0, 0), Pose2(1, 0), Pose2(2, 0.5, 1.0))
     path = MotionPath((0.0, 1.0, 9.0), poses, mode, ease="spline", phase=0.5)
@@ -153,7 +153,7 @@ def test_a_motion_at_changing_speed_is_said_in_keyframes(mode):
     assert world.bodies[0].path == path
 
 
-def test_what_the_file_adds_itself_comes_after():
+def test_additions_of_the_file_come_last():
     spec = WorldSpec.model_validate(
         {"simscen": 1, "sdf": "x.sdf", "obstacles": [{"name": "mine", "box": [1, 1, 1], "pose": {"x": 0, "y": 0}}]}
     )
@@ -194,7 +194,7 @@ def test_a_shape_that_a_world_file_cannot_hold_is_left_out_with_its_reason(shape
     assert [(body.name, body.mass) for body in world.bodies] == [("both", 2.0)]
 
 
-def test_a_mass_that_a_world_file_cannot_hold_is_told():
+def test_mass_outside_the_range_of_world_files_is_reported():
     world, changes = converted(bodies=(Body("heavy", (Solid(Box((1, 1, 1)), Pose3(z=0.5)),), Pose3(), 1e6),))
     assert changes == ["heavy: its `mass` is not valid: input should be less than or equal to 100000; it is left out"]
     assert world.bodies == ()

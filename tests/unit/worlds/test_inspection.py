@@ -20,7 +20,7 @@ ROOM = World(
 )
 
 
-def test_a_world_is_told_in_numbers():
+def test_world_summary_has_numbers():
     told = inspect_world(build_world_and_map(ROOM, 0.3))
     assert [item.name for item in told.solids] == ["wall", "wall", "post"]
     assert told.shapes == (("box", 2), ("cylinder", 1))

@@ -75,7 +75,7 @@ def test_a_map_becomes_walls_and_stays_the_map():
     assert world.bounds == pytest.approx((1.0, 1.0, 3.0, 3.0))
 
 
-def test_what_is_added_to_an_imported_world_comes_after_it_and_wins():
+def test_additions_to_an_imported_world_take_precedence():
     base = World("gz", (Solid(Box((1, 1, 1)), name="theirs"),), places={"a": Pose2(0, 0), "b": Pose2(1, 1)})
     own = spec(
         obstacles=[{"name": "ours", "box": [1.0, 1.0, 1.0], "pose": {"x": 3.0, "y": 0.0}}],

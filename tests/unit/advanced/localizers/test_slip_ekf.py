@@ -42,7 +42,7 @@ def test_pose_without_noise_equals_the_truth(imu: bool) -> None:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("imu", [False, True])
-def test_its_covariance_is_consistent_with_its_errors(imu: bool) -> None:
+def test_covariance_is_consistent_with_the_errors(imu: bool) -> None:
     """50 NEES of 3 degrees of freedom add up to chi-square with 150; all but one of 1000 such tests pass by chance."""
     way, values = drive(10.0), []
     for seed in range(50):

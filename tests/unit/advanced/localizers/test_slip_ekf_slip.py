@@ -142,9 +142,7 @@ def sampled(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Arr
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("slip", [0.0, 0.2])
 @pytest.mark.parametrize("case", CASES, ids=["tidy", "rough", "fast"])
-def test_its_covariance_is_consistent_with_its_errors_on_clean_and_on_slipping_drives(
-    case: dict[str, float], slip: float
-) -> None:
+def test_covariance_is_consistent_with_and_without_slip(case: dict[str, float], slip: float) -> None:
     """NEES of 3 degrees of freedom add up to chi-square; all but one of 1000 such tests pass by chance."""
     values = [nees(*sampled(case, slip, seed)) for seed in range(1000, 1000 + RUNS)]
     low, high = stats.chi2.ppf([0.0005, 0.9995], 3 * RUNS)

@@ -118,7 +118,7 @@ def test_boolean_signal_has_no_value():
     assert (finding.measured, finding.limit, finding.value) == ("no", "no", None)
 
 
-def test_what_the_end_of_the_run_left_open_is_undecided_with_the_time_of_the_end():
+def test_open_window_at_the_end_of_the_run_is_undecided():
     finding = found({"always": {**FAR, "within": 9.0}}, WAY)
     assert finding.status is Status.INCONCLUSIVE
     assert finding.measured.startswith("the run ended at t = 4.00 s (navigation ended) before `always within 9 s")

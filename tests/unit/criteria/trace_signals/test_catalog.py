@@ -29,7 +29,7 @@ def test_a_signal_has_a_range_that_it_can_fill(name):
 
 
 @pytest.mark.parametrize("name", SIGNALS)
-def test_only_questions_are_answered_by_yes_or_no_and_have_no_unit(name):
+def test_only_boolean_signals_have_no_unit(name):
     assert SIGNALS[name].is_boolean == (name in QUESTIONS)
     assert (SIGNALS[name].unit == "") == (name in (*QUESTIONS, "nees") or name.endswith("_count"))
 

@@ -139,7 +139,7 @@ def test_a_clearance_that_is_no_number_is_named_with_its_first_moment(value):
     assert clearance(trace) is trace.clearance
 
 
-def test_of_several_things_whose_pose_is_not_finite_the_first_by_name_is_named():
+def test_first_object_with_a_nonfinite_pose_is_named():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     lost = Samples(trace.truth.ticks, np.full((41, 3), np.nan))
     with pytest.raises(InvalidTrace, match=r"the pose of cart is not finite at t = 0\.00 s"):

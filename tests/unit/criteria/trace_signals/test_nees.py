@@ -25,7 +25,7 @@ def test_errors_count_in_standard_deviations_squared(error, expected):
     assert of([-part for part in error], APART) == pytest.approx(expected)
 
 
-def test_it_is_the_error_in_the_inverse_covariance_whatever_is_correlated():
+def test_nees_is_weighted_by_the_inverse_covariance():
     rng = np.random.default_rng(4)
     roots, errors = rng.normal(size=(30, 3, 3)), rng.normal(size=(30, 3))
     full = roots @ roots.transpose(0, 2, 1) + 0.1 * np.eye(3)

@@ -297,7 +297,7 @@ def test_distances_to_what_does_not_move():
         signal("distance_to", words, case, goal="self")
 
 
-def test_what_is_left_of_the_plan_is_measured_along_it_from_the_believed_place():
+def test_remaining_plan_length_starts_at_the_estimated_position():
     words = {
         "seconds": 4,
         "truth": [[0, 9, 9], [4, 9, 8]],
@@ -378,7 +378,7 @@ def test_short_state_counts_at_the_next_sample():
     assert not signal("in_collision", words, **{"with": "wall"}).any()
 
 
-def test_contacts_with_two_things_end_each_for_itself():
+def test_contacts_with_two_objects_end_independently():
     events = [
         [1, "collision.started", "a"],
         [2, "collision.started", "b"],

@@ -22,7 +22,7 @@ def test_object_without_space_for_the_disc_closes_the_passage(criterion):
     assert why(criterion, box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")) == [CLOSES.format("nothing is left")]
 
 
-def test_a_thing_beside_the_line_closes_it_too_when_nothing_fits_past():
+def test_object_beside_the_line_can_close_the_passage():
     assert why("result", box(1, "crate", 5.2, 0, 0.2, 1.0, "crate falls")) == [CLOSES.format("0.20 m are left")]
 
 
@@ -32,7 +32,7 @@ def test_object_without_space_to_turn_narrows_the_passage():
     assert "0.45 m are left" in line
 
 
-def test_two_things_that_only_together_close_it_are_both_named():
+def test_two_objects_that_close_the_passage_together_are_both_named():
     (line,) = why("result", [*box(1, "a", 5, 0.4, 0.6, 0.4, "first"), *box(2, "b", 5, -0.4, 0.6, 0.4, "second")])
     assert line.startswith("why: a (spawned by event `first` at t = 1.00 s) and b (spawned by event `second` at")
     assert "close the passage" in line
@@ -60,7 +60,7 @@ def test_a_passage_that_the_robot_has_passed_does_not_keep_it():
     assert why("result", crate, case=case) == []
 
 
-def test_a_thing_that_moved_counts_where_it_is_now():
+def test_moved_object_counts_at_its_current_pose():
     moved = by("cart comes", 3, [3, "object.moved", "cart", {}])
     (line,) = why(
         "goals_reached", [*box(0, "cart", 5, 9, 0.6, 1.2), *moved], objects={"cart": [[0, 5, 9], [3, 5, 9], [5, 5, 0]]}
@@ -69,14 +69,14 @@ def test_a_thing_that_moved_counts_where_it_is_now():
     assert why("result", [*box(0, "cart", 5, 0, 0.6, 1.2)])[0].startswith("why: cart closes the passage")
 
 
-def test_what_leaves_room_to_turn_is_not_in_the_way_and_a_passage_as_it_is_never_is():
+def test_object_with_space_to_turn_is_not_reported():
     assert why("result", box(1, "crate", 5, -0.5, 0.2, 0.4, "crate falls")) == []
     tight = {**CASE, "passages": [["study", [5, 0.25], [5, -0.25], "west wall", "east wall"]]}
     assert why("result", [], case=tight) == []
     assert why("result", box(1, "crate", 5, 5, 0.2, 0.4, "crate falls"), case=tight) == []
 
 
-def test_of_several_closed_passages_the_tightest_is_told():
+def test_tightest_closed_passage_is_reported():
     wider = ["study", [6, 0.9], [6, -0.9], "a", "b"]
     events = [*box(1, "crate", 5, 0, 0.2, 0.9, "crate falls"), *box(1, "shelf", 6, 0, 0.2, 1.5, "shelf falls")]
     (line,) = why("result", events, case={**CASE, "passages": [wider, DOOR]})
@@ -165,7 +165,7 @@ def test_a_robot_that_just_fits_is_not_shut_in_and_one_that_can_just_turn_not_ha
     assert said(("fog", 0.2), footprint=[]) == ""
 
 
-def test_two_centimeters_that_are_left_are_told_and_less_is_nothing():
+def test_remaining_gap_is_reported_from_two_centimeters():
     assert "the shortest path: 0.02 m are left" in told(("fog", 0.01))
     assert "the shortest path: nothing is left" in told(("fog", 0.0099))
 

@@ -19,6 +19,6 @@ def test_only_failures_are_explained_and_before_their_own_details():
     ]
 
 
-def test_of_many_causes_the_first_six_are_told():
+def test_at_most_six_causes_are_reported():
     lines = why("speed", [event for k in range(9) for event in by(f"gust {k}", 9)], case={})
     assert lines == [f"meanwhile: event `gust {k}` happened 1.00 s before: something" for k in range(6)]

@@ -20,7 +20,7 @@ def test_object_that_hit_the_robot_is_reported_with_its_speed():
     assert why("collisions", [*box(0, "crate", 2, 0, 0.4, 0.4), HIT], at=2) == []
 
 
-def test_a_thing_moves_from_a_sixteenth_of_a_meter_a_second_on():
+def test_object_faster_than_6_cm_per_second_is_moving():
     crate = [*box(0, "crate", 2, 0, 0.4, 0.4), HIT]
     slow, still = (
         {"crate": [[0, 2, 0], [2, 2 + 2 * speed, 0], [10, 2 + 2 * speed, 0]]} for speed in (0.0625, 0.0546875)

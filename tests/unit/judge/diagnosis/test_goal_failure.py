@@ -7,7 +7,7 @@ from simscen.judge.diagnosis.causes import causes
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 
-def test_a_thing_on_the_goal_is_named_once():
+def test_object_on_the_goal_is_named_once():
     assert why("goals_reached", box(1, "pallet", 8, 0, 1, 1, "pallet falls")) == [
         "why: pallet (spawned by event `pallet falls` at t = 1.00 s) stands on goal study"
     ]
@@ -34,7 +34,7 @@ def test_the_gap_that_is_too_narrow_is_named_with_the_world_that_leaves_no_way()
     )
 
 
-def test_what_it_touches_and_has_touched_since_is_named():
+def test_current_contact_is_named_with_its_start():
     touches = [[3, "collision.started", "sill", {}], [4, "collision.ended", "sill", {}]]
     assert why("stuck", touches) == []
     assert why("stuck", [*touches, [6, "collision.started", "sill", {}]]) == [
@@ -68,7 +68,7 @@ def test_closing_object_is_reported_once_with_other_near_objects():
     assert [line.split(" (")[0] for line in why("result", [*crate, *bin_], case=case)] == ["why: crate", "why: bin"]
 
 
-def test_what_was_there_from_the_start_is_told_beside_what_else_was():
+def test_initial_objects_are_reported_next_to_others():
     case = {**CASE, "passages": [["study", [4.6, 0.5], [4.6, -0.5], "a", "b"]]}
     events = [*box(0, "door", 4.6, 0, 0.1, 2.0), *box(0, "bin", 4, 0.4, 0.2, 0.2)]
     assert [line.split()[1] for line in why("result", events, case=case)] == ["door", "bin"]
@@ -109,22 +109,22 @@ def test_a_passage_as_wide_as_the_robot_is_not_what_leaves_no_way():
     assert line.endswith("path to goal study for a robot 0.40 m wide")
 
 
-def test_what_it_begins_to_touch_at_that_very_tick_is_named_and_what_it_lets_go_of_then_is_not():
+def test_contact_starting_at_the_tick_counts_and_ending_does_not():
     touches = [[6, "collision.started", "sill", {}], [8, "collision.ended", "sill", {}]]
     assert why("stuck", touches, at=6) == ["why: it had touched sill since t = 6.00 s"]
     assert why("stuck", touches, at=8) == []
 
 
-def test_a_thing_that_the_robot_on_its_goal_would_just_touch_does_not_stand_on_it():
+def test_object_that_only_touches_the_goal_footprint_is_not_on_the_goal():
     assert why("stuck", box(0, "crate", 8, 0.75, 1, 1), case={**CASE, "inscribed_radius": 0.25}) == []
 
 
-def test_what_is_thirty_centimeters_away_may_hold_the_robot():
+def test_object_within_thirty_centimeters_is_reported():
     (line,) = why("stuck", box(0, "crate", 4.7, 0, 0.4, 0.4), case={**CASE, "passages": []})
     assert line == "why: crate was 0.30 m from the robot"
 
 
-def test_what_its_own_stack_waits_for_is_named_while_it_does():
+def test_reason_for_waiting_of_the_stack_is_named():
     held = [2, "robot.held", "collision_monitor", {"message": "scans of lidar `lidar` come late"}]
     (line,) = why("goals_reached", [held])
     assert (
@@ -145,7 +145,7 @@ def test_where_nothing_else_is_known_its_stack_is_quoted_with_what_it_had_tried(
     assert "said" not in "".join(told(*box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")))
 
 
-def test_recoveries_that_failed_are_told_with_their_codes_whatever_else_is_known():
+def test_failed_recoveries_are_always_reported_with_their_codes():
     timeout = {"outcome": "failed", "error_code": 711, "error_name": "BACKUP_TIMEOUT", "message": "it took too long"}
     blocked = {"outcome": "failed", "error_code": 703, "error_name": "SPIN_COLLISION_AHEAD", "message": "no room"}
     tried = [

@@ -47,7 +47,7 @@ def test_error_of_half_a_meter_counts_as_lost():
     assert why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.49, 0, 0]}) == []
 
 
-def test_what_happens_at_that_very_tick_counts_and_what_comes_later_does_not():
+def test_events_up_to_the_failure_tick_count():
     lost = {"case": {"goals": [GOAL]}, "belief": {"offset": [2, 0, 0]}}
     events = by("carried off", 6, [6, "robot.placed", "", {}])
     assert why("localization_error", events, at=6, **lost) == [

@@ -43,20 +43,20 @@ def test_of_several_parts_the_nearest_counts():
     assert thing.distance(np.array([[1.5, 0.0], [9.9, 9.5]])).tolist() == pytest.approx([1.0, 0.0])
 
 
-def test_a_thing_is_there_from_when_it_came_until_it_went():
+def test_object_exists_from_spawn_to_removal():
     events = [spawned(2, "crate", 3, 0), [5, "object.removed", "crate", {}], spawned(7, "crate", 4, 0)]
     assert [len(there(events, at)) for at in (1.9, 2, 4.9, 5, 6.9, 7)] == [0, 1, 1, 0, 0, 1]
     assert there(events, 8)[0].outlines[0].mean(axis=0).tolist() == [4.0, 0.0]
 
 
-def test_it_stands_where_it_was_seen_last_not_where_one_of_its_name_stood_before():
+def test_object_is_at_its_last_observed_pose():
     events = [spawned(0, "cart", 0, 0), [4, "object.removed", "cart", {}], spawned(6, "cart", 5, 0)]
     way = {"cart": [[0, 0, 0], [3, 3, 0], [6, 3, 0], [8, 9, 0]]}
     assert there(events, 2, objects=way)[0].outlines[0].mean(axis=0).tolist() == pytest.approx([2.0, 0.0])
     assert there(events, 7, objects=way)[0].outlines[0].mean(axis=0).tolist() == pytest.approx([6.0, 0.0])
 
 
-def test_what_an_event_did_is_told_of_what_it_did_it_to():
+def test_effect_of_an_event_is_reported_for_its_object():
     events = [
         spawned(0, "bin", 9, 9),
         [1, "event.started", "crate falls", {}],

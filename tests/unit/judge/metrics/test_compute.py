@@ -169,7 +169,7 @@ def test_a_way_of_12_m_in_twice_its_optimal_time_or_less_is_worth_a_half(seconds
     assert barn_score(True, seconds, 12.0) == pytest.approx(expected)
 
 
-def test_who_does_not_arrive_scores_nothing():
+def test_run_without_arrival_has_score_zero():
     assert barn_score(False, 7.0, 12.0) == 0.0
 
 
@@ -202,7 +202,7 @@ def test_spinning_to_the_right_is_not_standing():
     ("speed", "turn", "stands"),
     [(0.009, 0.019, True), (0.01, 0.0, False), (-0.01, 0.0, False), (0.0, 0.02, False), (0.0, -0.02, False)],
 )
-def test_what_counts_as_not_moving(speed, turn, stands):
+def test_definition_of_not_moving(speed, turn, stands):
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     trace = replace(trace, velocity=Samples(trace.truth.ticks, np.tile([speed, 0.0, turn], (41, 1))))
     assert compute_metrics(trace, synthetic_case({})).values["time_not_moving"] == (1.0 if stands else 0.0)

@@ -55,7 +55,7 @@ def test_the_curvature_is_one_over_the_radius_of_the_circle_through_three_points
     assert metrics["norm_curvature"] == pytest.approx(chords / radius)
 
 
-def test_of_several_bends_the_sum_and_the_greatest_are_told():
+def test_sum_and_maximum_of_curvature_are_reported():
     metrics = shape((0, 0), (1, 0), (1, 1), (3, 1))
     assert metrics["max_curvature"] == pytest.approx(math.sqrt(2))
     assert metrics["norm_curvature"] == pytest.approx(2 * math.sqrt(2) + 3 * 2 / math.sqrt(5))

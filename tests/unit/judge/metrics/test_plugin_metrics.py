@@ -96,7 +96,7 @@ def test_a_zone_begins_with_its_first_distance_and_ends_before_its_last(monkeypa
     assert zones(monkeypatch, [math.nextafter(high, 0.0)])[f"intrusion_{zone}"] == 1.0
 
 
-def test_touching_a_person_is_a_distance_of_zero_and_nobody_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_contact_with_a_person_is_zero_distance(monkeypatch: pytest.MonkeyPatch) -> None:
     assert zones(monkeypatch, [0.0])["min_person_distance"] == 0.0
     assert (
         zones(monkeypatch, [math.inf])["min_person_distance"] == "no pedestrian was present at any sample of the truth"

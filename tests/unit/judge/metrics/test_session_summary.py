@@ -45,7 +45,7 @@ def test_the_order_of_the_runs_changes_nothing():
     assert summarize_session(RUNS) == summarize_session(reversed(RUNS))
 
 
-def test_it_is_told_in_a_line_with_the_numbers_of_runs():
+def test_summary_line_has_the_numbers_of_runs():
     line = (
         "success 50% of 4 runs (15% … 85%) · SPL 0.45 of 2 runs · 1.5 collisions/km, 2.0/h in 2.00 km, 1.50 h of 3 runs"
     )

@@ -46,7 +46,7 @@ def test_content_of_a_base_is_checked(write, text: str, problem: str) -> None:
     assert [one for one in found if problem in one], found
 
 
-def test_what_a_base_adds_to_a_list_is_checked(write) -> None:
+def test_list_additions_of_a_base_are_checked(write) -> None:
     assert told(write, "pass+: [{collisions: {max: 0}}]\n") == []
     assert told(write, "pass+: [{colisions: {max: 0}}]\n")[0].startswith("1:10 unknown key `colisions`")
 

@@ -63,7 +63,7 @@ def test_paths_may_be_relative_to_the_working_folder(
 PARAMETERS = "amcl:\n  ros__parameters: {alpha1: 0.1, beta: 2}\ndocking_server:\n  ros__parameters: {a: 1}\n"
 
 
-def test_of_a_parameter_file_of_nav2_is_told_what_means_nothing_and_what_is_wrong(write: Write, tmp_path: Path) -> None:
+def test_ignored_and_wrong_nav2_parameters_are_reported(write: Write, tmp_path: Path) -> None:
     told = _problems(write("nav2.yaml", PARAMETERS), tmp_path)
     assert [(p.place, p.code, p.severity) for p in told] == [
         ("nav2.yaml:2:40", "SC341", "warning"),
@@ -80,7 +80,7 @@ def test_of_a_parameter_file_of_nav2_is_told_what_means_nothing_and_what_is_wron
         ("simscen: 1\nstack: {}", "this is a stack file, not a scenario"),
     ],
 )
-def test_parameters_of_a_stack_are_no_scenario_and_what_they_are_for_is_told(
+def test_stack_parameter_file_is_no_scenario_and_gets_a_hint(
     write: Write, tmp_path: Path, text: str, told: str
 ) -> None:
     (problem,) = check_file("scenario", write("mine.yaml", text), tmp_path)

@@ -20,7 +20,7 @@ REMOVED = "events: [{when: {time: 1 s}, do: {remove: {name: crate}}}]\n"
 
 
 @pytest.mark.parametrize(("more", "lines"), [("", [7]), (REMOVED, [])])
-def test_a_goal_on_a_thing_is_warned_of_unless_something_moves_it(more, lines, tmp_path):
+def test_goal_on_an_object_causes_a_warning_unless_the_object_moves(more, lines, tmp_path):
     file = tmp_path / "crate.scenario.yaml"
     file.write_text(SCENARIO + more)
     problems = check_in_world(load_scenario(file, tmp_path))

@@ -56,7 +56,7 @@ def test_names_of_the_world_and_of_the_scenario_are_known(told: Told, trigger: s
         "{collision: {with: nobody}}",
     ],
 )
-def test_unknown_names_are_told_wherever_they_stand(told: Told, trigger: str) -> None:
+def test_unknown_names_are_reported_everywhere(told: Told, trigger: str) -> None:
     problems = told(f"events:\n  - {{when: {trigger}, do: {{cancel_goal: {{}}}}}}\n")
     assert [(p.code, p.line) for p in problems] == [("SC030", 7)]
 

@@ -82,7 +82,7 @@ def test_a_goal_that_an_event_sends_is_looked_at_too(tmp_path, do):
 
 
 @pytest.mark.parametrize(("x", "code"), [(4, "GOAL_OCCUPIED"), (40, "GOAL_OUTSIDE_MAP")])
-def test_the_failure_that_may_be_expected_is_told_by_its_code(tmp_path, x, code):
+def test_message_names_the_error_code_that_can_be_expected(tmp_path, x, code):
     file = tmp_path / "a.scenario.yaml"
     text = SCENARIO.replace("{{name: crate, pose: {{x: 4,", f"{{{{name: crate, pose: {{{{x: {x},")
     file.write_text(text.format(criteria="{goals_reached: {}}", start=1, events=""))

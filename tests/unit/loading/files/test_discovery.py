@@ -97,7 +97,7 @@ def test_the_working_folder_is_the_project_of_what_lies_in_it(tmp_path: Path, mo
 
 
 @pytest.mark.parametrize("home", ["user", "user/deep"])
-def test_neither_the_home_folder_nor_what_holds_it_is_a_project(
+def test_home_folder_and_its_parents_are_no_project_roots(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: str
 ) -> None:
     _touch(tmp_path, "user/down/x.yaml", "user/scenarios/y.yaml", "user/deep/z.yaml", "user/.ssh/id")

@@ -60,7 +60,7 @@ def test_a_link_inside_the_root_is_followed(sandbox: PathSandbox) -> None:
     assert sandbox.find("link.yaml", sandbox.root / "sub") == sandbox.root / "b.yaml"
 
 
-def test_a_loop_of_links_is_told(sandbox: PathSandbox) -> None:
+def test_a_loop_of_links_is_reported(sandbox: PathSandbox) -> None:
     (sandbox.root / "sub/one").symlink_to("two")
     (sandbox.root / "sub/two").symlink_to("one")
     refusal = _refusal(sandbox, "one")
@@ -81,6 +81,6 @@ def test_invalid_file_names_are_refused(fence: PathSandbox, written: str, code: 
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may look everywhere")
-def test_a_folder_that_may_not_be_searched_is_told(sandbox: PathSandbox) -> None:
+def test_a_folder_without_search_permission_is_reported(sandbox: PathSandbox) -> None:
     (sandbox.root / "locked").mkdir(mode=0)
     assert "permission denied" in _refusal(sandbox, "../locked/x.yaml").message

@@ -18,7 +18,7 @@ def test_a_world_that_is_written_reads_back_the_same(file: Path, tmp_path: Path)
     assert load_world_file(tmp_path / "copy.world.yaml", tmp_path).spec == spec
 
 
-def test_a_thing_takes_one_line(tmp_path: Path) -> None:
+def test_each_object_takes_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.world.yaml").write_text(
         "simscen: 1\nname: a\nobstacles:\n- name: x\n  box: [1, 2, 3]\n  pose:\n    x: 1\n    y: 90 cm\n"
         "places: {p: {x: 1, y: 2}}\nregions: {r: [[0, 0], [1, 0], [1, 1]]}\n"
@@ -31,7 +31,7 @@ def test_a_thing_takes_one_line(tmp_path: Path) -> None:
     )
 
 
-def test_sdf_and_ros_maps_are_told_by_what_they_are(tmp_path: Path) -> None:
+def test_sdf_worlds_and_ros_maps_are_recognized_by_content(tmp_path: Path) -> None:
     (tmp_path / "m.pgm").write_bytes(b"P5 1 1 255\n\x00")
     (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n")
     (tmp_path / "s.sdf.xacro").write_text("<sdf version='1.6'/>")

@@ -113,7 +113,7 @@ def test_parameter_without_counterpart_is_reported_at_its_line(tmp_path: Path) -
     ]
 
 
-def test_a_value_that_cannot_be_is_told_where_it_stands_in_the_file_of_nav2(tmp_path: Path) -> None:
+def test_invalid_value_is_reported_at_its_line_of_the_nav2_file(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput) as wrong:
         loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", PARAMS.replace("alpha1: 0.11", "alpha1: -1"))
     assert [(p.path, p.line, p.col) for p in wrong.value.problems] == [("nav2.yaml", 4, 13)]
@@ -122,9 +122,7 @@ def test_a_value_that_cannot_be_is_told_where_it_stands_in_the_file_of_nav2(tmp_
 @pytest.mark.parametrize(
     ("named", "code", "line"), [("none.yaml", "SC023", 6), ("../out.yaml", "SC020", 6), ("a.scenario.yaml", "SC340", 0)]
 )
-def test_a_file_that_is_not_there_not_allowed_or_of_another_kind_is_told(
-    tmp_path: Path, named: str, code: str, line: int
-) -> None:
+def test_missing_forbidden_or_wrong_file_is_reported(tmp_path: Path, named: str, code: str, line: int) -> None:
     with pytest.raises(InvalidInput) as wrong:
         loaded(tmp_path, f"stack: {{nav2_params: {named}}}")
     assert [(p.code, p.line) for p in wrong.value.problems] == [(code, line)]
@@ -231,7 +229,7 @@ collision_monitor:
 """
 
 
-def test_a_file_of_humble_is_read_as_humble_meant_it(tmp_path: Path) -> None:
+def test_humble_file_is_read_with_its_meaning(tmp_path: Path) -> None:
     stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", HUMBLE).spec.stack
     drives = stack.controller
     assert (stack.localizer.robot_model, stack.localizer.max_beams) == ("differential", 40)

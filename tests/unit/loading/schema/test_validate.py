@@ -39,7 +39,7 @@ def test_names_of_fields_in_python_are_no_keys() -> None:
     assert told == [(5, 35, "unknown key `for_` in `faults[0]`")]
 
 
-def test_a_mistake_inside_one_member_of_a_union_is_told_about_that_member() -> None:
+def test_mistake_in_a_union_member_is_reported_for_that_member() -> None:
     text = SCENARIO + "events:\n  - when: {time: 1}\n    do:\n      - {remove: {name: a}}\n      - {remove: {nam: b}}\n"
     assert _told(ScenarioSpec, text) == [(9, 19, "unknown key `nam` in `events[0].do[1].remove`")]
 
@@ -75,7 +75,7 @@ def test_keys_of_names_are_checked_at_the_key() -> None:
     assert told == [(4, 3, "`no/t` is not a valid name")]
 
 
-def test_a_member_of_a_plain_union_is_told_once() -> None:
+def test_a_member_of_a_plain_union_is_reported_once() -> None:
     told = _told(RosMapSpec, "image: a\nresolution: 1\norigin: [0, 0, 0]\nnegate: maybe\n")
     assert len(told) == 1
     assert told[0][:2] == (4, 9)
@@ -88,7 +88,7 @@ def test_null_values_are_refused() -> None:
     assert told[3].hint == "write `off: {}`"
 
 
-def test_an_older_or_newer_version_is_all_that_is_told() -> None:
+def test_unsupported_version_is_the_only_reported_problem() -> None:
     assert _told(ScenarioSpec, "simscen: 2\nnonsense: 1\n") == [
         (1, 10, "needs schema 2; this version of simscen supports 1")
     ]

@@ -48,7 +48,7 @@ def test_the_reference_stack_keeps_the_parameters_that_the_scenario_gives_it(wri
     assert resolved_text(loaded) == file.read_text()
 
 
-def test_a_mistake_in_a_stack_file_is_told_where_it_stands(chosen, tmp_path: Path) -> None:
+def test_a_mistake_in_a_stack_file_is_reported_at_its_position(chosen, tmp_path: Path) -> None:
     with pytest.raises(InvalidInput) as told:
         chosen("", "simscen: 1\nstack:\n  controler: {type: dwb}\n  keepout: [hall]\n")
     found = [(p.path, p.line, p.col, p.code, p.source) for p in told.value.problems]
@@ -58,7 +58,7 @@ def test_a_mistake_in_a_stack_file_is_told_where_it_stands(chosen, tmp_path: Pat
     ]
 
 
-def test_what_only_the_scenario_can_tell_of_a_stack_file_is_told_in_the_stack_file(chosen) -> None:
+def test_scenario_dependent_mistake_is_reported_in_the_stack_file(chosen) -> None:
     """240 Hz of physics is not 7 times anything."""
     with pytest.raises(InvalidInput) as told:
         chosen("", "simscen: 1\nstack:\n  controller_frequency: 7 Hz\n")

@@ -64,7 +64,7 @@ def test_an_external_stack_takes_the_place_of_one_that_a_scenario_extends(load: 
     assert stack_of(load("stack: {external: mine}\n")).controller_frequency == 20.0
 
 
-def test_what_is_said_of_an_external_stack_elsewhere_is_merged(load: Load, write: Write) -> None:
+def test_settings_of_an_external_stack_are_merged(load: Load, write: Write) -> None:
     write("defaults.yaml", "stack: {external: mine, controller_frequency: 10}\n")
     stack = stack_of(load("stack: {keepout: [hall]}\n"))
     assert (stack.external, stack.controller_frequency, stack.keepout) == ("mine", 10.0, ["hall"])

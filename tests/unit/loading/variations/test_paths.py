@@ -53,7 +53,7 @@ def test_a_path_leads_to_the_value_that_a_user_means(tree: MappingNode, path: st
     assert node_at(set_value(tree, target, value), keys) is value
 
 
-def test_what_was_not_written_stands_where_the_path_does(tree: MappingNode) -> None:
+def test_position_of_a_missing_value_is_that_of_the_path(tree: MappingNode) -> None:
     changed = set_value(tree, resolve_path("stack.controller.x", HERE, tree), ScalarNode(HERE, 7))
     assert changed.plain["stack"] == {"controller": {"x": 7}}
     assert changed.entries["stack"].key == HERE
@@ -79,9 +79,7 @@ def test_what_was_not_written_stands_where_the_path_does(tree: MappingNode) -> N
         ("variations.grid", "a variation cannot change `variations`", "cannot be nested"),
     ],
 )
-def test_a_path_that_names_nothing_is_told_with_what_is_there(
-    tree: MappingNode, path: str, told: str, hint: str
-) -> None:
+def test_unknown_path_is_reported_with_the_existing_keys(tree: MappingNode, path: str, told: str, hint: str) -> None:
     with pytest.raises(PathError) as raised:
         resolve_path(path, HERE, tree)
     assert told in str(raised.value)
@@ -89,7 +87,7 @@ def test_a_path_that_names_nothing_is_told_with_what_is_there(
     assert bool(hint) == bool(raised.value.hint)
 
 
-def test_values_in_another_file_are_said_to_be_there() -> None:
+def test_variation_of_a_value_in_another_file_is_reported() -> None:
     tree, _ = parse_yaml("world: room.world.yaml\n", "x")
     assert isinstance(tree, MappingNode)
     with pytest.raises(PathError) as raised:

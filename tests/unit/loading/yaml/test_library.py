@@ -89,7 +89,7 @@ def test_extends_names_one_file(tmp_path: Path) -> None:
         assert [p.code for p in problems] == ["SC011"]
 
 
-def test_what_is_extended_stays_inside_the_root(tmp_path: Path) -> None:
+def test_extended_files_must_be_inside_the_root(tmp_path: Path) -> None:
     (tmp_path / "outside.yaml").write_text("secret: 1")
     (tmp_path / "root").mkdir()
     plain, problems, _ = _read(tmp_path / "root", {"a.yaml": "extends: ../outside.yaml"})
@@ -97,7 +97,7 @@ def test_what_is_extended_stays_inside_the_root(tmp_path: Path) -> None:
     assert [p.code for p in problems] == ["SC020"]
 
 
-def test_mistakes_in_every_file_are_told(tmp_path: Path) -> None:
+def test_mistakes_in_every_file_are_reported(tmp_path: Path) -> None:
     files = {"a.yaml": "extends: b.yaml\nx: 1\nx: 2\n", "b.yaml": "y: !t 3\n", "defaults.yaml": "- 1"}
     _, problems, _ = _read(tmp_path, files, defaults=True)
     assert [(p.path, p.code) for p in problems] == [

@@ -56,7 +56,7 @@ def test_merged_keys_keep_the_place_they_were_written_at() -> None:
     assert key_position(tree, ("made", "x"))[1:] == (1, 14)
 
 
-def test_duplicate_keys_are_told_with_both_places_and_reading_goes_on() -> None:
+def test_duplicate_keys_are_reported_with_both_positions() -> None:
     _, problems = parse_yaml("a: 1\nb: {c: 1, c: 2}\na: 3\n", "f")
     assert [(p.line, p.col, p.message) for p in problems] == [
         (2, 11, "duplicate key `c` (first at 2:5)"),
@@ -106,7 +106,7 @@ def test_a_self_reference_is_refused(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "\n\n", "# only a comment\n", "---\n...\n"])
-def test_an_empty_file_is_told_as_such(text: str) -> None:
+def test_an_empty_file_is_reported(text: str) -> None:
     tree, problems = parse_yaml(text, "f")
     assert [p.message for p in problems] == ["the file is empty"] or (tree is not None and tree.plain is None)
 

@@ -26,7 +26,7 @@ def test_reads_utf8_with_every_kind_of_line_break_and_a_byte_order_mark(tmp_path
     assert read_text(file, "a.yaml") == "a: é\nb: 1\nc: 2\n"
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     assert _problem(tmp_path / "no.yaml").message == "no such file or directory"
 
 
@@ -65,19 +65,19 @@ def test_a_file_of_exactly_one_mebibyte_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_a_file_that_may_not_be_read_is_told(tmp_path: Path) -> None:
+def test_unreadable_file_is_reported(tmp_path: Path) -> None:
     path = _written(tmp_path / "secret.yaml", b"a: 1")
     path.chmod(0)
     assert _problem(path).message == "permission denied"
 
 
-def test_a_loop_of_symbolic_links_is_told(tmp_path: Path) -> None:
+def test_a_loop_of_symbolic_links_is_reported(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").symlink_to(tmp_path / "b.yaml")
     (tmp_path / "b.yaml").symlink_to(tmp_path / "a.yaml")
     assert _problem(tmp_path / "a.yaml").message == "symbolic link loop"
 
 
-def test_a_byte_that_is_not_utf8_is_told_with_its_place(tmp_path: Path) -> None:
+def test_a_byte_that_is_not_utf8_is_reported_with_its_position(tmp_path: Path) -> None:
     problem = _problem(_written(tmp_path / "latin1.yaml", b"a: 1\nname: caf" + b"\xe9\n"))
     assert (problem.line, problem.col, problem.message) == (2, 10, "not valid UTF-8 at byte 14")
 

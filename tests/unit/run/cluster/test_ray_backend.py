@@ -164,6 +164,6 @@ def test_an_interrupt_ends_the_processes_on_all_nodes(cluster, tmp_path: Path) -
     assert not set(servers) & set(processes("warm_process"))
 
 
-def test_a_cluster_that_is_not_there_is_an_error() -> None:
+def test_missing_cluster_is_an_error() -> None:
     with pytest.raises(UsageError, match=r"cannot connect to a Ray cluster at 127\.0\.0\.1:1: .*refused"):
         connect("127.0.0.1:1")

@@ -154,7 +154,7 @@ def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
         (ONE + "peer.goals.report('navigation.ended', 'SUCCEEDED')" + ON, "`navigation.ended`, which a stack may"),
     ],
 )
-def test_what_the_protocol_does_not_allow_is_told(play, text: str, says: str) -> None:
+def test_protocol_violations_are_reported(play, text: str, says: str) -> None:
     error = failed(play, text)
     assert error.kind == "stack-protocol"
     assert says in str(error)
@@ -171,7 +171,7 @@ def test_a_stack_that_gives_up_on_its_way_says_why(play) -> None:
 
 
 @pytest.mark.parametrize("argv", [("/no/such/program",), ("no-such-program", "-x"), ("/etc/passwd",)])
-def test_a_program_that_cannot_be_started_is_told(load, argv: tuple[str, ...]) -> None:
+def test_a_program_that_cannot_be_started_is_reported(load, argv: tuple[str, ...]) -> None:
     from dataclasses import replace
 
     from simscen.run.preparation import prepare

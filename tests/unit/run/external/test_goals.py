@@ -89,7 +89,7 @@ def test_after_a_failure_the_other_goals_are_dropped_or_follow_as_the_scenario_s
         ([("goal.canceled", "desk")], "goal.canceled `desk`, but no goal is active"),
     ],
 )
-def test_a_word_about_a_goal_that_cannot_be_is_an_error(play, events: list[tuple[str, str]], says: str) -> None:
+def test_impossible_goal_event_is_an_error(play, events: list[tuple[str, str]], says: str) -> None:
     said = "".join(f"    peer.goals.report({kind!r}, {name!r})\n" for kind, name in events)
     with pytest.raises(RunError) as error:
         play(HELLO + "for step in peer:\n" + said + STAND)
@@ -123,7 +123,7 @@ def test_a_goal_that_an_event_sends_goes_first_and_those_that_wait_follow(play) 
     assert [name for kind, name in told(run) if kind == "goal.reached"] == ["detour", "b", "c"]
 
 
-def test_a_stack_that_is_told_to_cancel_says_so_at_once(play) -> None:
+def test_cancel_is_reported_at_once(play) -> None:
     events = "[{when: {time: 0.5}, do: {cancel_goal: {}}}]"
     run = play(HELLO + "for step in peer:\n    peer.goals.accept()\n" + STAND, goals=THREE, events=events)
     assert told(run) == [("goal.accepted", "a"), ("goal.canceled", "a"), ("navigation.ended", "CANCELED")]
@@ -153,7 +153,7 @@ def test_replans_and_recoveries_that_a_stack_tells_of_are_counted(play) -> None:
     assert run.result.outcome is Outcome.PASSED, run.result.verdicts
 
 
-def test_what_the_stack_is_stands_in_the_log(play, tmp_path) -> None:
+def test_log_contains_name_and_version_of_the_stack(play, tmp_path) -> None:
     from mcap.reader import make_reader
 
     play(HELLO.replace('"2.1"', '"2.1", about={"sync": "lockstep"}') + "peer.add(beats=7)\n" + DRIVE)
@@ -168,7 +168,7 @@ def test_what_the_stack_is_stands_in_the_log(play, tmp_path) -> None:
     }
 
 
-def test_its_own_lines_are_in_rosout(play, tmp_path) -> None:
+def test_lines_of_the_stack_are_in_rosout(play, tmp_path) -> None:
     from mcap.reader import make_reader
 
     play(HELLO + "for step in peer:\n    if step.tick == 24: step.log('a wall', 30)\n" + STAND, time_limit="0.3")

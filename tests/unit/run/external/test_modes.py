@@ -26,7 +26,7 @@ def kinds(run) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("mode", ["navigate_through_poses", "follow_waypoints"])
-def test_a_stack_that_does_not_know_the_mode_is_told_apart_from_one_that_fails(play, mode: str) -> None:
+def test_unsupported_mode_differs_from_a_failure(play, mode: str) -> None:
     with pytest.raises(RunError) as error:
         play(OLD + DRIVE, navigation=f"{{mode: {mode}}}")
     assert error.value.kind == "stack-protocol"
@@ -48,7 +48,7 @@ def test_a_stack_that_says_nothing_of_modes_takes_goals_one_after_the_other(play
         play(older + DRIVE, navigation="{mode: follow_waypoints}")
 
 
-def test_what_is_reached_on_the_way_is_passed_in_each_loop(play) -> None:
+def test_via_goals_are_passed_in_each_loop(play) -> None:
     run = play(KNOWS + AT_ONCE, **THROUGH)
     assert kinds(run) == [
         ("goal.passed", "a"),
@@ -100,7 +100,7 @@ def test_a_wait_is_kept_by_the_peer_and_by_the_engine(play) -> None:
         ([("goal.passed", "a")], "no goal is active"),
     ],
 )
-def test_a_word_that_cannot_be_is_an_error(play, said, says: str) -> None:
+def test_impossible_event_is_an_error(play, said, says: str) -> None:
     lines = "".join(f"    peer.goals.report({kind!r}, {name!r})\n" for kind, name in said)
     goals = "[{name: a, pose: {x: 1, y: 1}, on_reached: {wait: 0.5}}, {name: b, pose: {x: 2, y: 1}}]"
     with pytest.raises(RunError, match=says) as error:

@@ -53,7 +53,7 @@ def fleet(load_fleet):
     return lambda text, **limits: prepare(load_fleet(text, **limits))
 
 
-def test_each_is_told_whose_it_is_and_leaves_what_it_printed_and_said(fleet, tmp_path: Path) -> None:
+def test_each_stack_gets_its_robot_name_and_has_its_own_output(fleet, tmp_path: Path) -> None:
     seen = []
     prepared = fleet(HELLO + DRIVE.replace("for step in peer:\n", GOALS))
     execute_run(prepared, 1, tmp_path, (), lambda *given: seen.append(given[1]))
@@ -91,7 +91,7 @@ def test_an_error_names_the_robot_and_leaves_no_other_stack_behind(fleet, tmp_pa
     assert_gone(tmp_path)
 
 
-def test_one_that_never_answers_hello_is_told_and_the_other_is_ended(fleet, tmp_path: Path) -> None:
+def test_stack_without_welcome_is_reported_and_the_other_is_ended(fleet, tmp_path: Path) -> None:
     silent = NOTED + RIGHT + "time.sleep(60)\n"
     with pytest.raises(RunError, match=r"stack mine of robot `right`: no answer to HELLO within 1 s") as raised:
         simulate(fleet(silent + HELLO + DRIVE, start_limit=1.0), stack_log=tmp_path / "stack.log")
@@ -99,7 +99,7 @@ def test_one_that_never_answers_hello_is_told_and_the_other_is_ended(fleet, tmp_
     assert_gone(tmp_path)
 
 
-def test_both_are_told_the_end_before_either_is_waited_for(fleet, tmp_path: Path) -> None:
+def test_both_stacks_get_end_before_waiting(fleet, tmp_path: Path) -> None:
     """Each says goodbye only when the other was told, too."""
     meets = (
         "say = peer._connection.send_json\n"

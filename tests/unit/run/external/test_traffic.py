@@ -47,7 +47,7 @@ def test_a_stack_is_asked_for_each_command_or_whenever_a_sensor_speaks(play, tmp
     assert sum(int(count) for *_, count in lines) == 5  # each reading once, whenever it is asked
 
 
-def test_what_a_stack_hears_is_what_the_log_holds(play, tmp_path: Path) -> None:
+def test_messages_to_the_stack_equal_those_in_the_log(play, tmp_path: Path) -> None:
     from mcap.reader import make_reader
 
     text = "import binascii\nfor step in peer:\n    for m in step.messages: print(m.topic, binascii.crc32(m.raw))\n"
@@ -109,7 +109,7 @@ def test_an_empty_plan_says_that_none_is_followed(play) -> None:
         assert len(run.trace.plans) == 1
 
 
-def test_a_stack_that_is_told_the_truth_corrects_the_odometry_of_its_wheels(play, tmp_path: Path) -> None:
+def test_stack_with_ground_truth_corrects_wheel_odometry(play, tmp_path: Path) -> None:
     """The true pose comes as an odometry, too, but is none of the frame `odom`."""
     from mcap.reader import make_reader
 

@@ -60,7 +60,7 @@ def test_bytes_gone_wrong_are_refused_or_understood(name: str, data) -> None:
             understand(**{name: garbage}, **with_belief)
 
 
-def test_filtered_odometry_is_recorded_as_it_was_said() -> None:
+def test_filtered_odometry_is_recorded_unchanged() -> None:
     (odometry,) = understand(**{"/odometry/filtered": EXAMPLES["/odometry/filtered"]}).odometry
     assert odometry.pose == pytest.approx(Pose2(1, 2, 3))
     assert (odometry.tick, odometry.twist) == (240, (0.5, 0.0, 0.1))
@@ -82,7 +82,7 @@ def test_filtered_odometry_that_is_none_is_refused(rows: list[float]) -> None:
         understand(**{"/odometry/filtered/exact": messages.float64_array(rows)})
 
 
-def test_a_costmap_is_recorded_as_it_was_said() -> None:
+def test_costmap_is_recorded_unchanged() -> None:
     (costmap,) = understand(**{"/global_costmap/costmap": EXAMPLES["/global_costmap/costmap"]}).costmaps
     assert (costmap.name, costmap.frame, costmap.grid.origin) == ("global", "map", Pose2(1, 2, 0))
     assert costmap.grid.cells.tolist() == [[0, 100], [-1, 50]]
@@ -117,7 +117,7 @@ events = st.fixed_dictionaries(
 
 
 @given(events)
-def test_an_event_of_any_kind_is_heard_or_refused_and_can_be_logged(said) -> None:
+def test_any_event_is_accepted_or_refused_and_can_be_logged(said) -> None:
     from simscen.peer.messages import log, string
     from simscen.record.messages.event_text import sentence, to_json
 

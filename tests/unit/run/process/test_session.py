@@ -46,7 +46,7 @@ def session(tmp_path):
     return run
 
 
-def test_a_run_that_ends_well_is_answered_with_its_result(session):
+def test_successful_run_returns_its_result(session):
     events = []
     answers, stopped = session("fine", events=events)
     assert answers["fine"].outcome is Outcome.PASSED
@@ -99,7 +99,7 @@ def test_the_log_of_a_crashed_worker_shows_where_it_was(session):
 
 
 @pytest.mark.parametrize("fault", ["hang", "deaf"])
-def test_a_run_beyond_its_wall_limit_is_killed_and_told(session, fault):
+def test_a_run_beyond_its_wall_limit_is_killed_and_reported(session, fault):
     answers, _ = session(fault, wall_limit=1.0)
     assert answers[fault].result.error.kind == "timeout"
 
@@ -129,7 +129,7 @@ def test_a_neighbor_of_a_run_that_kills_the_warm_process_runs_again_by_itself(se
     assert "that prepares runs was killed (SIGKILL) while" in answers["kill-parent"].result.error.message
 
 
-def test_neighbors_of_a_world_whose_preparation_crashes_are_answered_once_and_pass(session):
+def test_crash_while_preparing_a_world_affects_only_its_run(session):
     events = []
     answers, _ = session("long", "prepare-segfault", "fine", workers=2, events=events)
     assert [name for name, answer in answers.items() if answer.outcome is Outcome.PASSED] == ["fine", "long"]
@@ -168,7 +168,7 @@ def test_stray_bytes_on_the_pipes_are_no_message(session):
     assert answers["fine"].outcome is Outcome.PASSED
 
 
-def test_what_is_printed_while_a_run_is_prepared_stands_in_its_log(session, tmp_path):
+def test_output_during_preparation_is_in_the_worker_log(session, tmp_path):
     session("prepare-memory")
     (log,) = tmp_path.rglob("worker.log")
     assert log.read_text().startswith("growing\n")

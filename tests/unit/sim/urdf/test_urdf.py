@@ -217,7 +217,7 @@ def test_40_a_pipe_is_no_mesh(refusal, tmp_path):
     assert "not a regular file" in refusal(robot('<mesh filename="base.stl"/>')).message
 
 
-def test_41_a_false_count_of_triangles_is_told(refusal, tmp_path):
+def test_41_wrong_number_of_triangles_is_reported(refusal, tmp_path):
     (tmp_path / "base.stl").write_bytes(stl(4000))
     assert "STL header says 4000 triangles, file holds 4" in refusal(robot('<mesh filename="base.stl"/>')).message
 
@@ -229,7 +229,7 @@ def test_42_a_doctype_is_refused(refusal):
 
 
 @pytest.mark.parametrize("text", [robot()[:400], b"\x7fELF\x02\x01\x01\x00\x00", b""])
-def test_43_what_is_not_xml_is_told_with_its_line(refusal, text):
+def test_43_invalid_xml_is_reported_with_its_line(refusal, text):
     problem = refusal(text)
     assert "not well-formed XML" in problem.message
     assert problem.line >= 1
@@ -275,7 +275,7 @@ def test_trees_that_are_none_are_refused(refusal, extra, message):
     assert message in refusal(robot(extra=extra)).message
 
 
-def test_several_mistakes_are_told_at_once(load):
+def test_several_mistakes_are_reported_at_once(load):
     bad = '<link name="{}"><collision><geometry><box size="0 1 1"/></geometry></collision></link>'
     with pytest.raises(InvalidInput) as caught:
         load(robot(extra=bad.format("a") + bad.format("b")))

@@ -83,7 +83,7 @@ def test_backing_up_that_does_not_move_the_robot_times_out() -> None:
     assert failed.value.code == ErrorCode.BACKUP_TIMEOUT
 
 
-def test_a_robot_without_a_reverse_gear_cannot_be_told_to_back_up() -> None:
+def test_robot_without_reverse_refuses_to_back_up() -> None:
     robot = replace(ROUND, max_reverse=0.0)
     with pytest.raises(NavigationFailure) as failed:
         run(BackUp(model.BackUp(), setting(robot)), view_of(robot))

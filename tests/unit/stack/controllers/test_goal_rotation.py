@@ -33,12 +33,12 @@ def test_a_base_comes_to_rest_at_the_heading_that_it_turns_to(angle: float, late
     assert abs(left[-1]) < 0.01
 
 
-def test_it_brakes_no_sooner_for_that() -> None:
+def test_braking_starts_no_earlier() -> None:
     left, _ = turned(2.0, 4.0, 0)
     assert next(step for step, angle in enumerate(left) if angle < 0.125) * PERIOD < 1.75
 
 
-def test_a_goal_that_is_left_is_approached_anew() -> None:
+def test_goal_is_approached_again_after_leaving_it() -> None:
     pose, goal = GoalRotation(round_robot(), 1.9, 3.2, PERIOD), Goal("g", Pose2(0.0, 0.0), xy_tolerance=0.2)
     assert pose.reached(Pose2(0.05, 0.0), Twist(), goal, 0.05)
     assert pose.reached(Pose2(0.15, 0.0), Twist(0.2), goal, 0.5)

@@ -85,12 +85,12 @@ def test_pure_pursuit_stands_before_what_goes_no_further_and_does_not_fail() -> 
     assert driven(controllers()[0], among((1.45, 0.0, 0.0, 0.05))) == STOP
 
 
-def test_pure_pursuit_without_collision_detection_lets_nobody_pass() -> None:
+def test_pure_pursuit_without_collision_detection_ignores_obstacles() -> None:
     blind = Rpp(RegulatedPurePursuit(desired_linear_vel=0.5, use_collision_detection=False), setting(ROBOT))
     assert driven(blind, among(COMES)).vx == pytest.approx(0.5)
 
 
-def test_what_is_not_known_well_is_let_pass_with_more_room() -> None:
+def test_uncertain_obstacle_gets_more_clearance() -> None:
     beside = (1.4, 0.45, 0.0, 0.0)
     assert driven(controllers()[0], among(beside)).vx == pytest.approx(0.5)
     assert driven(controllers()[0], among(beside, deviation=0.3)).vx < 0.5

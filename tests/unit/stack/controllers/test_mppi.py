@@ -64,12 +64,12 @@ def test_on_an_empty_straight_it_reaches_the_speed_that_it_is_asked_for(speed: f
     assert min(each.vx for each in commands[-20:]) > 0.9 * speed
 
 
-def test_it_reaches_its_speed_at_steps_twice_as_long_as_its_period() -> None:
+def test_mppi_reaches_its_speed_with_longer_time_steps() -> None:
     commands = driven(round_robot(speed=2.5), 14.0, 3.0, vx_max=1.0, model_dt=0.1, time_steps=28)
     assert min(each.vx for each in commands[-20:]) > 0.9
 
 
-def test_its_commands_keep_to_the_accelerations_of_the_base() -> None:
+def test_commands_respect_the_accelerations_of_the_base() -> None:
     robot = round_robot(speed=1.0, linear_acceleration=0.8, linear_deceleration=0.8)
     speeds = np.array([each.vx for each in driven(robot, 8.0, 1.5, vx_max=1.0, batch_size=200)])
     assert np.diff(speeds).max() <= 0.8 * PERIOD + 1e-6
@@ -98,7 +98,7 @@ def test_a_step_keeps_the_heading_that_it_begins_with() -> None:
     assert rolled.y[:, 0] == pytest.approx([0.0, 0.5], abs=1e-6)
 
 
-def test_what_was_sent_and_is_under_way_comes_before_what_is_being_chosen() -> None:
+def test_pending_commands_precede_the_sampled_ones() -> None:
     velocities = np.arange(10, dtype=np.float32).reshape(2, 5, 1)
     apply_model_delay(velocities, np.tile(np.array([6.0, 7.0, 8.0, 9.0], np.float32), (2, 1)), (3, 0))
     assert velocities[0, :, 0].tolist() == [0.0, 8.0, 9.0, 1.0, 2.0]

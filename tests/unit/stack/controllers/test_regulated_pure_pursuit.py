@@ -58,7 +58,7 @@ def test_near_a_wall_it_is_slower_in_proportion_but_not_below_the_minimum() -> N
     assert rpp(line()).command(Pose2(1.01, 0.01, 0), Twist(), tight, FAR).vx == pytest.approx(0.25, abs=0.01)
 
 
-def test_it_slows_down_towards_the_end() -> None:
+def test_robot_slows_down_toward_the_end_of_the_path() -> None:
     goal = Goal("g", Pose2(2.0, 0.0))
     controller = rpp(line(2.0))
     controller.command(Pose2(1.0, 0.0, 0.0), Twist(0.5), view_of(), goal)
@@ -73,7 +73,7 @@ def test_a_path_that_begins_behind_is_turned_to_first_with_bounded_acceleration(
     assert abs(command.wz) == pytest.approx(3.2 * 0.05)
 
 
-def test_it_does_not_turn_in_place_if_told_not_to() -> None:
+def test_turning_in_place_can_be_disabled() -> None:
     assert rpp(line(), use_rotate_to_heading=False).command(Pose2(1, 0, 1.2), Twist(), view_of(), FAR).vx > 0.0
 
 

@@ -45,7 +45,7 @@ def test_under_mppi_it_hardly_turns_on_the_way() -> None:
     "controller", [{**DWB, "max_vel_y": 0.0}, {**MPPI, "motion_model": "DiffDrive"}, {**MPPI, "vy_max": 0.0}],
     ids=["dwb", "mppi as a diff drive", "mppi without"],
 )  # fmt: skip
-def test_it_does_not_strafe_where_it_is_told_not_to(controller: dict[str, Any]) -> None:
+def test_strafing_can_be_disabled(controller: dict[str, Any]) -> None:
     driven = sideways(0.5, **controller)
     assert driven.result == "SUCCEEDED"
     assert strafed(driven) == 0.0

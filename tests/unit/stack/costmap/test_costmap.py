@@ -202,7 +202,7 @@ def test_a_rolling_window_follows_the_robot_and_keeps_what_it_saw() -> None:
     assert view.origin == pytest.approx((-1.0, -6.0), abs=0.06)
 
 
-def test_what_leaves_the_rolling_window_is_forgotten() -> None:
+def test_obstacles_outside_the_rolling_window_are_forgotten() -> None:
     map_ = costmap(None, Spec(rolling_size=8.0))
     map_.update(Pose2(0, 0), scan_of(Flatland(discs=[(2.0, 0.5, 0.1)]), Pose2(0, 0)))
     map_.update(Pose2(20, 0), scan_of(Flatland(), Pose2(20, 0)))
@@ -244,7 +244,7 @@ def test_clearing_keeps_what_stands_close_behind_the_robot_where_no_lidar_looks(
     assert at(map_, 3.22, 3.0)[0] != 254
 
 
-def test_clearing_keeps_as_much_of_what_no_lidar_looks_at_as_it_is_told() -> None:
+def test_clearing_keeps_unseen_obstacles_within_the_given_distance() -> None:
     world = Flatland([], [(1.4, 3.0, 0.1)]).room(8, 6)
     map_ = costmap(Flatland().room(8, 6))
     map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))

@@ -52,7 +52,7 @@ def test_a_cell_beside_a_wall_is_part_of_it() -> None:
     assert not kept[0, 0]
 
 
-def test_a_drive_sees_the_same_with_updates_as_if_all_were_computed_anew() -> None:
+def test_incremental_updates_equal_a_full_computation() -> None:
     """What is computed again around changed cells is what a costmap of the same marks shows."""
     rng = np.random.default_rng(5)
     world = Flatland(discs=[(x, y, 0.03) for x, y in rng.uniform(-3, 3, (12, 2)).tolist() if math.hypot(x, y) > 1])

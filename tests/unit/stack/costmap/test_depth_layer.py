@@ -53,7 +53,7 @@ LOW_BOX, TABLE_TOP, LAMP = (1.5, -0.3, 0.3, 0.0, 0.12), (1.5, -0.3, 0.3, 0.7, 0.
 
 
 @pytest.mark.parametrize("thing", [LOW_BOX, (1.5, -0.3, 0.3, 0.5, 0.75)])
-def test_what_stands_below_or_hangs_above_the_plane_of_a_lidar_is_marked_where_it_is(thing: Slab) -> None:
+def test_obstacles_below_and_above_the_scan_plane_are_marked(thing: Slab) -> None:
     map_ = costmap()
     map_.update(Pose2(0.0, 0.0), image(thing))
     points = lethal(map_)
@@ -74,7 +74,7 @@ def _seen(map_: LayeredCostmap, *things: Slab) -> LayeredCostmap:
     return map_
 
 
-def test_what_the_camera_sees_through_is_cleared() -> None:
+def test_camera_clears_free_space() -> None:
     map_ = _seen(costmap(), LOW_BOX)
     assert len(lethal(map_))
     assert not len(lethal(_seen(map_)))
@@ -97,7 +97,7 @@ def test_a_lidar_that_sees_nothing_there_does_not_clear_what_a_camera_saw_below_
     assert np.array_equal(lethal(map_), before)
 
 
-def test_what_left_the_picture_is_remembered_while_the_robot_drives_on() -> None:
+def test_obstacles_outside_the_camera_view_are_remembered() -> None:
     map_ = _seen(costmap(), LOW_BOX)
     before = {tuple(p) for p in np.round(lethal(map_), 3)}
     base = Pose2(1.2, 0.6)  # beside the box, which is out of the picture now; the window has rolled on

@@ -75,7 +75,7 @@ def nodding(degrees: float, down: float) -> Ground:
 
 
 @pytest.mark.parametrize("mount", [LEVEL, TILTED], ids=["level", "tilted"])
-def test_what_a_robot_nods_counts_as_slope(mount: Pose3) -> None:
+def test_pitch_of_the_robot_counts_as_slope(mount: Pose3) -> None:
     """It nods about its axle, which is behind the camera: of a slope of 0.2 rad, which is 11.5°, 8° are left for it."""
     for down in (0.0, 8.0):
         assert not len(marked(nodding(8.0, down), mount))
@@ -91,7 +91,7 @@ def test_a_kerb_is_an_obstacle_with_level_ground_behind_it(mount: Pose3, away: f
     assert away - 0.06 < seen.min() < away + 0.15  # the level camera sees no ground nearer than 1.1 m
 
 
-def test_what_stands_on_a_ramp_or_is_steeper_than_one_is_an_obstacle() -> None:
+def test_object_on_a_ramp_or_steep_surface_is_an_obstacle() -> None:
     up = math.tan(math.radians(6))
     box = ((-1.0, 0.0), (0.4, 0.0), (1.4, up), (1.4, up + 0.15), (1.7, up + 0.15), (1.7, 1.3 * up), (3.0, 2.6 * up))
     seen = marked(box, LEVEL)

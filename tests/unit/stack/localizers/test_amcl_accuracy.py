@@ -36,7 +36,7 @@ def test_an_estimate_half_a_meter_and_twenty_degrees_off_is_corrected() -> None:
     assert measure.wrong_start(measure.PROB, SEEDS).found.all()
 
 
-def test_a_robot_that_is_told_nothing_finds_itself() -> None:
+def test_robot_without_initial_pose_localizes() -> None:
     assert measure.global_start(measure.MANY, SEEDS[:3]).found.all()
 
 

@@ -42,7 +42,7 @@ def test_a_scan_that_is_hard_to_explain_anywhere_is_no_reason() -> None:
         assert recovery.share < 1e-12
 
 
-def test_nor_is_one_that_the_particles_explain_worse_than_usual_but_better_than_other_places() -> None:
+def test_scan_explained_better_than_elsewhere_adds_no_random_particles() -> None:
     recovery = Recovery(0.001, 0.1)
     for likelihood in [6.0] * 50 + [2.0] * 50:
         recovery.observe(np.log(likelihood), ANYWHERE)
@@ -68,13 +68,13 @@ def test_all_that_stray_are_at_most_what_a_few_scans_put_anywhere() -> None:
     assert recovery.kept_share(0.6) == pytest.approx(0.25)
 
 
-def test_with_nav2s_default_of_zero_nobody_asks() -> None:
+def test_no_random_particles_with_nav2_defaults() -> None:
     assert not Recovery(0.0, 0.0).is_enabled
     assert Recovery(0.001, 0.1).is_enabled
 
 
 @pytest.mark.parametrize(("tracked", "anywhere"), [(-np.inf, -np.inf), (-np.inf, 0.0), (0.0, -np.inf), (2000.0, 0.0)])
-def test_what_nothing_or_only_one_side_explains_is_still_a_share(tracked: float, anywhere: float) -> None:
+def test_random_particle_share_is_valid_for_zero_likelihoods(tracked: float, anywhere: float) -> None:
     recovery = Recovery(0.01, 0.3)
     recovery.observe(1.0, np.zeros(3))
     recovery.observe(tracked, np.full(3, anywhere))

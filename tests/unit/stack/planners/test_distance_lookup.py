@@ -8,7 +8,7 @@ from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot
 
 
-def test_a_point_is_as_far_from_obstacles_as_the_costmap_says_and_off_it_is_told() -> None:
+def test_distance_lookup_equals_the_costmap_and_detects_outside_points() -> None:
     world = Flatland().room(8, 6)
     view = LayeredCostmap(Spec(), Surroundings(round_robot(), world.grid((-0.5, -0.5, 8.5, 6.5)), RATE)).view
     tested = DistanceLookup(view)

@@ -113,7 +113,7 @@ def test_a_goal_beside_a_wall_is_moved_within_the_tolerance() -> None:
         ((1, 1), (17, 3), ErrorCode.NO_VALID_PATH),
     ],
 )
-def test_what_cannot_be_planned_fails_with_nav2s_code(
+def test_planning_failures_have_nav2_error_codes(
     start: tuple[float, float], goal: tuple[float, float], code: ErrorCode
 ) -> None:
     world = house()
@@ -138,7 +138,7 @@ def test_a_long_robot_takes_a_way_on_which_it_can_turn() -> None:
     assert path.points[:, 1].max() > 3.8
 
 
-def test_it_squeezes_through_when_there_is_no_other_way() -> None:
+def test_plan_uses_a_tight_gap_without_an_alternative() -> None:
     world = Flatland().room(8, 6)
     world.boxes += [(4.0, 0.0, 4.1, 2.8), (4.0, 3.25, 4.1, 6.0)]
     path = planner(robot=box_robot()).plan(view_of(world, box_robot(), (8, 6)), Pose2(3, 3), Pose2(5, 3), 1)
@@ -180,7 +180,7 @@ def test_a_way_that_is_too_tight_by_a_hair_is_not_smoothed_through_walls() -> No
         assert not struck(view, spaced(better, SPACING_M))
 
 
-def test_who_stands_too_near_a_wall_is_not_sent_to_the_nearest_free_place_behind_it() -> None:
+def test_robot_near_a_wall_is_not_sent_through_it() -> None:
     pocket = ((5.0, 3.0, 5.05, 7.0), (5.35, 3.0, 5.4, 7.0))
     start, goal = Pose2(5.2, 6.75, 0.0), Pose2(12.0, 5.0, 0.0)
     path = planner().plan(hall(*pocket), start, goal, 1)

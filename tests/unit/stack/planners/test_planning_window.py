@@ -67,13 +67,13 @@ def test_over_the_edge_of_the_map_no_way_leaves():
     assert asked.views[0].origin == (0.0, 0.0)
 
 
-def test_what_the_whole_costmap_has_no_way_for_fails_as_ever():
+def test_missing_path_on_the_whole_costmap_fails():
     with pytest.raises(NavigationFailure) as failure:
         plan_in_windows(Asked(None, None, None).plan, hall(), START, GOAL, 1)
     assert failure.value.code == ErrorCode.NO_VALID_PATH
 
 
-def test_an_end_off_the_map_is_told_by_the_planner():
+def test_an_end_off_the_map_is_reported_by_the_planner():
     asked = Asked(None)
     with pytest.raises(NavigationFailure):
         plan_in_windows(asked.plan, hall(), START, Pose2(-3.0, 0.0, 0.0), 1)

@@ -32,7 +32,7 @@ def dear_below(ax: float, ay: float, bx: float, by: float) -> float:
     [((1.0, 1.0), (3.0, 3.0)), ((3.0, 1.0), (1.0, 3.0)), ((1.0, 1.0), (1.0, 5.0)), ((1.0, -1.0), (1.0, 3.0))],
     ids=["goal not free", "start not free", "goal out of bounds", "start out of bounds"],
 )
-def test_ends_that_cannot_be_are_told_before_any_iteration(kind: str, start, goal) -> None:
+def test_impossible_start_or_goal_is_reported_before_any_iteration(kind: str, start, goal) -> None:
     """OMPL would sleep 5 ms an iteration in wait for better ones: for ever, with so many."""
     assert search(kind, Problem(start, goal, BOUNDS, left_half), 1, 10**9, 1) is None
 
@@ -45,7 +45,7 @@ def cost(points: list[tuple[float, float]]) -> float:
 
 
 @pytest.mark.parametrize("kind", ["rrt_star", "informed_rrt_star", "bit_star"])
-def test_planners_that_improve_their_path_leave_dear_ground_for_cheap(kind: str) -> None:
+def test_optimizing_planners_avoid_expensive_cells(kind: str) -> None:
     """Straight on costs 30, up to cheap ground and along it 4.9."""
     points = search(kind, PROBLEM, 1, 9000, 400 if kind != "bit_star" else 3000)
     assert points is not None

@@ -36,7 +36,7 @@ def left_at(costs: Array, start: Pose2, goal: Pose2) -> float:
     return last
 
 
-def test_a_straight_way_is_dear_as_far_as_it_meets_dear_cells() -> None:
+def test_costly_distance_is_the_length_in_expensive_cells() -> None:
     rng, told = np.random.default_rng(5), []
     for _ in range(300):
         costs = (rng.random((30, 40)) < 0.02) * rng.integers(1, 253, (30, 40))
@@ -59,7 +59,7 @@ def test_along_an_axis_or_a_diagonal_the_cells_are_those_passed(turn: int) -> No
     assert costly_distance(view_of(costs), middle, goal, RADIUS) == pytest.approx(until)
 
 
-def test_a_way_that_leaves_the_costmap_or_is_too_near_an_obstacle_is_dear_to_its_end() -> None:
+def test_path_outside_the_costmap_or_near_an_obstacle_is_expensive() -> None:
     view = view_of(np.zeros((20, 20)))
     inside = Pose2(CORNER[0] + 0.5, CORNER[1] + 0.5)
     assert costly_distance(view, inside, inside, RADIUS) == 0.0
@@ -84,9 +84,7 @@ def test_the_default_planner_goes_straight_on_where_that_costs_nothing() -> None
 
 
 @pytest.mark.parametrize(("more", "aside", "taken"), [(0.09, 0.0, True), (0.11, 0.0, False), (0.09, 0.1, False)])
-def test_a_way_past_what_is_dear_is_taken_only_where_all_of_it_costs_hardly_more(
-    more: float, aside: float, taken: bool
-) -> None:
+def test_detour_around_expensive_cells_is_taken_only_if_cheap(more: float, aside: float, taken: bool) -> None:
     costs = np.zeros((40, 220))
     costs[18:22, 10:30] = 90
     (x, y), asked = CORNER, list[Pose2]()
@@ -104,7 +102,7 @@ def test_a_way_past_what_is_dear_is_taken_only_where_all_of_it_costs_hardly_more
         assert points.tolist() == [list(start[:2]), list(asked[0][:2]), list(goal[:2])]
 
 
-def test_where_there_is_no_way_past_or_too_much_is_dear_nothing_is_said() -> None:
+def test_no_straight_plan_without_a_cheap_detour() -> None:
     costs = np.zeros((40, 220))
     costs[18:22, 10:30] = 90
     (x, y), start = CORNER, Pose2(CORNER[0] + 0.2, CORNER[1] + 1.0)

@@ -64,7 +64,7 @@ def test_extents_are_those_of_the_triangle_mesh(shape, pose, frame):
     ],
     ids=["tilted", "ball", "cone", "hollow corner", "star", "corner given twice"],
 )
-def test_what_is_no_convex_prism_is_left_to_the_mesh(solid):
+def test_other_solids_use_the_mesh(solid):
     assert upright_prism(solid) is None
     assert bounding_rectangle(solid) == pytest.approx(mesh_bounds_2d(solid).ravel().tolist())
 
@@ -73,7 +73,7 @@ def test_a_solid_in_a_tilted_frame_is_left_to_the_mesh():
     assert upright_prism(Solid(Box((1, 1, 1))), Pose3.from_rpy(0, 0, 0, 0, 0.2, 0)) is None
 
 
-def test_what_only_touches_the_heights_in_question_is_not_there():
+def test_solid_that_only_touches_the_height_range_is_ignored():
     box = upright_prism(Solid(Box((1, 1, 1)), Pose3(z=0.5)))
     assert box is not None
     assert box.distance((0, 0), (1.0, 2.0)) == box.distance((0, 0), (-1.0, 0.0)) == math.inf

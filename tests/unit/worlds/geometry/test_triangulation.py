@@ -69,7 +69,7 @@ def test_fusing_places_every_solid_and_remembers_whose_face_it_is():
     assert mesh.names == ("a", "b")
 
 
-def test_what_is_told_to_be_convex_is_its_own_hull_and_its_vertices_are_those_told():
+def test_convex_shapes_are_their_own_hulls():
     quad, bent = ((0, 0), (2, 0), (2.2, 1), (0, 0.9)), ((0, 0), (2, 0), (0.5, 0.5), (0, 2))
     shapes = [*(shape for shape, _ in VOLUMES), Extrusion(quad, 1.0), Extrusion(bent, 1.0), triangulate(Box((1, 1, 1)))]
     rng = np.random.default_rng(2)

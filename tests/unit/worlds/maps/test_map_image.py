@@ -62,7 +62,7 @@ def test_a_truncated_png_is_refused(tmp_path):
     refused(tmp_path / "m.png", "PNG cannot be decoded")
 
 
-def test_what_is_not_a_file_is_refused_without_opening_it(tmp_path):
+def test_nonregular_file_is_refused_without_opening_it(tmp_path):
     os.mkfifo(tmp_path / "pipe.pgm")
     refused(tmp_path / "pipe.pgm", "not a regular file")
     refused(tmp_path, "not a regular file")

@@ -90,7 +90,7 @@ def test_outside_stays_free_when_a_named_place_is_there_or_a_door_stands_open():
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4, math.pi / 4])
-def test_neither_a_turn_nor_a_wing_makes_a_building_an_open_field(yaw):
+def test_rotated_or_winged_building_is_still_closed(yaw):
     plan = [(0, 0), (6, 0), (6, 2), (2, 2), (2, 6), (0, 6), (0, 0)]
     turned = Pose2(0, 0, yaw).apply(np.array(plan, dtype=float)).tolist()
     grid = grid_of(*wall_solids([(x, y) for x, y in turned], 0.1, 1.0, "w"))
@@ -116,7 +116,7 @@ def test_a_room_modeled_from_within_keeps_its_floor_free():
     assert grid.values_at(np.array([[0.0, 0.0], [1.5, 0.0]])).tolist() == [FREE, OCCUPIED]
 
 
-def test_what_is_added_to_a_ros_map_is_drawn_into_it_under_its_yaw():
+def test_additions_to_a_ros_map_respect_its_yaw():
     own = OccupancyGrid(np.full((40, 40), UNKNOWN, np.int8), 0.1, Pose2(1.0, 2.0, math.pi / 6))
     own.cells[5:30, 5:30] = FREE
     place = own.center_of(np.array([[20, 10]]))[0]

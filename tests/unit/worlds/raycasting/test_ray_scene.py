@@ -205,7 +205,7 @@ def test_a_fan_meets_what_its_rays_meet_one_by_one(first, beams, field):
             assert np.allclose(seen[seen <= reach], alone[seen <= reach], rtol=0, atol=2e-6)
 
 
-def test_the_rays_of_a_fan_within_a_cone_are_told_as_counting_all_would_tell():
+def test_rays_within_a_cone_match_brute_force():
     rng = np.random.default_rng(11)
     for _ in range(500):
         count, first = int(rng.integers(1, 60)), float(rng.uniform(-7, 7))

@@ -52,7 +52,7 @@ def changes():
 
 
 @pytest.mark.parametrize(("many", "several"), [(ray_scene.MAX_GROUP_TRIANGLES, ray_scene.MAX_GROUPS), (60, 3)])
-def test_how_things_are_piled_up_changes_not_one_bit(monkeypatch, many, several):
+def test_order_of_bodies_does_not_change_the_result(monkeypatch, many, several):
     """A scene that has seen all of it says what one says that sees it for the first time, or heard of less before."""
     monkeypatch.setattr(ray_scene, "MAX_GROUP_TRIANGLES", many)
     monkeypatch.setattr(ray_scene, "MAX_GROUPS", several)
@@ -70,7 +70,7 @@ def test_how_things_are_piled_up_changes_not_one_bit(monkeypatch, many, several)
 
 
 @pytest.mark.parametrize("reach", [2.5, 9.0, math.inf])
-def test_what_lies_at_home_is_met_where_it_would_be_met_alone(reach):
+def test_rays_hit_resting_bodies_at_the_same_points_as_alone(reach):
     together, alone = RayScene(WALLS), RayScene(WALLS)
     for poses in list(changes())[::6]:
         together.set_moving(placed(poses), HOMES)

@@ -60,7 +60,7 @@ def test_where_nothing_stands_everything_is_far_away():
     assert field.free_cells(100.0).all()
 
 
-def test_upright_things_need_one_cut_and_round_ones_a_dozen():
+def test_upright_solids_need_one_cross_section():
     upright = merge_solids([Solid(Box((1, 1, 1)), Pose3(z=0.5)), Solid(Cylinder(0.3, 2.0), Pose3(3, 0, 1.0))])
     assert len(sections_between(upright, BODY)) == 1
     assert len(sections_between(merge_solids([Solid(Sphere(0.5), Pose3(z=0.5))]), BODY)) == MAX_LEVELS

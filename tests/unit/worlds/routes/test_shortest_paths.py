@@ -119,7 +119,7 @@ def test_where_the_disc_does_not_fit_there_is_no_way():
     assert search.length(Pose2(-3, 0), Pose2(-0.5 - R - 0.001, 0)) == pytest.approx(2.25, abs=0.01)
 
 
-def test_low_and_high_things_do_not_matter_but_a_ball_bulges():
+def test_only_solids_at_the_height_of_the_robot_block_the_path():
     carpet, lamp = Solid(Box((2, 9, 0.02)), Pose3(0, 0, 0.01)), Solid(Box((2, 9, 1.0)), Pose3(0, 0, 2.0))
     assert ways(carpet, lamp).length(Pose2(-3, 0), Pose2(3, 0)) == 6.0
     ball = ways(Solid(Sphere(0.4), Pose3(0, 0, 0.4)))

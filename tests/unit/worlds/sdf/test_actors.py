@@ -25,7 +25,7 @@ def actor(script="", body=SKIN, rest=""):
 WALK = trajectory([(0, 1, 0, 1, 0), (4, 5, 0, 1, 0), (5, 5, 0, 1, 1.5)])
 
 
-def test_a_scripted_actor_is_a_body_nobody_can_push_with_a_path(load):
+def test_scripted_actor_is_an_unpushable_body_with_a_path(load):
     (body,) = load(actor("<loop>false</loop>" + WALK)).bodies
     assert (body.name, body.mass) == ("anna", 0)
     assert body.path is not None
@@ -109,5 +109,5 @@ def test_included_actors_walk_too(load, tmp_path):
         (WALK.replace("id='0'", "id='first'"), "the id must be a whole number"),
     ],
 )
-def test_a_script_that_makes_no_sense_is_refused(refuse, script, message):
+def test_invalid_script_is_refused(refuse, script, message):
     assert message in refuse(actor(script))[0].message

@@ -43,7 +43,7 @@ def test_links_without_a_joint_are_bodies_of_their_own(load):
     assert [(body.name, body.pose.x) for body in bodies] == [("cart::a", 1), ("cart::b", 5)]
 
 
-def test_what_hangs_on_the_world_does_not_move(load):
+def test_link_attached_to_the_world_is_fixed(load):
     door = link("frame") + link("panel", 1) + joint("world", "frame", "fixed", "f") + joint("frame", "panel")
     world = load(model(door))
     assert [solid.name for solid in world.solids] == ["cart::frame::c", "cart::panel::c"]
@@ -51,7 +51,7 @@ def test_what_hangs_on_the_world_does_not_move(load):
     assert "treated as fixed" in world.notes[0]
 
 
-def test_what_hangs_on_something_static_does_not_move(load):
+def test_link_attached_to_a_static_link_is_fixed(load):
     nested = f"<model name='post'><static>1</static>{link('p')}</model>"
     world = load(model(nested + link("a", 3) + joint("post::p", "a")))
     assert (len(world.solids), len(world.bodies)) == (2, 0)
@@ -99,7 +99,7 @@ def test_mass_from_density(load):
 
 
 @pytest.mark.parametrize("mass", ["0", "-1", "nan", "heavy"])
-def test_a_mass_that_makes_no_sense_is_refused(refuse, mass):
+def test_invalid_mass_is_refused(refuse, mass):
     (problem,) = refuse(model(link("a", 0, mass)))
     assert "/inertial/mass: " in problem.message
 
@@ -127,7 +127,7 @@ def test_order_is_that_of_the_document(load):
     assert [solid.name for solid in load(text).solids] == ["cart::n::x::c", "cart::a::c"]
 
 
-def test_what_is_too_heavy_for_physics_is_refused_unless_it_stands(load, refuse):
+def test_too_heavy_body_is_refused_unless_static(load, refuse):
     heavy = model(link("a", 1, "1e12"))
     (problem,) = refuse(heavy)
     assert "model[cart]/link[a]: has a mass of 1e+12 kg; at most 1e+06 kg can move" in problem.message

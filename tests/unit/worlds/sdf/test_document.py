@@ -33,7 +33,7 @@ def test_a_doctype_is_refused(refuse):
         ("<sdf version='1.99'><world name='w'/></sdf>", 1, "SDF version 1.99 is not read"),
     ],
 )
-def test_what_is_no_sdf_is_refused_with_a_line(refuse, content, line, message):
+def test_invalid_sdf_is_refused_with_a_line(refuse, content, line, message):
     (problem,) = refuse(content)
     assert problem.line == line
     assert message in problem.message
@@ -80,12 +80,12 @@ def test_a_world_must_be_a_file_inside_the_root(tmp_path, make):
         load_sdf(tmp_path / "x.world", root=tmp_path)
 
 
-def test_a_missing_world_is_told(tmp_path):
+def test_a_missing_world_is_reported(tmp_path):
     with pytest.raises(InvalidInput, match=r"x\.world: no such file or directory"):
         load_sdf(tmp_path / "x.world", root=tmp_path)
 
 
-def test_several_mistakes_are_told_at_once_in_file_order(refuse):
+def test_several_mistakes_are_reported_at_once_in_file_order(refuse):
     wrong = LINK.replace("1 1 1", "1 0 1")
     problems = refuse(f"<model name='m'>{wrong}</model>\n<population name='p'/>\n<include/>\n{MODEL}")
     assert [problem.line for problem in problems] == [2, 3, 4]

@@ -35,7 +35,7 @@ def test_everything_is_lowered_by_the_height_of_the_floor_and_a_note_says_so(loa
         pytest.param(slab(10, 8, -0.4), [-0.4], id="below the ground"),
     ],
 )
-def test_what_is_no_floor_stays_where_it_is(load, content, places):
+def test_world_without_a_floor_is_not_moved(load, content, places):
     world = load(content)
     assert [solid.pose.z for solid in world.solids] == places
     assert not world.notes

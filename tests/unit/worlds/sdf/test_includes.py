@@ -86,7 +86,7 @@ def test_the_pose_of_an_include_may_be_relative_to_a_frame_beside_it(load, model
     assert world.solids[0].pose.position == (11, 0, 0)
 
 
-def test_what_is_included_into_a_static_model_is_static(load, tmp_path):
+def test_model_included_in_a_static_model_is_static(load, tmp_path):
     write(tmp_path / "m", extra="")
     inner = include("m/crate", "<pose>1 0 0 0 0 0</pose>")
     world = load(f"<model name='shelf'><static>true</static><pose>0 2 0 0 0 0</pose>{inner}</model>")
@@ -192,14 +192,14 @@ def test_includes_that_unfold_without_end_are_refused_in_time(tmp_path, refuse, 
     assert any("more than 1000 models" in problem.message for problem in refuse(include("l0")))
 
 
-def test_an_error_in_an_included_file_is_told_in_that_file(tmp_path, refuse):
+def test_an_error_in_an_included_file_is_reported_in_that_file(tmp_path, refuse):
     write(tmp_path, "m", shape="<box><size>1 -1 1</size></box>")
     (problem,) = refuse(include("m"))
     assert (problem.path, problem.line) == ("m/model.sdf", 1)
     assert problem.message.startswith("model[crate]/link[a]/collision[c]/geometry/box/size: must be positive")
 
 
-def test_a_broken_included_file_is_told_with_its_line(tmp_path, refuse):
+def test_a_broken_included_file_is_reported_with_its_line(tmp_path, refuse):
     write(tmp_path, "m")
     (tmp_path / "m" / "model.sdf").write_text("<sdf version='1.6'>\n<model name='x'>\n</link>")
     (problem,) = refuse(include("m"))
@@ -276,7 +276,7 @@ class TestContainment:
         assert "control character" in refuse(include("a\u202eb"))[0].message
         assert "not well-formed XML" in refuse(include("a\0b"))[0].message
 
-    def test_an_unreadable_file_is_told(self, refuse, tmp_path):
+    def test_an_unreadable_file_is_reported(self, refuse, tmp_path):
         write(tmp_path, "m")
         (tmp_path / "m" / "model.sdf").chmod(0)
         if os.access(tmp_path / "m" / "model.sdf", os.R_OK):

@@ -229,7 +229,7 @@ def test_a_folder_as_mesh_is_refused(refuse, tmp_path):
     assert "not a regular file" in refuse(world("x.dae"))[0].message
 
 
-def test_equal_wishes_share_one_mesh_and_nobody_can_change_it(load, tmp_path):
+def test_equal_requests_share_one_immutable_mesh(load, tmp_path):
     (tmp_path / "x.dae").write_text(dae())
     solids = load(world("x.dae") + world("x.dae").replace("'m'", "'n'")).solids
     assert solids[0].shape is solids[1].shape
@@ -237,7 +237,7 @@ def test_equal_wishes_share_one_mesh_and_nobody_can_change_it(load, tmp_path):
         solids[0].shape.vertices[0] = 1
 
 
-def test_convex_hulls_are_not_made_and_that_is_said(load, tmp_path):
+def test_requested_convex_hull_is_ignored_with_a_note(load, tmp_path):
     (tmp_path / "x.dae").write_text(dae())
     (note,) = load(world("x.dae").replace("<mesh>", "<mesh optimization='convex_hull'>")).notes
     assert "the mesh is used unchanged" in note

@@ -84,7 +84,7 @@ def test_other_models_become_bodies_with_their_mass(data: Path, name: str) -> No
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_changes_the_geometry_is_an_error_with_its_place(data: Path, name: str) -> None:
+def test_unsupported_geometry_is_an_error_with_its_position(data: Path, name: str) -> None:
     col, start = REFUSED[name]
     with pytest.raises(InvalidInput) as caught:
         load(data, name)

@@ -82,7 +82,7 @@ def test_no_address_leads_out_of_the_allowed_folders(refuse, tmp_path, uri):
         ("meshes/other.dae", "model://hall/meshes/map.dae", "looked in models; allow its folder with --world-path"),
     ],
 )
-def test_what_lies_beside_a_missing_mesh_is_named(refuse, tmp_path, there, asked, hint):
+def test_files_next_to_a_missing_mesh_are_named(refuse, tmp_path, there, asked, hint):
     mesh = tmp_path / "models" / "hall" / there
     mesh.parent.mkdir(parents=True)
     mesh.write_bytes(b"")
@@ -91,7 +91,7 @@ def test_what_lies_beside_a_missing_mesh_is_named(refuse, tmp_path, there, asked
     assert problem.hint == hint
 
 
-def test_names_behind_a_link_are_not_told(refuse, tmp_path):
+def test_names_behind_a_link_are_not_revealed(refuse, tmp_path):
     (tmp_path / "private").mkdir()
     (tmp_path / "private" / "Key.dae").write_bytes(b"")
     (tmp_path / "models").mkdir()
@@ -100,7 +100,7 @@ def test_names_behind_a_link_are_not_told(refuse, tmp_path):
     assert "Key" not in problem.hint
 
 
-def test_a_missing_model_is_told_once_with_the_number_of_its_places(refuse):
+def test_a_missing_model_is_reported_once_with_the_number_of_its_places(refuse):
     problems = refuse(
         "\n".join(include("model://crate", f"<name>c{k}</name>") for k in range(4)) + include("model://box")
     )
@@ -132,7 +132,7 @@ def test_a_broken_model_config_alone_is_an_error(refuse, tmp_path):
 @pytest.mark.parametrize(
     ("x", "told"), [(9_000, "'far' is 8998 m away from the median"), (20_000, "farther than 10000 m")]
 )
-def test_a_thing_that_was_parked_far_away_is_left_out_with_a_note(load, x, told, static):
+def test_distant_object_is_left_out_with_a_note(load, x, told, static):
     world = load("".join(box(f"m{k}", k, k) for k in range(5)) + box("far", x, static=static))
     assert sorted({solid.name[:2] for solid in world.solids}) == ["m0", "m1", "m2", "m3", "m4"]
     assert world.bodies == ()

@@ -54,7 +54,7 @@ def test_primitive_shapes_keep_their_sizes(load, geometry, shape):
         ("<image><uri>x.png</uri></image>", "<image> is not a shape that is read"),
     ],
 )
-def test_sizes_that_make_no_sense_are_errors_at_their_line(refuse, geometry, message):
+def test_invalid_sizes_are_errors_at_their_line(refuse, geometry, message):
     (problem,) = refuse(shaped(geometry))
     assert problem.line == 3
     assert message in problem.message
@@ -217,7 +217,7 @@ class TestHeightmaps:
         points = {(x, y): z for x, y, z in solid.shape.vertices.tolist()}
         assert points == {(-5, 10): 0, (5, 10): 1.5, (-5, 0): 0, (5, 0): 0, (-5, -10): 3, (5, -10): 0}
 
-    def test_it_faces_up_everywhere_and_covers_its_size(self, load, tmp_path):
+    def test_heightmap_faces_upward_and_covers_its_size(self, load, tmp_path):
         self.save(tmp_path, np.random.default_rng(0).integers(0, 255, (5, 5)))
         mesh = triangulate(load(shaped(heightmap())).solids[0].shape)
         a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))

@@ -74,7 +74,7 @@ def test_only_the_first_state_counts(load):
         ("<model name='m'><pose>x</pose></model>", "expected 6 numbers"),
     ],
 )
-def test_what_cannot_be_applied_is_an_error(refuse, saved, message):
+def test_inapplicable_state_is_an_error(refuse, saved, message):
     assert message in refuse(model() + state(saved))[0].message
 
 

@@ -95,7 +95,7 @@ def test_an_include_outside_the_root_is_not_read(refusal, tmp_path, written):
     assert "outside the scenario root" in told or "not the name of a package" in told
 
 
-def test_whether_an_optional_file_outside_exists_is_not_told(refusal):
+def test_existence_of_an_optional_file_outside_is_not_revealed(refusal):
     for written in ("/etc/passwd", "/etc/no-such-file"):
         problem = refusal(f'<xacro:include filename="{written}" optional="true"/>')
         assert problem.message == f"include '{written}': outside the scenario root and the world paths"

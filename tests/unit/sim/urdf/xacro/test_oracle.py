@@ -109,7 +109,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_what_xacro_refuses_is_refused_where_it_stands(refusal, tmp_path, name):
+def test_errors_of_xacro_have_positions(refusal, tmp_path, name):
     problem = refusal(BROKEN[name])
 
     assert problem.message
