@@ -39,7 +39,7 @@ def test_component_meets_its_contract(promise: Promise) -> None:
 
 @pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
 def test_belief_after_reset_equals_the_estimate(spec: LocalizerSpec) -> None:
-    """More than the contract asks: a localizer that draws particles may be off by what they are off."""
+    """This is stricter than the contract, which allows the deviation of random particles."""
     used = localizer(spec, Estimate(Pose2(3, 3, 3)), 1)
     run(used, Drive(short_drive().truth[:80], short_drive().steps[:80], short_drive().ranges[:20]), 1, imu=True)
     used.reset(start_estimate())

@@ -79,7 +79,7 @@ def test_plan_around_expensive_spots_is_near_optimal(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize(("kind", "number", "seed"), [("rooms", 4, 2), ("forest", 3, 2), ("forest", 5, 1)])
 def test_plan_takes_the_cheaper_of_two_similar_paths(kind: str, number: int, seed: int) -> None:
-    """It took the other one: a gap of a cell or two was not sampled, or straight legs said little of what ways cost."""
+    """Regression: the other path was taken, because a gap of one or two cells was not sampled."""
     rng = np.random.default_rng((number, 77, len(kind)))
     view = view_of(*GROUNDS[kind](rng))
     rates = TraversalCosts(view, ROBOT, 2.0, True)
@@ -91,7 +91,7 @@ def test_plan_takes_the_cheaper_of_two_similar_paths(kind: str, number: int, see
 
 
 def test_path_through_a_50_m_maze_is_found() -> None:
-    """There were too many samples for the iterations of one search: NO_VALID_PATH, where there was a way."""
+    """Regression: too many samples for the iterations of one search gave NO_VALID_PATH."""
     view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(2, 40, 27), RATE)).view
     path = medial_axis().plan(view, Pose2(0.7, 0.7), Pose2(53.3, 53.3), 1)
     rates = TraversalCosts(view, ROBOT, 2.0, True)
@@ -136,7 +136,7 @@ def plan(**costmap: float) -> np.ndarray:
 
 
 def test_cost_scaling_factor_and_inflation_radius_shape_the_path() -> None:
-    """The slower costs fall and the further they reach, the more room is left around a corner."""
+    """Costs that decay slowly or reach far give more clearance around a corner."""
     hardly = least_room(plan(cost_scaling_factor=100.0))
     some = least_room(plan(cost_scaling_factor=3.0))
     most = least_room(plan(cost_scaling_factor=1.0, inflation_radius=2.0))

@@ -82,7 +82,7 @@ def test_plan_never_crosses_an_unknown_cell(kind: str) -> None:
 def test_hull_of_a_car_is_collision_free_along_the_plan(
     space: str, kind: str, ground: str, numbers: tuple[int, ...]
 ) -> None:
-    """Of thirty, those on which it did."""
+    """Plans of the thirty random ones that had collisions before."""
     for number in numbers:
         view, start, goal = way(ground, number, CAR, 0.45)
         car = ompl_planner(spec(kind, state_space=space, max_iterations=20_000), setting(CAR))

@@ -51,7 +51,7 @@ def test_written_yaml_is_read_back_equal_with_types(file: Path, data: dict[str, 
 
 @pytest.mark.parametrize("name", ["1e3", "on", "0o7", "1:30", "no", "017", "2026-11-21"])
 def test_ambiguous_name_is_quoted_in_a_merged_scenario(tmp_path: Path, name: str) -> None:
-    """A goal named so made the log unjudgeable: YAML 1.1 wrote it plain, YAML 1.2 read a number."""
+    """Regression: YAML 1.1 wrote the name of a goal without quotes, and YAML 1.2 read it as a number."""
     (tmp_path / "base.scenario.yaml").write_text(
         "simscen: 1\nworld: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}\n"
         "robot: {pose: {x: 1, y: 1}}\npass: [{goals_reached: {}}]\n"
@@ -63,7 +63,7 @@ def test_ambiguous_name_is_quoted_in_a_merged_scenario(tmp_path: Path, name: str
 
 
 def test_a_world_that_is_written_is_read_back_with_its_names() -> None:
-    """`simscen world convert` writes with the same hand; a world called 0o7 came back as the number 7."""
+    """Regression: `simscen world convert` wrote a world called 0o7, which was read as the number 7."""
     spec = WorldSpec.model_validate({"simscen": 1, "name": "0o7", "places": {"on": {"x": 0, "y": 0}}})
     tree, problems = parse_yaml(world_text(spec), "world")
     assert not problems
@@ -71,7 +71,7 @@ def test_a_world_that_is_written_is_read_back_with_its_names() -> None:
 
 
 def test_yaml_is_quoted_only_if_necessary() -> None:
-    """Only what must be quoted is."""
+    """Values are quoted only if necessary."""
     data = {"name": "lidar dropout", "when": {"time": 10.5}, "goals": ["1e3", "on"], "yaw": "90 deg"}
     text = to_yaml(data)
     assert text == "name: lidar dropout\nwhen:\n  time: 10.5\ngoals:\n- '1e3'\n- on\nyaw: 90 deg\n"

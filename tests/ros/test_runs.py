@@ -87,7 +87,7 @@ def test_the_scenario_selects_the_action(with_interfaces, run, tmp_path: Path, m
 
 @pytest.mark.parametrize("repeats", [2, pytest.param(20, marks=pytest.mark.slow)])
 def test_concurrent_lockstep_runs_have_equal_logs(ros, run, repeats: int) -> None:
-    """Two runs at a time, which must not receive each other's messages."""
+    """Two parallel runs must not receive each other's messages."""
     with ThreadPoolExecutor(2) as pool:
         words = ["--settle", "0.2", "--launch", ros.node("navigator")]
         calls = [pool.submit(run, *words, scenario="short.scenario.yaml") for _ in range(repeats)]

@@ -37,7 +37,7 @@ def test_nav2_profile_clears_the_whole_costmap_each_time() -> None:
 
 
 def test_reopened_door_out_of_sight_is_tried_again() -> None:
-    """The way back is forgotten for the second time within ten seconds of the first, or a little later."""
+    """The costmap is cleared again within ten seconds of the first time, or a little later."""
     mapped = Flatland().room(8, 8)
     mapped.boxes += [(3.9, 0.0, 4.0, 1.0), (3.9, 2.0, 4.0, 6.0), (3.9, 7.0, 4.0, 8.0)]  # two doors
     world = Flatland([*mapped.boxes, lower := (3.9, 1.0, 4.0, 2.0), (3.9, 6.0, 4.0, 7.0)])

@@ -117,7 +117,7 @@ def test_removed_obstacle_leads_to_a_clearly_shorter_plan() -> None:
 
 
 def test_no_better_plan_is_searched_if_the_straight_line_is_not_clearly_shorter() -> None:
-    """The planner would be busy with it, and a plan that is blocked would have to wait."""
+    """Otherwise the planner would be busy, and a blocked plan would have to wait."""
     for bulge, looked in ((1.0, False), (2.5, True)):  # 6.4 m and 8.5 m instead of 6
         bench = Bench()
         bench.script.bulge = bulge

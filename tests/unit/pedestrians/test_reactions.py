@@ -25,7 +25,7 @@ def test_regular_pedestrians_treat_the_robot_as_a_person():
 
 
 def test_impassive_pedestrians_treat_the_robot_as_an_object():
-    """They go on until they feel it as a wall, and do not turn aside before."""
+    """They continue until the wall force acts, and do not evade before."""
     one = walk(people(walker("anna", 6.0, 0.1, (-9.0, 0.1), behavior="impassive")), 3.0, robot(0.0, 0.0))[0]["anna"]
     before = one[one[:, 0] > 1.2]
     assert len(before) > 10 and before[:, 1] == pytest.approx(0.1, abs=1e-3)
@@ -56,7 +56,7 @@ def test_curious_pedestrians_approach_and_leave():
 
 
 def test_scared_pedestrians_keep_away_from_a_standing_robot():
-    """They would have to pass it; what is left is the way they need to stop."""
+    """Their goal is behind the robot; the tolerance is their stopping distance."""
     crowd = people(walker("anna", 9.0, 0.0, (-9.0, 0.0), **SCARED))
     tracks, deeds = walk(crowd, 60.0, robot(0.0, 0.0))
     assert deeds[0].what == "reacted" and gaps(tracks["anna"]).min() > 2.2
@@ -94,7 +94,7 @@ def test_pedestrians_blind_to_robots_ignore_them():
 
 
 def test_pedestrians_do_not_walk_into_a_visible_robot():
-    """Pushed towards it by nothing but their wish, whatever they take it for."""
+    """Only the driving force pushes them toward the robot, with each behavior."""
     for behavior in ("regular", "impassive"):
         crowd = people(walker("anna", 3.0, 0.0, (-9.0, 0.0), speed=2.0, behavior=behavior))
         track = walk(crowd, 8.0, robot(0.0, 0.0, radius=0.4))[0]["anna"]

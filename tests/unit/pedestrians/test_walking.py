@@ -111,7 +111,7 @@ def test_group_members_walk_side_by_side():
 
 
 def test_pedestrians_do_not_walk_through_walls_or_each_other():
-    """Fifty in a hurry who all want through one door."""
+    """Fifty pedestrians in a hurry pass through one door."""
     rng = np.random.default_rng(5)
     box = [[[0, 0], [8, 0]], [[8, 0], [8, 8]], [[8, 8], [0, 8]], [[0, 8], [0, 0]]]
     crowd = people(around=walls(*box, [[0, 4], [3.4, 4]], [[4.6, 4], [8, 4]]))
@@ -166,7 +166,7 @@ def test_additional_pedestrian_changes_others_only_after_meeting(name):
 
 
 def test_walls_hide_people_from_each_other():
-    """Two who walk towards each other on both sides of a wall go straight on."""
+    """Two pedestrians on both sides of a wall walk straight past each other."""
     wall = walls([[-9.0, 0.0], [9.0, 0.0]])
     crowd = people(walker("anna", -4.0, -1.5, (8.0, -1.5)), walker("bert", 4.0, 1.5, (-8.0, 1.5)), around=wall)
     alone = people(walker("anna", -4.0, -1.5, (8.0, -1.5)), around=wall)

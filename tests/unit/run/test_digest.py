@@ -161,7 +161,7 @@ def test_a_heightmap_changes_the_digest(project: Path, of: Digest) -> None:
 
 
 def test_unused_file_does_not_change_the_digest(project: Path, of: Digest) -> None:
-    """Or --resume would never keep anything."""
+    """Otherwise `--resume` would keep no verdicts."""
     before = of()
     (project / "p/notes.txt").write_text("hello")
     (project / "models/other").mkdir()
@@ -169,7 +169,7 @@ def test_unused_file_does_not_change_the_digest(project: Path, of: Digest) -> No
 
 
 def test_the_order_of_the_world_path_matters_where_it_chooses_another_model(project: Path, of: Digest) -> None:
-    """A folder that comes first may hold another shelf."""
+    """The first folder can contain another shelf."""
     (project / "mine/shelf").mkdir(parents=True)
     (project / "mine/shelf/model.config").write_text(MODEL_CONFIG)
     (project / "mine/shelf/model.sdf").write_text(SHELF.replace("1 1 1", "2 2 2"))
@@ -178,7 +178,7 @@ def test_the_order_of_the_world_path_matters_where_it_chooses_another_model(proj
 
 
 def test_lenient_option_changes_the_digest(of: Digest) -> None:
-    """It leaves out what cannot be used."""
+    """It leaves out unusable elements."""
     assert of(lenient=True) != of()
 
 

@@ -319,7 +319,7 @@ def test_another_value_changes_a_decision(other: Other) -> None:
 
 
 def test_the_same_values_change_none() -> None:
-    """Else nothing is told by a change."""
+    """Otherwise a change shows nothing."""
     scene = scenes.seen_by_one
     assert [*scene(StackSpec.model_validate(amcl()))] == [*scene(StackSpec.model_validate(amcl()))]
 

@@ -391,7 +391,7 @@ def test_a_dead_end_that_was_seen_is_not_forgotten_when_control_fails_out_of_its
 
 @pytest.mark.parametrize("off", [0.04, -0.04])
 def test_navigator_passes_a_wall_that_is_off_the_map_by_centimeters(off: float) -> None:
-    """As for a robot whose belief is off by as much; it has been told to take the shortest way, not the roomiest."""
+    """As for a robot whose estimate is wrong by as much; it is configured for the shortest path, not for clearance."""
     mapped, world = (Flatland([(2.5 + x, 2.7, 9.5, 2.8)]).room(12, 5) for x in (0.0, off))
     spec = StackSpec(
         profile="advanced", localizer=TRUTH, planner={"type": "medial_axis", "cost_travel_multiplier": 0.2}

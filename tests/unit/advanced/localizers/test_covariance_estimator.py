@@ -48,7 +48,7 @@ def corrections(
 def test_estimated_covariance_matches_the_error_despite_overconfident_particles(
     lasting: float,
 ) -> None:
-    """3 is right; of AMCL's errors one and the next, 25 cm on, are correlated by 0.94."""
+    """The expected NEES is 3. Errors of AMCL that are 25 cm apart have a correlation of 0.94."""
     alone, inflated = (
         np.array([drive(seed, lasting, ERROR, TOO_SURE) for seed in range(20)]).reshape(-1, 2).mean(axis=0)
     )
@@ -57,7 +57,7 @@ def test_estimated_covariance_matches_the_error_despite_overconfident_particles(
 
 
 def test_common_errors_of_all_poses_are_detected_by_beam_residuals() -> None:
-    """What beams that are off mean was learned where poses scatter, and holds where they all err alike."""
+    """The meaning of beam residuals is learned where poses scatter, and applies where all poses have the same error."""
 
     def doubt(misfit: ScanResiduals) -> float:
         rng, scatter, base, covariance = (
@@ -89,7 +89,7 @@ def test_pose_scatter_overrides_wide_particles() -> None:
 
 
 def test_drift_of_matched_scans_is_not_a_pose_error() -> None:
-    """Along a corridor without features nothing but wheels tells how far the robot went, and the map puts it right."""
+    """In a corridor without features, only the wheels measure the distance, and the map corrects it."""
     blind, stds = np.diag(np.square((0.05, 0.004, 0.0017))), []
     for doubt in (MATCHED, blind):
         rng, scatter, base, covariance = (

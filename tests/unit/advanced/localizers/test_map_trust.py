@@ -49,7 +49,7 @@ def test_a_scan_of_which_few_beams_fit_counts_for_less(on_walls: int, in_the_ope
 
 @pytest.mark.parametrize("poses", [NEAR, SPREAD])
 def test_a_scan_that_hardly_touches_the_map_counts_for_nothing_even_if_that_fits(poses: Array) -> None:
-    """It counted in full, and drew particles that had spread on their way through unknown rooms back into the map."""
+    """Regression: the scan had its full weight, and moved particles from unknown rooms back into the map."""
     assert asked(poses, 2, 0, 30)[0] == 0.0
 
 
@@ -71,7 +71,7 @@ def test_beams_that_hit_nothing_stay_when_some_of_the_others_are_left_out() -> N
 
 @pytest.mark.parametrize("count", [500, 700])
 def test_map_trust_uses_a_sample_of_many_particles(count: int) -> None:
-    """Whether or not it is known where the beams end at all of them."""
+    """With and without known beam ends for all particles."""
     rng = np.random.default_rng(3)
     poses = rng.normal((0.0, 0.0, 0.0), (0.1, 0.1, 0.02), (count, 3))
     beams, asked_ones = beams_to(np.linspace(-1.0, 3.0, 40) + 1.9j), poses[:: -(-count // 50)]

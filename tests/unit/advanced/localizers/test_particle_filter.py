@@ -26,7 +26,7 @@ def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
 
 
 def test_some_particles_follow_odometry_if_scans_show_no_motion() -> None:
-    """People who walk beside a robot look like a room that moves with it."""
+    """People who walk next to a robot look like surroundings that move with it."""
     poses = poses_after(Pose2(0.0, 0.0, 0.0), Pose2(1.0, 0.0, 0.0))
     by_odometry = np.hypot(poses[:, 0], poses[:, 1]) > 0.1
     assert abs(by_odometry.mean() - ODOMETRY_SHARE) < 0.05
@@ -41,7 +41,7 @@ def test_some_particles_rotate_as_odometry_says_where_it_disagrees() -> None:
 
 @pytest.mark.parametrize(("relocalization", "stays"), [("scan_matching", True), ("random", False)])
 def test_random_particles_do_not_compete_with_the_search_of_the_map(relocalization: str, stays: bool) -> None:
-    """A group of particles that scans stopped fitting."""
+    """For a group of particles that no longer fits the scans."""
     spec = ScanMatchingAmcl.model_validate({
         "relocalization": relocalization, "recovery_alpha_slow": 0.01, "recovery_alpha_fast": 0.5,
         "map_trust_full": 0.0, "settling_distance": 0.0,

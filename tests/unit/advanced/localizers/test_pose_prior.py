@@ -61,7 +61,7 @@ def test_step_errors_accumulate_as_in_simulation(off: tuple[float, ...]) -> None
 def test_step_errors_are_correlated_without_scan_matches(
     axis: int, way: ObservedMotion, drift: tuple[float, float, float]
 ) -> None:
-    """Twice as far leads twice as far astray; errors by chance lead √2 as far, and those of a step count besides."""
+    """Systematic errors double with the distance, random errors grow by √2, and errors of a step are added."""
     sure = SURE.after(THEN, THEN, 10.0, way).after(THEN, THEN, 10.0, way)
     rng = 0.0 if way.step is None else 2 * way.step.covariance[axis, axis]
     off = np.eye(3)[axis] * 2 * np.sqrt((CERTAIN_STD[axis] + 2 * drift[axis]) ** 2 + rng)

@@ -81,7 +81,7 @@ def test_particles_return_to_the_initial_pose_if_scans_fit_there() -> None:
 
 @pytest.mark.parametrize(("off", "places"), [(Pose2(0.9, -0.5, 0.1), 1), (Pose2(0.3, 0.2, 0.05), 0)])
 def test_particles_stay_at_the_initial_pose_on_a_sparse_map(off: Pose2, places: int) -> None:
-    """They were drawn 4.9 m off by the few beams that the map shows, of a robot that saw how it went."""
+    """Regression: few mapped beams moved the particles by 4.9 m, although scan matching measured the motion."""
     put = found(off, way=0.3, settling=4.0, map_=corner_of_the_map())
     assert [np.abs(place).max() < 1e-9 for place in put[:1]] == [True] * places
 
@@ -91,7 +91,7 @@ def test_initial_pose_counts_only_for_the_settling_distance() -> None:
 
 
 def test_large_correction_needs_agreeing_searches_over_two_meters() -> None:
-    """Within 0.7 m, on a floor that was rebuilt, what was seen fitted a room 11 m away by chance."""
+    """Regression: on a rebuilt floor, scans over 0.7 m matched a room 11 m away by chance."""
     away = Pose2(3.0, 2.0, 2.5)
     assert found(away, way=3.0) == []
     (place,) = found(away, way=4.25)[:1]
@@ -100,7 +100,7 @@ def test_large_correction_needs_agreeing_searches_over_two_meters() -> None:
 
 @pytest.mark.parametrize(("parted", "found_again"), [(True, True), (False, False)])
 def test_detected_kidnapping_clears_the_scan_memory(parted: bool, found_again: bool) -> None:
-    """What it saw there would lie beside what it sees here: with that, here fits no better than elsewhere."""
+    """Scans from before the kidnapping would make the correct pose fit no better than others."""
     trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
     finder, there, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(3.9, -0.2, 2.17), []
     step = Step(Pose2(0.25, 0.0, 0.0), np.diag([1e-5, 1e-5, 1e-6]))
@@ -117,7 +117,7 @@ def test_detected_kidnapping_clears_the_scan_memory(parted: bool, found_again: b
 
 @pytest.mark.parametrize("carried_off", [True, False])
 def test_kidnapped_robot_is_relocalized_with_weaker_evidence_than_off_map(carried_off: bool) -> None:
-    """Rooms that nobody mapped look like mapped ones, and who went there is there; who was carried off is anywhere."""
+    """Unmapped rooms look like mapped ones, so a robot that left the map needs stronger evidence."""
     trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
     finder, away, puts = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(40.0, 3.0, 0.7), []
     for k, driven in enumerate([0.25 * k for k in range(44)]):

@@ -43,7 +43,7 @@ def test_odometry_determines_motion_along_an_endless_corridor() -> None:
 
 @pytest.mark.parametrize("wheels", [0.25, 0.21, 0.3])
 def test_person_ahead_in_a_corridor_does_not_bias_the_match(wheels: float) -> None:
-    """Scans showed 0.03 m: the wall at the end was as far as the wheels say, and outvoted by whoever is nearer."""
+    """Regression: the person outvoted the wall at the end of the corridor, and scans showed 0.03 m of motion."""
     corridor = (-100.0, 1.0, 9.0, 1.1), (-100.0, -1.1, 9.0, -1.0), (9.0, -1.1, 9.1, 1.1)
     before, after = (np.array([*corridor, (2.0 + gone, -0.2, 2.3 + gone, 0.2)]) for gone in (0.0, 0.25))
     step = stepped(Pose2(wheels, 0, 0), view(Pose2(0, 0, 0), before), view(Pose2(0.25, 0, 0), after))
@@ -91,7 +91,7 @@ def test_particles_follow_a_step_with_its_covariance() -> None:
 
 
 def test_particles_spread_as_the_covariance_of_the_step_says() -> None:
-    """Three of them, each with one of the normal numbers 1: what they differ by makes up the covariance."""
+    """Three particles with unit normal numbers: their differences give the covariance."""
 
     class Ones(np.random.Generator):
         def standard_normal(self, size: object = None, *_: object, **__: object) -> Array:  # type: ignore[override]

@@ -55,7 +55,7 @@ def test_covariance_is_consistent_with_the_errors(imu: bool) -> None:
 
 
 def test_a_gyroscope_that_sees_no_turn_outweighs_wheels_that_slip() -> None:
-    """The wheels claim 1 rad/s, the gyroscope none: it is the more exact one by far."""
+    """The wheels measure 1 rad/s and the gyroscope 0 rad/s, which is far more precise."""
     subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
     feed(subject, 40, Pose2(0.0125, 0, 0.025), 0.0)
     alone = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
@@ -66,7 +66,7 @@ def test_a_gyroscope_that_sees_no_turn_outweighs_wheels_that_slip() -> None:
 
 
 def test_standing_still_reveals_the_bias_of_the_gyroscope() -> None:
-    """Believed as it is, it would have turned the robot by 0.04 rad."""
+    """Without the estimate of the bias, the heading would be wrong by 0.04 rad."""
     subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
     feed(subject, 400, Pose2(0, 0, 0), 0.004)
     assert abs(subject.belief.pose.yaw) < 2e-4

@@ -46,7 +46,7 @@ def turning(seconds: float = 4.0) -> Array:
 
 
 def test_locked_wheels_in_a_turn_are_detected() -> None:
-    """They stand for a second in which the robot slides on: its heading stays right, and it knows of the slide."""
+    """The wheels stop for one second while the robot slides: the heading stays correct, and the covariance grows."""
     truth = turning()
     claimed = truth.copy()
     claimed[60:100] = 0.0
@@ -69,7 +69,7 @@ def test_spinning_wheels_do_not_turn_the_estimate() -> None:
 
 
 def test_locked_wheels_do_not_change_the_gyro_bias() -> None:
-    """After it, wheels and gyroscope agree as before."""
+    """Afterward, wheels and gyroscope agree as before."""
     truth = turning(8.0)
     claimed = truth.copy()
     claimed[100:140] = 0.0
@@ -80,7 +80,7 @@ def test_locked_wheels_do_not_change_the_gyro_bias() -> None:
 
 
 def test_position_variance_stops_growing_after_slip() -> None:
-    """The variance of the place grows while they slip, and hardly afterwards."""
+    """The position variance grows while the wheels slip, and hardly afterward."""
 
     def spread(seconds: float) -> float:
         truth = turning(seconds)
@@ -95,7 +95,7 @@ def test_position_variance_stops_growing_after_slip() -> None:
 
 
 def test_gyro_bias_variance_has_a_floor() -> None:
-    """Variance floor: after ten minutes at rest a bias that wanders off is still noticed."""
+    """After ten minutes at rest, a drifting bias is still detected."""
     n = 600 * RATE // 10  # at 4 Hz, to be quick
     subject = localizer(SlipEkf(type="slip_ekf"), Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
     for k in range(n):

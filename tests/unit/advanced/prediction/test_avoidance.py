@@ -117,7 +117,7 @@ def test_moving_obstacle_leaves_no_trail_in_the_costmap() -> None:
 
 
 def test_prediction_has_no_effect_without_moving_obstacles() -> None:
-    """But for the first moments, in which a fast robot cannot know yet."""
+    """Except for the first moments, in which motion cannot be detected yet."""
     world = Flatland(discs=[(2.0, 0.3, 0.3), (4.0, -0.3, 0.2), (2.5, 3.0, 0.05)])
     slow, near = RegulatedPurePursuit(desired_linear_vel=0.5), Goal("near", Pose2(3.5, 0.5), xy_tolerance=0.3)
     with_it, without = (start(near, controller=slow, enabled=on, world=world).run(15.0) for on in (True, False))

@@ -30,7 +30,7 @@ def cost_at(view: CostmapView, x: float, y: float) -> int:
 
 @pytest.mark.parametrize("resolution", [0.05, 0.03, 0.25])
 def test_crossing_obstacle_is_marked_at_its_predicted_position(resolution: float) -> None:
-    """It stands at (2, 2) and crosses the robot's way, 2 m ahead, in 2 s: the robot is there then."""
+    """The obstacle starts at (2, 2) and crosses the path 2 m ahead after 2 s, when the robot is there."""
     view = add_predicted_costs(ground(crossing(2.0, 2.0, -1.0), resolution), ROBOT, SPEED, RADIUS)
     assert cost_at(view, 2.0, 0.0) > 50
     assert cost_at(view, 2.0, 2.0) == 0  # where it is now

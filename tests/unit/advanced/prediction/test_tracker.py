@@ -127,21 +127,21 @@ def test_stopped_obstacle_becomes_static() -> None:
 
 
 def test_approaching_obstacle_is_reported_before_one_meter() -> None:
-    """At 0.45 m/s, head on, as another robot does; seen to move by its way of a second rather than by its speed now."""
+    """At 0.45 m/s, head on, like another robot. Motion over one second detects it before its current speed does."""
     watch = Watch(lambda t: [(4.0 - 0.45 * t, 0.1, 0.22)], view=FULL, beams=360).run(2.5)
     assert len(watch.tracker.moving) == 1
     assert watch.tracker.moving.velocities[0] == pytest.approx([-0.45, 0.0], abs=0.15)
 
 
 def test_reported_radius_covers_the_body_behind_a_visible_mast() -> None:
-    """Three beams of a degree hit it, two meters away."""
+    """Three beams with a spacing of one degree hit it at two meters."""
     watch = Watch(lambda t: [(4.0 - 0.5 * t, 0.1, 0.06)], view=FULL, beams=360).run(5.0)
     assert len(watch.tracker.moving) == 1
     assert watch.tracker.moving.radii[0] >= 0.25
 
 
 def test_turning_obstacle_is_reported() -> None:
-    """It creeps away, and so is not told at first, and then comes back faster."""
+    """It moves away slowly, so it is not reported at first, and then returns faster."""
 
     def there_and_back(t: float) -> list[Disc]:
         return [(4.0, 0.26 * t if t < 4.0 else 1.04 - 1.0 * (t - 4.0), 0.4)]
@@ -152,7 +152,7 @@ def test_turning_obstacle_is_reported() -> None:
 
 
 def test_partly_visible_obstacle_is_reported_after_a_long_distance() -> None:
-    """It goes beside the robot, as fast as that: no beam ever was where it came from."""
+    """It moves next to the robot at the same speed, so no beam ever passed through its earlier position."""
     base = lambda t: Pose2(1.5 * t, 0.0)  # noqa: E731
     edge = math.radians(135.0)
 
@@ -188,7 +188,7 @@ def test_no_motion_is_reported_in_a_static_room(view: float, beams: int) -> None
 
 @pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
 def test_no_motion_is_reported_with_odometry_drift(view: float, beams: int) -> None:
-    """By 5 % of the way and 1 % of each turn, at 2 rad/s: more than wheels with a gyroscope do."""
+    """By 5 % of the distance and 1 % of each turn, at 2 rad/s: more than wheels with a gyroscope have."""
 
     def drifted(t: float) -> Pose2:
         pose = tour(t)
@@ -198,7 +198,7 @@ def test_no_motion_is_reported_with_odometry_drift(view: float, beams: int) -> N
 
 
 def test_no_motion_of_posts_is_reported_with_wheel_slip() -> None:
-    """Where a post is, a beam went by before that by odometry went just where the post stands."""
+    """According to odometry, an earlier beam passed through the position of a post."""
     rng = np.random.default_rng(3)
     posts = Flatland()
     posts.discs += [(x, side * float(rng.uniform(1.2, 4.5)), 0.075) for x in np.arange(-2, 24, 0.3) for side in (-1, 1)]
@@ -215,7 +215,7 @@ def test_no_motion_of_posts_is_reported_with_wheel_slip() -> None:
 
 @pytest.mark.parametrize("gap", [0.4, 0.55, 0.7])
 def test_track_of_a_removed_object_does_not_jump_to_a_post(gap: float) -> None:
-    """It has stood where it was free, and a post stands within reach of where a track without speed may be."""
+    """The object stood in free space, and a post is within the gate of a track without speed."""
     posts = Flatland(discs=[(3.0 + 0.05 * k, gap * k, 0.1) for k in range(1, 8)])
     watch = Watch(lambda t: [(3.0, 0.0, 0.1)] if 1.0 <= t < 2.0 else [], walls=posts)
     assert claims(watch, 4.0) == 0
@@ -262,7 +262,7 @@ def test_quick_check_never_separates_hits_of_one_segment() -> None:
 
 
 def test_sparse_and_full_beam_tests_give_the_same_tracks() -> None:
-    """After a scan in which something had appeared all are looked at; wires appear at many scans."""
+    """All beams are tested after a scan with a new object."""
     rng = np.random.default_rng(2)
     wires = Flatland(discs=[(6 * rng.random() + 1, 2.2 * (-1) ** k * (0.5 + rng.random()), 0.002) for k in range(30)])
 

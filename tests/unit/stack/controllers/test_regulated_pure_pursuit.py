@@ -120,7 +120,7 @@ def test_where_the_arc_to_the_carrot_would_cut_a_corner_a_nearer_carrot_keeps_to
 
 
 def test_a_robot_that_has_been_pushed_off_the_end_of_its_path_drives_back_as_it_came_and_does_not_creep() -> None:
-    """Who makes way for somebody at the goal has 0.5 m to go again: at Nav2's ratio, 0.5 of 0.6 m's."""
+    """A robot that moved out of the way at its goal has to drive 0.5 m again."""
     goal, controller = Goal("g", Pose2(2.0, 0.0)), rpp(line(2.0))
     controller.command(Pose2(1.95, 0.0, 0.0), Twist(0.1), view_of(), goal)
     command = controller.command(Pose2(2.5, 0.0, math.pi), Twist(0.1), view_of(), goal)

@@ -220,6 +220,6 @@ def test_no_greatest_range_is_the_lidars_own(kind: str, farthest: float) -> None
 
 
 def test_a_standard_deviation_of_nothing_is_not_accepted() -> None:
-    """Its square would be zero."""
+    """Its square would be zero, which is a singular covariance."""
     with pytest.raises(ValidationError, match="sigma_hit"):
         Amcl(sigma_hit=1e-30)
