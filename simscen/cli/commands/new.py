@@ -41,10 +41,10 @@ def command(
         next((last.removesuffix(suffix) for suffix in SCENARIO_SUFFIXES if last.endswith(suffix)), last)
     ):
         raise UsageError(f"{name!r} is not a valid scenario name")
-    is_base = last == DEFAULTS_FILE or last.endswith(BASE)
+    is_base = last == DEFAULTS_FILE or last.endswith(BASE_SUFFIXES)
     if is_base and like:
         raise UsageError(f"{name!r} is a base file; --like copies only scenarios")
-    file = Path(name if is_base or name.endswith(SCENARIO) else f"{name}{SCENARIO[0]}")
+    file = Path(name if is_base or name.endswith(SCENARIO_SUFFIXES) else f"{name}{SCENARIO_SUFFIXES[0]}")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.open("x").close()

@@ -269,9 +269,9 @@ def summary_lines(falsification: Falsification) -> list[str]:
     lines = []
     for failure in falsification.found:
         values = ", ".join(f"{path} = {value_text(value)}" for path, value in failure.values.items())
-        lines += [f"failure: {shown(failure.file)}", f"with {values}"]
+        lines += [f"failure: {display_path(failure.file)}", f"with {values}"]
         lines += [f"replay: {failure.run.artifacts.replay}"] if failure.run.artifacts.replay else []
-        lines += [f"smaller: simscen shrink {shown(failure.file)}", ""]
+        lines += [f"smaller: simscen shrink {display_path(failure.file)}", ""]
     number = len(falsification.found)
     if number:
         lines.append(f"found {number} {'failure' if number == 1 else 'different failures'} in {runs} runs")

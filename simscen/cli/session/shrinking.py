@@ -95,7 +95,7 @@ class Shrinking:
             before, parts = self.tree, removable_parts(self.tree, depth)
 
             def build(needed: Sequence[Keys], parts: Sequence[Keys] = parts, tree: MappingNode = before) -> MappingNode:
-                return without(tree, [keys for keys in parts if keys not in needed])
+                return without_parts(tree, [keys for keys in parts if keys not in needed])
 
             self.tree = build(self._minimize(parts, build))
             depth += 1
@@ -147,7 +147,7 @@ def smallest_margin(verdict: Verdict) -> float | None:
 
 def only_failing(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
     """Return the scenario with this seed, only the failing criterion, and without keys that do not affect the run."""
-    entries = {key: entry for key, entry in tree.entries.items() if key not in NOT_RUN}
+    entries = {key: entry for key, entry in tree.entries.items() if key not in UNNEEDED_KEYS}
     criteria = tree.entries.get("pass")
     if failure.criterion and criteria is not None and isinstance(criteria.value, SequenceNode):
         items = [item for item in criteria.value.items if child(item, failure.criterion) is not None]
@@ -155,7 +155,7 @@ def only_failing(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
         selected = named or items
         if selected:
             entries["pass"] = Entry(criteria.key, replace(criteria.value, items=tuple(selected)))
-    return with_seed(MappingNode(tree.place, entries), seed)
+    return with_seed(MappingNode(tree.position, entries), seed)
 
 
 def with_inline_world(tree: MappingNode, world: MappingNode | None) -> MappingNode | None:

@@ -62,7 +62,7 @@ class Stacks:
         """
         if loaded.robots:
             checked = {name: self.with_command(view) for name, view in loaded.robots.items()}
-            names = [choice.name for choice in self.chosen if choice.runs]
+            names = [choice.name for choice in self.chosen if choice.external_command]
             problems = [
                 *(one for _, found in checked.values() for one in found),
                 *conflicting_stacks(loaded, names, config_file()),

@@ -122,8 +122,8 @@ class _StudySession:
         self.total = self._count_runs()
         self._base_seed = request.options.seed if request.options.seed is not None else scenario.spec.seed
         seeds = self.total if self._is_random else request.repeat
-        if self._base_seed + seeds - 1 > LARGEST_SEED:
-            raise UsageError(f"{seeds} runs from seed {self._base_seed} on exceed the largest seed, {LARGEST_SEED}")
+        if self._base_seed + seeds - 1 > MAX_SEED:
+            raise UsageError(f"{seeds} runs from seed {self._base_seed} on exceed the largest seed, {MAX_SEED}")
         self._runs = islice(self._all_runs(), self.total)
         self._batch = list(islice(self._runs, self._batch_size))
         return self._load([run.number for run in self._batch])

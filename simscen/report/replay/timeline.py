@@ -142,9 +142,9 @@ def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[d
     data, numbers = [], {"event": 0, "fault": 0}
     first = next(iter(lines.values()))
     for one in result.disturbances:
-        number = numbers[one.ordered.kind]
-        numbers[one.ordered.kind] += 1
-        line_numbers = first.events if one.ordered.kind == "event" else first.faults
+        number = numbers[one.disturbance.kind]
+        numbers[one.disturbance.kind] += 1
+        line_numbers = first.events if one.disturbance.kind == "event" else first.faults
         data.append(
             {
                 "kind": one.disturbance.kind,
@@ -155,7 +155,7 @@ def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[d
                 "happened": one.happened,
                 "missing": one.missing,
                 "effect": one_line(one.effect),
-                "line": line_numbers.get(number, one.ordered.line) if len(lines) == 1 else one.ordered.line,
+                "line": line_numbers.get(number, one.disturbance.line) if len(lines) == 1 else one.disturbance.line,
             }
         )
     return data
