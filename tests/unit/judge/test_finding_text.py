@@ -171,3 +171,10 @@ def test_a_margin_without_a_known_limit_counts_as_it_is() -> None:
     assert relative_margin(Finding(Status.PASS, "x", "", "", 0.3, "m")) == 0.3
     assert relative_margin(Finding(Status.PASS, "x", "", "≥ 0 m", 0.3, "m", 0.3)) == 0.3
     assert relative_margin(Finding(Status.PASS, "x", "", "> -2 m", 0.5, "m", -1.5)) == 0.25
+
+
+def test_the_margin_of_a_failed_run_ignores_findings_without_a_finite_one() -> None:
+    broken = measured(Status.FAIL, 0.3, 0.4)
+    assert margins(Outcome.FAILED, replace(broken, margin=math.inf), broken) == pytest.approx(-0.25)
+    assert margins(Outcome.FAILED, replace(broken, margin=-math.inf), broken) == pytest.approx(-0.25)
+    assert margins(Outcome.FAILED, replace(broken, margin=0.1, value=0.5), broken) == pytest.approx(-0.25)
