@@ -305,3 +305,11 @@ def test_the_study_as_plain_data() -> None:
     fixed = study_data(evaluate_study(plan_of([], claim=PassRate(min=0.5, confidence=0.9)), runs))
     assert (fixed["claim"]["passed"], fixed["claim"]["runs"], fixed["claim"]["power"]) == (3, 4, None)
     assert fixed["claim"]["limits"] == list(clopper_pearson_limits(3, 4, 0.9))
+
+
+def test_values_are_listed_by_variation_then_seed() -> None:
+    keys = [RunKey("s", seed, variation) for seed in (1, 2) for variation in ("wide", "narrow")]
+    plan = StudyPlan("s", is_random=True, values={key: {"gap": key.variation} for key in keys})
+    data = study_data(evaluate_study(plan, [RunResult(key, "s.yaml", Outcome.PASSED) for key in keys]))
+    listed = [(row["variation"], row["seed"]) for row in data["values"]]
+    assert listed == [("narrow", 1), ("narrow", 2), ("wide", 1), ("wide", 2)]
