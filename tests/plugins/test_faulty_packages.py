@@ -189,7 +189,10 @@ def test_invalid_result_of_a_component_is_an_error_with_its_name(run, kind, text
 
 
 def test_invalid_command_from_a_fault_is_an_error_with_its_name(run) -> None:
-    with pytest.raises(RunError, match=r"makes Twist\(vx=nan.* of a command \(fault `mine` of mines 0.3\)"):
+    with pytest.raises(
+        RunError,
+        match=r"returned Twist\(vx=nan.* for a command, which is not a finite Twist \(fault `mine` of mines 0.3\)",
+    ):
         run("fault", "def command(self, command): return Twist(float('nan'), 0.0, 0.0)", sensor="cmd_vel")
 
 
@@ -214,7 +217,7 @@ def test_output_of_a_fault_is_validated_for_every_target(run, instance: str, tex
 
 
 def test_invalid_map_from_a_fault_is_an_error_with_its_name(run) -> None:
-    with pytest.raises(RunError, match=r"makes str of a map \(fault `mine` of mines 0.3\)"):
+    with pytest.raises(RunError, match=r"returned an object of type str for a map \(fault `mine` of mines 0.3\)"):
         run(
             "fault",
             "def map(self, grid): return 'here be dragons'",
