@@ -49,7 +49,7 @@ def _inside(kind: Any, marks: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[Any,
     found = next((mark for mark in marks if isinstance(mark, LazySpec | ExtensibleUnion)), None)
     if found is not None:
         rest = tuple(mark for mark in marks if mark is not found)
-        yield from _inside(found.load() if isinstance(found, LazySpec) else found.own, rest)
+        yield from _inside(found.load() if isinstance(found, LazySpec) else found.shipped_union, rest)
     elif get_origin(kind) is Annotated:
         inner, *more = get_args(kind)
         yield from _inside(inner, (*marks, *_flat(more)))

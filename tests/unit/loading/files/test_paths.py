@@ -76,8 +76,8 @@ def test_a_near_name_is_suggested(sandbox: PathSandbox) -> None:
     ("written", "code"),
     [("a\x00b", "SC017"), ("a\x1b[31m", "SC017"), ("x" * 5000, "SC023"), ("a.yaml/b", "SC023"), ("x/" * 2000, "SC023")],
 )
-def test_invalid_file_names_are_refused(fence: PathSandbox, written: str, code: str) -> None:
-    assert _refusal(fence, written).code == code
+def test_invalid_file_names_are_refused(sandbox: PathSandbox, written: str, code: str) -> None:
+    assert _refusal(sandbox, written).code == code
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may look everywhere")
