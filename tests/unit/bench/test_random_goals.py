@@ -37,7 +37,7 @@ def two_rooms() -> BuiltWorld:
 
 
 def test_every_drive_is_reachable_with_free_start_and_goal() -> None:
-    found = list(random_drives(two_rooms(), 0.22, range(1, 21), least=2.0))
+    found = list(random_drives(two_rooms(), 0.22, range(1, 21), min_length=2.0))
     assert len(found) == 20
     for one in found:
         assert (one.start.x < 5.0) == (one.goal.x < 5.0)  # nothing leads through the wall

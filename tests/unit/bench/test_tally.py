@@ -19,8 +19,8 @@ from simscen.core.records.session_events import RunFinished
         (run(Outcome.ERROR), DriveOutcome.ERROR),
     ],
 )
-def test_run_has_exactly_one_outcome(finished: RunFinished, fate: DriveOutcome) -> None:
-    assert Trial(finished).fate is fate
+def test_run_has_exactly_one_outcome(finished: RunFinished, drive_outcome: DriveOutcome) -> None:
+    assert Trial(finished).drive_outcome is drive_outcome
 
 
 def test_rates_are_of_all_runs_and_times_of_the_good_ones() -> None:
