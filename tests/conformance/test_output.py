@@ -133,5 +133,5 @@ def test_102_stopped_warm_process_is_replaced(folder: Path) -> None:
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stderr) == (3, "")
     runs = {run["scenario"]: run for run in json.loads((folder / "out/results.json").read_text())["runs"]}
-    assert "did not answer and was killed (SIGKILL)" in runs["a"]["error"]["message"]
+    assert "did not respond and was killed (SIGKILL)" in runs["a"]["error"]["message"]
     assert runs["b"]["outcome"] == "passed"

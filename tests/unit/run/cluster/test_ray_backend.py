@@ -132,7 +132,7 @@ def test_a_job_that_is_lost_twice_is_an_error(cluster, jobs) -> None:
         done.set()
         killer.join()
     assert isinstance(end, ForkServerDeath)
-    assert "was lost with its node" in end.how
+    assert "was lost with its node" in end.description
 
 
 def test_a_session_on_a_cluster_writes_the_same_results(cluster, tmp_path: Path) -> None:

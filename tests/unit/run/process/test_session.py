@@ -150,7 +150,7 @@ def test_a_preparation_that_hangs_in_c_is_a_timeout_with_its_stack(session, monk
 def test_a_warm_process_that_is_stopped_is_replaced(session, monkeypatch):
     monkeypatch.setattr(supervisor, "MAX_SILENCE_S", 2.0)
     answers, _ = session("stop-parent", "fine")
-    assert "did not answer and was killed" in answers["stop-parent"].result.error.message
+    assert "did not respond and was killed" in answers["stop-parent"].result.error.message
     assert answers["fine"].outcome is Outcome.PASSED
 
 
