@@ -17,7 +17,7 @@ EXIT_CODES = {
     Exit.PASSED: "All runs passed, or failed as expected by their scenarios.",
     Exit.FAILED: "A criterion failed, or held although it was expected to fail.",
     Exit.USAGE: "Invalid file, wrong usage, or unusable output folder. Nothing was run.",
-    Exit.INCOMPLETE: "A run could not be completed (crash, timeout, out of memory), or a result could not be spelling.",
+    Exit.INCOMPLETE: "A run could not be completed (crash, timeout, out of memory), or a result could not be written.",
     Exit.INTERNAL: "A bug in simscen.",
     Exit.NOTHING_SELECTED: "Nothing was selected, or all selected scenarios are skipped.",
     Exit.UNDECIDED: "The claim of a study is undecided: more runs may decide it.",
