@@ -102,19 +102,19 @@ def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
         ),
         (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'topics': 'all'})", "`topics` is not a list"),
         (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'step': 'often'})", "`step` is 'often'"),
-        (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'name': 7})", "`name` is no text"),
-        (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'about': 'x' * 10})", "`about` is no object"),
+        (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'name': 7})", "`name` is not a text"),
+        (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'about': 'x' * 10})", "`about` is not an object"),
         (WELCOMED + "c.send(bytes(4))", "a frame of 0 bytes"),
         (WELCOMED + f"c.send(wire.answer_frame(12, {COMMAND}))", "it answers tick 12 instead of 0"),
         (WELCOMED + "c.send(wire.frame(wire.WELCOME, b'{}'))", "a frame WELCOME instead of an ANSWER"),
-        (WELCOMED + "c.send(wire.frame(wire.ANSWER, bytes(8)))", "it ends before its header does"),
+        (WELCOMED + "c.send(wire.frame(wire.ANSWER, bytes(8)))", "it ends before its header is complete"),
         (
             WELCOMED + f"c.send(wire.frame(wire.ANSWER, wire.answer_frame(0, {COMMAND})[5:-1]))",
-            "ends before its messages",
+            "it ends before its last message is complete",
         ),
         (
             WELCOMED + f"c.send(wire.frame(wire.ANSWER, wire.answer_frame(0, {COMMAND})[5:] + b'x'))",
-            "goes on after its last",
+            "there are more bytes after its last message",
         ),
         (WELCOMED + "c.send(wire.answer_frame(0, [(99, b'')]))", "a message on topic number 99, which does not exist"),
         (WELCOMED + "c.send(wire.answer_frame(0, []))", "no message on /cmd_vel, though a command is due"),
@@ -125,11 +125,11 @@ def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
         ),
         (
             WELCOMED + "c.send(wire.answer_frame(0, [(1, b'')]))",
-            "no geometry_msgs/msg/Twist: a message is not plain CDR",
+            "not a valid geometry_msgs/msg/Twist: a message is not plain CDR",
         ),
         (
             WELCOMED + "c.send(wire.answer_frame(0, [(1, bytes([0, 1, 0, 0]) + bytes(40))]))",
-            "no geometry_msgs/msg/Twist",
+            "not a valid geometry_msgs/msg/Twist",
         ),
         (WELCOMED + "c.send(wire.answer_frame(0, [(1, bytes([0, 1, 0, 0]) + bytes(64))]))", "longer than its type"),
         (ONE + "step.drive(float('nan'), 0.0)" + ON, "a command that is not finite: nan, 0, 0"),
@@ -141,7 +141,7 @@ def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
         ),
         (
             ONE + "step.publish('/plan/exact', messages.float64_array([1.0, 2.0]))" + ON,
-            "2 numbers, which are no rows of 3",
+            "2 numbers, which cannot be split into rows of 3",
         ),
         (ONE + "step.publish('/simscen/events', messages.string('{'))" + ON, "not a valid std_msgs/msg/String"),
         (
