@@ -82,9 +82,9 @@ def test_after_a_failure_the_other_goals_are_dropped_or_follow_as_the_scenario_s
     ("events", "says"),
     [
         ([("goal.reached", "desk")], "goal.reached `desk`, but no goal is active"),
-        ([("goal.accepted", "shelf")], "goal.accepted `shelf`, but the next one is `desk`"),
+        ([("goal.accepted", "shelf")], "goal.accepted `shelf`, but the next goal is `desk`"),
         ([("goal.accepted", "desk")] * 2, "goal.accepted, but goal `desk` is active"),
-        ([("goal.accepted", ""), ("goal.reached", "shelf")], "goal.reached `shelf`, but the current one is `desk`"),
+        ([("goal.accepted", ""), ("goal.reached", "shelf")], "goal.reached `shelf`, but the current goal is `desk`"),
         ([("goal.accepted", ""), ("goal.reached", ""), ("goal.accepted", "")], "but there is no next goal"),
         ([("goal.canceled", "desk")], "goal.canceled `desk`, but no goal is active"),
     ],
