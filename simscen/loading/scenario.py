@@ -1,6 +1,6 @@
 """Load a scenario with all files that it refers to, or report all its problems."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -67,13 +67,14 @@ def try_variations(
     world_path: Sequence[Path] = (),
     choice: StackChoice | None = None,
     numbers: Sequence[int] | None = None,
+    unsaved: Mapping[Path, str] | None = None,
 ) -> tuple[LoadedScenario, ...] | list[Problem]:
     """Return all variations of the scenario in a file in order, or all problems of any of them.
 
     A file without variations yields one scenario whose variation has no name. `numbers` selects variations by their
     numbers from 1, without those that do not exist or do not meet the conditions in `require`.
     """
-    library = Library(PathSandbox.around(root, world_path))
+    library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     read = _read(path, library, choice)
     if isinstance(read, list):
         return read

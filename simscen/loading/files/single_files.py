@@ -1,6 +1,6 @@
 """Load a robot file or a world file without a scenario, and write worlds as `*.world.yaml`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

@@ -30,6 +30,7 @@ class Library:
     texts: dict[str, str] = field(default_factory=dict)
     files: dict[str, Path] = field(default_factory=dict)
     loaded: dict[tuple[str, Path], Any] = field(default_factory=dict)
+    unsaved: Mapping[Path, str] = field(default_factory=dict)
 
     def read(self, path: Path, defaults: bool = False) -> tuple[Node | None, list[Problem]]:
         """Return the tree of `path` merged with what it extends and, if `defaults`, the `defaults.yaml` next to it."""

@@ -1,0 +1,86 @@
+"""Insert keys and items into a YAML text, with the indentation and the style of their siblings."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from simscen.editor.splices import Splice, column, line_end, line_start
+from simscen.editor.value_text import flow_text, key_text
+from simscen.loading.yaml.source_nodes import SourceNode
+
+INDENT = 2
+"""Spaces by which the items of a new list are indented."""
+
+
+def inserted_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Sequence[str] = ()) -> Splice:
+    """Return the splice that adds a key to a mapping: after the last key that comes before it in `order`."""
+    if not mapping.entries:
+        return Splice(mapping.start, mapping.end, flow_text({key: value}))
+    entries = list(mapping.entries.items())
+    before = [entry for name, entry in entries if name in order[: order.index(key)]] if key in order else []
+    after = max(before, key=lambda entry: entry.start) if before else entries[-1][1]
+    end = max(after.value.end, after.end)
+    if mapping.flow:
+        return Splice(end, end, f", {key_text(key)}: {flow_text(value)}")
+    place = line_end(text, end)
+    indent = column(text, entries[0][1].start)
+    return Splice(place, place, "\n" + " " * indent + _block_entry(key, value, indent))
+
+
+def added_item(text: str, sequence: SourceNode, value: Any, index: int | None = None) -> Splice:
+    """Return the splice that inserts an item into a list before the item `index`; None: at the end."""
+    items = sequence.items
+    if not items:
+        return Splice(sequence.start, sequence.end, f"[{flow_text(value)}]")
+    at_end = index is None or index >= len(items)
+    like = items[-1] if at_end else items[index or 0]
+    if sequence.flow:
+        if at_end:
+            return Splice(like.end, like.end, _separator(text, items) + flow_text(value))
+        return Splice(like.start, like.start, f"{flow_text(value)}, ")
+    dash = dash_before(text, like.start)
+    indent = column(text, dash)
+    item = f"- {_block_value(text, value, like, indent + INDENT)}"
+    if at_end:
+        place = line_end(text, like.end)
+        gap = "\n\n" if len(items) > 1 and _has_blank_line(text, items[-2].end, dash) else "\n"
+        return Splice(place, place, gap + " " * indent + item)
+    place = line_start(text, dash)
+    return Splice(place, place, " " * indent + item + "\n")
+
+
+def dash_before(text: str, start: int) -> int:
+    """Return the index of the dash of the list item that starts at `start`."""
+    return text.rfind("-", 0, start)
+
+
+def _block_entry(key: str, value: Any, indent: int) -> str:
+    """Return a new key of a block mapping; a list of mappings gets one line for each item."""
+    if isinstance(value, list) and any(isinstance(item, dict) for item in value):
+        items = [f"\n{' ' * (indent + INDENT)}- {flow_text(item)}" for item in value]
+        return f"{key_text(key)}:{''.join(items)}"
+    return f"{key_text(key)}: {flow_text(value)}"
+
+
+def _block_value(text: str, value: Any, like: SourceNode, indent: int) -> str:
+    """Return the text of a new item: a block mapping if its sibling is one, otherwise on one line."""
+    if like.kind != "mapping" or like.flow or not isinstance(value, dict) or not value:
+        return flow_text(value)
+    lines = []
+    for key, part in value.items():
+        entry = like.entries.get(key)
+        if entry is not None and not entry.value.flow and entry.value.kind == "mapping" and isinstance(part, dict):
+            inner = _block_value(text, part, entry.value, indent + INDENT)
+            lines.append(f"{key_text(key)}:\n{' ' * (indent + INDENT)}{inner}")
+        else:
+            lines.append(f"{key_text(key)}: {flow_text(part)}")
+    return f"\n{' ' * indent}".join(lines)
+
+
+def _separator(text: str, items: Sequence[SourceNode]) -> str:
+    """Return what stands between the last two items, which may be a line break; `, ` if there is a comment."""
+    between = text[items[-2].end : items[-1].start] if len(items) > 1 else ", "
+    return between if between.count(",") == 1 and not between.replace(",", "").strip() else ", "
+
+
+def _has_blank_line(text: str, start: int, end: int) -> bool:
+    return any(not line.strip() for line in text[start:end].split("\n")[1:-1])

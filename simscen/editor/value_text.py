@@ -1,0 +1,138 @@
+"""Write values as YAML text, in the notation of the text that they replace."""
+
+import json
+import math
+import re
+from typing import Any
+
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.spec.quantities import NUMBER_AND_UNIT, UNITS, si_number
+
+DECIMALS = 6
+"""Decimal places of numbers, in their unit."""
+MAX_PADDED_DECIMALS = 3
+"""Numbers keep the decimal places of the number that they replace, up to this many: 1.50 becomes 2.00."""
+SAME_NUMBER = 2e-6
+"""Largest difference between a number and its text, in the unit of the text."""
+
+_PLAIN_NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.([0-9]*))?|\.([0-9]+))")
+_UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
+
+
+def flow_text(value: Any) -> str:
+    """Return a value of numbers, texts, lists, and mappings as YAML on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_text(str(key))}: {flow_text(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(flow_text(one) for one in value) + "]"
+    return scalar_text(value)
+
+
+def scalar_text(value: Any) -> str:
+    """Return a scalar as YAML that is valid everywhere on one line."""
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return number_text(float(value)) if isinstance(value, float) else str(value)
+    return _text(str(value))
+
+
+def replacing_text(value: Any, old: str, style: str) -> str:
+    """Return a scalar as YAML in the notation of the text `old`: with its unit, its decimal places, and its quotes.
+
+    `style` is that of the node of `old`. Numbers are in SI units.
+    """
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        quote = style if style in ("'", '"') else ""
+        inner = old[1:-1] if quote else old
+        text = number_in_unit(float(value), inner)
+        return f"{quote}{text}{quote}" if _unit(inner) else text
+    if isinstance(value, str) and style == "'" and not _UNSAFE.search(value):
+        return "'" + value.replace("'", "''") + "'"
+    if isinstance(value, str) and style == '"':
+        return quoted_text(value)
+    return scalar_text(value)
+
+
+def number_in_unit(value: float, old: str) -> str:
+    """Return a number in SI units as text with the unit and the decimal places of the text `old`."""
+    match = NUMBER_AND_UNIT.fullmatch(old)
+    scale = _scale(_unit(old))
+    if match is None or not scale:
+        plain = _PLAIN_NUMBER.fullmatch(old.strip())
+        return number_text(value, len(plain[1] or plain[2] or "") if plain else 0)
+    decimals = _PLAIN_NUMBER.fullmatch(match[1])
+    number = number_text(value / scale, len(decimals[1] or decimals[2] or "") if decimals else 0)
+    return number + old[match.end(1) :].rstrip()
+
+
+def number_text(value: float, decimals: int = 0) -> str:
+    """Return a number with at least this many decimal places, up to MAX_PADDED_DECIMALS, and no more than needed."""
+    if not math.isfinite(value) or abs(value) >= 1e9 or 0 < abs(value) < 10.0 ** (1 - DECIMALS):
+        return _words(value)
+    number, _, places = f"{value:.{DECIMALS}f}".partition(".")
+    places = places.rstrip("0").ljust(min(decimals, MAX_PADDED_DECIMALS), "0")
+    text = f"{number}.{places}" if places else number
+    return text.removeprefix("-") if float(text) == 0 else text
+
+
+def same_value(found: Any, wanted: Any) -> bool:
+    """Return whether two values are equal, with numbers and texts with units compared as numbers."""
+    if isinstance(found, dict) and isinstance(wanted, dict):
+        return found.keys() == wanted.keys() and all(same_value(found[key], wanted[key]) for key in found)
+    if isinstance(found, list) and isinstance(wanted, list):
+        return len(found) == len(wanted) and all(map(same_value, found, wanted))
+    if found == wanted or found is wanted:
+        return isinstance(found, bool) == isinstance(wanted, bool)
+    if isinstance(found, bool) or isinstance(wanted, bool):
+        return False
+    numbers = si_number(found), si_number(wanted)
+    if not all(isinstance(number, int | float) for number in numbers):
+        return False
+    scale = max((_unit_scale(one) for one in (found, wanted)), default=1.0)
+    return math.isclose(*numbers, rel_tol=1e-9, abs_tol=SAME_NUMBER * scale)
+
+
+def quoted_text(text: str) -> str:
+    """Return a text in double quotes."""
+    return _UNSAFE.sub(lambda found: f"\\u{ord(found[0]):04x}", json.dumps(text, ensure_ascii=False))
+
+
+def key_text(key: str) -> str:
+    """Return the key of a mapping as YAML."""
+    return _text(key)
+
+
+def _text(text: str) -> str:
+    """Return a text without quotes if YAML then reads the same text, also inside of brackets and braces."""
+    if "\n" in text or _UNSAFE.search(text) or text != text.strip():
+        return quoted_text(text)
+    tree, problems = parse_yaml(f"[{{k: {text}}}, {{{text}: 1}}]", "")
+    if problems or tree is None or tree.plain != [{"k": text}, {text: 1}]:
+        return quoted_text(text)
+    return text
+
+
+def _unit(text: str) -> str:
+    """Return the known unit of a text such as "2.5 m"; "" if it has none."""
+    match = NUMBER_AND_UNIT.fullmatch(text)
+    return match[2] if match and _scale(match[2]) else ""
+
+
+def _scale(unit: str) -> float:
+    return next((units[unit] for units in UNITS.values() if unit in units), 0.0)
+
+
+def _unit_scale(value: Any) -> float:
+    unit = _unit(value) if isinstance(value, str) else ""
+    return _scale(unit) if unit else 1.0
+
+
+def _words(value: float) -> str:
+    if math.isnan(value):
+        return ".nan"
+    if math.isinf(value):
+        return ".inf" if value > 0 else "-.inf"
+    return repr(value)
