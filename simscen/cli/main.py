@@ -38,6 +38,7 @@ COMMANDS = {
     "localize": "Run a localizer on a recorded drive.",
     "log": "Recover damaged logs and write layouts for viewers.",
     "new": "Write a commented scenario to start from.",
+    "edit": "Edit a scenario or a world on its map, in a browser.",
     "explain": "Explain a key, criterion, fault, signal, metric, component, or code.",
     "schema": "Print or write the JSON Schemas that editors use.",
     "completion": "Print the shell completion script.",

@@ -7,7 +7,7 @@ from simscen.loading.yaml.tree import Key, dotted_path
 
 
 class EditRefused(Exception):
-    """An edit is impossible without changing other parts of the text; the message says why, for the person who edits."""
+    """An edit is impossible without changing other parts of the text; the message says why."""
 
 
 class Splice(NamedTuple):

@@ -87,7 +87,12 @@ def _independent_splices(text: str, source: SourceNode, edits: Sequence[Edit]) -
     found: list[Splice] = []
     for edit in edits:
         node = source_at(source, edit.keys) if isinstance(edit, SetValue) else None
-        if node is None or node.kind != "scalar" or not isinstance(edit, SetValue) or isinstance(edit.value, dict | list):
+        if (
+            node is None
+            or node.kind != "scalar"
+            or not isinstance(edit, SetValue)
+            or isinstance(edit.value, dict | list)
+        ):
             break
         splice = _replacement(text, node, edit.value)
         if any(other.start < splice.end and splice.start < other.end for other in found):
@@ -125,7 +130,9 @@ def _set(text: str, source: SourceNode, keys: tuple[Key, ...], value: Any, order
         for key in reversed(missing[1:]):
             value = {key: value}
         if parent.kind == "mapping":
-            return inserted_entry(text, parent, str(missing[0]), value, order if len(missing) == 1 or depth == 0 else ())
+            return inserted_entry(
+                text, parent, str(missing[0]), value, order if len(missing) == 1 or depth == 0 else ()
+            )
         if parent.kind == "scalar" and text[parent.start : parent.end] in ("", "~", "null"):
             return _replacement(text, parent, {missing[0]: value})
         break

@@ -24,6 +24,10 @@ Bounds = tuple[float, float, float, float]
 class WorldCache:
     """Caches built worlds, and the shortest paths of discs in them."""
 
+    `max_worlds` limits the number of worlds; the oldest ones are forgotten.
+    """
+
+    max_worlds: int = 100_000
     _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
     _simple_paths: list[tuple[tuple[Solid, ...], float, tuple[float, float], SimplePaths | None]] = field(
         default_factory=list
@@ -39,7 +43,7 @@ class WorldCache:
             with collect_read_files() as read:
                 world = load_world(loaded)
             known = loaded.world, world, read
-            self._worlds.append(known)
+            self._worlds = [*self._worlds[-self.max_worlds + 1 :], known]
         for file in sorted(known[2]):
             record_read_file(file)
         return known[1]

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import yaml
 from yaml import events as ev
@@ -113,6 +113,5 @@ class _Composer:
         return start + len(self._text[start:end].rstrip())
 
 
-def _index(mark: yaml.Mark | None) -> int:
-    assert mark is not None
+def _index(mark: Any) -> int:
     return int(mark.index)

@@ -67,6 +67,10 @@ class ShortestPaths:
         path = self.path(start, goal)
         return math.inf if path is None else polyline_length(path)
 
+    def clearances(self, points: Array) -> Array:
+        """Return the distances (n,) in m from points (n, 2) to the nearest solid; negative inside of solids."""
+        return self._field.exact(points)
+
     def leg(self, start: Pose2, goal: Pose2, name: str) -> Leg:
         """Return the shortest path to the goal `name`; if there is none, length inf and the gap that is too narrow."""
         path = self.path(start, goal)

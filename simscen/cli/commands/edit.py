@@ -1,0 +1,138 @@
+"""`simscen edit`."""
+
+import os
+import sys
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from simscen.cli import completions
+from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.session.run_options import LenientOption, RootOption, WorldPathOption
+from simscen.core.errors import InvalidInput, Problem, UsageError
+from simscen.loading.files.discovery import SCENARIO, STUDY, default_root
+
+if TYPE_CHECKING:
+    from simscen.editor.files import EditedFile
+    from simscen.run.process.backend import Backend
+
+SUFFIX = SCENARIO[0]
+
+
+def command(
+    file: Annotated[
+        Path | None, typer.Argument(help="A scenario or a *.world.yaml.", autocompletion=completions.files)
+    ] = None,
+    new: Annotated[bool, typer.Option("--new", help="Start a new scenario; needs --map.")] = False,
+    map_: Annotated[
+        Path | None,
+        typer.Option("--map", help="World of the new scenario: a *.world.yaml, a ROS map (yaml), or an SDF file."),
+    ] = None,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address without opening it.")] = False,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the local server; 0: any free port.")] = 0,
+    root: RootOption = None,
+    world_path: WorldPathOption = None,
+    lenient: LenientOption = False,
+) -> None:
+    """Edit a scenario or a world on its map, in a browser.
+
+    The page shows the map and the text of the file side by side. Changes on the map or in a form change only the values
+    that they are about; comments, order, and formatting stay. Problems are shown while you edit. Nothing is written
+    until you save, and a file that another program changed is not overwritten without asking. Run simulates the text
+    without saving it. The page is served on this machine only, at an address with a secret token, until you press
+    Ctrl-C.
+
+    Exit code 0: ended with Ctrl-C; 2: the file or an option is unusable.
+    """
+    edited, text = _edited_file(file, new, map_, root, tuple(world_path or ()), lenient)
+    from simscen.editor.server import EditorServer
+    from simscen.editor.session import EditorSession
+
+    session = EditorSession(edited, _backend, text, lenient)
+    try:
+        server = EditorServer(session, port)
+    except OSError as error:
+        session.runs.close()
+        raise UsageError(f"port {port} cannot be used: {error.strerror}; choose another with --port") from error
+    with server:
+        print_text(f"editing {escaped(edited.shown)} at {server.url}\npress Ctrl-C to end")
+        sys.stdout.flush()
+        if not no_browser:
+            webbrowser.open(server.url)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            print_text("")
+        finally:
+            session.runs.close()
+
+
+def _backend() -> "Backend":
+    from simscen.cli.session.backends import backend_of
+    from simscen.run.sessions.run_session import SessionOptions
+
+    return backend_of(SessionOptions())
+
+
+def _edited_file(
+    file: Path | None,
+    new: bool,
+    map_: Path | None,
+    root: Path | None,
+    world_path: tuple[Path, ...],
+    lenient: bool,
+) -> tuple["EditedFile", str]:
+    """Return the file to edit, and the text of a new one. Raises UsageError and InvalidInput."""
+    if new != (map_ is not None):
+        raise UsageError("--new and --map belong together: simscen edit --new --map office.yaml [FILE]")
+    if map_ is not None:
+        return _new_file(file, map_, root, world_path, lenient)
+    if file is None:
+        raise UsageError("name the file to edit, or start a new one with --new --map office.yaml")
+    if not file.is_file():
+        what = "it is not a regular file" if file.exists() else "no such file"
+        raise InvalidInput([Problem(str(file), 0, 0, "SC001", what, "start a new one with --new --map office.yaml")])
+    home = root if root is not None else default_root([file])
+    return _file_of_kind(file, home, world_path), ""
+
+
+def _new_file(
+    file: Path | None, map_: Path, root: Path | None, world_path: tuple[Path, ...], lenient: bool
+) -> tuple["EditedFile", str]:
+    from simscen.editor.files import EditedFile
+    from simscen.editor.new_scenario import new_scenario_text
+
+    target = file or Path(f"{map_.name.split('.')[0]}{SUFFIX}")
+    if not target.name.endswith(SCENARIO):
+        target = target.with_name(f"{target.name}{SUFFIX}")
+    if target.exists():
+        raise UsageError(f"{target} already exists; edit it without --new, or choose another name")
+    if not target.absolute().parent.is_dir():
+        raise UsageError(f"{target.parent} is not a folder; create it first")
+    home = root if root is not None else default_root([target, map_])
+    text = new_scenario_text(target, map_, home, world_path, lenient)
+    return EditedFile(_real(target), "scenario", _real_folder(home), world_path), text
+
+
+def _file_of_kind(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
+    from simscen.editor.files import EditedFile
+    from simscen.loading.checks.files import file_kind
+    from simscen.loading.files.assets import GAZEBO
+
+    kind = "scenario" if file.name.endswith((*SCENARIO, *STUDY)) else file_kind(file, root)
+    if kind not in ("scenario", "world") or file.name.endswith(GAZEBO):
+        hint = "edit takes a scenario or a *.world.yaml; for other maps use: simscen edit --new --map FILE"
+        message = f"is a {'Gazebo world' if kind == 'world' else f'{kind} file'}"
+        raise InvalidInput([Problem(str(file), 0, 0, "SC001", message, hint)])
+    return EditedFile(_real(file), kind, _real_folder(root), world_path)
+
+
+def _real(file: Path) -> Path:
+    """Return the absolute path of a file with the symbolic links of its folder resolved, as the loader names it."""
+    return Path(os.path.realpath(file.parent)) / file.name
+
+
+def _real_folder(folder: Path) -> Path:
+    return Path(os.path.realpath(folder))

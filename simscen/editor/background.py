@@ -1,0 +1,102 @@
+"""What the map shows below the things that can be edited: a ROS map as an image, an SDF world as lines."""
+
+import base64
+from dataclasses import dataclass, field, replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
+from simscen.core.errors import InvalidInput
+from simscen.core.geometry.shapes import Solid
+from simscen.loading.builders import load_map, world_from_file
+from simscen.loading.loaded import LoadedWorld
+
+SECTION_HEIGHT_M = 0.2
+"""Height of the cross section of an SDF world: that of a usual lidar."""
+MAX_IMAGE_SIDE = 2048
+"""Maximum number of pixels of the image of a map; larger maps are scaled down."""
+MAX_SEGMENTS = 40_000
+UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 128, 255, 0
+
+
+@dataclass
+class Backgrounds:
+    """Makes backgrounds and keeps the last one, because most edits do not change it."""
+
+    root: Path
+    world_path: tuple[Path, ...] = ()
+    _key: object = None
+    _made: dict[str, Any] = field(default_factory=dict)
+
+    def of(self, source: LoadedWorld | None) -> dict[str, Any]:
+        """Return the background of a world: `id`, `bounds`, and perhaps `image` and `segments`."""
+        files = (
+            ()
+            if source is None
+            else tuple(
+                (str(file), file.stat().st_mtime_ns)
+                for file in (
+                    source.sdf,
+                    source.map.path if source.map else None,
+                    source.map.image if source.map else None,
+                )
+                if file is not None and file.exists()
+            )
+        )
+        if not files or source is None:
+            return {"id": "", "bounds": None}
+        if self._key != files:
+            self._made = {"id": str(hash(files)), "bounds": None, **self._parts(source)}
+            self._key = files
+        return self._made
+
+    def _parts(self, source: LoadedWorld) -> dict[str, Any]:
+        try:
+            if source.map is not None:
+                return _image_part(load_map(source.map))
+            return self._segments_part(source)
+        except InvalidInput:
+            return {}  # `validate` reports it
+
+    def _segments_part(self, source: LoadedWorld) -> dict[str, Any]:
+        from simscen.worlds.geometry.cross_section import section_segments
+        from simscen.worlds.geometry.triangulation import merge_solids
+
+        world = world_from_file(replace(source, spec=None), self.root, self.world_path, lenient=True)
+        bodies = [
+            Solid(solid.shape, body.pose.compose(solid.pose), body.name)
+            for body in world.bodies
+            for solid in body.solids
+        ]
+        solids = (*world.solids, *bodies)
+        if not solids:
+            return {}
+        segments = section_segments(merge_solids(solids), SECTION_HEIGHT_M)[:MAX_SEGMENTS]
+        rounded = np.round(segments.reshape(-1, 4), 3).tolist()
+        return {"bounds": list(world.bounds), "segments": rounded}
+
+
+def _image_part(grid: OccupancyGrid) -> dict[str, Any]:
+    """Return the image of a grid as a PNG in a data URL, with its size in m and the pose of its lower left corner."""
+    from PIL import Image
+
+    shades = np.array([UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY], dtype=np.uint8)
+    kind = np.where(grid.cells < 0, 0, np.where(grid.cells == FREE, 1, 2))
+    image = Image.fromarray(shades[kind][::-1])
+    image.thumbnail((MAX_IMAGE_SIDE, MAX_IMAGE_SIDE))
+    data = BytesIO()
+    image.save(data, "PNG")
+    height, width = (cells * grid.resolution for cells in grid.shape)
+    corners = grid.origin.apply(np.array([[0, 0], [width, 0], [width, height], [0, height]]))
+    (left, low), (right, high) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    return {
+        "bounds": [left, low, right, high],
+        "image": {
+            "url": "data:image/png;base64," + base64.b64encode(data.getvalue()).decode("ascii"),
+            "origin": [grid.origin.x, grid.origin.y, grid.origin.yaw],
+            "size": [width, height],
+        },
+    }

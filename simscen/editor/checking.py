@@ -1,0 +1,68 @@
+"""Problems of a text that is not saved yet: those that `simscen validate` reports."""
+
+from dataclasses import dataclass, field
+
+from simscen.core.errors import InvalidInput, Problem
+from simscen.editor.files import EditedFile
+from simscen.loading.builders import world_from_file
+from simscen.loading.checks.built_world import check_built_world
+from simscen.loading.checks.runner import check_world_file
+from simscen.loading.checks.scene_runner import check_in_world, world_reader_notes
+from simscen.loading.files.single_files import load_world_file
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.scenario import try_variations
+from simscen.loading.variations.naming import VariationProblems, merge_problems
+from simscen.loading.world_cache import WorldCache
+
+CHECKED_VARIATIONS = range(1, 4)
+"""Numbers of the variations that are checked while a text is edited; `simscen validate` checks all of them."""
+
+MAX_WORLDS = 8
+"""Worlds that are kept: each change of an inline world is a new one."""
+
+
+@dataclass
+class TextChecks:
+    """Checks of one file; worlds and shortest paths are kept between two checks."""
+
+    file: EditedFile
+    lenient: bool = False
+    cache: WorldCache = field(default_factory=lambda: WorldCache(MAX_WORLDS))
+
+    def load(self, text: str) -> tuple[LoadedScenario, ...] | list[Problem]:
+        """Return the first variations of a scenario, or its problems."""
+        file = self.file
+        numbers = CHECKED_VARIATIONS
+        loaded = try_variations(file.path, file.root, file.world_path, None, numbers, {file.path: text})
+        if isinstance(loaded, list):
+            return loaded
+        return tuple(one.having(lenient=self.lenient) for one in loaded)
+
+    def problems(self, text: str) -> list[Problem]:
+        """Return all problems of a text, in the order of the file."""
+        try:
+            found = self._scenario(text) if self.file.kind == "scenario" else self._world(text)
+        except InvalidInput as error:
+            found = error.problems
+        return sorted(dict.fromkeys(found))
+
+    def _scenario(self, text: str) -> list[Problem]:
+        loaded = self.load(text)
+        if isinstance(loaded, list):
+            return loaded
+        checked = [VariationProblems(one.variation, one.set_by, self._in_world(one)) for one in loaded]
+        return merge_problems(checked)
+
+    def _in_world(self, loaded: LoadedScenario) -> list[Problem]:
+        try:
+            return [*loaded.notes, *check_in_world(loaded, self.cache)]
+        except InvalidInput as error:
+            return [*loaded.notes, *error.problems]
+
+    def _world(self, text: str) -> list[Problem]:
+        file = self.file
+        source = load_world_file(file.path, file.root, file.world_path, {file.path: text})
+        own = check_world_file(source)
+        world = world_from_file(source, file.root, file.world_path, self.lenient)
+        notes = list(source.map.notes) if source.map else []
+        return [*notes, *own, *check_built_world(world, source), *world_reader_notes(world, source, file.root)]

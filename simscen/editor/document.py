@@ -1,0 +1,93 @@
+"""The file that is edited: read as text, and saved only if nobody changed it meanwhile."""
+
+import hashlib
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from simscen.core.errors import InvalidInput, Problem, UsageError
+from simscen.loading.yaml.textfile import read_text
+from simscen.run.sessions.output_folder import write_atomically
+
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+NEW = ""
+"""Version of a file that does not exist yet."""
+
+
+class Content(NamedTuple):
+    """Text of a file with line breaks as \\n, and its version, which changes with every byte of the file."""
+
+    text: str
+    version: str
+
+
+class ChangedMeanwhile(Exception):
+    """The file was changed, created, or deleted since it was read; `content` is what it is now."""
+
+    def __init__(self, message: str, content: Content) -> None:
+        super().__init__(message)
+        self.content = content
+
+
+@dataclass
+class Document:
+    """A scenario or world file. `shown` is its name in messages.
+
+    Line breaks (\\n or \\r\\n) and a byte order mark stay as they are in the file.
+    """
+
+    path: Path
+    shown: str
+    _line_break: str = "\n"
+    _mark: bytes = b""
+
+    def read(self) -> Content:
+        """Return the content of the file. Raises InvalidInput if it is not a readable text file."""
+        text = read_text(self.path, self.shown)
+        if isinstance(text, Problem):
+            raise InvalidInput([text])
+        raw = self.path.read_bytes()
+        breaks = {"\r\n": raw.count(b"\r\n"), "\n": raw.count(b"\n") - raw.count(b"\r\n")}
+        if (breaks["\r\n"] and breaks["\n"]) or raw.count(b"\r") > breaks["\r\n"]:
+            hint = "convert the file to one kind, for example with dos2unix"
+            raise InvalidInput([Problem(self.shown, 0, 0, "SC002", "the file mixes kinds of line breaks", hint)])
+        self._line_break = "\r\n" if breaks["\r\n"] else "\n"
+        self._mark = BYTE_ORDER_MARK if raw.startswith(BYTE_ORDER_MARK) else b""
+        return Content(text, _version(raw))
+
+    def save(self, text: str, version: str, overwrite: bool = False) -> str:
+        """Replace the content of the file atomically and return its new version.
+
+        Raises ChangedMeanwhile if the file is not the `version` any more, unless `overwrite`; UsageError if the file
+        cannot be written.
+        """
+        if not overwrite and (now := self._current_version()) != version:
+            raise ChangedMeanwhile(self._what_changed(version, now), self._current(now))
+        data = self._mark + text.replace("\n", self._line_break).encode()
+        try:
+            mode = stat.S_IMODE(self.path.stat().st_mode) if self.path.exists() else None
+            write_atomically(self.path, data)
+            if mode is not None:
+                self.path.chmod(mode)
+        except OSError as error:
+            raise UsageError(f"{self.shown}: cannot be written: {error.strerror or error}") from error
+        return _version(data)
+
+    def _current_version(self) -> str:
+        try:
+            return _version(self.path.read_bytes())
+        except OSError:
+            return NEW
+
+    def _current(self, version: str) -> Content:
+        text = read_text(self.path, self.shown) if version != NEW else ""
+        return Content(text if isinstance(text, str) else "", version)
+
+    def _what_changed(self, version: str, now: str) -> str:
+        what = "was created" if version == NEW else "was deleted" if now == NEW else "was changed by another program"
+        return f"{self.shown} {what} since it was opened here; reload it, or overwrite it with your text"
+
+
+def _version(raw: bytes) -> str:
+    return hashlib.sha256(raw).hexdigest()

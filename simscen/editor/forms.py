@@ -1,0 +1,165 @@
+"""Forms for the values of a file, made from its JSON Schema, with the help that `simscen explain` prints."""
+
+import re
+from typing import Any
+
+from simscen.editor.schema_lookup import Schema, alternatives, below_of, resolved, schema_at, schema_of_kind, value_at
+from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at
+from simscen.loading.yaml.tree import Key
+
+MAX_DEPTH = 4
+MAX_ITEMS = 12
+"""Longer lists are edited in the text, or on the map."""
+MAX_TEXT_FIELD = 60
+"""Texts that are longer, or have line breaks, get a field of several lines."""
+PREFERRED = {
+    "name": "new",
+    "description": "description",
+    "keyframes": [[0, 0, 0, 0]],
+    "through": [[0, 0]],
+    "points": [[0, 0], [1, 0]],
+}
+"""First values of keys for which the schema suggests none."""
+
+Keys = tuple[Key, ...]
+_UNIT = re.compile(r"\s*\((?:[a-z ]+), e\.g\. ([^)]*)\)$")
+
+
+def form_data(kind: str, text: str, data: Any, keys: Keys) -> dict[str, Any]:
+    """Return the form of the value at `keys`: its help, its fields, and the keys that can be added.
+
+    `data` is the content of the text with what it extends. The form of the whole file has no nested fields.
+    """
+    root = schema_of_kind(kind)
+    schema = schema_at(root, keys, data)
+    value = value_at(data, keys)
+    form = _Form(root, text, parse_source(text), 1 if not keys else MAX_DEPTH)
+    return form.field(keys, schema, value, required=True, depth=0)
+
+
+class _Form:
+    def __init__(self, root: Schema, text: str, source: SourceNode | None, max_depth: int) -> None:
+        self._root, self._text, self._source, self._max_depth = root, text, source, max_depth
+
+    def field(self, keys: Keys, schema: Schema, value: Any, required: bool, depth: int) -> dict[str, Any]:
+        """Return the field of a value, with the fields in it."""
+        help_, example = _help(schema)
+        written = None if self._source is None or not keys else source_at(self._source, keys)
+        base = {
+            "key": str(keys[-1]) if keys else "",
+            "keys": list(keys),
+            "help": help_,
+            "example": example,
+            "required": required,
+            "written": written is not None or not keys,
+        }
+        if isinstance(value, dict):
+            return {**base, "type": "group", **self._group(keys, schema, value, depth)}
+        if isinstance(value, list):
+            return {**base, "type": "list", **self._list(keys, schema, value, depth)}
+        return {**base, **self._scalar(schema, value, written)}
+
+    def _group(self, keys: Keys, schema: Schema, value: dict[str, Any], depth: int) -> dict[str, Any]:
+        needed = set(schema.get("required", []))
+        shown = [] if depth >= self._max_depth else list(value)
+        if depth == 0 and not keys:
+            shown = [key for key in value if not isinstance(value[key], dict | list)]
+        fields = []
+        for key in shown:
+            below = resolved(self._root, below_of(schema, key), value[key])
+            fields.append(self.field((*keys, key), below, value[key], key in needed, depth + 1))
+        return {"fields": fields, "addable": self._addable(keys, schema, value)}
+
+    def _addable(self, keys: Keys, schema: Schema, value: dict[str, Any]) -> list[dict[str, Any]]:
+        """Return the keys that can be added to a mapping, each with its help and a first value."""
+        choices = alternatives(schema)
+        has_choice = any(choice in value for choice in choices)
+        found = []
+        for key, one in schema.get("properties", {}).items():
+            if key in value or key.endswith("+") or (key in choices and has_choice):
+                continue
+            below = resolved(self._root, one, None)
+            initial = first_value(self._root, below, key)
+            if initial is None or (not keys and isinstance(initial, dict | list)):
+                continue
+            found.append({"key": key, "help": _help(below)[0], "value": initial})
+        return found
+
+    def _list(self, keys: Keys, schema: Schema, value: list[Any], depth: int) -> dict[str, Any]:
+        if len(value) > MAX_ITEMS or depth >= self._max_depth:
+            return {"fields": [], "addable": [], "omitted": len(value)}
+        fields = []
+        for index, item in enumerate(value):
+            below = resolved(self._root, below_of(schema, index), item)
+            fields.append(self.field((*keys, index), below, item, required=False, depth=depth + 1))
+        return {"fields": fields, "addable": []}
+
+    def _scalar(self, schema: Schema, value: Any, written: SourceNode | None) -> dict[str, Any]:
+        if "enum" in schema:
+            return {"type": "choice", "choices": schema["enum"], "value": value}
+        if isinstance(value, bool) or schema.get("type") == "boolean":
+            return {"type": "choice", "choices": [True, False], "value": value}
+        if schema.get("type") == "string" or (isinstance(value, str) and "type" not in schema):
+            text = "" if value is None else str(value)
+            is_long = "\n" in text.strip() or len(text) > MAX_TEXT_FIELD
+            return {"type": "long text" if is_long else "text", "value": text}
+        raw = "" if value is None else str(value)
+        if written is not None and written.kind == "scalar" and not written.style:
+            raw = self._text[written.start : written.end]
+        return {"type": "number", "value": raw}
+
+
+def first_value(root: Schema, schema: Schema, key: str = "", depth: int = 0) -> Any:
+    """Return a valid value for a new key or item as far as the schema says one; None if there is no simple one."""
+    if key in PREFERRED:
+        return PREFERRED[key]
+    if "default" in schema and schema["default"] not in (None, "", [], {}):
+        return schema["default"]
+    if "const" in schema:
+        return schema["const"]
+    if "enum" in schema:
+        return schema["enum"][0]
+    kinds = schema.get("type", "")
+    match kinds[0] if isinstance(kinds, list) and kinds else kinds:
+        case "boolean":
+            return True
+        case "number" | "integer":
+            return _first_number(schema)
+        case "string":
+            return "new"
+        case "array":
+            item = resolved(root, below_of(schema, 0), None)
+            one = first_value(root, item, "", depth + 1) if depth < MAX_DEPTH else None
+            return None if one is None else [one] * max(1, schema.get("minItems", 1))
+        case "object":
+            return _first_mapping(root, schema, depth)
+    return None
+
+
+def _first_mapping(root: Schema, schema: Schema, depth: int) -> Any:
+    if depth >= MAX_DEPTH:
+        return None
+    properties, made = schema.get("properties", {}), {}
+    for key in schema.get("required", []):
+        made[key] = first_value(root, resolved(root, properties.get(key, {}), {}), key, depth + 1)
+        if made[key] is None:
+            return None
+    return made
+
+
+def _first_number(schema: Schema) -> float:
+    low: float = schema["minimum"] if "minimum" in schema else schema.get("exclusiveMinimum", -1.0)
+    high: float = schema["maximum"] if "maximum" in schema else schema.get("exclusiveMaximum", 1.0)
+    if low < 0 or (low == 0 and "exclusiveMinimum" not in schema):
+        return 0
+    return max(1.0, low) if high > max(1.0, low) else (low + high) / 2
+
+
+def _help(schema: Schema) -> tuple[str, str]:
+    """Return the description of a value without the example of a quantity, and that example."""
+    text = " ".join(str(schema.get("description", "")).split(" ")).strip()
+    match = _UNIT.search(text)
+    if match is None:
+        plain = re.fullmatch(r"[a-z ]+, e\.g\. (.*)", text)
+        return ("", plain[1]) if plain else (text, "")
+    return text[: match.start()].strip(), match[1]

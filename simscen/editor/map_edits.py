@@ -1,0 +1,101 @@
+"""Translate what a person does on the map into edits of values of the file."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from simscen.editor.schema_lookup import schema_of_kind
+from simscen.editor.splices import EditRefused
+from simscen.editor.text_edits import AddItem, Edit, RemovePart, SetValue
+from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at
+from simscen.loading.yaml.tree import Key
+
+Keys = tuple[Key, ...]
+
+
+def edits_of(request: Any, text: str, kind: str) -> list[Edit]:
+    """Return the edits that a request of the page describes. Raises EditRefused for a malformed request.
+
+    Each is a mapping with `op` and `keys`: `set`, `add`, and `remove` change any value; `pose`, `point`, and
+    `keyframe` set a position in m and a heading in rad.
+    """
+    if not isinstance(request, list):
+        raise EditRefused("the request has no list of edits")
+    order = tuple(schema_of_kind(kind)["properties"])
+    source = parse_source(text)
+    return [edit for one in request for edit in _edits_of_one(one, source, order)]
+
+
+def _edits_of_one(one: Any, source: SourceNode | None, order: tuple[str, ...]) -> Iterator[Edit]:
+    if not isinstance(one, dict):
+        raise EditRefused("an edit must be a mapping")
+    keys = _keys(one.get("keys"))
+    match one.get("op"):
+        case "set":
+            yield SetValue(keys, one.get("value"), order)
+        case "add":
+            index = one.get("index")
+            yield AddItem(keys, one.get("value"), index if isinstance(index, int) else None, order)
+        case "remove":
+            yield RemovePart(keys)
+        case "pose":
+            yield from _pose(keys, _number(one, "x"), _number(one, "y"), _yaw(one), source, order)
+        case "point":
+            yield from _point(keys, {0: _number(one, "x"), 1: _number(one, "y")}, source)
+        case "keyframe":
+            yaw = _yaw(one)
+            axes = {1: _number(one, "x"), 2: _number(one, "y")}
+            yield from _point(keys, axes if yaw is None else {**axes, 3: yaw}, source)
+        case _:
+            raise EditRefused("unknown kind of edit")
+
+
+def _pose(
+    keys: Keys, x: float, y: float, yaw: float | None, source: SourceNode | None, order: tuple[str, ...]
+) -> Iterator[Edit]:
+    node = None if source is None else source_at(source, keys)
+    if node is not None and node.kind == "mapping":
+        yield SetValue((*keys, "x"), x)
+        yield SetValue((*keys, "y"), y)
+        if yaw is not None:
+            yield SetValue((*keys, "yaw"), yaw if "yaw" in node.entries else degrees_text(yaw))
+        return
+    pose: dict[str, Any] = {"x": x, "y": y} if not yaw else {"x": x, "y": y, "yaw": degrees_text(yaw)}
+    above = None if source is None or node is not None else source_at(source, keys[:-1])
+    if above is not None and above.kind == "scalar" and keys[-1] == "pose":
+        yield SetValue(keys[:-1], {"pose": pose})  # the name of a place instead of a goal
+    else:
+        yield SetValue(keys, pose, order)
+
+
+def _point(keys: Keys, axes: dict[int, float], source: SourceNode | None) -> Iterator[Edit]:
+    node = None if source is None else source_at(source, keys)
+    if node is not None and node.kind == "sequence":
+        for index, value in axes.items():
+            yield SetValue((*keys, index), value)
+    else:
+        yield SetValue(keys, [axes[0], axes[1]] if 0 in axes else list(axes.values()))
+
+
+def degrees_text(yaw: float) -> str:
+    """Return an angle in rad as text in degrees."""
+    return f"{round(math.degrees(yaw), 3):g} deg"
+
+
+def _keys(value: Any) -> Keys:
+    if not isinstance(value, list) or not all(
+        isinstance(key, str) or (isinstance(key, int) and not isinstance(key, bool) and key >= 0) for key in value
+    ):
+        raise EditRefused("an edit needs a list of keys")
+    return tuple(value)
+
+
+def _number(one: dict[str, Any], key: str) -> float:
+    value = one.get(key)
+    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+        raise EditRefused(f"an edit needs a number `{key}`")
+    return value
+
+
+def _yaw(one: dict[str, Any]) -> float | None:
+    return None if one.get("yaw") is None else _number(one, "yaw")

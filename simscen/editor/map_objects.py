@@ -1,0 +1,152 @@
+"""The things of a scenario or a world that a map can show: their handles, outlines, lines, circles, and regions.
+
+They are read from plain data, not from a valid specification, so that the map also shows a file with problems. What
+cannot be read is left out.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from simscen.loading.yaml.tree import Key
+from simscen.spec.quantities import si_number
+
+Keys = tuple[Key, ...]
+Form = Literal["pose", "point", "keyframe"]
+Corners = list[tuple[float, float]]
+CIRCLE_CORNERS = 24
+PERSON_RADIUS_M = 0.25
+MAX_OBJECTS = 3000
+"""Maximum number of things on a map."""
+
+
+@dataclass(frozen=True)
+class Handle:
+    """Point that can be dragged: position in m, heading in rad if it has one, and what is written at `keys`."""
+
+    keys: Keys
+    form: Form
+    x: float
+    y: float
+    yaw: float | None = None
+    place: str = ""
+    """Name of the place that is written instead of numbers."""
+
+
+@dataclass(frozen=True)
+class MapObject:
+    """Thing on the map; `keys` lead to the value that its form shows.
+
+    `parts` are outlines in the frame of the first handle, `line` connects the handles, `radius` is that of a circle
+    around the first handle and is written at `radius_keys`, `region` is the name of a region that it refers to, and
+    `follows` that of an object. With `whole`, dragging the object moves all its handles. `origin` is where the line
+    begins.
+    """
+
+    keys: Keys
+    kind: str
+    label: str
+    handles: tuple[Handle, ...] = ()
+    parts: list[Corners] = field(default_factory=list)
+    line: Literal["", "open", "closed"] = ""
+    radius: float | None = None
+    radius_keys: Keys = ()
+    region: str = ""
+    follows: str = ""
+    whole: bool = False
+    origin: tuple[float, float] | None = None
+    points_keys: Keys = ()
+    """Keys of the list of the handles, if points can be added and removed."""
+    width: float = 0.0
+    """Width of the line in m."""
+
+
+Places = Mapping[str, tuple[float, float, float]]
+
+
+def number(value: Any) -> float | None:
+    """Return a number, or a text with a unit in SI units; None for anything else."""
+    found = si_number(value)
+    usable = isinstance(found, int | float) and not isinstance(found, bool) and math.isfinite(found)
+    return float(found) if usable else None
+
+
+def items(value: Any) -> list[Any]:
+    """Return a list, or an empty list for anything else."""
+    return value if isinstance(value, list) else []
+
+
+def mapping(value: Any) -> dict[str, Any]:
+    """Return a mapping, or an empty mapping for anything else."""
+    return value if isinstance(value, dict) else {}
+
+
+def pose_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
+    """Return the handle of a pose or of the name of a place; () if there is no position."""
+    if isinstance(value, str):
+        found = places.get(value)
+        return (Handle(keys, "pose", *found, value),) if found else ()
+    x, y, yaw = (number(mapping(value).get(key, default)) for key, default in (("x", None), ("y", None), ("yaw", 0.0)))
+    return () if x is None or y is None else (Handle(keys, "pose", x, y, yaw or 0.0),)
+
+
+def point_handles(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
+    """Return the handles of a list of points; the unusable ones are left out."""
+    return tuple(
+        handle for index, one in enumerate(items(value)) for handle in point_handle(one, (*keys, index), places)
+    )
+
+
+def point_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
+    """Return the handle of a point [x, y] or of the name of a place; () if there is no position."""
+    if isinstance(value, str):
+        found = places.get(value)
+        return (Handle(keys, "point", found[0], found[1], None, value),) if found else ()
+    axes = [number(axis) for axis in items(value)]
+    if len(axes) != 2 or axes[0] is None or axes[1] is None:
+        return ()
+    return (Handle(keys, "point", axes[0], axes[1]),)
+
+
+def keyframe_handles(value: Any, keys: Keys) -> tuple[Handle, ...]:
+    """Return the handles of keyframes [t, x, y, yaw]."""
+    found = []
+    for index, one in enumerate(items(value)):
+        axes = [number(axis) for axis in items(one)]
+        if len(axes) == 4 and axes[1] is not None and axes[2] is not None:
+            found.append(Handle((*keys, index), "keyframe", axes[1], axes[2], axes[3] or 0.0))
+    return tuple(found)
+
+
+def outline(thing: Mapping[str, Any]) -> list[Corners]:
+    """Return the outline of a box, a cylinder, or a polygon in the frame of the object."""
+    box = [number(side) for side in items(thing.get("box"))]
+    if len(box) == 3 and box[0] and box[1]:
+        x, y = box[0] / 2, box[1] / 2
+        return [[(-x, -y), (x, -y), (x, y), (-x, y)]]
+    cylinder = [number(side) for side in items(thing.get("cylinder"))]
+    if cylinder and cylinder[0]:
+        return [circle(cylinder[0])]
+    corners = point_handles(thing.get("polygon"), (), {})
+    return [[(corner.x, corner.y) for corner in corners]] if len(corners) > 2 else []
+
+
+def circle(radius: float) -> Corners:
+    """Return a circle around the origin as a polygon."""
+    turns = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
+    return [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]
+
+
+def motion_path(
+    value: Any, keys: Keys, label: str, places: Places, origin: Handle | None = None
+) -> Iterator[MapObject]:
+    """Yield the path of a motion through waypoints or keyframes."""
+    motion = mapping(value)
+    start = None if origin is None else (origin.x, origin.y)
+    if through := point_handles(motion.get("through"), (*keys, "through"), places):
+        is_loop: Literal["open", "closed"] = "closed" if motion.get("repeat") == "loop" and start is None else "open"
+        yield MapObject(keys, "path", label, through, line=is_loop, origin=start, points_keys=(*keys, "through"))
+    elif keyframes := keyframe_handles(motion.get("keyframes"), (*keys, "keyframes")):
+        begins_there = number(items(items(motion.get("keyframes"))[0])[0]) == 0
+        yield MapObject(keys, "path", label, keyframes, line="open", origin=None if begins_there else start)

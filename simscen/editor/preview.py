@@ -1,0 +1,95 @@
+"""Shortest paths and clearances of the robots of a scenario, for the map while something is dragged."""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.shapes import Solid
+from simscen.editor.checking import TextChecks
+from simscen.grid_graph import polyline_length
+from simscen.loading.checks.scene import Scene
+from simscen.loading.goals import scenario_goals
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.robot_size import RobotSize, blocking_world, robot_size
+from simscen.loading.world_cache import bounds_with
+from simscen.worlds.routes.shortest_paths import ShortestPaths
+
+OUTLINE_STEP_M = 0.05
+"""Distance between the points of a footprint at which the clearance is measured."""
+MAX_LEGS = 40
+FAR_M = 1000.0
+"""Clearances beyond this are not shown: there is nothing around."""
+
+
+def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
+    """Return, for each robot by key, its footprint, the path through its goals, and its clearance at each stop.
+
+    A text with problems gives the data `reason`.
+    """
+    loaded = checks.load(text)
+    if isinstance(loaded, list):
+        return {"reason": _reason(loaded), "robots": {}}
+    first, robots = loaded[0], {}
+    try:
+        for name, view in first.each.items():
+            key = f"robots/{name}" if first.robots else "robot"
+            robots[key] = _robot_data(view, checks)
+    except InvalidInput as error:
+        return {"reason": _reason(error.problems), "robots": {}}
+    return {"reason": "", "robots": robots}
+
+
+def _reason(problems: Sequence[Problem]) -> str:
+    first = min(problems)
+    return f"No path is shown until this is corrected: line {first.line}: {first.message}"
+
+
+def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:
+    world = checks.cache.world(loaded)
+    size = robot_size(loaded)
+    scene = Scene(loaded, blocking_world(loaded, world), size, checks.cache)
+    goals = scenario_goals(loaded.spec)[: len(loaded.spec.goals)]
+    stops = [scene.start, *(goal.pose for goal in goals)]
+    solids = _standing_solids(scene)
+    ways = checks.cache.ways(solids, bounds_with(world.bounds, stops), size.inscribed, scene.z_range)
+    legs = [_leg(ways, *ends) for ends in list(pairwise(stops))[:MAX_LEGS]]
+    return {
+        "footprint": [[round(x, 4), round(y, 4)] for x, y in size.footprint],
+        "legs": legs,
+        "clearances": [_clearance(ways, size, stop) for stop in stops],
+    }
+
+
+def _standing_solids(scene: Scene) -> tuple[Solid, ...]:
+    """Return what blocks the robot: fixed solids, and bodies that nothing moves. Equal scenes give the same tuple."""
+    moved = scene.immovable_bodies
+    return (*scene.world.solids, *moved) if moved else scene.world.solids
+
+
+def _leg(ways: ShortestPaths, start: Pose2, goal: Pose2) -> dict[str, Any]:
+    way = ways.way(start, goal)
+    if way is None:
+        return {"points": [[start.x, start.y], [goal.x, goal.y]], "length": None}
+    return {"points": np.round(way, 3).tolist(), "length": round(polyline_length(way), 2)}
+
+
+def _clearance(ways: ShortestPaths, size: RobotSize, pose: Pose2) -> float | None:
+    """Return the distance in m from the footprint at a pose to the nearest solid; negative if they overlap."""
+    if size.radius is not None:
+        nearest = float(ways.clearances(np.array([[pose.x, pose.y]]))[0]) - size.radius
+    else:
+        nearest = float(ways.clearances(pose.apply(np.array(list(_outline_points(size))))).min())
+    return None if not math.isfinite(nearest) or nearest > FAR_M else round(nearest, 3)
+
+
+def _outline_points(size: RobotSize) -> Iterator[Array]:
+    yield np.zeros(2)
+    ends = (*size.footprint[1:], size.footprint[0])
+    for a, b in zip(size.footprint, ends, strict=True):
+        count = max(1, math.ceil(math.dist(a, b) / OUTLINE_STEP_M))
+        yield from np.linspace(a, b, count, endpoint=False)

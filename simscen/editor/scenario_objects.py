@@ -1,0 +1,169 @@
+"""The things of a scenario on the map: robots, goals, people, spawned objects, triggers, zones, and all other parts."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from simscen.editor.map_objects import (
+    PERSON_RADIUS_M,
+    Keys,
+    MapObject,
+    Places,
+    circle,
+    items,
+    mapping,
+    motion_path,
+    number,
+    outline,
+    point_handle,
+    point_handles,
+    pose_handle,
+)
+
+SETTINGS = "settings"
+"""Kind of the entry for the keys of the scenario itself."""
+POSE_ACTIONS = {"teleport": "teleport", "kidnap": "kidnap", "new_goal": "goal"}
+CONDITIONS = {"all", "any"}
+
+
+def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject]:
+    """Yield the things of a scenario without those of its world."""
+    yield MapObject((), SETTINGS, str(data.get("name", "scenario")))
+    robots = mapping(data.get("robots"))
+    if not robots:
+        yield from _robot(mapping(data.get("robot")), ("robot",), "robot", places)
+        yield from _goals(data.get("goals"), ("goals",), "", places)
+    for name, robot in robots.items():
+        own: Keys = ("robots", name)
+        yield from _robot(mapping(robot), own, f"robot {name}", places)
+        yield from _goals(mapping(robot).get("goals"), (*own, "goals"), f"{name}: ", places)
+        yield from _zones(mapping(robot), own, f"{name}: ")
+        yield from _faults(mapping(robot), own, places)
+    for index, event in enumerate(map(mapping, items(data.get("events")))):
+        own = ("events", index)
+        label = str(event.get("name", f"event-{index + 1}"))
+        yield MapObject(own, "event", label)
+        yield from _event(event, own, label, places)
+        for number_, step in enumerate(map(mapping, items(event.get("then")))):
+            yield from _event(
+                step, (*own, "then", number_), str(step.get("name", f"{label} then {number_ + 1}")), places
+            )
+    yield from _zones(data, (), "")
+    yield from _faults(data, (), places)
+    for index, criterion in enumerate(map(mapping, items(data.get("pass")))):
+        region = _region_of(criterion)
+        yield MapObject(("pass", index), "criterion", _title(criterion), region=region)
+
+
+def _robot(robot: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
+    yield MapObject(keys, "robot", label, pose_handle(robot.get("pose"), (*keys, "pose"), places))
+    own = (*keys, "initial_estimate")
+    if estimate := pose_handle(robot.get("initial_estimate"), own, places):
+        yield MapObject(own, "estimate", f"initial estimate of {label}", estimate)
+
+
+def _goals(value: Any, keys: Keys, prefix: str, places: Places) -> Iterator[MapObject]:
+    for index, goal in enumerate(items(value)):
+        own = (*keys, index)
+        pose = goal if isinstance(goal, str) else mapping(goal).get("pose")
+        default = pose if isinstance(pose, str) else f"goal-{index + 1}"
+        label = f"{prefix}goal {mapping(goal).get('name', default)}"
+        radius = number(mapping(goal).get("xy_tolerance"))
+        radius_keys = (*own, "xy_tolerance") if radius is not None else ()
+        handle = pose_handle(pose, (*own, "pose"), places)
+        yield MapObject(own, "goal", label, handle, radius=radius, radius_keys=radius_keys)
+
+
+def _event(event: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
+    yield from _triggers(event.get("when"), (*keys, "when"), f"trigger of {label}", places)
+    actions = event.get("do")
+    written: list[tuple[Keys, Any]] = [(("do", index), action) for index, action in enumerate(items(actions))]
+    if isinstance(actions, dict):
+        written = [(("do",), actions)]
+    for own, action in written:
+        for kind, value in mapping(action).items():
+            yield from _action(kind, mapping(value), (*keys, *own, kind), label, places)
+
+
+def _action(kind: str, action: dict[str, Any], keys: Keys, event: str, places: Places) -> Iterator[MapObject]:
+    """Yield what an action shows on the map, at least an entry of the list."""
+    handle = pose_handle(action.get("pose"), (*keys, "pose"), places)
+    name = str(action.get("name", ""))
+    if kind == "spawn":
+        yield MapObject(keys, "spawn", name or kind, handle, outline(action))
+    elif kind == "pedestrian":
+        goals = point_handles(action.get("goals"), (*keys, "goals"), places)
+        body = [circle(number(action.get("radius")) or PERSON_RADIUS_M)]
+        points = (*keys, "goals")
+        yield MapObject(keys, "person", name or kind, (*handle, *goals), body, "open", points_keys=points)
+    elif kind in POSE_ACTIONS:
+        label = f"goal {name}" if kind == "new_goal" else f"{kind} {name}".strip()
+        yield MapObject(keys, POSE_ACTIONS[kind], f"{label} of {event}", handle)
+    elif kind == "move":
+        found = list(motion_path(action, keys, f"path of {name}", places))
+        yield from found or [MapObject(keys, "action", f"move {name}")]
+    elif kind != "robot":
+        yield replace(_patch(action, keys, places), label=f"{kind} {name}".strip())
+
+
+def _patch(action: dict[str, Any], keys: Keys, places: Places) -> MapObject:
+    """Return an action on a region, or on a disc of floor."""
+    region = action.get("region", action.get("start"))
+    center = point_handle(action.get("at"), (*keys, "at"), places)
+    radius = number(action.get("radius")) if center else None
+    radius_keys = (*keys, "radius") if radius is not None else ()
+    named = region if isinstance(region, str) else ""
+    return MapObject(keys, "action", "", center, radius=radius, radius_keys=radius_keys, region=named)
+
+
+def _triggers(value: Any, keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
+    """Yield the places at which a trigger, or a condition in it, becomes true."""
+    for kind, condition in mapping(value).items():
+        own, said = (*keys, kind), mapping(condition)
+        if kind in CONDITIONS:
+            for index, part in enumerate(items(condition)):
+                yield from _triggers(part, (*own, index), label, places)
+        elif kind == "not":
+            yield from _triggers(condition, own, f"{label} (not)", places)
+        elif kind == "robot_in":
+            yield MapObject(own, "trigger", label, region=str(said.get("region", "")))
+        elif kind == "robot_within":
+            center = point_handle(said.get("of"), (*own, "of"), places)
+            yield MapObject(
+                own,
+                "trigger",
+                label,
+                center,
+                radius=number(said.get("distance")),
+                radius_keys=(*own, "distance"),
+                region=str(said.get("region", "")),
+                follows=str(said.get("object", "")),
+            )
+
+
+def _zones(data: dict[str, Any], keys: Keys, prefix: str) -> Iterator[MapObject]:
+    stack = mapping(data.get("stack"))
+    for index, region in enumerate(items(stack.get("keepout"))):
+        own = (*keys, "stack", "keepout", index)
+        yield MapObject(own, "keepout", f"{prefix}keepout zone {region}", region=str(region))
+    for index, zone in enumerate(map(mapping, items(stack.get("speed_zones")))):
+        own, region = (*keys, "stack", "speed_zones", index), str(zone.get("region", ""))
+        yield MapObject(own, "speed zone", f"{prefix}speed zone {region}", region=region)
+
+
+def _faults(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObject]:
+    for index, fault in enumerate(map(mapping, items(data.get("faults")))):
+        own = (*keys, "faults", index)
+        label = str(fault.get("name", f"{fault.get('sensor', 'fault')} {_title(fault, ('name', 'sensor'))}"))
+        yield MapObject(own, "fault", label)
+        yield from _triggers(fault.get("when"), (*own, "when"), f"trigger of {label}", places)
+
+
+def _title(entry: dict[str, Any], without: tuple[str, ...] = ("id", "severity", "robot")) -> str:
+    return next((key for key in entry if key not in without), "entry")
+
+
+def _region_of(criterion: dict[str, Any]) -> str:
+    chosen = mapping(criterion.get(_title(criterion)))
+    region = chosen.get("region", chosen.get("in"))
+    return region if isinstance(region, str) else ""

@@ -1,0 +1,199 @@
+"""What the page shows of a text: the things on the map, the robots, the background, and where each thing is written."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from simscen.core.errors import InvalidInput, Problem
+from simscen.editor.background import Backgrounds
+from simscen.editor.files import EditedFile
+from simscen.editor.map_objects import MAX_OBJECTS, Handle, Keys, MapObject, mapping
+from simscen.editor.scenario_objects import scenario_objects
+from simscen.editor.world_objects import world_objects, world_places
+from simscen.loading.files.assets import Assets
+from simscen.loading.loaded import LoadedRobot, LoadedWorld
+from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at
+from simscen.loading.yaml.tree import MappingNode, Position, ScalarNode, child, key_position, node_at, value_position
+
+
+@dataclass(frozen=True)
+class SceneParts:
+    """A text with the files that it names, as far as they can be read."""
+
+    file: EditedFile
+    text: str
+    tree: MappingNode
+    assets: Assets
+    world: LoadedWorld | None
+    is_inline: bool
+
+    @property
+    def world_data(self) -> dict[str, Any]:
+        """The data of the world file or of the inline world."""
+        if self.is_inline:
+            return mapping(self.tree.plain if self.file.kind == "world" else mapping(self.tree.plain).get("world"))
+        tree = None if self.world is None else self.world.tree
+        return {} if tree is None else mapping(tree.plain)
+
+
+def scene_parts(file: EditedFile, text: str) -> SceneParts | None:
+    """Read a text and the world that it names; None if it is not a YAML mapping."""
+    library = file.library(text)
+    tree, _ = library.read(file.path, defaults=file.kind == "scenario")
+    if not isinstance(tree, MappingNode):
+        return None
+    assets = Assets(library)
+    node = child(tree, "world") if file.kind == "scenario" else tree
+    world, is_inline = None, isinstance(node, MappingNode)
+    try:
+        if file.kind == "world":
+            world = assets.world_file(file.path)
+        elif isinstance(node, ScalarNode) and isinstance(node.value, str):
+            world = assets.world(node)
+        elif isinstance(node, MappingNode):
+            world = _inline_world(assets, node, file)
+    except (InvalidInput, OSError):
+        pass  # `validate` reports it
+    return SceneParts(file, text, tree, assets, world, is_inline)
+
+
+def _inline_world(assets: Assets, node: MappingNode, file: EditedFile) -> LoadedWorld | None:
+    from simscen.loading.schema.validate import check
+    from simscen.model.world import WorldSpec
+
+    spec = check(WorldSpec, node)
+    return None if isinstance(spec, list) else assets.own_world(spec, node, file.path)
+
+
+def map_objects(parts: SceneParts) -> list[MapObject]:
+    """Return everything that the map or the list of the page shows, in the order of the language."""
+    data, places = parts.tree.plain, world_places(parts.world_data)
+    found: list[MapObject] = []
+    if parts.file.kind == "scenario":
+        found += scenario_objects(data, places)
+    found += world_objects(parts.world_data, _world_keys(parts), places)
+    return found[:MAX_OBJECTS]
+
+
+def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
+    """Return what the page shows, as JSON data."""
+    own = parse_source(parts.text)
+    shown = parts.file.shown
+    return {
+        "kind": parts.file.kind,
+        "objects": [_object_data(one, parts, own) for one in map_objects(parts)],
+        "regions": {
+            name: [[handle.x, handle.y] for handle in one.handles]
+            for one in world_objects(parts.world_data, (), {})
+            if one.kind == "region" and (name := one.label)
+        },
+        "places": sorted(world_places(parts.world_data)),
+        "inline": parts.is_inline,
+        "world_file": _world_file(parts, shown),
+        "background": backgrounds.of(parts.world),
+    }
+
+
+def _world_keys(parts: SceneParts) -> Keys:
+    return () if parts.file.kind == "world" else ("world",)
+
+
+def _world_file(parts: SceneParts, shown: str) -> str:
+    """Return the name of the world file if the things of the world are written there; "" otherwise."""
+    if parts.is_inline or parts.world is None:
+        return ""
+    name = parts.assets.library.fence.shown(parts.world.path)
+    return "" if name == shown else name
+
+
+def _object_data(one: MapObject, parts: SceneParts, own: SourceNode | None) -> dict[str, Any]:
+    is_here, line = _own_line(one.keys, parts, own)
+    return {
+        "id": "/".join(map(str, one.keys)) or "settings",
+        "keys": list(one.keys),
+        "kind": one.kind,
+        "label": one.label,
+        "handles": [_handle_data(handle) for handle in one.handles],
+        "parts": [[[round(x, 4), round(y, 4)] for x, y in part] for part in one.parts],
+        "line": one.line,
+        "radius": one.radius,
+        "radius_keys": list(one.radius_keys),
+        "region": one.region,
+        "follows": one.follows,
+        "whole": one.whole,
+        "origin": one.origin,
+        "points_keys": list(one.points_keys),
+        "width": one.width,
+        "editable": is_here,
+        "at": line,
+    }
+
+
+def _handle_data(handle: Handle) -> dict[str, Any]:
+    return {
+        "keys": list(handle.keys),
+        "form": handle.form,
+        "x": round(handle.x, 6),
+        "y": round(handle.y, 6),
+        "yaw": None if handle.yaw is None else round(handle.yaw, 8),
+        "place": handle.place,
+    }
+
+
+def _own_line(keys: Keys, parts: SceneParts, own: SourceNode | None) -> tuple[bool, int]:
+    """Return whether the thing is written in this text, or can be, and its line (0: elsewhere)."""
+    if own is None or (not parts.is_inline and parts.file.kind == "scenario" and keys[:1] == ("world",)):
+        return False, 0
+    place = _written_at(parts.tree, keys)
+    here = place.path == parts.file.shown and source_at(own, keys) is not None
+    line = place.line if here and keys else 0
+    if any(isinstance(key, int) for key in keys):
+        return here, line
+    return True, line
+
+
+def _written_at(tree: MappingNode, keys: Keys) -> Position:
+    return key_position(tree, keys) if keys and isinstance(keys[-1], str) else value_position(tree, keys)
+
+
+def robot_files(parts: SceneParts) -> Iterator[tuple[str, LoadedRobot]]:
+    """Yield the key of each robot of a scenario, and its file if that can be read."""
+    for key in _robot_keys(parts.tree):
+        node = node_at(parts.tree, key)
+        model = child(node, "model")
+        written = model.value if isinstance(model, ScalarNode) and isinstance(model.value, str) else "turtlebot"
+        try:
+            robot = parts.assets.robot(written, value_position(parts.tree, key))
+        except (InvalidInput, OSError):
+            continue
+        if robot is not None:
+            yield "/".join(map(str, key)), robot
+
+
+def _robot_keys(tree: MappingNode) -> list[Keys]:
+    robots = child(tree, "robots")
+    if isinstance(robots, MappingNode):
+        return [("robots", name) for name in robots.entries]
+    return [("robot",)]
+
+
+def problem_keys(
+    problem: Problem, file: EditedFile, objects: list[MapObject], own: SourceNode | None, text: str
+) -> str:
+    """Return the id of the smallest thing whose text contains the position of a problem; "" if there is none."""
+    if problem.path != file.shown or not problem.line or own is None:
+        return ""
+    lines = text.split("\n")
+    index = sum(len(line) + 1 for line in lines[: problem.line - 1]) + max(problem.col - 1, 0)
+    best, size = "", len(text) + 1
+    for one in objects:
+        node = source_at(own, one.keys) if one.keys else None
+        if node is not None and _contains(node, index, text) and node.end - node.start < size:
+            best, size = "/".join(map(str, one.keys)), node.end - node.start
+    return best
+
+
+def _contains(node: SourceNode, index: int, text: str) -> bool:
+    """Return whether a position is in a node, or on its first line before it, such as on its key."""
+    start = text.rfind("\n", 0, node.start) + 1
+    return start <= index <= node.end

@@ -1,0 +1,187 @@
+"""The local web server of the editor. It answers only requests that know the secret part of its address."""
+
+import json
+import re
+import secrets
+import sys
+import traceback
+from html import unescape
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any, NamedTuple
+
+from simscen.core.version import PACKAGE
+from simscen.editor.session import EditorSession, RequestRefused
+from simscen.report.picture.palette import css_variables
+
+ADDRESS = "127.0.0.1"
+FOLDER = PACKAGE / "data" / "editor"
+REPLAY_FOLDER = PACKAGE / "data" / "replay"
+SHARED_MODULES = ("camera.js", "dom.js")
+"""Modules of the replay page that this page uses as well."""
+MAX_REQUEST_BYTES = 4 << 20
+TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; frame-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
+)
+_REPLAY = re.compile(r"runs/([0-9]{1,6})/replay\.html")
+_PAGE_POLICY = re.compile(r'http-equiv="Content-Security-Policy" content="([^"]*)"')
+
+
+class Answer(NamedTuple):
+    """An answer of the server; `policy` is its Content-Security-Policy."""
+
+    body: bytes
+    content_type: str
+    status: int = 200
+    policy: str = POLICY
+
+
+class EditorServer(ThreadingHTTPServer):
+    """Serves the page of one session at `url`, on this machine only. Port 0 selects a free port."""
+
+    daemon_threads = True
+
+    def __init__(self, session: EditorSession, port: int = 0) -> None:
+        """Listen on the port. Raises OSError if it is taken."""
+        super().__init__((ADDRESS, port), _Handler)
+        self.session, self.token = session, secrets.token_urlsafe(24)
+        self.hosts = {f"{name}:{self.server_port}" for name in (ADDRESS, "localhost")}
+        self.files = {file.name: file for file in FOLDER.iterdir() if file.suffix in TYPES}
+        self.files |= {name: REPLAY_FOLDER / name for name in SHARED_MODULES}
+
+    @property
+    def url(self) -> str:
+        """Address of the page, with the token."""
+        return f"http://{ADDRESS}:{self.server_port}/{self.token}/"
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Ignore a connection that the browser closed; print other errors."""
+        if not isinstance(sys.exc_info()[1], ConnectionError | TimeoutError):
+            super().handle_error(request, client_address)
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: EditorServer
+    protocol_version = "HTTP/1.1"
+    server_version, sys_version = "simscen", ""
+    timeout = 60
+
+    def do_GET(self) -> None:
+        """Answer with a file of the page, or the replay page of a run."""
+        if (name := self._allowed()) is not None:
+            self._send(self._file(name))
+
+    def do_POST(self) -> None:
+        """Answer a request of the page."""
+        body = self._body()
+        if (name := self._allowed()) is None:
+            return
+        if body is None:
+            self._send(_error("the request is too large, or has no length", HTTPStatus.REQUEST_ENTITY_TOO_LARGE))
+        elif self.headers.get_content_type() != "application/json":
+            self._send(_error("requests must be JSON", HTTPStatus.UNSUPPORTED_MEDIA_TYPE))
+        else:
+            self._send(self._answer(name, body))
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Print nothing: the address contains the token."""
+
+    def _allowed(self) -> str | None:
+        """Return the path behind the token; answer with an error and return None if the request is not allowed."""
+        origin, host = self.headers.get("Origin"), self.headers.get("Host", "")
+        if host not in self.server.hosts:
+            self._send(_error("wrong host", HTTPStatus.MISDIRECTED_REQUEST))
+            return None
+        if origin is not None and origin not in {f"http://{name}" for name in self.server.hosts}:
+            self._send(_error("wrong origin", HTTPStatus.FORBIDDEN))
+            return None
+        token, _, name = self.path.partition("?")[0].removeprefix("/").partition("/")
+        if not secrets.compare_digest(token.encode(errors="replace"), self.server.token.encode()):
+            self._send(
+                _error("wrong or missing token; use the address that simscen edit printed", HTTPStatus.FORBIDDEN)
+            )
+            return None
+        return name
+
+    def _body(self) -> bytes | None:
+        """Return the body of a request; None if it is too large or has no length, and then close the connection."""
+        length = self.headers.get("Content-Length", "")
+        if not length.isdecimal() or int(length) > MAX_REQUEST_BYTES:
+            self.close_connection = True
+            return None
+        return self.rfile.read(int(length))
+
+    def _file(self, name: str) -> Answer:
+        if match := _REPLAY.fullmatch(name):
+            return self._replay(int(match[1]))
+        file = self.server.files.get(name or "page.html")
+        if file is None:
+            return _error("no such file", HTTPStatus.NOT_FOUND)
+        data = file.read_bytes()
+        if file.name == "page.css":
+            data = css_variables().encode() + data
+        return Answer(data, TYPES[file.suffix])
+
+    def _replay(self, number: int) -> Answer:
+        trial = self.server.session.runs.trial(number)
+        if trial is None or not trial.replay.is_file():
+            return _error("there is no such replay", HTTPStatus.NOT_FOUND)
+        page = trial.replay.read_bytes()
+        own = _PAGE_POLICY.search(page[:4096].decode(errors="replace"))
+        policy = unescape(own[1]) if own else "default-src 'none'"
+        return Answer(page, "text/html", policy=f"{policy}; frame-ancestors 'self'")
+
+    def _answer(self, name: str, body: bytes) -> Answer:
+        handler = self.server.session.requests.get(name.removeprefix("api/")) if name.startswith("api/") else None
+        if handler is None:
+            return _error("no such request", HTTPStatus.NOT_FOUND)
+        try:
+            data = json.loads(body)
+            if not isinstance(data, dict):
+                return _error("a request must be a JSON object", HTTPStatus.BAD_REQUEST)
+            return _json(handler(data))
+        except (ValueError, RecursionError) as error:
+            if not isinstance(error, json.JSONDecodeError | UnicodeDecodeError | RecursionError):
+                return _internal_error()
+            return _error("the request is not JSON", HTTPStatus.BAD_REQUEST)
+        except RequestRefused as refused:
+            return _json({**refused.data, "error": str(refused)}, refused.status)
+        except Exception:
+            return _internal_error()
+
+    def _send(self, answer: Answer) -> None:
+        self.send_response(answer.status)
+        headers = {
+            "Content-Type": f"{answer.content_type}; charset=utf-8",
+            "Content-Length": str(len(answer.body)),
+            "Content-Security-Policy": answer.policy,
+            "X-Content-Type-Options": "nosniff",
+            "Referrer-Policy": "no-referrer",
+            "Cross-Origin-Resource-Policy": "same-origin",
+            "Cross-Origin-Opener-Policy": "same-origin",
+            "Cache-Control": "no-store",
+        }
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(answer.body)
+
+
+def _json(data: Any, status: int = 200) -> Answer:
+    return Answer(
+        json.dumps(data, ensure_ascii=False, allow_nan=False).encode(errors="replace"), "application/json", status
+    )
+
+
+def _error(message: str, status: HTTPStatus) -> Answer:
+    return _json({"error": message}, status)
+
+
+def _internal_error() -> Answer:
+    """Print the traceback for a report, and tell the page."""
+    traceback.print_exc()
+    return _error(
+        "internal error: this is a bug in simscen; the terminal shows details", HTTPStatus.INTERNAL_SERVER_ERROR
+    )
