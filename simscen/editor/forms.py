@@ -157,7 +157,8 @@ def _first_number(schema: Schema) -> float:
 
 def _help(schema: Schema) -> tuple[str, str]:
     """Return the description of a value without the example of a quantity, and that example."""
-    text = " ".join(str(schema.get("description", "")).split(" ")).strip()
+    paragraphs = str(schema.get("description", "")).split("\n\n")
+    text = "\n\n".join(" ".join(part.split()) for part in paragraphs).strip()
     match = _UNIT.search(text)
     if match is None:
         plain = re.fullmatch(r"[a-z ]+, e\.g\. (.*)", text)

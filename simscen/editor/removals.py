@@ -23,7 +23,10 @@ def removed_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice
     if parent.flow:
         return _from_flow(parent, parts, number)
     if len(parts) == 1:
-        return Splice(parent.start, parent.end, "[]" if parent.kind == "sequence" else "{}")
+        begin = len(text[: parent.start].rstrip())
+        empty = "[]" if parent.kind == "sequence" else "{}"
+        is_behind_key = text[begin - 1 : begin] == ":"
+        return Splice(begin if is_behind_key else parent.start, parent.end, f" {empty}" if is_behind_key else empty)
     return _from_block(text, parts, number)
 
 

@@ -59,7 +59,7 @@ def open_page(browser: Any) -> Iterator[Opener]:
     """Opens files in the browser; afterwards none of them may have logged an error or asked for anything else."""
     opened: list[Opened] = []
 
-    def open_(file: Path, *, size: tuple[int, int] = (1280, 800), dark: bool = False, where: str = "") -> Opened:
+    def open_(file: Path | str, *, size: tuple[int, int] = (1280, 800), dark: bool = False, where: str = "") -> Opened:
         opened.append(Opened(browser, file, size, dark, where))
         return opened[-1]
 

@@ -11,9 +11,9 @@ GRAVE = ("serious", "critical")
 
 
 class Opened:
-    """A page in a context of its own. `page` is Playwright's."""
+    """A page in a context of its own, from a file or from a local server. `page` is Playwright's."""
 
-    def __init__(self, browser: Any, file: Path, size: tuple[int, int], dark: bool, where: str) -> None:
+    def __init__(self, browser: Any, file: Path | str, size: tuple[int, int], dark: bool, where: str) -> None:
         scheme = "dark" if dark else "light"
         width, height = size
         self._context = browser.new_context(
@@ -22,7 +22,7 @@ class Opened:
         self._context.set_default_timeout(PATIENCE)
         self.page = self._context.new_page()
         self._complaints: list[str] = []
-        self._uri = file.resolve().as_uri()
+        self._uri = file if isinstance(file, str) else file.resolve().as_uri()
         self.page.on("console", self._heard)
         self.page.on("pageerror", lambda error: self._complaints.append(f"error: {error}"))
         self.page.on("request", self._requested)
@@ -69,5 +69,10 @@ class Opened:
             self._complaints.append(f"console: {message.text}")
 
     def _requested(self, request: Any) -> None:
-        if request.url.split("#")[0] != self._uri and not request.url.startswith(("data:", "blob:")):
+        own = (
+            request.url.startswith(self._uri)
+            if self._uri.startswith("http:")
+            else request.url.split("#")[0] == self._uri
+        )
+        if not own and not request.url.startswith(("data:", "blob:")):
             self._complaints.append(f"request: {request.url}")

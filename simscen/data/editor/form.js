@@ -21,10 +21,16 @@ export class Form {
   show(heading, form, editable, more = []) {
     const focused = this.element.contains(document.activeElement) ? document.activeElement.dataset.path : null;
     this.editable = editable;
-    const parts = form ? [form.help ? el("p", { class: "help quiet" }, form.help) : null, ...this.contents(form)] : [];
+    const parts = form ? [form.help ? this.about(form) : null, ...this.contents(form)] : [];
     fill(this.element, el("h2", {}, heading), ...more, ...parts);
     const same = focused && [...this.element.querySelectorAll("[data-path]")].find((one) => one.dataset.path === focused);
     if (same) same.focus();
+  }
+
+  /** The help of the whole form, folded if it is long. */
+  about(form) {
+    if (form.help.length < 140) return el("p", { class: "help quiet" }, form.help);
+    return el("details", {}, el("summary", {}, "What this is"), ...form.help.split("\n\n").map((part) => el("p", {}, part)));
   }
 
   contents(field) {
@@ -78,7 +84,7 @@ export class Form {
       const one = field.addable[Number(event.target.value)];
       if (event.target.value !== "") this.change([{ op: "set", keys: [...field.keys, one.key], value: one.value }], `${one.key} added`);
     };
-    const name = field.key ? `Add a key to ${field.key}` : "Add a key";
+    const name = field.key && !NUMBER.test(field.key) ? `Add a key to ${field.key}` : "Add a key";
     return el("select", { "aria-label": name, onchange: chosen, "data-path": `add-${field.keys.join("/")}` }, el("option", { value: "" }, `${name}…`), ...options);
   }
 }

@@ -33,7 +33,7 @@ class Page {
     this.runs = new RunPanel($("runpanel"), (text) => this.say(text), (line) => { this.showTab("text"); this.textPane.goTo(line, 1); });
     $("name").textContent = opened.name;
     document.title = `${opened.name} – simscen edit`;
-    if (this.kind !== "scenario") $("run").hidden = true;
+    if (this.kind !== "scenario") $("run").hidden = $("runtab").hidden = true;
     this.listen();
     this.textPane.setText(opened.text);
   }

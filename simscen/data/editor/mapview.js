@@ -164,6 +164,7 @@ export class MapView {
       pen.translate(u, v);
       pen.rotate(-yaw);
       pen.imageSmoothingEnabled = false;
+      pen.globalAlpha = 0.8;
       if (matchMedia("(prefers-color-scheme: dark)").matches) pen.filter = "invert(0.86)";
       pen.drawImage(this.image, 0, -image.size[1] * scale, image.size[0] * scale, image.size[1] * scale);
       pen.restore();
@@ -197,7 +198,8 @@ export class MapView {
     const color = this.color(COLORS[one.kind] ?? "thing"), chosen = one.id === this.selected, line = this.line(one);
     pen.strokeStyle = pen.fillStyle = color;
     pen.lineWidth = chosen ? 3 : 1.6;
-    pen.setLineDash(one.editable ? [] : [5, 3]);
+    pen.globalAlpha = one.editable ? 1 : 0.6;
+    this.strength = pen.globalAlpha;
     if (one.region && this.scene.regions[one.region] && (chosen || one.kind !== "criterion")) {
       this.trace(pen, this.scene.regions[one.region], true);
       this.fillAndStroke(pen, 0.16);
@@ -207,10 +209,10 @@ export class MapView {
       if (one.line === "closed" && one.kind === "region") this.fillAndStroke(pen, chosen ? 0.2 : 0.09);
       else {
         const wide = one.width ? Math.max(one.width * this.camera.scale, 2) : 0;
-        if (wide) { pen.lineWidth = wide; pen.globalAlpha = one.kind === "ramp" ? 0.45 : 1; }
+        if (wide) { pen.lineWidth = wide; pen.globalAlpha = one.kind === "ramp" ? 0.45 : this.strength; }
         else pen.setLineDash([6, 4]);
         pen.stroke();
-        pen.globalAlpha = 1;
+        pen.globalAlpha = this.strength;
         pen.lineWidth = chosen ? 3 : 1.6;
       }
       pen.setLineDash([]);
@@ -229,14 +231,15 @@ export class MapView {
       this.fillAndStroke(pen, 0.08);
     }
     pen.setLineDash([]);
+    pen.globalAlpha = 1;
     one.handles.forEach((handle, k) => this.drawHandle(pen, one, handle, k, chosen));
     this.drawName(pen, one, chosen);
   }
 
   fillAndStroke(pen, alpha) {
-    pen.globalAlpha = alpha;
+    pen.globalAlpha = alpha * this.strength;
     pen.fill();
-    pen.globalAlpha = 1;
+    pen.globalAlpha = this.strength;
     pen.stroke();
   }
 

@@ -1,0 +1,160 @@
+"""The server of the editor answers only its own page."""
+
+import http.client
+import json
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from simscen.editor.files import EditedFile
+from simscen.editor.server import MAX_REQUEST_BYTES, EditorServer
+from simscen.editor.session import EditorSession
+from simscen.run.process.backend import Backend
+
+TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: {x: 3, y: 1}}]\npass: []\n"
+
+
+def _no_backend() -> Backend:
+    raise AssertionError("nothing runs in these tests")
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[EditorServer]:
+    file = tmp_path / "a.scenario.yaml"
+    file.write_text(TEXT)
+    (tmp_path / "secret.txt").write_text("secret")
+    running = EditorServer(EditorSession(EditedFile(file, "scenario", tmp_path), _no_backend))
+    threading.Thread(target=running.serve_forever, daemon=True).start()
+    yield running
+    running.shutdown()
+    running.server_close()
+    running.session.runs.close()
+
+
+class Reply:
+    def __init__(self, answer: http.client.HTTPResponse) -> None:
+        self.status, self.headers, self.body = answer.status, answer.headers, answer.read()
+
+    @property
+    def data(self) -> Any:
+        return json.loads(self.body)
+
+
+def request(server: EditorServer, method: str, path: str, body: Any = None, **headers: str) -> Reply:
+    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
+    given = {name.replace("_", "-"): value for name, value in headers.items()}
+    data = None
+    if body is not None:
+        data = body if isinstance(body, bytes) else json.dumps(body).encode()
+        given.setdefault("Content-Type", "application/json")
+    connection.request(method, path, data, given)
+    try:
+        return Reply(connection.getresponse())
+    finally:
+        connection.close()
+
+
+def ask(server: EditorServer, name: str, **data: Any) -> Reply:
+    return request(server, "POST", f"/{server.token}/api/{name}", data)
+
+
+def test_it_listens_on_this_machine_only_at_a_random_port_with_a_random_token(server: EditorServer) -> None:
+    assert server.server_address[0] == "127.0.0.1"
+    assert server.url == f"http://127.0.0.1:{server.server_port}/{server.token}/"
+    assert len(server.token) >= 32
+
+
+@pytest.mark.parametrize("path", ["/", "/page.html", "/wrong/", "/wrong/page.js", "//", "/../", "/%2e%2e/page.html"])
+def test_a_request_without_the_token_gets_nothing(server: EditorServer, path: str) -> None:
+    assert request(server, "GET", path).status == 403
+    answer = request(server, "POST", f"{path}api/open", {})
+    assert answer.status == 403 and TEXT not in answer.body.decode()
+
+
+@pytest.mark.parametrize("host", ["example.org", "127.0.0.1", "localhost:1", "attacker.test:80", ""])
+def test_another_host_name_is_refused_also_with_the_token(server: EditorServer, host: str) -> None:
+    assert request(server, "GET", f"/{server.token}/", Host=host).status == 421
+
+
+def test_a_page_from_another_origin_is_refused(server: EditorServer) -> None:
+    path = f"/{server.token}/api/open"
+    assert request(server, "POST", path, {}, Origin="https://example.org").status == 403
+    assert request(server, "POST", path, {}, Origin="null").status == 403
+    assert request(server, "POST", path, {}, Origin=server.url[: server.url.index(server.token) - 1]).status == 200
+
+
+def test_a_form_of_another_page_cannot_send_requests(server: EditorServer) -> None:
+    answer = request(server, "POST", f"/{server.token}/api/open", {}, Content_Type="text/plain")
+    assert answer.status == 415
+
+
+@pytest.mark.parametrize("name", ["", "page.html", "page.css", "main.js", "camera.js"])
+def test_every_file_comes_with_a_strict_policy(server: EditorServer, name: str) -> None:
+    answer = request(server, "GET", f"/{server.token}/{name}")
+    policy = answer.headers["Content-Security-Policy"]
+    assert answer.status == 200 and answer.body
+    assert policy.startswith("default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'")
+    assert "frame-ancestors 'none'" in policy and "unsafe" not in policy and "http" not in policy
+    assert answer.headers["X-Content-Type-Options"] == "nosniff"
+    assert answer.headers["Referrer-Policy"] == "no-referrer"
+    assert answer.headers["Cache-Control"] == "no-store"
+    assert "Access-Control-Allow-Origin" not in answer.headers
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["../secret.txt", "..%2fsecret.txt", "a.scenario.yaml", "/etc/passwd", "..\\secret.txt", "runs/1/replay.html",
+     "runs/../../secret.txt", "runs/1/../../secret.txt", "page.html/../secret.txt", "api/open"],
+)  # fmt: skip
+def test_no_path_leads_to_other_files(server: EditorServer, path: str) -> None:
+    assert request(server, "GET", f"/{server.token}/{path}").status == 404
+
+
+@pytest.mark.parametrize("body", [b"", b"[]", b"nonsense", b"\xff\xfe", b'{"text": 1}', b"[" * 100_000, b"1e999"])
+def test_a_malformed_request_is_an_error_of_the_page_not_of_the_program(server: EditorServer, body: bytes) -> None:
+    for name in ("scene", "problems", "edit", "form", "preview", "save"):
+        assert 400 <= request(server, "POST", f"/{server.token}/api/{name}", body).status < 500
+    assert ask(server, "open").status == 200
+
+
+@pytest.mark.parametrize(
+    "edits",
+    [None, [1], [{}], [{"op": "set"}], [{"op": "set", "keys": [-1]}], [{"op": "pose", "keys": ["robot", "pose"], "x": "1"}],
+     [{"op": "remove", "keys": []}], [{"op": "remove", "keys": ["nowhere"]}], [{"op": "explode", "keys": []}],
+     [{"op": "add", "keys": ["robot"], "value": 1}], [{"op": "set", "keys": ["goals", 7], "value": 1}]],
+)  # fmt: skip
+def test_an_impossible_edit_is_refused_with_a_reason(server: EditorServer, edits: Any) -> None:
+    answer = ask(server, "edit", text=TEXT, edits=edits)
+    assert answer.status == 422 and answer.data["error"]
+
+
+def test_a_request_that_is_too_large_is_refused(server: EditorServer) -> None:
+    path = f"/{server.token}/api/open"
+    assert request(server, "POST", path, b"", Content_Length=str(MAX_REQUEST_BYTES + 1)).status == 413
+    assert ask(server, "scene", text="a: " + "x" * (1 << 20)).status == 413
+
+
+def test_saving_needs_the_version_that_was_read(server: EditorServer) -> None:
+    opened = ask(server, "open").data
+    server.session.file.path.write_text("theirs: 1\n")
+    conflict = ask(server, "save", text=TEXT, version=opened["version"])
+    assert conflict.status == 409
+    assert conflict.data["text"] == "theirs: 1\n" and "reload it, or overwrite it" in conflict.data["error"]
+    assert server.session.file.path.read_text() == "theirs: 1\n"
+    assert ask(server, "save", text=TEXT, version=opened["version"], overwrite=True).status == 200
+    assert server.session.file.path.read_text() == TEXT
+
+
+def test_an_error_in_the_program_is_reported_and_the_server_goes_on(
+    server: EditorServer, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(_: object) -> dict[str, Any]:
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr(server.session, "requests", {**server.session.requests, "scene": broken})
+    assert ask(server, "scene").status == 500
+    assert "RuntimeError: broken" in capsys.readouterr().err
+    assert ask(server, "open").status == 200

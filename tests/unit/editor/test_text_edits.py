@@ -1,0 +1,184 @@
+"""An edit changes the text of one value and nothing else."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from simscen.editor.splices import EditRefused
+from simscen.editor.text_edits import AddItem, Edit, RemovePart, SetValue, apply_edits
+from simscen.editor.value_text import same_value
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.source_nodes import parse_source, source_at
+from simscen.loading.yaml.tree import Key
+from simscen.spec.quantities import si_number
+
+ROOT = Path(__file__).parents[3]
+SHIPPED = sorted([*ROOT.glob("scenarios/**/*.yaml"), *ROOT.glob("worlds/*.world.yaml")])
+
+
+def edited(text: str, *edits: Edit) -> str:
+    return apply_edits(text, edits).text
+
+
+def plain(text: str) -> Any:
+    tree, problems = parse_yaml(text, "")
+    assert tree is not None and not problems
+    return tree.plain
+
+
+@pytest.mark.parametrize(
+    ("before", "value", "after"),
+    [
+        ("x: 1.0", 2, "x: 2.0"),
+        ("x: 1.50", 2.25, "x: 2.25"),
+        ("x: 1", 2.5, "x: 2.5"),
+        ("x: 1.123456", 2, "x: 2.000"),
+        ("x: 250 cm", 3.1, "x: 310 cm"),
+        ("x: 2.5m", 3, "x: 3.0m"),
+        ("x: 90 deg", math.pi, "x: 180 deg"),
+        ('x: "1.5 m"  # note', 2, 'x: "2.0 m"  # note'),
+        ("x: 50 %", 0.25, "x: 25 %"),
+        ("x: -0.001", -0.0, "x: 0.000"),
+        ("x: 3", 1e-9, "x: 1e-09"),
+        ("x: old", "new name", "x: new name"),
+        ("x: 'old'", "it's", "x: 'it''s'"),
+        ('x: "old"', 'say "hi"', 'x: "say \\"hi\\""'),
+        ("x: old", "yes: no", 'x: "yes: no"'),
+        ("x: old", "12", 'x: "12"'),
+        ("x: true", False, "x: false"),
+        ("x:", 3, "x: 3"),
+        ("x: &a 2.0 # anchor", 3, "x: &a 3.0 # anchor"),
+        ("x: |\n  long\n  text\n# end", "short", "x: short\n# end"),
+        ("x: {a: 1, b: 2}", {"a": [1, 2]}, "x: {a: [1, 2]}"),
+    ],
+)
+def test_a_value_keeps_its_notation(before: str, value: Any, after: str) -> None:
+    assert edited(before, SetValue(("x",), value)) == after
+
+
+def test_the_alias_that_is_edited_gets_a_value_of_its_own() -> None:
+    assert edited("a: &n 2.0\nb: *n\n", SetValue(("b",), 3)) == "a: &n 2.0\nb: 3\n"
+    with pytest.raises(EditRefused, match="is not written out in this file"):
+        edited("a: &n {x: 2}\nb: [*n]\n", SetValue(("b", 0, "x"), 3))
+
+
+def test_a_change_that_would_reach_other_values_is_refused() -> None:
+    with pytest.raises(EditRefused, match="without changing other values"):
+        edited("a: &n 2.0\nb: *n\n", SetValue(("a",), 3))
+
+
+def test_new_keys_take_the_indentation_and_the_order_of_the_language() -> None:
+    text = "simscen: 1\nrobot:\n    pose: {x: 1, y: 2}\n\n# criteria\npass:\n  - goals_reached: {}\n"
+    order = ("simscen", "robot", "goals", "pass")
+    goals = SetValue(("goals",), [{"name": "a"}], order)
+    assert edited(text, goals) == text.replace("y: 2}\n", "y: 2}\ngoals:\n  - {name: a}\n")
+    assert edited(text, SetValue(("robot", "model"), "amr")) == text.replace("y: 2}\n", "y: 2}\n    model: amr\n")
+    assert edited(text, SetValue(("robot", "pose", "yaw"), "5 deg")) == text.replace("y: 2}", "y: 2, yaw: 5 deg}")
+    assert edited(text, SetValue(("stack", "planner", "type"), "navfn")).endswith("stack: {planner: {type: navfn}}\n")
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("g: [1, 2]\n", "g: [1, 2, 3]\n"),
+        ("g: []\n", "g: [3]\n"),
+        ("g:\n- 1\n- 2 # two\nh: 1\n", "g:\n- 1\n- 2 # two\n- 3\nh: 1\n"),
+        ("g:\n    - 1\n\n    - 2\n", "g:\n    - 1\n\n    - 2\n\n    - 3\n"),
+        ("g: [\n  1,\n  2,\n]\n", "g: [\n  1,\n  2,\n  3,\n]\n"),
+        ("g:\n  - 1", "g:\n  - 1\n  - 3"),
+        ("h: 1\n", "h: 1\ng: [3]\n"),
+        ("{h: 1}", "{h: 1, g: [3]}"),
+    ],
+)
+def test_a_new_item_looks_like_its_siblings(before: str, after: str) -> None:
+    assert edited(before, AddItem(("g",), 3)) == after
+
+
+def test_a_new_block_item_is_written_like_the_one_before() -> None:
+    text = "goals:\n  - name: a\n    pose:\n      x: 1\n      y: 2\npass: []\n"
+    goal = {"name": "b", "pose": {"x": 3, "y": 4.5}, "timeout": "5 s"}
+    added = "  - name: b\n    pose:\n      x: 3\n      y: 4.5\n    timeout: 5 s\n"
+    assert edited(text, AddItem(("goals",), goal)) == text.replace("pass", f"{added}pass")
+
+
+@pytest.mark.parametrize(
+    ("before", "keys", "after"),
+    [
+        ("a: 1\nb: 2 # two\nc: 3\n", ("b",), "a: 1\nc: 3\n"),
+        ("a: 1\nb: 2", ("b",), "a: 1"),
+        ("a: {b: 1, c: 2, d: 3}\n", ("a", "c"), "a: {b: 1, d: 3}\n"),
+        ("a: {b: 1, c: 2}\n", ("a", "b"), "a: {c: 2}\n"),
+        ("a: [1, 2, 3]\n", ("a", 2), "a: [1, 2]\n"),
+        ("a: [1]\n", ("a", 0), "a: []\n"),
+        ("a:\n  - x: 1\n    y: 2\n  - x: 3\n", ("a", 0), "a:\n  - x: 3\n"),
+        ("a:\n  - x: 1\n    y: 2\n", ("a", 0, "x"), "a:\n  - y: 2\n"),
+        ("a:\n  - x: 1\n    y: 2\n", ("a", 0, "y"), "a:\n  - x: 1\n"),
+        ("a:\n  - 1\nb: 2\n", ("a", 0), "a: []\nb: 2\n"),
+    ],
+)
+def test_removing(before: str, keys: tuple[Key, ...], after: str) -> None:
+    assert edited(before, RemovePart(keys)) == after
+
+
+def _leaves(value: Any, keys: tuple[Key, ...] = ()) -> list[tuple[Key, ...]]:
+    if isinstance(value, dict):
+        return [leaf for key, one in value.items() for leaf in _leaves(one, (*keys, key))]
+    if isinstance(value, list):
+        return [leaf for index, one in enumerate(value) for leaf in _leaves(one, (*keys, index))]
+    return [keys]
+
+
+def _at(value: Any, keys: tuple[Key, ...]) -> Any:
+    for key in keys:
+        value = value[key]
+    return value
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.data())
+def test_any_edit_of_a_shipped_file_changes_only_its_span(data: st.DataObject) -> None:
+    text = data.draw(st.sampled_from(SHIPPED)).read_text(encoding="utf-8")
+    keys = data.draw(st.sampled_from(_leaves(plain(text))))
+    number = st.floats(-1e4, 1e4).map(lambda value: round(value, 3))
+    value = data.draw(
+        number | st.text(st.characters(codec="utf-8", exclude_categories=["C"]), min_size=1) | st.booleans()
+    )
+    source = parse_source(text)
+    node = None if source is None else source_at(source, keys)
+    assert node is not None
+    after = edited(text, SetValue(keys, value))
+    assert after.startswith(text[: node.start]) and after.endswith(text[node.end :])
+    assert same_value(_at(plain(after), keys), value)
+    if isinstance(value, float):
+        found = si_number(_at(plain(after), keys))
+        assert math.isclose(found, value, rel_tol=1e-9, abs_tol=2e-6)
+    others = [leaf for leaf in _leaves(plain(text)) if leaf != keys]
+    assert all(_at(plain(after), leaf) == _at(plain(text), leaf) for leaf in others)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.data())
+def test_what_is_added_to_a_shipped_file_can_be_removed_without_a_trace(data: st.DataObject) -> None:
+    text = data.draw(st.sampled_from(SHIPPED)).read_text(encoding="utf-8")
+    lists = [("goals",), ("events",), ("pass",), ("obstacles",), ("walls",), ("regions", "hall"), ("tags",)]
+    keys = data.draw(st.sampled_from(lists))
+    found = plain(text)
+    for key in keys:
+        found = found.get(key) if isinstance(found, dict) else None
+    if not isinstance(found, list):
+        return
+    added = edited(text, AddItem(keys, {"name": "new", "pose": {"x": 1.5, "y": 2}}))
+    assert edited(added, RemovePart((*keys, len(found)))) == text
+
+
+@pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.name)
+def test_setting_every_value_of_a_shipped_file_to_what_it_is_changes_nothing(file: Path) -> None:
+    text = file.read_text(encoding="utf-8")
+    data = plain(text)
+    numbers = [keys for keys in _leaves(data) if isinstance(_at(data, keys), int | float)]
+    kept = [SetValue(keys, _at(data, keys)) for keys in numbers]
+    assert edited(text, *kept) == text
