@@ -19,6 +19,9 @@ def inserted_entry(text: str, mapping: SourceNode, key: str, value: Any, order: 
     before = [entry for name, entry in entries if name in order[: order.index(key)]] if key in order else []
     after = max(before, key=lambda entry: entry.start) if before else entries[-1][1]
     end = max(after.value.end, after.end)
+    if mapping.flow and text[mapping.start] != "{":  # one pair in brackets: [key: value]
+        pair = f"{text[mapping.start : end]}, {key_text(key)}: {flow_text(value)}"
+        return Splice(mapping.start, end, f"{{{pair}}}")
     if mapping.flow:
         return Splice(end, end, f", {key_text(key)}: {flow_text(value)}")
     place = line_end(text, end)

@@ -122,10 +122,20 @@ def test_a_malformed_request_is_an_error_of_the_page_not_of_the_program(server: 
 
 @pytest.mark.parametrize(
     "edits",
-    [None, [1], [{}], [{"op": "set"}], [{"op": "set", "keys": [-1]}], [{"op": "pose", "keys": ["robot", "pose"], "x": "1"}],
-     [{"op": "remove", "keys": []}], [{"op": "remove", "keys": ["nowhere"]}], [{"op": "explode", "keys": []}],
-     [{"op": "add", "keys": ["robot"], "value": 1}], [{"op": "set", "keys": ["goals", 7], "value": 1}]],
-)  # fmt: skip
+    [
+        None,
+        [1],
+        [{}],
+        [{"op": "set"}],
+        [{"op": "set", "keys": [-1]}],
+        [{"op": "pose", "keys": ["robot", "pose"], "x": "1"}],
+        [{"op": "remove", "keys": []}],
+        [{"op": "remove", "keys": ["nowhere"]}],
+        [{"op": "explode", "keys": []}],
+        [{"op": "add", "keys": ["robot"], "value": 1}],
+        [{"op": "set", "keys": ["goals", 7], "value": 1}],
+    ],
+)
 def test_an_impossible_edit_is_refused_with_a_reason(server: EditorServer, edits: Any) -> None:
     answer = ask(server, "edit", text=TEXT, edits=edits)
     assert answer.status == 422 and answer.data["error"]

@@ -1,0 +1,182 @@
+"""What the page is told about a text: things on the map, problems, forms, paths."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from simscen.editor.files import EditedFile
+from simscen.editor.session import EditorSession, RequestRefused
+from simscen.run.process.backend import Backend
+
+TEXT = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [9, 0], [9, 5], [0, 5], [0, 0]]}]
+  obstacles: [{name: rack, cylinder: [50 cm, 1], pose: {x: 4, y: 4}}]
+  objects: [{name: cart, box: [1, 0.5, 1], pose: {x: 2, y: 4}, move: {through: [[3, 4]], speed: 1 m/s}}]
+  places: {dock: {x: 1, y: 1, yaw: 90 deg}}
+  regions: {lane: [[3, 0.5], [5, 0.5], [5, 2]]}
+robot: {pose: dock}
+goals: [dock, {pose: {x: 7, y: 2}}]
+stack: {keepout: [lane]}
+events:
+  - when: {any: [{robot_in: {region: lane}}, {robot_within: {of: dock, distance: 1}}]}
+    do: [{pedestrian: {name: anna, pose: {x: 8, y: 4}, goals: [dock]}}, {mark: {name: here}}]
+    then:
+      - do: {kidnap: {pose: {x: 3, y: 3}}}
+faults:
+  - {sensor: lidar, off: {}, when: {robot_within: {object: cart, distance: 2 m}}, for: 1 s}
+pass: [goals_reached: {}]
+"""
+MakeSession = Any
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Iterator[MakeSession]:
+    made: list[EditorSession] = []
+
+    def make(text: str = TEXT, name: str = "a.scenario.yaml", kind: str = "scenario") -> EditorSession:
+        (tmp_path / name).write_text(text)
+        made.append(EditorSession(EditedFile(tmp_path / name, kind, tmp_path), _no_backend))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.runs.close()
+
+
+def _no_backend() -> Backend:
+    raise AssertionError("nothing runs in these tests")
+
+
+def things(session: EditorSession, text: str = TEXT) -> dict[str, Any]:
+    return {one["id"]: one for one in session.scene({"text": text})["objects"]}
+
+
+def test_everything_that_has_a_place_is_on_the_map(session: MakeSession) -> None:
+    found = things(session())
+    where = {
+        name: [(handle["x"], handle["y"]) for handle in one["handles"]] for name, one in found.items() if one["handles"]
+    }
+    assert where == {
+        "robot": [(1, 1)],
+        "goals/0": [(1, 1)],
+        "goals/1": [(7, 2)],
+        "events/0/when/any/1/robot_within": [(1, 1)],
+        "events/0/do/0/pedestrian": [(8, 4), (1, 1)],
+        "events/0/then/0/do/kidnap": [(3, 3)],
+        "world/walls/0": [(0, 0), (9, 0), (9, 5), (0, 5), (0, 0)],
+        "world/obstacles/0": [(4, 4)],
+        "world/objects/0": [(2, 4)],
+        "world/objects/0/move": [(3, 4)],
+        "world/places/dock": [(1, 1)],
+        "world/regions/lane": [(3, 0.5), (5, 0.5), (5, 2)],
+    }
+    assert found["events/0/when/any/0/robot_in"]["region"] == "lane"
+    assert found["stack/keepout/0"]["region"] == "lane"
+    assert found["faults/0/when/robot_within"]["follows"] == "cart"
+    assert found["world/obstacles/0"]["parts"][0][0] == [0.5, 0]
+    assert found["world/objects/0/move"]["origin"] == (2, 4)
+    assert found["robot"]["handles"][0]["place"] == "dock"
+    assert all(one["editable"] for one in found.values())
+    assert found["goals/0"]["at"] == 10 and found["world/regions/lane"]["at"] == 8
+
+
+def test_a_text_with_mistakes_still_has_a_map(session: MakeSession) -> None:
+    one = session()
+    found = things(one, TEXT.replace("x: 7, y: 2", "x: seven, y: 2").replace("speed: 1 m/s", "speed: fast"))
+    assert found["goals/1"]["handles"] == [] and found["goals/0"]["handles"]
+    with pytest.raises(RequestRefused, match="not a YAML mapping"):
+        one.scene({"text": "a: [1"})
+
+
+def test_problems_name_the_thing_on_the_map(session: MakeSession) -> None:
+    one = session()
+    (note,) = one.problems({"text": TEXT})["problems"]
+    assert (note["severity"], note["object"], note["where"]) == ("warning", "goals/0", "10:9")
+    found = one.problems({"text": TEXT.replace("x: 7, y: 2", "x: 4, y: 4")})["problems"]
+    errors = [problem for problem in found if problem["severity"] == "error"]
+    assert [(problem["code"], problem["object"], problem["where"]) for problem in errors] == [
+        ("SC301", "goals/1", "10:22")
+    ]
+    found = one.problems({"text": TEXT.replace("distance: 1}", "distence: 1}")})["problems"]
+    assert {problem["object"] for problem in found} == {"events/0/when/any/1/robot_within"}
+    assert one.problems({"text": "a: [1"})["problems"][0]["code"] == "SC003"
+
+
+def test_moving_a_thing_at_a_place_writes_its_own_pose(session: MakeSession) -> None:
+    one = session()
+
+    def moved(keys: list[Any], **to: float) -> str:
+        return str(one.edit({"text": TEXT, "edits": [{"op": "pose", "keys": keys, **to}]})["text"])
+
+    assert moved(["robot", "pose"], x=2, y=1.5, yaw=0) == TEXT.replace("pose: dock}\ngoals", "pose: {x: 2, y: 1.5}}\ngoals")
+    assert moved(["goals", 0, "pose"], x=2, y=3) == TEXT.replace("goals: [dock, {", "goals: [{pose: {x: 2, y: 3}}, {")
+    point = {"op": "point", "keys": ["events", 0, "do", 0, "pedestrian", "goals", 0], "x": 2, "y": 3}
+    assert one.edit({"text": TEXT, "edits": [point]})["text"] == TEXT.replace("goals: [dock]}}", "goals: [[2, 3]]}}")
+
+
+def test_paths_and_clearances_are_those_after_the_edits(session: MakeSession) -> None:
+    one = session()
+    before = one.preview({"text": TEXT, "edits": []})["robots"]["robot"]
+    assert [leg["length"] for leg in before["legs"]] == [0, 6.08]
+    near = one.preview({"text": TEXT, "edits": [{"op": "pose", "keys": ["goals", 1, "pose"], "x": 4, "y": 4.2}]})
+    assert near["robots"]["robot"]["legs"][1]["length"] is None
+    assert near["robots"]["robot"]["clearances"][2] < 0
+    assert one.preview({"text": TEXT + "raduis: 1\n"})["reason"].startswith("No path is shown until this is corrected")
+
+
+def test_the_inscribed_obstacle_is_avoided_where_it_is_dragged_to(session: MakeSession) -> None:
+    one = session()
+    moved = [{"op": "pose", "keys": ["world", "obstacles", 0, "pose"], "x": 4.0, "y": 1.5}]
+    length = one.preview({"text": TEXT, "edits": moved})["robots"]["robot"]["legs"][1]["length"]
+    assert length > 6.1
+
+
+def fields(form: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    return {field["key"]: field for field in form["fields"]}
+
+
+def test_a_form_has_the_help_and_the_choices_of_the_schema(session: MakeSession) -> None:
+    one = session()
+    form = one.form({"text": TEXT, "keys": ["events", 0, "do", 0, "pedestrian"]})
+    assert form["help"].startswith("Add a person who walks to goals on their own")
+    assert fields(form)["name"]["type"] == "text" and fields(form)["name"]["required"]
+    offered = {each["key"]: each for each in form["addable"]}
+    assert offered["behavior"]["value"] == "regular" and "Reaction to the robot" in offered["behavior"]["help"]
+    form = one.form({"text": TEXT, "keys": ["world", "obstacles", 0]})
+    assert fields(form)["cylinder"]["fields"][0]["value"] == "50 cm"
+    assert fields(form)["cylinder"]["fields"][0]["example"] == "1.5 m"
+    form = one.form({"text": TEXT, "keys": ["faults", 0]})
+    assert "noise" not in {each["key"] for each in form["addable"]}, "a fault has exactly one kind"
+
+
+def test_every_form_offers_only_keys_that_the_file_accepts(session: MakeSession) -> None:
+    one = session()
+    for thing in things(one).values():
+        form = one.form({"text": TEXT, "keys": thing["keys"]})
+        for offered in form.get("addable", []):
+            edit = {"op": "set", "keys": [*thing["keys"], offered["key"]], "value": offered["value"]}
+            text = one.edit({"text": TEXT, "edits": [edit]})["text"]
+            codes = {problem["code"] for problem in one.problems({"text": text})["problems"]}
+            assert not codes & {"SC003", "SC011", "SC012", "SC013", "SC014", "SC015"}, (thing["id"], offered, codes)
+
+
+def test_what_a_base_file_says_is_shown_and_overridden_here(session: MakeSession, tmp_path: Path) -> None:
+    (tmp_path / "hall.base.yaml").write_text(TEXT)
+    own = "extends: hall.base.yaml\nname: mine\n"
+    one = session(own)
+    found = things(one, own)
+    assert found["robot"]["editable"] and not found["goals/1"]["editable"]
+    moved = one.edit({"text": own, "edits": [{"op": "pose", "keys": ["robot", "pose"], "x": 2, "y": 1, "yaw": 0}]})
+    assert moved["text"] == f"{own}robot: {{pose: {{x: 2, y: 1}}}}\n"
+    with pytest.raises(RequestRefused, match="not written out in this file"):
+        one.edit({"text": own, "edits": [{"op": "pose", "keys": ["goals", 1, "pose"], "x": 2, "y": 1}]})
+
+
+def test_a_scenario_with_problems_does_not_run(session: MakeSession) -> None:
+    with pytest.raises(RequestRefused, match="inside obstacle"):
+        session().run({"text": TEXT.replace("x: 7, y: 2", "x: 4, y: 4")})
