@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.environment.occupancy_grid import FREE
 from simscen.core.environment.world_model import BuiltWorld
@@ -80,8 +81,17 @@ def _roomy_points(built: BuiltWorld) -> Array:
     free = np.pad(grid.cells == FREE, 1)
     room = ndimage.distance_transform_edt(free)[1:-1, 1:-1] * grid.resolution
     for needed in (ROOM_M, ROOM_M / 2, 0.0):
-        cells = np.argwhere(room > needed)
+        cells = _in_bounds(np.argwhere(room > needed), built)
         if len(cells):
             chosen = cells[np.linspace(0, len(cells) - 1, min(CANDIDATES, len(cells))).astype(np.int64)]
             return np.round(grid.center_of(chosen), 2)
     return np.zeros((0, 2))
+
+
+def _in_bounds(cells: npt.NDArray[np.int64], built: BuiltWorld) -> npt.NDArray[np.int64]:
+    """Return the cells inside the bounds of a world without a map of its own, which limit where goals may be."""
+    if built.world.grid is not None:
+        return cells
+    left, low, right, high = built.world.bounds
+    x, y = built.map.center_of(cells).T
+    return cells[(x > left) & (x < right) & (y > low) & (y < high)]

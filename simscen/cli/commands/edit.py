@@ -1,6 +1,7 @@
 """`simscen edit`."""
 
 import os
+import signal
 import sys
 import webbrowser
 from pathlib import Path
@@ -11,7 +12,7 @@ import typer
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.run_options import LenientOption, RootOption, WorldPathOption
-from simscen.core.errors import InvalidInput, Problem, UsageError
+from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.loading.files.discovery import SCENARIO, STUDY, default_root
 
 if TYPE_CHECKING:
@@ -57,11 +58,12 @@ def command(
         session.runs.close()
         raise UsageError(f"port {port} cannot be used: {error.strerror}; choose another with --port") from error
     with server:
-        print_text(f"editing {escaped(edited.shown)} at {server.url}\npress Ctrl-C to end")
-        sys.stdout.flush()
-        if not no_browser:
-            webbrowser.open(server.url)
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(Exit.TERMINATED))
         try:
+            print_text(f"editing {escaped(edited.shown)} at {server.url}\npress Ctrl-C to end")
+            sys.stdout.flush()
+            if not no_browser:
+                webbrowser.open(server.url)
             server.serve_forever()
         except KeyboardInterrupt:
             print_text("")
@@ -113,7 +115,7 @@ def _new_file(
         raise UsageError(f"{target.parent} is not a folder; create it first")
     home = root if root is not None else default_root([target, map_])
     text = new_scenario_text(target, map_, home, world_path, lenient)
-    return EditedFile(_real(target), "scenario", _real_folder(home), world_path), text
+    return _inside(EditedFile(_real(target), "scenario", _real_folder(home), world_path), target), text
 
 
 def _file_of_kind(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
@@ -126,7 +128,17 @@ def _file_of_kind(file: Path, root: Path, world_path: tuple[Path, ...]) -> "Edit
         hint = "edit takes a scenario or a *.world.yaml; for other maps use: simscen edit --new --map FILE"
         message = f"is a {'Gazebo world' if kind == 'world' else f'{kind} file'}"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", message, hint)])
-    return EditedFile(_real(file), kind, _real_folder(root), world_path)
+    return _inside(EditedFile(_real(file), kind, _real_folder(root), world_path), file)
+
+
+def _inside(edited: "EditedFile", file: Path) -> "EditedFile":
+    """Return the file if it is inside the root. Raises InvalidInput."""
+    from simscen.loading.files.paths import PathSandbox
+
+    entered = PathSandbox.around(edited.root, edited.world_path).entered(file)
+    if isinstance(entered, Problem):
+        raise InvalidInput([entered])
+    return edited
 
 
 def _real(file: Path) -> Path:

@@ -113,7 +113,9 @@ def test_moving_a_thing_at_a_place_writes_its_own_pose(session: MakeSession) -> 
     def moved(keys: list[Any], **to: float) -> str:
         return str(one.edit({"text": TEXT, "edits": [{"op": "pose", "keys": keys, **to}]})["text"])
 
-    assert moved(["robot", "pose"], x=2, y=1.5, yaw=0) == TEXT.replace("pose: dock}\ngoals", "pose: {x: 2, y: 1.5}}\ngoals")
+    assert moved(["robot", "pose"], x=2, y=1.5, yaw=0) == TEXT.replace(
+        "pose: dock}\ngoals", "pose: {x: 2, y: 1.5}}\ngoals"
+    )
     assert moved(["goals", 0, "pose"], x=2, y=3) == TEXT.replace("goals: [dock, {", "goals: [{pose: {x: 2, y: 3}}, {")
     point = {"op": "point", "keys": ["events", 0, "do", 0, "pedestrian", "goals", 0], "x": 2, "y": 3}
     assert one.edit({"text": TEXT, "edits": [point]})["text"] == TEXT.replace("goals: [dock]}}", "goals: [[2, 3]]}}")

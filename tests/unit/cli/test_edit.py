@@ -1,0 +1,130 @@
+"""`simscen edit` on the command line."""
+
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+SCENARIO = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: {x: 3, y: 1}}]\n"
+SDF = """\
+<sdf version="1.7"><world name="yard"><model name="hut"><static>true</static><pose>3 0 0.5 0 0 0</pose>
+<link name="l"><collision name="c"><geometry><box><size>1 1 1</size></box></geometry></collision></link></model>
+<model name="far"><static>true</static><pose>-3 4 0.5 0 0 0</pose>
+<link name="l"><collision name="c"><geometry><box><size>1 1 1</size></box></geometry></collision></link></model>
+</world></sdf>
+"""
+
+
+@contextmanager
+def editor(folder: Path, *arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    command = [sys.executable, "-m", "simscen", "edit", *arguments, "--no-browser"]
+    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None and process.stderr is not None
+        line = process.stdout.readline()
+        found = re.search(r"http://127\.0\.0\.1:\d+/[\w-]+/", line)
+        assert found, line + process.stderr.read()
+        yield process, found[0]
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def ask(url: str, name: str, **data: Any) -> Any:
+    request = urllib.request.Request(
+        f"{url}api/{name}", json.dumps(data).encode(), {"Content-Type": "application/json"}
+    )
+    with urllib.request.urlopen(request, timeout=30) as answer:
+        return json.load(answer)
+
+
+def test_it_serves_the_page_until_ctrl_c_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    with editor(tmp_path, "a.scenario.yaml") as (process, url):
+        with urllib.request.urlopen(url, timeout=30) as page:
+            assert b"<canvas" in page.read()
+        assert ask(url, "open")["text"] == SCENARIO
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=30)[1] == ""
+        assert process.returncode == 0
+    assert [file.name for file in tmp_path.iterdir()] == ["a.scenario.yaml"]
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(url, timeout=5)
+
+
+def test_sigterm_ends_it_with_the_usual_exit_code(tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    with editor(tmp_path, "a.scenario.yaml") as (process, _):
+        process.terminate()
+        assert process.communicate(timeout=30)[1] == ""
+        assert process.returncode == 143
+
+
+@pytest.mark.parametrize("kind", ["ros map", "world", "sdf"])
+def test_a_new_scenario_on_a_map_is_valid_and_has_a_goal_that_can_be_reached(tmp_path: Path, kind: str) -> None:
+    if kind == "ros map":
+        for file in ("house_last_year.yaml", "house_last_year.pgm"):
+            shutil.copy(ROOT / "worlds" / file, tmp_path)
+        map_, world = "house_last_year.yaml", "world:\n  simscen: 1\n  map: house_last_year.yaml\n"
+    elif kind == "world":
+        shutil.copy(ROOT / "worlds" / "office.world.yaml", tmp_path)
+        map_, world = "office.world.yaml", "world: office.world.yaml\n"
+    else:
+        (tmp_path / "yard.sdf").write_text(SDF)
+        map_, world = "yard.sdf", "world:\n  simscen: 1\n  sdf: yard.sdf\n"
+    name = f"{map_.split('.')[0]}.scenario.yaml"
+    with editor(tmp_path, "--new", "--map", map_) as (_, url):
+        opened = ask(url, "open")
+        assert opened["is_new"] and opened["name"] == name and world in opened["text"]
+        assert not (tmp_path / name).exists(), "nothing is written before it is saved"
+        errors = [one for one in ask(url, "problems", text=opened["text"])["problems"] if one["severity"] == "error"]
+        assert errors == []
+        (leg,) = ask(url, "preview", text=opened["text"], edits=[])["robots"]["robot"]["legs"]
+        assert leg["length"] > 2
+        ask(url, "save", text=opened["text"], version=opened["version"])
+    assert (tmp_path / name).read_text() == opened["text"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "name the file to edit"),
+        (("--new",), "--new and --map belong together"),
+        (("a.scenario.yaml", "--map", "b.yaml"), "--new and --map belong together"),
+        (("missing.scenario.yaml",), "missing.scenario.yaml: error[SC001]"),
+        (("folder",), "not a regular file"),
+        (("r.robot.yaml",), "is a robot file"),
+        (("w.sdf",), "is a Gazebo world"),
+        (("--new", "--map", "none.yaml"), "none.yaml: error[SC001]"),
+        (("--new", "--map", "w.sdf", "a.scenario.yaml"), "already exists"),
+        (("--new", "--map", "w.sdf", "nowhere/a"), "nowhere is not a folder"),
+        (("--root", "folder", "a.scenario.yaml"), "outside the scenario root"),
+    ],
+)
+def test_what_cannot_be_edited_is_an_error_with_exit_code_2(
+    simscen: Any, tmp_path: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    (tmp_path / "r.robot.yaml").write_text("simscen: 1\ndrive: {}\n")
+    (tmp_path / "w.sdf").write_text(SDF)
+    (tmp_path / "folder").mkdir()
+    ended = simscen("edit", *arguments, "--no-browser")
+    assert ended.code == 2
+    assert message in ended.err and "Traceback" not in ended.err
+
+
+def test_a_file_that_is_no_text_is_refused(simscen: Any, tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_bytes(b"\xff\xfe")
+    ended = simscen("edit", "a.scenario.yaml", "--no-browser")
+    assert ended.code == 2 and "not valid UTF-8" in ended.err
