@@ -94,4 +94,6 @@ def _in_bounds(cells: npt.NDArray[np.int64], built: BuiltWorld) -> npt.NDArray[n
         return cells
     left, low, right, high = built.world.bounds
     x, y = built.map.center_of(cells).T
-    return cells[(x > left) & (x < right) & (y > low) & (y < high)]
+    inside: npt.NDArray[np.bool_] = (x > left) & (x < right) & (y > low) & (y < high)
+    chosen: npt.NDArray[np.int64] = cells[inside]
+    return chosen

@@ -103,7 +103,7 @@ def _world_file(parts: SceneParts, shown: str) -> str:
     if parts.is_inline or parts.world is None:
         return ""
     name = parts.assets.library.fence.shown(parts.world.path)
-    return "" if name == shown else name
+    return "" if name == shown or parts.world.spec is None else name
 
 
 def _object_data(one: MapObject, parts: SceneParts, own: SourceNode | None) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, NamedTuple
 
 from simscen.core.version import PACKAGE
+from simscen.editor.open_files import OpenFiles
 from simscen.editor.session import EditorSession, RequestRefused
 from simscen.report.picture.palette import css_variables
 
@@ -46,7 +47,7 @@ class EditorServer(ThreadingHTTPServer):
     def __init__(self, session: EditorSession, port: int = 0) -> None:
         """Listen on the port. Raises OSError if it is taken."""
         super().__init__((ADDRESS, port), _Handler)
-        self.session, self.token = session, secrets.token_urlsafe(24)
+        self.open_files, self.token = OpenFiles(session), secrets.token_urlsafe(24)
         self.hosts = {f"{name}:{self.server_port}" for name in (ADDRESS, "localhost")}
         self.files = {file.name: file for file in FOLDER.iterdir() if file.suffix in TYPES}
         self.files |= {name: REPLAY_FOLDER / name for name in SHARED_MODULES}
@@ -55,6 +56,15 @@ class EditorServer(ThreadingHTTPServer):
     def url(self) -> str:
         """Address of the page, with the token."""
         return f"http://{ADDRESS}:{self.server_port}/{self.token}/"
+
+    @property
+    def session(self) -> EditorSession:
+        """Session of the file of the command."""
+        return self.open_files.main
+
+    def close_files(self) -> None:
+        """End the sessions of all files."""
+        self.open_files.close()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Ignore a connection that the browser closed; print other errors."""
@@ -70,26 +80,26 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer with a file of the page, or the replay page of a run."""
-        if (name := self._allowed()) is not None:
-            self._send(self._file(name))
+        if (requested := self._allowed()) is not None:
+            self._send(self._file(*requested))
 
     def do_POST(self) -> None:
         """Answer a request of the page."""
         body = self._body()
-        if (name := self._allowed()) is None:
+        if (requested := self._allowed()) is None:
             return
         if body is None:
             self._send(_error("the request is too large, or has no length", HTTPStatus.REQUEST_ENTITY_TOO_LARGE))
         elif self.headers.get_content_type() != "application/json":
             self._send(_error("requests must be JSON", HTTPStatus.UNSUPPORTED_MEDIA_TYPE))
         else:
-            self._send(self._answer(name, body))
+            self._send(_answer(*requested, body))
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing: the address contains the token."""
 
-    def _allowed(self) -> str | None:
-        """Return the path behind the token; answer with an error and return None if the request is not allowed."""
+    def _allowed(self) -> tuple[EditorSession, str] | None:
+        """Return the session of a request and the path within it; if it is not allowed, answer, and return None."""
         origin, host = self.headers.get("Origin"), self.headers.get("Host", "")
         if host not in self.server.hosts:
             self._send(_error("wrong host", HTTPStatus.MISDIRECTED_REQUEST))
@@ -103,7 +113,10 @@ class _Handler(BaseHTTPRequestHandler):
                 _error("wrong or missing token; use the address that simscen edit printed", HTTPStatus.FORBIDDEN)
             )
             return None
-        return name
+        requested = self.server.open_files.resolve(name)
+        if requested is None:
+            self._send(_error("there is no such file to edit", HTTPStatus.NOT_FOUND))
+        return requested
 
     def _body(self) -> bytes | None:
         """Return the body of a request; None if it is too large or has no length, and then close the connection."""
@@ -113,9 +126,9 @@ class _Handler(BaseHTTPRequestHandler):
             return None
         return self.rfile.read(int(length))
 
-    def _file(self, name: str) -> Answer:
+    def _file(self, session: EditorSession, name: str) -> Answer:
         if match := _REPLAY.fullmatch(name):
-            return self._replay(int(match[1]))
+            return _replay(session, int(match[1]))
         file = self.server.files.get(name or "page.html")
         if file is None:
             return _error("no such file", HTTPStatus.NOT_FOUND)
@@ -123,33 +136,6 @@ class _Handler(BaseHTTPRequestHandler):
         if file.name == "page.css":
             data = css_variables().encode() + data
         return Answer(data, TYPES[file.suffix])
-
-    def _replay(self, number: int) -> Answer:
-        trial = self.server.session.runs.trial(number)
-        if trial is None or not trial.replay.is_file():
-            return _error("there is no such replay", HTTPStatus.NOT_FOUND)
-        page = trial.replay.read_bytes()
-        own = _PAGE_POLICY.search(page[:4096].decode(errors="replace"))
-        policy = unescape(own[1]) if own else "default-src 'none'"
-        return Answer(page, "text/html", policy=f"{policy}; frame-ancestors 'self'")
-
-    def _answer(self, name: str, body: bytes) -> Answer:
-        handler = self.server.session.requests.get(name.removeprefix("api/")) if name.startswith("api/") else None
-        if handler is None:
-            return _error("no such request", HTTPStatus.NOT_FOUND)
-        try:
-            data = json.loads(body)
-            if not isinstance(data, dict):
-                return _error("a request must be a JSON object", HTTPStatus.BAD_REQUEST)
-            return _json(handler(data))
-        except (ValueError, RecursionError) as error:
-            if not isinstance(error, json.JSONDecodeError | UnicodeDecodeError | RecursionError):
-                return _internal_error()
-            return _error("the request is not JSON", HTTPStatus.BAD_REQUEST)
-        except RequestRefused as refused:
-            return _json({**refused.data, "error": str(refused)}, refused.status)
-        except Exception:
-            return _internal_error()
 
     def _send(self, answer: Answer) -> None:
         self.send_response(answer.status)
@@ -167,6 +153,35 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(answer.body)
+
+
+def _replay(session: EditorSession, number: int) -> Answer:
+    trial = session.runs.trial(number)
+    if trial is None or not trial.replay.is_file():
+        return _error("there is no such replay", HTTPStatus.NOT_FOUND)
+    page = trial.replay.read_bytes()
+    own = _PAGE_POLICY.search(page[:4096].decode(errors="replace"))
+    policy = unescape(own[1]) if own else "default-src 'none'"
+    return Answer(page, "text/html", policy=f"{policy}; frame-ancestors 'self'")
+
+
+def _answer(session: EditorSession, name: str, body: bytes) -> Answer:
+    handler = session.requests.get(name.removeprefix("api/")) if name.startswith("api/") else None
+    if handler is None:
+        return _error("no such request", HTTPStatus.NOT_FOUND)
+    try:
+        data = json.loads(body)
+        if not isinstance(data, dict):
+            return _error("a request must be a JSON object", HTTPStatus.BAD_REQUEST)
+        return _json(handler(data))
+    except (ValueError, RecursionError) as error:
+        if not isinstance(error, json.JSONDecodeError | UnicodeDecodeError | RecursionError):
+            return _internal_error()
+        return _error("the request is not JSON", HTTPStatus.BAD_REQUEST)
+    except RequestRefused as refused:
+        return _json({**refused.data, "error": str(refused)}, refused.status)
+    except Exception:
+        return _internal_error()
 
 
 def _json(data: Any, status: int = 200) -> Answer:

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from simscen.core.errors import InvalidInput, Problem
@@ -40,6 +41,9 @@ class EditorSession:
         """Open a file; `new_text` is the text of one that does not exist yet. Raises InvalidInput."""
         self.file = file
         self.runs = TrialRuns(backend_factory)
+        self.world_page: Callable[[Path], str] = lambda _: ""
+        """Returns the address of the page that edits a world file, relative to that of this session."""
+        self._backend_factory, self._lenient = backend_factory, lenient
         self._document = Document(file.path, file.shown)
         self._opened = Content(new_text, NEW) if new_text else self._document.read()
         self._backgrounds = Backgrounds(file.root, file.world_path)
@@ -58,6 +62,10 @@ class EditorSession:
             "run-status": self.run_status,
             "run-stop": self.run_stop,
         }
+
+    def other(self, file: EditedFile) -> "EditorSession":
+        """Open another file with the same options. Raises InvalidInput."""
+        return EditorSession(file, self._backend_factory, lenient=self._lenient)
 
     def open(self, _: Data) -> Data:
         """Return the text as it was opened."""
@@ -78,6 +86,7 @@ class EditorSession:
             if parts is None:
                 raise RequestRefused("the text is not a YAML mapping yet, so the map shows its last valid state", 422)
             data = scene_data(parts, self._backgrounds)
+        data["world_page"] = self.world_page(parts.world.path) if data["world_file"] and parts.world else ""
         if data["background"]["id"] and data["background"]["id"] == request.get("known"):
             data["background"] = None
         return data

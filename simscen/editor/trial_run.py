@@ -61,7 +61,7 @@ class TrialRuns:
 
     def __init__(self, backend_factory: Callable[[], Backend]) -> None:
         self._backend_factory = backend_factory
-        self._folder = Path(tempfile.mkdtemp(prefix="simscen-edit-"))
+        self._folder: Path | None = None
         self._trials: list[Trial] = []
         self._lock = threading.Lock()
 
@@ -69,6 +69,7 @@ class TrialRuns:
         """Start a run, and cancel the one before."""
         for trial in self._trials:
             trial.is_canceled = True
+        self._folder = self._folder or Path(tempfile.mkdtemp(prefix="simscen-edit-"))
         number = len(self._trials) + 1
         trial = Trial(number, self._folder / str(number), loaded.spec.time_limit)
         self._trials.append(trial)
@@ -84,7 +85,8 @@ class TrialRuns:
         for trial in self._trials:
             trial.is_canceled = True
         with self._lock:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            if self._folder is not None:
+                shutil.rmtree(self._folder, ignore_errors=True)
 
     def _run(self, loaded: LoadedScenario, trial: Trial) -> None:
         def listen(event: SessionEvent) -> None:

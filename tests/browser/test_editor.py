@@ -1,5 +1,7 @@
 """The editor in a browser: mouse and keyboard change the map, and only the values in the file that they are about."""
 
+import re
+import shutil
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -18,6 +20,7 @@ from simscen.editor.server import EditorServer
 from simscen.editor.session import EditorSession
 from simscen.run.sessions.run_session import SessionOptions
 
+ROOT = Path(__file__).parents[2]
 TEXT = """\
 simscen: 1   # the version
 name: hall
@@ -51,8 +54,8 @@ def edit(open_page: Opener, tmp_path: Path) -> Iterator[Edit]:
     """Opens a file in the editor."""
     servers: list[EditorServer] = []
 
-    def open_(file: Path, kind: str = "scenario", **given: Any) -> Opened:
-        session = EditorSession(EditedFile(file, kind, file.parent), lambda: backend_of(SessionOptions()))
+    def open_(file: Path, kind: str = "scenario", root: Path | None = None, **given: Any) -> Opened:
+        session = EditorSession(EditedFile(file, kind, root or file.parent), lambda: backend_of(SessionOptions()))
         server = EditorServer(session)
         servers.append(server)
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -65,7 +68,7 @@ def edit(open_page: Opener, tmp_path: Path) -> Iterator[Edit]:
     for server in servers:
         server.shutdown()
         server.server_close()
-        server.session.runs.close()
+        server.close_files()
 
 
 @pytest.fixture
@@ -113,7 +116,7 @@ def text(opened: Opened) -> str:
 
 def changes(before: str, after: str) -> list[tuple[str, str]]:
     """The pieces of the text that differ, by whole words."""
-    words = [__import__("re").findall(r"[\w.-]+|\W", one) for one in (before, after)]
+    words = [re.findall(r"[\w.-]+|\W", one) for one in (before, after)]
     steps = SequenceMatcher(None, *words, autojunk=False).get_opcodes()
     return [("".join(words[0][a:b]), "".join(words[1][c:d])) for what, a, b, c, d in steps if what != "equal"]
 
@@ -278,7 +281,7 @@ def test_a_run_shows_its_verdicts_and_the_replay_beside_the_map(edit: Edit, hall
     assert hall.read_text() == TEXT
 
 
-def test_things_of_a_world_in_another_file_are_shown_but_stay(edit: Edit, tmp_path: Path) -> None:
+def test_things_of_a_world_in_another_file_are_edited_on_their_own_page(edit: Edit, tmp_path: Path) -> None:
     (tmp_path / "hall.world.yaml").write_text(
         "simscen: 1\nobstacles: [{name: rack, box: [1, 1, 1], pose: {x: 4, y: 4}}]\n"
     )
@@ -287,7 +290,19 @@ def test_things_of_a_world_in_another_file_are_shown_but_stay(edit: Edit, tmp_pa
     opened = edit(file)
     opened.page.get_by_role("button", name="rack").click()
     settle(opened)
-    assert "simscen edit hall.world.yaml" in opened.page.inner_text("#details")
+    with opened.page.expect_popup() as popup:
+        opened.page.get_by_role("link", name="Edit hall.world.yaml").click()
+    world = popup.value
+    world.wait_for_selector("html[data-checked]", state="attached")
+    world.get_by_role("button", name="rack").click()
+    world.keyboard.press("ArrowRight")
+    world.wait_for_timeout(600)
+    world.keyboard.press("Control+s")
+    world.wait_for_timeout(600)
+    assert "pose: {x: 4.1, y: 4}" in (tmp_path / "hall.world.yaml").read_text()
+    world.close()
+    opened.page.evaluate("editor.refresh()")
+    opened.until("editor.scene.objects.some((one) => one.label === 'rack' && one.handles[0].x === 4.1)")
 
 
 def test_a_world_file_is_edited_on_its_own_map(edit: Edit, tmp_path: Path) -> None:
@@ -301,6 +316,52 @@ def test_a_world_file_is_edited_on_its_own_map(edit: Edit, tmp_path: Path) -> No
     opened.until("editor.history.before.length === 1 && !editor.keyMove")
     settle(opened)
     assert text(opened) == before.replace("400 cm", "430 cm")
+
+
+SHIPPED = (
+    "scenarios/corner_cases/u_trap.scenario.yaml",
+    "scenarios/ground/ramp_up_and_over.scenario.yaml",
+    "scenarios/corner_cases/narrow_doorway.scenario.yaml",
+    "scenarios/people/group_in_the_way.scenario.yaml",
+    "scenarios/multi_robot/meet_in_corridor.scenario.yaml",
+    "scenarios/obstacles/cart_crossing.scenario.yaml",
+    "scenarios/localization/wrong_initial_estimate.scenario.yaml",
+    "scenarios/ground/oil_on_the_way.scenario.yaml",
+    "worlds/office.world.yaml",
+    "worlds/hospital.world.yaml",
+)
+MOVABLE = (
+    "editor.scene.objects.filter((one) => one.editable && one.handles.some((each) => !each.place)).map((one) => one.id)"
+)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_editing_a_shipped_file_changes_no_byte_that_was_not_edited(edit: Edit, tmp_path: Path, name: str) -> None:
+    for folder in ("scenarios", "worlds"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    file = tmp_path / name
+    before = file.read_bytes()
+    opened = edit(file, "world" if ".world." in name else "scenario", root=tmp_path)
+    moved = opened.page.evaluate(MOVABLE)[:3]
+    assert moved
+    for count, one in enumerate(moved, 1):
+        opened.page.locator(f'#list button[data-id="{one}"]').click()
+        opened.page.keyboard.press("ArrowRight")
+        opened.page.keyboard.press("ArrowUp")
+        opened.until(f"editor.history.before.length === {count} && !editor.keyMove")
+        settle(opened)
+    opened.page.keyboard.press("Control+s")
+    opened.until("editor.isSaved")
+    found = changes(before.decode(), file.read_bytes().decode())
+    assert 2 * len(moved) - 1 <= len(found)
+    assert all(re.fullmatch(r"-?[\d.]+", part) for pair in found for part in pair), found
+    numbers = [float(after) - float(old) for old, after in found]
+    assert all(abs(abs(step) - 0.1) < 1e-9 for step in numbers), "each number moved by the step of an arrow key"
+    for _ in moved:
+        opened.page.keyboard.press("Control+z")
+    opened.until("editor.history.before.length === 0")
+    settle(opened)
+    assert text(opened) == before.decode()
 
 
 @pytest.mark.parametrize("dark", [False, True])

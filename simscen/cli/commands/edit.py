@@ -68,7 +68,7 @@ def command(
         except KeyboardInterrupt:
             print_text("")
         finally:
-            session.runs.close()
+            server.close_files()
 
 
 def _backend() -> "Backend":

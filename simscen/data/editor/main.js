@@ -188,13 +188,20 @@ class Page {
 
   /** Buttons of the selected object: its points, adding a point, and removing it. */
   tools(one) {
-    if (!one.editable) return [el("p", {}, `This is written in ${this.scene.world_file || "another file"}. To change it, run: simscen edit ${this.scene.world_file}`)];
+    if (!one.editable) return [this.elsewhere(one)];
     const points = one.handles.length > 1 ? one.handles.map((_, k) => el("button", { "aria-pressed": k === this.handle ? "true" : "false", onclick: () => this.select(one.id, k), "aria-label": `Point ${k + 1} of ${one.handles.length}` }, String(k + 1))) : [];
     const canAdd = one.points_keys.length && (one.kind === "person" || one.handles[0]?.form !== "keyframe");
     const removable = removalKeys(one, this.handle), isOnePoint = this.handle >= 0 && isPoint(one, one.handles[this.handle]);
     return [el("div", { class: "row" }, points.length ? el("span", {}, "Points") : null, ...points,
       canAdd ? el("button", { onclick: () => this.edit([pointEdit(one, this.handle)], "point added") }, "Add a point") : null,
       removable ? el("button", { onclick: () => this.remove() }, isOnePoint ? "Delete this point" : "Delete") : null)];
+  }
+
+  /** Where a thing is written that this file only refers to. */
+  elsewhere(one) {
+    const isWorld = one.keys[0] === "world" && this.scene.world_page;
+    if (!isWorld) return el("p", {}, "This is written in a file that this one extends. Edit that file to change it.");
+    return el("p", {}, "This is written in the world file. ", el("a", { href: this.scene.world_page, target: "_blank" }, `Edit ${this.scene.world_file}`));
   }
 
   remove() {
@@ -295,6 +302,7 @@ class Page {
     $("farther").onclick = () => this.zoom(0.8);
     $("fit").onclick = () => { this.view.fit(); this.view.draw(); };
     addEventListener("keydown", (event) => this.key(event), true);
+    addEventListener("focus", () => this.refresh());  // the world file may have changed in another tab
     addEventListener("beforeunload", (event) => { if (!this.isSaved) event.preventDefault(); });
     this.listenToPointer($("map"));
   }

@@ -31,7 +31,7 @@ def server(tmp_path: Path) -> Iterator[EditorServer]:
     yield running
     running.shutdown()
     running.server_close()
-    running.session.runs.close()
+    running.close_files()
 
 
 class Reply:
@@ -156,6 +156,19 @@ def test_saving_needs_the_version_that_was_read(server: EditorServer) -> None:
     assert server.session.file.path.read_text() == "theirs: 1\n"
     assert ask(server, "save", text=TEXT, version=opened["version"], overwrite=True).status == 200
     assert server.session.file.path.read_text() == TEXT
+
+
+def test_a_world_file_has_a_page_of_its_own_as_soon_as_the_scenario_names_it(server: EditorServer) -> None:
+    world = server.session.file.path.with_name("b.world.yaml")
+    world.write_text("simscen: 1\n")
+    assert request(server, "GET", f"/{server.token}/world-1/").status == 404
+    scene = ask(server, "scene", text=TEXT.replace("{simscen: 1}", "b.world.yaml")).data
+    assert scene["world_file"] == "b.world.yaml" and scene["world_page"] == "world-1/"
+    assert request(server, "GET", f"/{server.token}/world-1/").status == 200
+    assert ask(server, "../world-1/api/open").status == 404
+    opened = request(server, "POST", f"/{server.token}/world-1/api/open", {}).data
+    assert (opened["kind"], opened["text"]) == ("world", "simscen: 1\n")
+    assert request(server, "GET", f"/{server.token}/world-2/").status == 404
 
 
 def test_an_error_in_the_program_is_reported_and_the_server_goes_on(
