@@ -101,6 +101,7 @@ mutation: setup  ## Mutate the code that decides verdicts, and check that tests 
 screenshots: setup  ## Create the screenshots for the docs (needs Chromium)
 	@$(BIN)/python tests/browser/screenshots.py
 	@$(BIN)/python tests/browser/suite_screenshots.py
+	@$(BIN)/python tests/browser/editor_screenshots.py
 
 bench: setup  ## Measure speed (simscen bench)
 	@$(BIN)/simscen bench

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from simscen.core.environment.occupancy_grid import FREE
 from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Array, Pose2
-from simscen.editor.value_text import scalar_text
+from simscen.editor.text_editing.value_text import scalar_text
 from simscen.loading.builders import world_from_file
 from simscen.loading.files.single_files import load_world_file
 from simscen.loading.loaded import LoadedWorld

@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.errors import InvalidInput, Problem
-from simscen.editor.background import Backgrounds
 from simscen.editor.checking import TextChecks
 from simscen.editor.document import NEW, ChangedMeanwhile, Content, Document
 from simscen.editor.files import EditedFile
 from simscen.editor.forms import form_data
-from simscen.editor.map_edits import edits_of
+from simscen.editor.map_view.background import Backgrounds
+from simscen.editor.map_view.map_edits import edits_of
+from simscen.editor.map_view.scene import map_objects, problem_keys, scene_data, scene_parts
 from simscen.editor.preview import preview_data
-from simscen.editor.scene import map_objects, problem_keys, scene_data, scene_parts
-from simscen.editor.splices import EditRefused
-from simscen.editor.text_edits import apply_edits
+from simscen.editor.text_editing.splices import EditRefused
+from simscen.editor.text_editing.text_edits import apply_edits
 from simscen.editor.trial_run import TrialRuns
 from simscen.loading.yaml.source_nodes import parse_source
 from simscen.loading.yaml.textfile import MAX_FILE_BYTES

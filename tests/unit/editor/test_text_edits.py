@@ -8,9 +8,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from simscen.editor.splices import EditRefused
-from simscen.editor.text_edits import AddItem, Edit, RemovePart, SetValue, apply_edits
-from simscen.editor.value_text import same_value
+from simscen.editor.text_editing.splices import EditRefused
+from simscen.editor.text_editing.text_edits import AddItem, Edit, RemovePart, SetValue, apply_edits
+from simscen.editor.text_editing.value_text import same_value
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.source_nodes import parse_source, source_at
 from simscen.loading.yaml.tree import Key

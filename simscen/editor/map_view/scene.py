@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from simscen.core.errors import InvalidInput, Problem
-from simscen.editor.background import Backgrounds
 from simscen.editor.files import EditedFile
-from simscen.editor.map_objects import MAX_OBJECTS, Handle, Keys, MapObject, mapping
-from simscen.editor.scenario_objects import scenario_objects
-from simscen.editor.world_objects import world_objects, world_places
+from simscen.editor.map_view.background import Backgrounds
+from simscen.editor.map_view.map_objects import MAX_OBJECTS, Handle, Keys, MapObject, mapping
+from simscen.editor.map_view.scenario_objects import scenario_objects
+from simscen.editor.map_view.world_objects import world_objects, world_places
 from simscen.loading.files.assets import Assets
 from simscen.loading.loaded import LoadedRobot, LoadedWorld
 from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at

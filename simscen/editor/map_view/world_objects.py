@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from simscen.editor.map_objects import (
+from simscen.editor.map_view.map_objects import (
     Keys,
     MapObject,
     Places,

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from simscen.editor.map_objects import (
+from simscen.editor.map_view.map_objects import (
     PERSON_RADIUS_M,
     Keys,
     MapObject,

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from simscen.editor.schema_lookup import schema_of_kind
-from simscen.editor.splices import EditRefused
-from simscen.editor.text_edits import AddItem, Edit, RemovePart, SetValue
+from simscen.editor.text_editing.splices import EditRefused
+from simscen.editor.text_editing.text_edits import AddItem, Edit, RemovePart, SetValue
 from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at
 from simscen.loading.yaml.tree import Key
 

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from simscen.editor.splices import Splice, column, line_end, line_start
-from simscen.editor.value_text import flow_text, key_text
+from simscen.editor.text_editing.splices import Splice, column, line_end, line_start
+from simscen.editor.text_editing.value_text import flow_text, key_text
 from simscen.loading.yaml.source_nodes import SourceNode
 
 INDENT = 2

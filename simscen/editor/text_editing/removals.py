@@ -1,7 +1,7 @@
 """Remove keys and items from a YAML text together with their line breaks or commas."""
 
-from simscen.editor.insertions import dash_before
-from simscen.editor.splices import EditRefused, Splice, line_end, line_start, path_text
+from simscen.editor.text_editing.insertions import dash_before
+from simscen.editor.text_editing.splices import EditRefused, Splice, line_end, line_start, path_text
 from simscen.loading.yaml.source_nodes import SourceNode, source_at
 from simscen.loading.yaml.tree import Key
 
