@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -362,6 +363,28 @@ def test_editing_a_shipped_file_changes_no_byte_that_was_not_edited(edit: Edit, 
     opened.until("editor.history.before.length === 0")
     settle(opened)
     assert text(opened) == before.decode()
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
+def test_the_modules_that_need_no_page() -> None:
+    command = ["node", "--test", "--test-reporter=tap", str(ROOT / "tests/browser/editor.test.mjs")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stdout
+
+
+def test_steps_of_the_keys_add_up_however_fast_they_come(edit: Edit, hall: Path) -> None:
+    opened = edit(hall)
+    opened.page.get_by_role("button", name="goal shelf").click()
+    for count in range(12):
+        opened.page.keyboard.press("ArrowLeft")
+        opened.page.wait_for_timeout(count * 20)
+    opened.page.get_by_role("button", name="rack at").click()
+    opened.page.keyboard.press("ArrowLeft")
+    opened.page.keyboard.press("Control+z")
+    opened.page.keyboard.press("Control+y")
+    opened.until("!editor.keyMove && editor.text.includes('x: 4.4')")
+    settle(opened)
+    assert text(opened) == TEXT.replace("{x: 7.5, y: 2.2}", "{x: 6.3, y: 2.2}").replace("x: 4.5, y: 4}", "x: 4.4, y: 4}")
 
 
 @pytest.mark.parametrize("dark", [False, True])

@@ -25,6 +25,7 @@ class Page {
     this.problems = [];
     this.bad = new Map();
     this.queue = Promise.resolve();
+    this.waiting = 0;  // edits in the queue
     this.placing = "";
     this.view = new MapView($("map"));
     this.list = new ObjectList($("list"), (id) => this.select(id));
@@ -59,6 +60,8 @@ class Page {
     try {
       const scene = await ask("scene", { text, known: this.view.background.id });
       if (text !== this.text) return;
+      if (this.drag || this.keyMove || this.waiting) { this.isStale = true; return; }  // what moves now would jump back
+      this.isStale = false;
       this.scene = scene;
       this.view.show(scene);
       $("facts").classList.remove("bad");
@@ -135,7 +138,9 @@ class Page {
 
   /** Change values of the text, after all changes before. */
   edit(edits, what = "", group = "") {
+    this.waiting++;
     this.queue = this.queue.then(async () => {
+      this.waiting--;
       for (let tries = 0; tries < 3; tries++) {
         const text = this.text;
         try {
@@ -191,7 +196,7 @@ class Page {
     if (!one.editable) return [this.elsewhere(one)];
     const points = one.handles.length > 1 ? one.handles.map((_, k) => el("button", { "aria-pressed": k === this.handle ? "true" : "false", onclick: () => this.select(one.id, k), "aria-label": `Point ${k + 1} of ${one.handles.length}` }, String(k + 1))) : [];
     const canAdd = one.points_keys.length && (one.kind === "person" || one.handles[0]?.form !== "keyframe");
-    const removable = removalKeys(one, this.handle), isOnePoint = this.handle >= 0 && isPoint(one, one.handles[this.handle]);
+    const removable = removalKeys(one, this.handle, this.scene), isOnePoint = this.handle >= 0 && isPoint(one, one.handles[this.handle]);
     return [el("div", { class: "row" }, points.length ? el("span", {}, "Points") : null, ...points,
       canAdd ? el("button", { onclick: () => this.edit([pointEdit(one, this.handle)], "point added") }, "Add a point") : null,
       removable ? el("button", { onclick: () => this.remove() }, isOnePoint ? "Delete this point" : "Delete") : null)];
@@ -205,7 +210,7 @@ class Page {
   }
 
   remove() {
-    const one = this.object, keys = one && removalKeys(one, this.handle);
+    const one = this.object, keys = one && removalKeys(one, this.handle, this.scene);
     if (!keys) return;
     const what = this.handle >= 0 && keys.length > one.keys.length ? "point deleted" : `${one.label} deleted`;
     if (what !== "point deleted") this.selected = "";
@@ -239,11 +244,17 @@ class Page {
     if (name) { $("facts").textContent = `Click where to place: ${name}. Escape cancels.`; this.say($("facts").textContent); }
   }
 
-  undo() { if (this.history.undo() !== null) { this.say("undone"); this.refresh(); } }
-  redo() { if (this.history.redo() !== null) { this.say("redone"); this.refresh(); } }
+  /** Write a move by keys that still waits. */
+  async flush() {
+    this.keyMove?.write();
+    await this.queue;
+  }
+
+  async undo() { await this.flush(); if (this.history.undo() !== null) { this.say("undone"); this.refresh(); } }
+  async redo() { await this.flush(); if (this.history.redo() !== null) { this.say("redone"); this.refresh(); } }
 
   async save(overwrite = false) {
-    await this.queue;
+    await this.flush();
     const text = this.text;
     try {
       this.version = (await ask("save", { text, version: this.version, overwrite })).version;
@@ -290,7 +301,7 @@ class Page {
     $("undo").onclick = () => this.undo();
     $("redo").onclick = () => this.redo();
     $("save").onclick = () => this.save();
-    $("run").onclick = async () => { this.showTab("run"); await this.queue; this.runs.start(this.text); };
+    $("run").onclick = async () => { this.showTab("run"); await this.flush(); this.runs.start(this.text); };
     $("texttab").onclick = () => this.showTab("text");
     $("runtab").onclick = () => this.showTab("run");
     $("place").onclick = () => (this.placing ? this.add([this.view.camera.x, this.view.camera.y]) : this.setPlacing($("add").value));
@@ -320,7 +331,7 @@ class Page {
       pointers.set(event.pointerId, [event.clientX, event.clientY]);
       map.setPointerCapture(event.pointerId);
       map.focus();
-      if (pointers.size === 2) { drag?.cancel(); drag = null; pan = spread(); return; }
+      if (pointers.size === 2) { drag?.cancel(); drag = this.drag = null; pan = spread(); return; }
       const point = this.view.point(event);
       if (this.placing) { this.add(point); return; }
       const hit = event.button === 0 ? this.view.hit(point) : null;
@@ -353,9 +364,11 @@ class Page {
     });
     const end = (event) => {
       pointers.delete(event.pointerId);
-      if (drag && !drag.cancelled && drag.moved && event.type === "pointerup") this.edit(drag.edits, `${drag.object.label}${positionText(drag.object)}`);
-      else if (drag?.moved && !drag.cancelled) drag.cancel();
+      const done = drag;
       drag = this.drag = null;
+      if (done?.moved && !done.cancelled && event.type === "pointerup") this.edit(done.edits, `${done.object.label}${positionText(done.object)}`);
+      else if (done?.moved && !done.cancelled) done.cancel();
+      if (this.isStale && !(done?.moved && !done.cancelled)) this.refresh();
       this.view.draw();
     };
     map.addEventListener("pointerup", end);
@@ -390,12 +403,17 @@ class Page {
   /** Show a move by a key at once, and write it when the keys pause. */
   movedByKey(one, turned) {
     this.view.draw();
-    const handles = movedHandles(one, this.handle), waiting = this.keyMove;
-    clearTimeout(waiting?.timer);
-    const anyTurn = turned || Boolean(waiting && waiting.one === one && waiting.turned);
-    const edits = handles.map((handle) => handleEdit(handle, anyTurn));
-    const write = () => { this.keyMove = null; this.edit(edits, `${one.label}${positionText(one)}`, `keys ${one.id}`); };
-    this.keyMove = { one, turned: anyTurn, timer: setTimeout(write, KEY_PAUSE_MS) };
+    const target = `${one.id} ${this.handle}`;
+    if (this.keyMove && this.keyMove.target !== target) this.keyMove.write();
+    clearTimeout(this.keyMove?.timer);
+    const anyTurn = turned || Boolean(this.keyMove?.turned);
+    const edits = movedHandles(one, this.handle).map((handle) => handleEdit(handle, anyTurn));
+    const write = () => {
+      clearTimeout(this.keyMove?.timer);
+      this.keyMove = null;
+      this.edit(edits, `${one.label}${positionText(one)}`, `keys ${target}`);
+    };
+    this.keyMove = { target, write, turned: anyTurn, timer: setTimeout(write, KEY_PAUSE_MS) };
     this.showPreview(edits);
   }
 }

@@ -69,7 +69,7 @@ export function addEdits(name, scene, [x, y], region) {
 }
 
 /** The keys of what Delete removes for an object, or for one point of it; null if it has to stay. */
-export function removalKeys(one, handle) {
+export function removalKeys(one, handle, scene = { objects: [] }) {
   const least = one.kind === "person" ? 0 : one.line === "closed" ? 3 : 2;
   const points = one.handles.filter((each) => isPoint(one, each));
   if (one.points_keys.length && handle >= 0 && isPoint(one, one.handles[handle])) return points.length > least ? one.handles[handle].keys : null;
@@ -77,7 +77,8 @@ export function removalKeys(one, handle) {
   if (one.keys[0] === "events") {
     const inSequence = one.keys[2] === "then";
     const own = one.keys.slice(0, inSequence ? 4 : 2), rest = one.keys.slice(own.length);
-    return rest[0] === "do" && typeof rest[1] === "number" ? [...own, "do", rest[1]] : own;
+    const actions = new Set(scene.objects.filter((other) => [...own, "do"].every((key, k) => other.keys[k] === key)).map((other) => other.keys[own.length + 1]));
+    return rest[0] === "do" && typeof rest[1] === "number" && actions.size > 1 ? [...own, "do", rest[1]] : own;
   }
   if (one.kind === "trigger") return null;
   return one.keys;
