@@ -17,11 +17,17 @@ from simscen.editor.preview import preview_data
 from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import apply_edits
 from simscen.editor.trial_run import TrialRuns
+from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.source_nodes import parse_source
 from simscen.loading.yaml.textfile import MAX_FILE_BYTES
 from simscen.run.process.backend import Backend
 
 Data = dict[str, Any]
+WithCommand = Callable[[LoadedScenario], tuple[LoadedScenario, list[Problem]]]
+
+
+def _as_it_is(loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:
+    return loaded, []
 
 
 class RequestRefused(Exception):
@@ -36,14 +42,22 @@ class EditorSession:
     """One file in one editor. The page holds the text, and sends it with each request."""
 
     def __init__(
-        self, file: EditedFile, backend_factory: Callable[[], Backend], new_text: str = "", lenient: bool = False
+        self,
+        file: EditedFile,
+        backend_factory: Callable[[], Backend],
+        new_text: str = "",
+        lenient: bool = False,
+        with_command: WithCommand = _as_it_is,
     ) -> None:
-        """Open a file; `new_text` is the text of one that does not exist yet. Raises InvalidInput."""
+        """Open a file; `new_text` is the text of one that does not exist yet. Raises InvalidInput.
+
+        `with_command` returns a scenario with the commands of its external stacks, and problems if they are unknown.
+        """
         self.file = file
         self.runs = TrialRuns(backend_factory)
         self.world_page: Callable[[Path], str] = lambda _: ""
         """Returns the address of the page that edits a world file, relative to that of this session."""
-        self._backend_factory, self._lenient = backend_factory, lenient
+        self._backend_factory, self._lenient, self._with_command = backend_factory, lenient, with_command
         self._document = Document(file.path, file.shown)
         self._opened = Content(new_text, NEW) if new_text else self._document.read()
         self._backgrounds = Backgrounds(file.root, file.world_path)
@@ -147,7 +161,10 @@ class EditorSession:
         errors = [one for one in problems if one.severity == "error"]
         if errors:
             raise RequestRefused(f"the scenario has problems: {_first_message(errors)}", 422)
-        return self.runs.start(loaded[0]).data()
+        scenario, undefined = self._with_command(loaded[0])
+        if undefined:
+            raise RequestRefused(f"{_first_message(undefined)}; {undefined[0].hint}", 422)
+        return self.runs.start(scenario).data()
 
     def run_status(self, request: Data) -> Data:
         """Return the state of a run."""

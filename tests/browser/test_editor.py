@@ -149,6 +149,74 @@ def test_dragging_a_corner_of_a_region_a_door_a_person_and_their_path(edit: Edit
     assert "# a comment that must survive" in shown
 
 
+EVERYTHING = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{name: long wall, points: [[0, 6], [9, 6]]}]
+  objects: [{name: cart, box: [0.6, 0.6, 1], pose: {x: 2, y: 5}, move: {through: [[4, 5]], speed: 0.5 m/s}}]
+  ramps: [{name: slope, start: [6, 5], end: [7, 5], width: 0.6, height: 0.05}]
+  places: {dock: {x: 8, y: 5}}
+robot: {pose: {x: 1, y: 1}, initial_estimate: {x: 1.5, y: 1.6, yaw: 0}}
+goals: [{pose: {x: 3, y: 1}}]
+events:
+  - when: {time: 1 s}
+    do:
+      - {spawn: {name: box, cylinder: [0.3, 1], pose: {x: 4, y: 3}}}
+      - {teleport: {name: cart, pose: {x: 5, y: 3}}}
+      - {kidnap: {pose: {x: 6, y: 3}}}
+      - {new_goal: {name: extra, pose: {x: 7, y: 3}}}
+      - {friction: {at: [2, 3], radius: 0.5, value: 0.1}}
+      - {move: {name: cart, keyframes: [[1, 3, 4, 0], [2, 4, 4, 0]]}}
+pass: []
+"""
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "before", "after"),
+    [
+        ((4.5, 6), (4.5, 5.6), "[[0, 6], [9, 6]]", "[[0, 5.6], [9, 5.6]]"),
+        ((2, 5), (2.5, 4.6), "pose: {x: 2, y: 5}", "pose: {x: 2.5, y: 4.6}"),
+        ((4, 5), (4.5, 4.6), "through: [[4, 5]]", "through: [[4.5, 4.6]]"),
+        ((6.5, 5), (6.5, 4.6), "start: [6, 5], end: [7, 5]", "start: [6, 4.6], end: [7, 4.6]"),
+        ((8, 5), (8.5, 4.6), "dock: {x: 8, y: 5}", "dock: {x: 8.5, y: 4.6}"),
+        ((1, 1), (0.5, 0.8), "pose: {x: 1, y: 1}", "pose: {x: 0.5, y: 0.8}"),
+        ((1.5, 1.6), (2, 2), "{x: 1.5, y: 1.6, yaw: 0}", "{x: 2.0, y: 2.0, yaw: 0}"),
+        ((4, 3), (4.4, 2.6), "pose: {x: 4, y: 3}", "pose: {x: 4.4, y: 2.6}"),
+        ((5, 3), (5.4, 2.6), "pose: {x: 5, y: 3}", "pose: {x: 5.4, y: 2.6}"),
+        ((6, 3), (6.4, 2.6), "pose: {x: 6, y: 3}", "pose: {x: 6.4, y: 2.6}"),
+        ((7, 3), (7.4, 2.6), "pose: {x: 7, y: 3}", "pose: {x: 7.4, y: 2.6}"),
+        ((2, 3), (2.4, 2.6), "at: [2, 3]", "at: [2.4, 2.6]"),
+        ((3, 4), (3.4, 3.6), "[1, 3, 4, 0]", "[1, 3.4, 3.6, 0]"),
+    ],
+    ids=(
+        [
+            "wall",
+            "object",
+            "path",
+            "ramp",
+            "place",
+            "robot",
+            "estimate",
+            "spawned",
+            "teleported",
+            "kidnapped",
+            "new-goal",
+            "patch",
+            "keyframe",
+        ]
+    ),
+)
+def test_everything_that_has_a_place_can_be_dragged(
+    edit: Edit, tmp_path: Path, start: tuple[float, float], end: tuple[float, float], before: str, after: str
+) -> None:
+    file = tmp_path / "a.scenario.yaml"
+    file.write_text(EVERYTHING)
+    opened = edit(file)
+    drag(opened, start, end)
+    assert text(opened) == EVERYTHING.replace(before, after, 1)
+
+
 def test_dragging_a_trigger_and_its_radius(edit: Edit, hall: Path) -> None:
     opened = edit(hall)
     drag(opened, (6, 3), (5.5, 2.5))
@@ -384,7 +452,9 @@ def test_steps_of_the_keys_add_up_however_fast_they_come(edit: Edit, hall: Path)
     opened.page.keyboard.press("Control+y")
     opened.until("!editor.keyMove && editor.text.includes('x: 4.4')")
     settle(opened)
-    assert text(opened) == TEXT.replace("{x: 7.5, y: 2.2}", "{x: 6.3, y: 2.2}").replace("x: 4.5, y: 4}", "x: 4.4, y: 4}")
+    assert text(opened) == TEXT.replace("{x: 7.5, y: 2.2}", "{x: 6.3, y: 2.2}").replace(
+        "x: 4.5, y: 4}", "x: 4.4, y: 4}"
+    )
 
 
 @pytest.mark.parametrize("dark", [False, True])

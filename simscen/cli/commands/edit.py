@@ -48,10 +48,11 @@ def command(
     Exit code 0: ended with Ctrl-C; 2: the file or an option is unusable.
     """
     edited, text = _edited_file(file, new, map_, root, tuple(world_path or ()), lenient)
+    from simscen.cli.session.stacks import Stacks
     from simscen.editor.server import EditorServer
     from simscen.editor.session import EditorSession
 
-    session = EditorSession(edited, _backend, text, lenient)
+    session = EditorSession(edited, _backend, text, lenient, Stacks().with_command)
     try:
         server = EditorServer(session, port)
     except OSError as error:
