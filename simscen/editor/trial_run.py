@@ -18,6 +18,8 @@ from simscen.run.process.jobs import Job, ReplayMode
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 WALL_LIMIT_S = 300.0
+END_S = 5.0
+"""How long to wait for a run that was stopped; its process ends with this one at the latest."""
 REPLAY = "replay.html"
 
 
@@ -84,9 +86,11 @@ class TrialRuns:
         """Cancel all runs and delete their files."""
         for trial in self._trials:
             trial.is_canceled = True
-        with self._lock:
-            if self._folder is not None:
-                shutil.rmtree(self._folder, ignore_errors=True)
+        has_ended = self._lock.acquire(timeout=END_S)
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+        if has_ended:
+            self._lock.release()
 
     def _run(self, loaded: LoadedScenario, trial: Trial) -> None:
         def listen(event: SessionEvent) -> None:

@@ -5,6 +5,7 @@ import math
 import re
 from typing import Any
 
+from simscen.editor.text_editing.block_text import block_text
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.spec.quantities import NUMBER_AND_UNIT, UNITS, si_number
 
@@ -49,6 +50,10 @@ def replacing_text(value: Any, old: str, style: str) -> str:
         inner = old[1:-1] if quote else old
         text = number_in_unit(float(value), inner)
         return f"{quote}{text}{quote}" if _unit(inner) else text
+    if isinstance(value, str) and style in (">", "|"):
+        lines = [line for line in old.split("\n")[1:] if line.strip()]
+        indent = len(lines[0]) - len(lines[0].lstrip()) if lines else 0
+        return (block_text(value, old, indent) if indent else None) or scalar_text(value)
     if isinstance(value, str) and style == "'" and not _UNSAFE.search(value):
         return "'" + value.replace("'", "''") + "'"
     if isinstance(value, str) and style == '"':

@@ -52,12 +52,27 @@ def plain(text: str) -> Any:
         ("x: true", False, "x: false"),
         ("x:", 3, "x: 3"),
         ("x: &a 2.0 # anchor", 3, "x: &a 3.0 # anchor"),
-        ("x: |\n  long\n  text\n# end", "short", "x: short\n# end"),
+        ("x: |\n  long\n  text\n# end", 3, "x: 3\n# end"),
         ("x: {a: 1, b: 2}", {"a": [1, 2]}, "x: {a: [1, 2]}"),
     ],
 )
 def test_a_value_keeps_its_notation(before: str, value: Any, after: str) -> None:
     assert edited(before, SetValue(("x",), value)) == after
+
+
+@pytest.mark.parametrize(
+    ("before", "value", "after"),
+    [
+        ("d: >\n  old\n  text\ne: 1\n", "new text\n", "d: >\n  new text\ne: 1\n"),
+        ("d: >\n  old\ne: 1\n", "one\ntwo\n\nthree", "d: >-\n  one\n\n  two\n\n\n  three\ne: 1\n"),
+        ("d:\n  f: |\n    old\n\n# end\n", "one\ntwo\n", "d:\n  f: |\n    one\n    two\n\n# end\n"),
+        ("d: >\n  old\n", "  indented", 'd: "  indented"\n'),
+        ("d: >\n  old\n", "x " * 100 + "end\n", "d: >\n  " + ("x " * 59)[:-1] + "\n  " + "x " * 41 + "end\n"),
+    ],
+)
+def test_a_long_text_keeps_its_style_where_that_can_hold_it(before: str, value: str, after: str) -> None:
+    keys = ("d", "f") if "f:" in before else ("d",)
+    assert edited(before, SetValue(keys, value)) == after
 
 
 def test_the_alias_that_is_edited_gets_a_value_of_its_own() -> None:

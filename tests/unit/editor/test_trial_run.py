@@ -1,0 +1,76 @@
+"""A run of the editor can be watched and stopped, and leaves nothing behind."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+from simscen.editor.checking import TextChecks
+from simscen.editor.files import EditedFile
+from simscen.editor.trial_run import Trial, TrialRuns
+from simscen.loading.loaded import LoadedScenario
+from simscen.run.process.backend import JobUpdate, Progressed, Started, always
+from simscen.run.process.jobs import Job
+from simscen.spec.registry import Entry
+
+TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: {x: 3, y: 1}}]\ntime_limit: 60 s\npass: []\n"
+
+
+class EndlessBackend:
+    """Runs that report progress for ever."""
+
+    def __enter__(self) -> "EndlessBackend":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def run(
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), go_on: Callable[[], bool] = always
+    ) -> Iterator[JobUpdate]:
+        (job,) = jobs
+        job.folder.mkdir(parents=True)
+        yield Started(job)
+        for seconds in range(1_000_000):
+            time.sleep(0.01)
+            yield Progressed(job, seconds + 1)
+
+
+@pytest.fixture
+def loaded(tmp_path: Path) -> LoadedScenario:
+    found = TextChecks(EditedFile(tmp_path / "a.scenario.yaml", "scenario", tmp_path)).load(TEXT)
+    assert not isinstance(found, list)
+    return found[0]
+
+
+def until(holds: Callable[[], bool]) -> None:
+    for _ in range(1000):
+        if holds():
+            return
+        time.sleep(0.01)
+    raise AssertionError("it never happened")
+
+
+def test_a_run_shows_its_progress_until_it_is_stopped(loaded: LoadedScenario) -> None:
+    runs = TrialRuns(EndlessBackend)
+    trial = runs.start(loaded)
+    until(lambda: trial.seconds > 2)
+    assert trial.data()["state"] == "running" and trial.data()["limit"] == 60
+    trial.is_canceled = True
+    until(lambda: trial.state == "canceled")
+    assert not trial.data()["replay"]
+    runs.close()
+
+
+def test_a_new_run_stops_the_one_before_and_the_end_deletes_their_files(loaded: LoadedScenario) -> None:
+    runs = TrialRuns(EndlessBackend)
+    trials: list[Trial] = []
+    for _ in range(2):
+        trials.append(runs.start(loaded))
+        until(lambda: trials[-1].seconds > 1)
+    assert trials[0].state == "canceled"
+    folder = trials[0].folder.parent
+    assert folder.is_dir() and folder.name.startswith("simscen-edit-")
+    runs.close()
+    assert not folder.exists()
