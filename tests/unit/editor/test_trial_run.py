@@ -14,7 +14,14 @@ from simscen.run.process.backend import JobUpdate, Progressed, Started, always
 from simscen.run.process.jobs import Job
 from simscen.spec.registry import Entry
 
-TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: {x: 3, y: 1}}]\ntime_limit: 60 s\npass: []\n"
+TEXT = """\
+simscen: 1
+world: {simscen: 1}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 3, y: 1}}]
+time_limit: 60 s
+pass: [goals_reached: {}]
+"""
 
 
 class EndlessBackend:
