@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +83,10 @@ class EditorSession:
         return EditorSession(file, self._backend_factory, lenient=self._lenient)
 
     def open(self, _: Data) -> Data:
-        """Return the text as it was opened."""
+        """Return the text of the file as it is now; that of the last time if it cannot be read any more."""
+        if self._opened.version != NEW:
+            with suppress(InvalidInput, OSError):
+                self._opened = self._document.read()
         return self._opened_data(self._opened)
 
     def reload(self, _: Data) -> Data:
