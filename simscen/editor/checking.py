@@ -36,7 +36,7 @@ class TextChecks:
         loaded = try_variations(file.path, file.root, file.world_path, None, numbers, {file.path: text})
         if isinstance(loaded, list):
             return loaded
-        return tuple(one.having(lenient=self.lenient) for one in loaded)
+        return tuple(one.with_changes(lenient=self.lenient) for one in loaded)
 
     def problems(self, text: str) -> list[Problem]:
         """Return all problems of a text, in the order of the file."""

@@ -69,7 +69,7 @@ def _start_and_goal(built: BuiltWorld) -> tuple[Pose2, Pose2]:
     poses = [Pose2(round(x, 2), round(y, 2)) for x, y in points.tolist()]
     ways = shortest_paths_in(built, poses, ROOM_M / 2)
     order = np.argsort(-np.linalg.norm(points - start, axis=1))
-    reachable = (poses[k] for k in order.tolist() if ways.way(poses[0], poses[k]) is not None)
+    reachable = (poses[k] for k in order.tolist() if ways.path(poses[0], poses[k]) is not None)
     return poses[0], next(reachable, poses[0])
 
 

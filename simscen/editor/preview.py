@@ -16,7 +16,7 @@ from simscen.loading.checks.scene import Scene
 from simscen.loading.goals import scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.robot_size import RobotSize, blocking_world, robot_size
-from simscen.loading.world_cache import bounds_with
+from simscen.loading.world_cache import extend_bounds
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 OUTLINE_STEP_M = 0.05
@@ -36,7 +36,7 @@ def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
         return {"reason": _reason(loaded), "robots": {}}
     first, robots = loaded[0], {}
     try:
-        for name, view in first.each.items():
+        for name, view in first.robot_views.items():
             key = f"robots/{name}" if first.robots else "robot"
             robots[key] = _robot_data(view, checks)
     except InvalidInput as error:
@@ -56,7 +56,7 @@ def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:
     goals = scenario_goals(loaded.spec)[: len(loaded.spec.goals)]
     stops = [scene.start, *(goal.pose for goal in goals)]
     solids = _standing_solids(scene)
-    ways = checks.cache.ways(solids, bounds_with(world.bounds, stops), size.inscribed, scene.z_range)
+    ways = checks.cache.shortest_paths(solids, extend_bounds(world.bounds, stops), size.inscribed, scene.z_range)
     legs = [_leg(ways, *ends) for ends in list(pairwise(stops))[:MAX_LEGS]]
     return {
         "footprint": [[round(x, 4), round(y, 4)] for x, y in size.footprint],
@@ -72,7 +72,7 @@ def _standing_solids(scene: Scene) -> tuple[Solid, ...]:
 
 
 def _leg(ways: ShortestPaths, start: Pose2, goal: Pose2) -> dict[str, Any]:
-    way = ways.way(start, goal)
+    way = ways.path(start, goal)
     if way is None:
         return {"points": [[start.x, start.y], [goal.x, goal.y]], "length": None}
     return {"points": np.round(way, 3).tolist(), "length": round(polyline_length(way), 2)}

@@ -72,7 +72,8 @@ def try_variations(
     """Return all variations of the scenario in a file in order, or all problems of any of them.
 
     A file without variations yields one scenario whose variation has no name. `numbers` selects variations by their
-    numbers from 1, without those that do not exist or do not meet the conditions in `require`.
+    numbers from 1, without those that do not exist or do not meet the conditions in `require`. `unsaved` contains
+    texts that replace those of files.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     read = _read(path, library, choice)

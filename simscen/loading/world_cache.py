@@ -22,9 +22,9 @@ Bounds = tuple[float, float, float, float]
 
 @dataclass
 class WorldCache:
-    """Caches built worlds, and the shortest paths of discs in them."""
+    """Caches built worlds, and the shortest paths of discs in them.
 
-    `max_worlds` limits the number of worlds; the oldest ones are forgotten.
+    `max_worlds` limits the number of worlds; the oldest ones are discarded.
     """
 
     max_worlds: int = 100_000

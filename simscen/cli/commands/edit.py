@@ -13,13 +13,13 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.run_options import LenientOption, RootOption, WorldPathOption
 from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
-from simscen.loading.files.discovery import SCENARIO, STUDY, default_root
+from simscen.loading.files.discovery import SCENARIO_SUFFIXES, STUDY_SUFFIXES, default_root
 
 if TYPE_CHECKING:
     from simscen.editor.files import EditedFile
     from simscen.run.process.backend import Backend
 
-SUFFIX = SCENARIO[0]
+SUFFIX = SCENARIO_SUFFIXES[0]
 
 
 def command(
@@ -108,7 +108,7 @@ def _new_file(
     from simscen.editor.new_scenario import new_scenario_text
 
     target = file or Path(f"{map_.name.split('.')[0]}{SUFFIX}")
-    if not target.name.endswith(SCENARIO):
+    if not target.name.endswith(SCENARIO_SUFFIXES):
         target = target.with_name(f"{target.name}{SUFFIX}")
     if target.exists():
         raise UsageError(f"{target} already exists; edit it without --new, or choose another name")
@@ -122,10 +122,10 @@ def _new_file(
 def _file_of_kind(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
     from simscen.editor.files import EditedFile
     from simscen.loading.checks.files import file_kind
-    from simscen.loading.files.assets import GAZEBO
+    from simscen.loading.files.assets import SDF_SUFFIXES
 
-    kind = "scenario" if file.name.endswith((*SCENARIO, *STUDY)) else file_kind(file, root)
-    if kind not in ("scenario", "world") or file.name.endswith(GAZEBO):
+    kind = "scenario" if file.name.endswith((*SCENARIO_SUFFIXES, *STUDY_SUFFIXES)) else file_kind(file, root)
+    if kind not in ("scenario", "world") or file.name.endswith(SDF_SUFFIXES):
         hint = "edit takes a scenario or a *.world.yaml; for other maps use: simscen edit --new --map FILE"
         message = f"is a {'Gazebo world' if kind == 'world' else f'{kind} file'}"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", message, hint)])
@@ -136,7 +136,7 @@ def _inside(edited: "EditedFile", file: Path) -> "EditedFile":
     """Return the file if it is inside the root. Raises InvalidInput."""
     from simscen.loading.files.paths import PathSandbox
 
-    entered = PathSandbox.around(edited.root, edited.world_path).entered(file)
+    entered = PathSandbox.around(edited.root, edited.world_path).resolve_argument(file)
     if isinstance(entered, Problem):
         raise InvalidInput([entered])
     return edited

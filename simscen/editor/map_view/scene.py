@@ -62,7 +62,7 @@ def _inline_world(assets: Assets, node: MappingNode, file: EditedFile) -> Loaded
     from simscen.model.world import WorldSpec
 
     spec = check(WorldSpec, node)
-    return None if isinstance(spec, list) else assets.own_world(spec, node, file.path)
+    return None if isinstance(spec, list) else assets.complete_world(spec, node, file.path)
 
 
 def map_objects(parts: SceneParts) -> list[MapObject]:
@@ -102,7 +102,7 @@ def _world_file(parts: SceneParts, shown: str) -> str:
     """Return the name of the world file if the things of the world are written there; "" otherwise."""
     if parts.is_inline or parts.world is None:
         return ""
-    name = parts.assets.library.fence.shown(parts.world.path)
+    name = parts.assets.library.sandbox.display_name(parts.world.path)
     return "" if name == shown or parts.world.spec is None else name
 
 

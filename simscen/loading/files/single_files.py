@@ -51,9 +51,14 @@ def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -
     return RobotFile(robot, library)
 
 
-def load_world_file(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedWorld:
-    """Load the world in a `*.world.yaml`, a ROS map or an SDF file. Raises InvalidInput with all problems."""
-    library = Library(PathSandbox.around(root, world_path))
+def load_world_file(
+    path: Path, root: Path, world_path: Sequence[Path] = (), unsaved: Mapping[Path, str] | None = None
+) -> LoadedWorld:
+    """Load the world in a `*.world.yaml`, a ROS map, or an SDF file. Raises InvalidInput with all problems.
+
+    `unsaved` contains texts that replace those of files.
+    """
+    library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):
         raise InvalidInput([file])

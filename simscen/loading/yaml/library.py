@@ -24,6 +24,7 @@ class Library:
     """Reader of the files of one scenario; keeps their texts so that problems can show their lines.
 
     The keys of `texts` and `files` are the names that problems use. `loaded` caches worlds, maps and robots.
+    `unsaved` contains texts that replace those of files, by absolute path, such as the text in an editor.
     """
 
     sandbox: PathSandbox
@@ -99,7 +100,7 @@ class Library:
     def _read_file(self, path: Path) -> tuple[Node | None, list[Problem]]:
         name = self.sandbox.display_name(path)
         self.files[name] = path
-        text = read_text(path, name)
+        text = self.unsaved[path] if path in self.unsaved else read_text(path, name)
         if isinstance(text, Problem):
             return None, [text]
         self.texts[name] = text
