@@ -32,26 +32,26 @@ class ChangedMeanwhile(Exception):
 
 @dataclass
 class Document:
-    """A scenario or world file. `shown` is its name in messages.
+    """A scenario or world file. `display_name` is its name in messages.
 
     Line breaks (\\n or \\r\\n) and a byte order mark stay as they are in the file.
     """
 
     path: Path
-    shown: str
+    display_name: str
     _line_break: str = "\n"
     _mark: bytes = b""
 
     def read(self) -> Content:
         """Return the content of the file. Raises InvalidInput if it is not a readable text file."""
-        text = read_text(self.path, self.shown)
+        text = read_text(self.path, self.display_name)
         if isinstance(text, Problem):
             raise InvalidInput([text])
         raw = self.path.read_bytes()
         breaks = {"\r\n": raw.count(b"\r\n"), "\n": raw.count(b"\n") - raw.count(b"\r\n")}
         if (breaks["\r\n"] and breaks["\n"]) or raw.count(b"\r") > breaks["\r\n"]:
             hint = "convert the file to one kind, for example with dos2unix"
-            raise InvalidInput([Problem(self.shown, 0, 0, "SC002", "the file mixes kinds of line breaks", hint)])
+            raise InvalidInput([Problem(self.display_name, 0, 0, "SC002", "the file mixes kinds of line breaks", hint)])
         self._line_break = "\r\n" if breaks["\r\n"] else "\n"
         self._mark = BYTE_ORDER_MARK if raw.startswith(BYTE_ORDER_MARK) else b""
         return Content(text, _version(raw))
@@ -71,7 +71,7 @@ class Document:
             if mode is not None:
                 self.path.chmod(mode)
         except OSError as error:
-            raise UsageError(f"{self.shown}: cannot be written: {error.strerror or error}") from error
+            raise UsageError(f"{self.display_name}: cannot be written: {error.strerror or error}") from error
         return _version(data)
 
     def _current_version(self) -> str:
@@ -81,12 +81,12 @@ class Document:
             return NEW
 
     def _current(self, version: str) -> Content:
-        text = read_text(self.path, self.shown) if version != NEW else ""
+        text = read_text(self.path, self.display_name) if version != NEW else ""
         return Content(text if isinstance(text, str) else "", version)
 
     def _what_changed(self, version: str, now: str) -> str:
         what = "was created" if version == NEW else "was deleted" if now == NEW else "was changed by another program"
-        return f"{self.shown} {what} since it was opened here; reload it, or overwrite it with your text"
+        return f"{self.display_name} {what} since it was opened here; reload it, or overwrite it with your text"
 
 
 def _version(raw: bytes) -> str:

@@ -20,9 +20,9 @@ class EditedFile:
     world_path: tuple[Path, ...] = ()
 
     @property
-    def shown(self) -> str:
+    def display_name(self) -> str:
         """Name of the file in problems."""
-        return PathSandbox.around(self.root, self.world_path).shown(self.path)
+        return PathSandbox.around(self.root, self.world_path).display_name(self.path)
 
     def library(self, text: str) -> Library:
         """Return a reader of files that has `text` in the place of the content of this file."""

@@ -59,7 +59,7 @@ class EditorSession:
         self.world_page: Callable[[Path], str] = lambda _: ""
         """Returns the address of the page that edits a world file, relative to that of this session."""
         self._backend_factory, self._lenient, self._with_command = backend_factory, lenient, with_command
-        self._document = Document(file.path, file.shown)
+        self._document = Document(file.path, file.display_name)
         self._opened = Content(new_text, NEW) if new_text else self._document.read()
         self._backgrounds = Backgrounds(file.root, file.world_path)
         self._checks, self._preview_checks = TextChecks(file, lenient), TextChecks(file, lenient)
@@ -192,7 +192,7 @@ class EditorSession:
 
     def _opened_data(self, content: Content) -> Data:
         return {
-            "name": self.file.shown,
+            "name": self.file.display_name,
             "kind": self.file.kind,
             "text": content.text,
             "version": content.version,
@@ -200,7 +200,7 @@ class EditorSession:
         }
 
     def _problem_data(self, problem: Problem, objects: list[Any], own: Any, text: str) -> Data:
-        is_own = problem.path == self.file.shown
+        is_own = problem.path == self.file.display_name
         return {
             "path": problem.path,
             "line": problem.line if is_own else 0,

@@ -78,7 +78,7 @@ def map_objects(parts: SceneParts) -> list[MapObject]:
 def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
     """Return what the page shows, as JSON data."""
     own = parse_source(parts.text)
-    shown = parts.file.shown
+    display_name = parts.file.display_name
     return {
         "kind": parts.file.kind,
         "objects": [_object_data(one, parts, own) for one in map_objects(parts)],
@@ -89,7 +89,7 @@ def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
         },
         "places": sorted(world_places(parts.world_data)),
         "inline": parts.is_inline,
-        "world_file": _world_file(parts, shown),
+        "world_file": _world_file(parts, display_name),
         "background": backgrounds.of(parts.world),
     }
 
@@ -145,7 +145,7 @@ def _own_line(keys: Keys, parts: SceneParts, own: SourceNode | None) -> tuple[bo
     if own is None or (not parts.is_inline and parts.file.kind == "scenario" and keys[:1] == ("world",)):
         return False, 0
     place = _written_at(parts.tree, keys)
-    here = place.path == parts.file.shown and source_at(own, keys) is not None
+    here = place.path == parts.file.display_name and source_at(own, keys) is not None
     line = place.line if here and keys else 0
     if any(isinstance(key, int) for key in keys):
         return here, line
@@ -181,7 +181,7 @@ def problem_keys(
     problem: Problem, file: EditedFile, objects: list[MapObject], own: SourceNode | None, text: str
 ) -> str:
     """Return the id of the smallest thing whose text contains the position of a problem; "" if there is none."""
-    if problem.path != file.shown or not problem.line or own is None:
+    if problem.path != file.display_name or not problem.line or own is None:
         return ""
     lines = text.split("\n")
     index = sum(len(line) + 1 for line in lines[: problem.line - 1]) + max(problem.col - 1, 0)
