@@ -13,7 +13,8 @@ from simscen.editor.files import EditedFile
 from simscen.editor.forms import form_data
 from simscen.editor.map_view.background import Backgrounds
 from simscen.editor.map_view.map_edits import edits_of
-from simscen.editor.map_view.scene import map_objects, problem_keys, scene_data, scene_parts
+from simscen.editor.map_view.problem_places import object_at_problem
+from simscen.editor.map_view.scene import map_objects, scene_data, scene_parts
 from simscen.editor.preview import preview_data
 from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import apply_edits
@@ -210,7 +211,7 @@ class EditorSession:
             "severity": problem.severity,
             "message": problem.message,
             "hint": problem.hint,
-            "object": problem_keys(problem, self.file, objects, own, text),
+            "object": object_at_problem(problem, objects, own, text) if is_own else "",
         }
 
 

@@ -1,19 +1,20 @@
 """What the page shows of a text: the things on the map, the robots, the background, and where each thing is written."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from simscen.core.errors import InvalidInput, Problem
+from simscen.core.errors import InvalidInput
 from simscen.editor.files import EditedFile
 from simscen.editor.map_view.background import Backgrounds
 from simscen.editor.map_view.map_objects import MAX_OBJECTS, Handle, Keys, MapObject, mapping
 from simscen.editor.map_view.scenario_objects import scenario_objects
 from simscen.editor.map_view.world_objects import world_objects, world_places
 from simscen.loading.files.assets import Assets
-from simscen.loading.loaded import LoadedRobot, LoadedWorld
+from simscen.loading.loaded import LoadedWorld
+from simscen.loading.schema.validate import check
 from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at
-from simscen.loading.yaml.tree import MappingNode, Position, ScalarNode, child, key_position, node_at, value_position
+from simscen.loading.yaml.tree import MappingNode, Position, ScalarNode, child, key_position, value_position
+from simscen.model.world import WorldSpec
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,6 @@ def scene_parts(file: EditedFile, text: str) -> SceneParts | None:
 
 
 def _inline_world(assets: Assets, node: MappingNode, file: EditedFile) -> LoadedWorld | None:
-    from simscen.loading.schema.validate import check
-    from simscen.model.world import WorldSpec
-
     spec = check(WorldSpec, node)
     return None if isinstance(spec, list) else assets.complete_world(spec, node, file.path)
 

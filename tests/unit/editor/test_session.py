@@ -107,6 +107,12 @@ def test_problems_name_the_thing_on_the_map(session: MakeSession) -> None:
     assert one.problems({"text": "a: [1"})["problems"][0]["code"] == "SC003"
 
 
+def test_a_problem_is_not_put_down_to_a_neighbor_in_the_same_line(session: MakeSession) -> None:
+    text = TEXT.replace("goals: [dock, ", "goals: [{name: first one, pose: {x: 4, y: 4.0}}, {pose: {x: 6, y: 2}}, ")
+    found = session().problems({"text": text})["problems"]
+    assert [problem["object"] for problem in found] == ["goals/0"]
+
+
 def test_moving_a_thing_at_a_place_writes_its_own_pose(session: MakeSession) -> None:
     one = session()
 
