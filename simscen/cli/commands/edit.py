@@ -61,7 +61,7 @@ def command(
     with server:
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(Exit.TERMINATED))
         try:
-            print_text(f"editing {escaped(edited.shown)} at {server.url}\npress Ctrl-C to end")
+            print_text(f"editing {escaped(edited.display_name)} at {server.url}\npress Ctrl-C to end")
             sys.stdout.flush()
             if not no_browser:
                 webbrowser.open(server.url)

@@ -96,12 +96,12 @@ def _world_keys(parts: SceneParts) -> Keys:
     return () if parts.file.kind == "world" else ("world",)
 
 
-def _world_file(parts: SceneParts, shown: str) -> str:
+def _world_file(parts: SceneParts, display_name: str) -> str:
     """Return the name of the world file if the things of the world are written there; "" otherwise."""
     if parts.is_inline or parts.world is None:
         return ""
     name = parts.assets.library.sandbox.display_name(parts.world.path)
-    return "" if name == shown or parts.world.spec is None else name
+    return "" if name == display_name or parts.world.spec is None else name
 
 
 def _object_data(one: MapObject, parts: SceneParts, own: SourceNode | None) -> dict[str, Any]:
@@ -152,46 +152,3 @@ def _own_line(keys: Keys, parts: SceneParts, own: SourceNode | None) -> tuple[bo
 
 def _written_at(tree: MappingNode, keys: Keys) -> Position:
     return key_position(tree, keys) if keys and isinstance(keys[-1], str) else value_position(tree, keys)
-
-
-def robot_files(parts: SceneParts) -> Iterator[tuple[str, LoadedRobot]]:
-    """Yield the key of each robot of a scenario, and its file if that can be read."""
-    for key in _robot_keys(parts.tree):
-        node = node_at(parts.tree, key)
-        model = child(node, "model")
-        written = model.value if isinstance(model, ScalarNode) and isinstance(model.value, str) else "turtlebot"
-        try:
-            robot = parts.assets.robot(written, value_position(parts.tree, key))
-        except (InvalidInput, OSError):
-            continue
-        if robot is not None:
-            yield "/".join(map(str, key)), robot
-
-
-def _robot_keys(tree: MappingNode) -> list[Keys]:
-    robots = child(tree, "robots")
-    if isinstance(robots, MappingNode):
-        return [("robots", name) for name in robots.entries]
-    return [("robot",)]
-
-
-def problem_keys(
-    problem: Problem, file: EditedFile, objects: list[MapObject], own: SourceNode | None, text: str
-) -> str:
-    """Return the id of the smallest thing whose text contains the position of a problem; "" if there is none."""
-    if problem.path != file.display_name or not problem.line or own is None:
-        return ""
-    lines = text.split("\n")
-    index = sum(len(line) + 1 for line in lines[: problem.line - 1]) + max(problem.col - 1, 0)
-    best, size = "", len(text) + 1
-    for one in objects:
-        node = source_at(own, one.keys) if one.keys else None
-        if node is not None and _contains(node, index, text) and node.end - node.start < size:
-            best, size = "/".join(map(str, one.keys)), node.end - node.start
-    return best
-
-
-def _contains(node: SourceNode, index: int, text: str) -> bool:
-    """Return whether a position is in a node, or on its first line before it, such as on its key."""
-    start = text.rfind("\n", 0, node.start) + 1
-    return start <= index <= node.end
