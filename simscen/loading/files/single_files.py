@@ -76,7 +76,7 @@ def load_world_file(
 def world_text(spec: WorldSpec) -> str:
     """Return a world as the text of a `*.world.yaml`, without default values."""
     data = spec.model_dump(mode="json", exclude_defaults=True)
-    return to_yaml(_in_order(data), _Compact)
+    return to_yaml(_in_order(data), CompactDumper)
 
 
 def _in_order(value: Any) -> Any:
@@ -89,7 +89,7 @@ def _in_order(value: Any) -> Any:
     return {key: _in_order(value[key]) for key in dict.fromkeys((*first, *value))}
 
 
-class _Compact(Dumper):
+class CompactDumper(Dumper):
     """YAML writer that puts each item of a list on one line."""
 
 
@@ -103,5 +103,5 @@ def _mapping(dumper: yaml.SafeDumper, value: dict[str, Any]) -> yaml.Node:
     return dumper.represent_mapping("tag:yaml.org,2002:map", value, flow_style=flat)
 
 
-_Compact.add_representer(list, _list)
-_Compact.add_representer(dict, _mapping)
+CompactDumper.add_representer(list, _list)
+CompactDumper.add_representer(dict, _mapping)

@@ -1,0 +1,1 @@
+"""Reconstruction of scenarios from recorded drives: poses, goals, obstacles, and sensor faults from a log."""

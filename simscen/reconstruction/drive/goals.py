@@ -1,0 +1,133 @@
+"""Goals of a drive: from goal messages and results of actions, or from plans, or from where the robot stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from simscen.core.geometry import Pose2
+from simscen.core.records.events import Event, EventKind
+from simscen.reconstruction.drive.log_messages import LogMessages
+from simscen.reconstruction.drive.recorded_drive import RecordedGoal, TimedValues
+from simscen.reconstruction.evidence import windows
+from simscen.record.foreign.trace_reader import goal_events
+from simscen.record.localization_logs.rosbag import planar_pose
+from simscen.record.messages import event_text
+
+SAME_GOAL_M = 0.05
+"""Maximum distance between the ends of two plans to one goal."""
+STOPPED_SPEED_M_S, STOPPED_TURN_RAD_S = 0.03, 0.05
+"""Speeds below which the robot stands."""
+MIN_STOP_S = 2.0
+"""Minimum duration of a stop that counts as a goal."""
+MIN_LEG_M = 0.5
+"""Minimum distance between two stops that count as goals."""
+_ENDINGS = {
+    EventKind.GOAL_REACHED: "reached",
+    EventKind.GOAL_PASSED: "passed",
+    EventKind.GOAL_FAILED: "failed",
+    EventKind.GOAL_CANCELED: "canceled",
+}
+Seconds = Callable[[int], float]
+"""Converts a time of logging in ns to s since the start of the drive."""
+
+
+def goals_of(messages: LogMessages, seconds: Seconds, poses: TimedValues) -> tuple[tuple[RecordedGoal, ...], str]:
+    """Return the goals of a drive and the final result of the navigation, "" if unknown."""
+    sent = [
+        RecordedGoal("", Pose2(*planar_pose(one.message.pose)), seconds(one.logged), source="/goal_pose")
+        for one in messages.of("goal")
+    ]
+    events = [(seconds(one.logged), event_text.from_json(one.message)) for one in messages.of("events")]
+    if events:
+        return tuple(_with_events(sent, events)), _result(events)
+    if not sent:
+        sent = list(_ends_of_plans(messages, seconds))
+    status = _with_status(sent, messages, seconds)
+    if sent:
+        return tuple(status), ""
+    return tuple(ends_of_motion(poses)), ""
+
+
+def _with_events(sent: Sequence[RecordedGoal], events: Sequence[tuple[float, Event]]) -> Iterator[RecordedGoal]:
+    """Yield the goals with their names and results from the events of the navigator."""
+    accepted = [(time, event) for time, event in events if event.kind is EventKind.GOAL_ACCEPTED]
+    poses = list(sent)
+    for time, event in accepted:
+        match = min(poses, key=lambda goal: abs(goal.sent - time), default=None)
+        if match is None or abs(match.sent - time) > 1e-3:
+            continue
+        poses.remove(match)
+        ending = next(
+            ((t, e) for t, e in events if e.kind in _ENDINGS and e.name == event.name and t >= time),
+            None,
+        )
+        goal = replace(match, name=event.name, source="/goal_pose and the events of the navigator")
+        if ending is not None:
+            code = str(ending[1].data.get("error_name", "") or "")
+            goal = replace(goal, ended=ending[0], status=_ENDINGS[ending[1].kind], error=code)
+        yield goal
+
+
+def _result(events: Sequence[tuple[float, Event]]) -> str:
+    ended = [event.name for _, event in events if event.kind is EventKind.NAVIGATION_ENDED]
+    return ended[-1] if ended else ""
+
+
+def _with_status(sent: Sequence[RecordedGoal], messages: LogMessages, seconds: Seconds) -> Iterator[RecordedGoal]:
+    """Yield the goals with the results of their actions, if the log has as many actions as goals."""
+    states = [(one.logged, one.message) for one in messages.of("status")]
+    names = [str(number) for number in range(len(sent))]
+    events = goal_events(states, names) if states and sent else "no status"
+    if isinstance(events, str):
+        yield from sent
+        return
+    for name, goal in zip(names, sent, strict=True):
+        own = [event for event in events if event.name == name]
+        accepted = next((seconds(event.tick) for event in own if event.kind is EventKind.GOAL_ACCEPTED), goal.sent)
+        ending = next((event for event in own if event.kind in _ENDINGS), None)
+        source = f"{goal.source} and the action's status"
+        if ending is None:
+            yield replace(goal, sent=accepted, source=source)
+        else:
+            status = _ENDINGS[ending.kind]
+            yield replace(goal, sent=accepted, ended=seconds(ending.tick), status=status, source=source)
+
+
+def _ends_of_plans(messages: LogMessages, seconds: Seconds) -> Iterator[RecordedGoal]:
+    """Yield a goal for each plan that ends elsewhere than the previous one."""
+    last: Pose2 | None = None
+    for one in messages.of("plan"):
+        if not len(one.message.poses):
+            continue
+        end = Pose2(*planar_pose(tuple(one.message.poses[-1].tolist())))
+        if last is None or end.distance(last) > SAME_GOAL_M:
+            yield RecordedGoal("", end, seconds(one.logged), source="end of the plan on /plan")
+        last = end
+
+
+def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
+    """Yield a goal of status "reached" where the robot stopped for MIN_STOP_S, and where the drive ends."""
+    if len(poses) < 2:
+        return
+    steps = np.maximum(np.diff(poses.times), 1e-6)
+    speeds = np.hypot(*np.diff(poses.values[:, :2], axis=0).T) / steps
+    turns = np.abs(np.diff(np.unwrap(poses.values[:, 2]))) / steps
+    window = max(1, round(0.5 / float(np.median(steps))))
+    kernel = np.ones(window) / window
+    still = (np.convolve(speeds, kernel, "same") < STOPPED_SPEED_M_S) & (
+        np.convolve(turns, kernel, "same") < STOPPED_TURN_RAD_S
+    )
+    last, sent = Pose2(*poses.values[0].tolist()), float(poses.times[0])
+    stops = windows(still, poses.times[1:], min_length=MIN_STOP_S, max_gap=0.5)
+    ends = [(stop.begin, stop.end, stop.first + 1) for stop in stops if stop.begin > float(poses.times[0]) + 1e-3]
+    if not ends or ends[-1][2] < len(poses) - 1:
+        ends.append((float(poses.times[-1]), float(poses.times[-1]), len(poses) - 1))
+    for begin, end, index in ends:
+        pose = Pose2(*poses.values[index].tolist())
+        if pose.distance(last) < MIN_LEG_M:
+            continue
+        yield RecordedGoal("", pose, sent, begin, "reached", source="the robot stopped there")
+        last, sent = pose, end

@@ -1,0 +1,155 @@
+"""Collection of the messages of a log that a reconstruction uses, decoded and by role."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from simscen.record import topics
+from simscen.record.foreign.options import TOPICS
+from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
+from simscen.record.messages import decode
+from simscen.record.messages.decode import MessageReader, decode_checked
+
+
+class Logged(NamedTuple):
+    """A decoded message; `logged` and `stamp` are in ns, and `stamp` is 0 if the message has none."""
+
+    logged: int
+    stamp: int
+    message: Any
+
+
+class ImuMessage(NamedTuple):
+    """Turn rate in rad/s about the vertical axis of sensor_msgs/msg/Imu."""
+
+    stamp: int
+    frame: str
+    turn_rate: float
+
+
+EXTRA_TOPICS = {
+    "imu": "/imu",
+    "bumper": "/bumper",
+    "map": topics.MAP.name,
+    "goal": topics.GOAL.name,
+    "initial": "/initialpose",
+    "footprint": "/local_costmap/published_footprint",
+    "events": topics.EVENTS.name,
+}
+"""Default topics by role, besides those of TOPICS."""
+TOPIC_ROLES = (*TOPICS, *(role for role in EXTRA_TOPICS if role != "events"))
+"""Names of the topics in `--topic NAME=TOPIC`."""
+
+
+def imu(reader: MessageReader) -> ImuMessage:
+    """Decode the turn rate of sensor_msgs/msg/Imu."""
+    stamp, frame = reader.header()
+    reader.take("13d")
+    turn_rate = reader.take("3d")[2]
+    reader.take("21d")
+    return ImuMessage(stamp, frame, turn_rate)
+
+
+def polygon_stamped(reader: MessageReader) -> list[tuple[float, float]]:
+    """Decode the corners of geometry_msgs/msg/PolygonStamped, without their heights."""
+    reader.header()
+    corners = (reader.take("3f") for _ in range(reader.count()))
+    return [(x, y) for x, y, _ in corners]
+
+
+Decoders = Mapping[str, Callable[[bytes], Any]]
+
+_POSES: Decoders = {name: partial(decode_checked, decoder) for name, decoder in decode.POSE_DECODERS.items()}
+_TRANSFORMS: Decoders = {topics.TF.type: partial(decode_checked, decode.transforms)}
+_DECODERS: Mapping[str, Decoders] = {
+    "truth": _POSES,
+    "odom": {topics.ODOMETRY_TYPE: partial(decode_checked, decode.odometry)},
+    "amcl_pose": _POSES,
+    "initial": _POSES,
+    "goal": _POSES,
+    "scan": {topics.SCAN_TYPE: partial(decode_checked, decode.laser_scan)},
+    "cmd_vel": {
+        "geometry_msgs/msg/Twist": partial(decode_checked, decode.twist),
+        "geometry_msgs/msg/TwistStamped": partial(decode_checked, decode.twist_stamped),
+    },
+    "plan": {topics.PLAN.type: partial(decode_checked, decode.path)},
+    "tf": _TRANSFORMS,
+    "tf_static": _TRANSFORMS,
+    "status": {"action_msgs/msg/GoalStatusArray": partial(decode_checked, decode.goal_states)},
+    "imu": {topics.IMU_TYPE: partial(decode_checked, imu)},
+    "bumper": {topics.BUMPER_TYPE: lambda data: bool(MessageReader(data).take("?")[0])},
+    "map": {topics.MAP.type: lambda data: decode.occupancy_grid(MessageReader(data))[1]},
+    "footprint": {"geometry_msgs/msg/PolygonStamped": partial(decode_checked, polygon_stamped)},
+    "events": {topics.EVENTS.type: lambda data: MessageReader(data).string()},
+}
+
+
+@dataclass
+class LogMessages:
+    """Messages of a log by role, in the order of logging, and the message types of all its topics."""
+
+    by_role: dict[str, list[Logged]] = field(default_factory=dict)
+    topics: dict[str, str] = field(default_factory=dict)
+    is_complete: bool = True
+
+    def of(self, role: str) -> list[Logged]:
+        """Return the messages of a role."""
+        return self.by_role.get(role, [])
+
+
+def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None) -> LogMessages:
+    """Read the messages of an MCAP file or a rosbag2 folder.
+
+    `renamed` are topics that differ from the defaults, by role, and `truth` is the topic of the ground truth. Scans are
+    found on any topic if the default topic has none. Raises UnusableLog.
+    """
+    names = {**TOPICS, **EXTRA_TOPICS, **renamed}
+    roles = {names[role]: role for role in sorted(names)}
+    if truth:
+        roles[truth] = "truth"
+    stream = open_messages(path, _AnyTopic(roles) if path.is_dir() else roles)
+    messages = LogMessages()
+    other_scans: dict[str, list[Logged]] = {}
+    for raw in stream:
+        role = roles.get(raw.topic)
+        if role is not None and raw.type in _DECODERS[role]:
+            messages.by_role.setdefault(role, []).append(_decoded(raw, role))
+        elif role is None and raw.type == topics.SCAN_TYPE:
+            other_scans.setdefault(raw.topic, []).append(_decoded(raw, "scan"))
+    if not messages.of("scan") and other_scans:
+        messages.by_role["scan"] = other_scans[min(other_scans)]
+    messages.topics, messages.is_complete = stream.topics, stream.complete
+    for logged in messages.by_role.values():
+        logged.sort(key=lambda one: one.logged)
+    return messages
+
+
+class _AnyTopic:
+    """Container that also accepts topics of other names whose messages may be scans."""
+
+    def __init__(self, roles: Mapping[str, str]) -> None:
+        self._roles = roles
+
+    def __contains__(self, topic: object) -> bool:
+        return topic in self._roles or "scan" in str(topic)
+
+
+def _decoded(raw: RawMessage, role: str) -> Logged:
+    if raw.encoding != "cdr":
+        raise UnusableLog(f"{raw.topic} is encoded as {raw.encoding or 'something unknown'}, not as CDR")
+    try:
+        message = _DECODERS[role][raw.type](raw.data)
+    except (struct.error, ValueError, UnicodeDecodeError, OverflowError) as error:
+        raise UnusableLog(f"a message of {raw.topic} cannot be read as {raw.type}: {error}") from error
+    return Logged(raw.time, _stamp(message), message)
+
+
+def _stamp(message: Any) -> int:
+    if isinstance(message, list):
+        return int(message[0].stamp) if message and hasattr(message[0], "stamp") else 0
+    return int(getattr(message, "stamp", 0) or 0)

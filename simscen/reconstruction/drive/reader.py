@@ -1,0 +1,261 @@
+"""Reader of logs for a reconstruction: the messages of a log as a RecordedDrive."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.clock import NS_PER_SECOND
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.reconstruction.drive.goals import goals_of
+from simscen.reconstruction.drive.log_messages import Logged, LogMessages, collect_messages
+from simscen.reconstruction.drive.recorded_drive import Polygon, RecordedDrive, Scans, TimedValues, no_values
+from simscen.record import topics
+from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log
+from simscen.record.foreign.transforms import TransformTree, lidar_mount
+from simscen.record.localization_logs.rosbag import planar_pose
+from simscen.record.log_reader.read import LOG_READ_ERRORS, invalid_log
+from simscen.record.messages.decode import ScanMessage
+
+BASE_FRAMES = ("base_link", "base_footprint")
+NO_TRUTH = "none"
+MAX_CLOCK_DIFFERENCE_NS = 10 * NS_PER_SECOND
+"""Maximum difference between stamps and times of logging of one clock."""
+MIN_POSES = 2
+
+
+@dataclass(frozen=True)
+class DriveOptions:
+    """How to read a log: the topic of the ground truth, "none" to ignore it, and topics that differ, by role."""
+
+    truth: str | None = None
+    topics: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
+    """Read an MCAP file or a rosbag2 folder. Raises InvalidInput if it cannot be used for a reconstruction."""
+    try:
+        truth = options.truth
+        if truth is None and not path.is_dir() and is_simscen_log(path):
+            truth = topics.TRUTH.name
+        messages = collect_messages(path, options.topics, None if truth == NO_TRUTH else truth)
+        return _DriveReader(path, messages).drive()
+    except UnusableLog as error:
+        raise invalid_log(path, "SC804", str(error), error.hint) from error
+    except OSError as error:
+        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror or error}") from error
+    except LOG_READ_ERRORS as error:
+        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
+
+
+class _DriveReader:
+    """Converts the messages of one log."""
+
+    def __init__(self, path: Path, messages: LogMessages) -> None:
+        self._path, self._messages = path, messages
+        self._notes: list[str] = []
+        moving = [one for role, logged in messages.by_role.items() if role not in _LATCHED for one in logged]
+        if not moving:
+            names = ", ".join(sorted(messages.topics)[:12]) or "none"
+            raise UnusableLog("it has no messages of a drive", f"its topics: {names}; name others with --topic")
+        own = topics.EVENTS.name in messages.topics
+        self._start = 0 if own else min(one.logged for one in moving)
+        self._stamp_start = self._start + self._clock_offset()
+        self._end = max(one.logged for one in moving)
+        if not messages.is_complete:
+            self._notes.append("the log is truncated; the scenario covers what it holds")
+
+    def drive(self) -> RecordedDrive:
+        odometry, belief = self._odometry(), self._belief()
+        poses, source, independent = self._poses(odometry, belief)
+        scans = self._scans()
+        duration = (self._end - self._start) / NS_PER_SECOND
+        commands = self._signal("cmd_vel", [tuple(one.message.values) for one in self._messages.of("cmd_vel")], 3)
+        goals, result = goals_of(self._messages, self._seconds, poses)
+        return RecordedDrive(
+            name=self._path.stem,
+            duration=duration,
+            poses=poses,
+            pose_source=source,
+            has_independent_poses=independent,
+            belief=belief,
+            corrections=self._poses_of_tf("map", "odom") or no_values(3),
+            odometry=odometry,
+            commands=commands,
+            turn_rates=self._signal("imu", [(one.message.turn_rate,) for one in self._messages.of("imu")], 1),
+            bumper=self._signal("bumper", [(float(one.message),) for one in self._messages.of("bumper")], 1),
+            scans=scans,
+            map=self._map(),
+            goals=goals,
+            result=result,
+            footprint=self._footprint(poses),
+            notes=tuple(self._notes),
+        )
+
+    def _clock_offset(self) -> int:
+        """Return how much later the clock of the stamps is in ns, or 0 if it is the clock of logging."""
+        differences = [
+            one.stamp - one.logged
+            for role in ("scan", "odom", "amcl_pose", "truth")
+            for one in self._messages.of(role)
+            if one.stamp
+        ]
+        if not differences:
+            return 0
+        offset = max(differences)
+        if abs(offset) <= MAX_CLOCK_DIFFERENCE_NS:
+            return 0
+        self._notes.append("stamps and times of logging are of different clocks; delays are relative to the smallest")
+        return int(offset)
+
+    def _seconds(self, logged: int) -> float:
+        return (logged - self._start) / NS_PER_SECOND
+
+    def _times(self, messages: Sequence[Logged]) -> tuple[Array, Array]:
+        """Return the times of measurement and of logging in s."""
+        arrivals = np.array([one.logged - self._start for one in messages], dtype=np.float64) / NS_PER_SECOND
+        if not any(one.stamp for one in messages):
+            return arrivals, arrivals
+        stamps = np.array([one.stamp - self._stamp_start for one in messages], dtype=np.float64) / NS_PER_SECOND
+        return stamps, arrivals
+
+    def _signal(self, role: str, rows: Sequence[Sequence[float]], columns: int) -> TimedValues:
+        messages = self._messages.of(role)
+        if not messages:
+            return no_values(columns)
+        times, arrivals = self._times(messages)
+        values = np.array(rows, dtype=np.float64).reshape(len(messages), columns)
+        order = np.argsort(times, kind="stable")
+        return TimedValues(times[order], values[order], arrivals[order])
+
+    def _odometry(self) -> TimedValues:
+        messages = self._messages.of("odom")
+        rows = [(*planar_pose(one.message.pose), *(one.message.twist or (0.0, 0.0, 0.0))) for one in messages]
+        return self._signal("odom", rows, 6)
+
+    def _belief(self) -> TimedValues:
+        messages = self._messages.of("amcl_pose")
+        rows = [(*planar_pose(one.message.pose), *one.message.covariance) for one in messages]
+        return self._signal("amcl_pose", rows, 9)
+
+    def _poses(self, odometry: TimedValues, belief: TimedValues) -> tuple[TimedValues, str, bool]:
+        """Return the best known poses in the map frame, their source, and whether they are a ground truth."""
+        if truth := self._messages.of("truth"):
+            return self._signal("truth", [planar_pose(one.message.pose) for one in truth], 3), "ground truth", True
+        for base in BASE_FRAMES:
+            poses = self._poses_of_tf("map", base)
+            if poses is not None:
+                return poses, f"transform from map to {base}", False
+        if len(belief) >= MIN_POSES and len(odometry) >= MIN_POSES:
+            return _belief_along_odometry(belief, odometry), "/amcl_pose with the odometry in between", False
+        if len(belief) >= MIN_POSES:
+            return TimedValues(belief.times, belief.values[:, :3], belief.arrivals), "/amcl_pose", False
+        if len(odometry) >= MIN_POSES:
+            self._notes.append("the log has no poses in a map; the odometry is used, and the map is built along it")
+            return TimedValues(odometry.times, odometry.values[:, :3], odometry.arrivals), "odometry", False
+        for base in BASE_FRAMES:
+            poses = self._poses_of_tf("odom", base)
+            if poses is not None:
+                return poses, f"transform from odom to {base}", False
+        kinds = [name for name, kind in sorted(self._messages.topics.items()) if "Pose" in kind or "Odometry" in kind]
+        listed = f"; topics with poses: {', '.join(kinds[:12])}" if kinds else ""
+        raise UnusableLog("it has no poses of the robot", f"name a topic with --topic odom=/TOPIC{listed}")
+
+    def _poses_of_tf(self, outer: str, inner: str) -> TimedValues | None:
+        tree = TransformTree()
+        for role in ("tf_static", "tf"):
+            for one in self._messages.of(role):
+                tree.add(one.logged, one.message, static=role == "tf_static")
+        try:
+            found = tree.between(outer, inner)
+        except UnusableLog:
+            return None
+        if isinstance(found, str) or len(found[1]) < MIN_POSES:
+            return None
+        stamped, poses = found
+        times = (stamped.stamps - self._stamp_start) / NS_PER_SECOND
+        order = np.argsort(times, kind="stable")
+        planar = np.array([planar_pose(tuple(pose)) for pose in poses[order].tolist()])
+        return TimedValues(times[order], planar, (stamped.logged[order] - self._start) / NS_PER_SECOND)
+
+    def _scans(self) -> Scans | None:
+        messages = self._messages.of("scan")
+        if not messages:
+            return None
+        frames = Counter(one.message.frame for one in messages)
+        frame = min(frames, key=lambda name: (-frames[name], name))
+        messages = [one for one in messages if one.message.frame == frame]
+        beams = Counter(len(one.message.ranges) for one in messages).most_common(1)[0][0]
+        times, arrivals = self._times(messages)
+        order = np.argsort(times, kind="stable")
+        first: ScanMessage = next(one.message for one in messages if len(one.message.ranges) == beams)
+        ranges = np.full((len(messages), beams), np.nan)
+        malformed = np.zeros(len(messages), dtype=bool)
+        for row, index in enumerate(order.tolist()):
+            values = messages[index].message.ranges
+            malformed[row] = len(values) != beams
+            if not malformed[row]:
+                ranges[row] = values
+        mount, height = self._mount(frame)
+        angles = first.angle_min + first.angle_increment * np.arange(beams, dtype=np.float64)
+        limits = first.range_min, first.range_max
+        return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, malformed, frame)
+
+    def _mount(self, frame: str) -> tuple[Pose2, float]:
+        """Return the pose of the lidar on the base and its height, from static transforms."""
+        links = {link.child: link for one in self._messages.of("tf_static") for link in one.message}
+        base = next((one.message.child for one in self._messages.of("odom") if one.message.child), BASE_FRAMES[0])
+        mount = lidar_mount(frame, base, links)
+        if mount is None:
+            self._notes.append(f"the mount of the lidar `{frame}` is unknown; it is assumed at the base")
+            return Pose2(0.0, 0.0, 0.0), 0.2
+        height, at = 0.0, frame
+        while at in links and at != base:
+            height, at = height + Pose3(*links[at].pose).z, links[at].frame
+        if mount.is_upside_down:
+            self._notes.append(f"the lidar `{frame}` is mounted upside down")
+        return Pose2(*mount.pose), max(height, 0.05)
+
+    def _map(self) -> OccupancyGrid | None:
+        maps = self._messages.of("map")
+        grid: OccupancyGrid | None = maps[-1].message if maps else None
+        if grid is None:
+            return None
+        # The message rounds the resolution to single precision.
+        return OccupancyGrid(grid.cells, round(grid.resolution, 6), grid.origin)
+
+    def _footprint(self, poses: TimedValues) -> Polygon:
+        """Return the footprint in the base frame. It is published in the odom or map frame, where it cannot be used."""
+        messages = self._messages.of("footprint")
+        if not messages:
+            return ()
+        corners = np.array(messages[0].message, dtype=np.float64).reshape(-1, 2)
+        if len(corners) < 3 or np.abs(corners).max() > 5.0:
+            return ()
+        x, y, yaw = poses.poses_at(np.array([self._seconds(messages[0].logged)]))[0].tolist()
+        inside = np.hypot(*corners.mean(axis=0)) < 0.5
+        local = corners if inside else Pose2(x, y, yaw).inverse().apply(corners)
+        return tuple((round(a, 3), round(b, 3)) for a, b in local.tolist())
+
+
+_LATCHED = frozenset({"map", "tf_static", "footprint", "events"})
+
+
+def _belief_along_odometry(belief: TimedValues, odometry: TimedValues) -> TimedValues:
+    """Return poses in the map frame at the times of the odometry: the latest belief, moved by the odometry since."""
+    at_belief = odometry.poses_at(belief.times)
+    corrections = [
+        Pose2(*pose).compose(Pose2(*odom).inverse())
+        for pose, odom in zip(belief.values[:, :3].tolist(), at_belief.tolist(), strict=True)
+    ]
+    newest = np.maximum(np.searchsorted(belief.times, odometry.times, side="right") - 1, 0)
+    poses = [
+        corrections[index].compose(Pose2(*pose))
+        for index, pose in zip(newest.tolist(), odometry.values[:, :3].tolist(), strict=True)
+    ]
+    return TimedValues(odometry.times, np.array(poses), odometry.arrivals)

@@ -1,0 +1,167 @@
+"""A recorded drive as arrays: poses, odometry, scans, commands, goals, and the map, with times in s since the start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry import Array, Pose2, wrap_array
+
+Polygon = tuple[tuple[float, float], ...]
+Mask = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class TimedValues:
+    """Values (n, k) of a signal: `times` (n,) of measurement in ascending order, `arrivals` (n,) of logging, in s."""
+
+    times: Array
+    values: Array
+    arrivals: Array
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def period(self) -> float:
+        """Usual time between two messages in s; nan for fewer than two messages."""
+        return float(np.median(np.diff(self.times))) if len(self) > 1 else float("nan")
+
+    def poses_at(self, times: Array) -> Array:
+        """Return poses x, y, yaw (m, 3) at `times` (m,), interpolated linearly; held before the first and the last."""
+        columns = [np.interp(times, self.times, self.values[:, axis]) for axis in (0, 1)]
+        yaw = np.interp(times, self.times, np.unwrap(self.values[:, 2]))
+        return np.column_stack((*columns, wrap_array(yaw)))
+
+    def values_at(self, times: Array) -> Array:
+        """Return the newest values (m, k) at `times` (m,); before the first, the first."""
+        return self.values[np.maximum(np.searchsorted(self.times, times, side="right") - 1, 0)]
+
+
+def no_values(columns: int) -> TimedValues:
+    """Return a signal without samples."""
+    return TimedValues(np.empty(0), np.empty((0, columns)), np.empty(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Scans:
+    """Scans of one lidar: `ranges` (n, beams) in m, as in sensor_msgs/LaserScan, in the order of measurement.
+
+    Attributes:
+        times: Times of measurement (n,) in s.
+        arrivals: Times of logging (n,) in s.
+        angles: Beam directions (beams,) in the lidar frame in rad.
+        range_min: Minimum range in m.
+        range_max: Maximum range in m.
+        mount: Pose of the lidar on the base.
+        height: Height of the lidar above the base frame in m.
+        malformed: Whether a scan (n,) has another number of beams; its ranges are nan.
+        frame: Frame of the lidar.
+    """
+
+    times: Array
+    arrivals: Array
+    ranges: Array
+    angles: Array
+    range_min: float
+    range_max: float
+    mount: Pose2
+    height: float
+    malformed: Mask
+    frame: str = "lidar"
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def period(self) -> float:
+        """Usual time between two scans in s; nan for fewer than two scans."""
+        return float(np.median(np.diff(self.times))) if len(self) > 1 else float("nan")
+
+    def is_hit(self) -> Mask:
+        """Return which beams (n, beams) measured an object within the limits of the lidar."""
+        with np.errstate(invalid="ignore"):
+            hit: Mask = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
+            return hit
+
+    def every(self, step: int) -> Scans:
+        """Return every second, third, … of the scans."""
+        which = slice(None, None, step)
+        times, arrivals, ranges, malformed = (
+            self.times[which],
+            self.arrivals[which],
+            self.ranges[which],
+            self.malformed[which],
+        )
+        limits = self.range_min, self.range_max
+        return Scans(times, arrivals, ranges, self.angles, *limits, self.mount, self.height, malformed, self.frame)
+
+
+@dataclass(frozen=True)
+class RecordedGoal:
+    """Goal of the drive.
+
+    Attributes:
+        name: Name, or "" if unknown.
+        pose: Pose in the map frame.
+        sent: Time in s at which the robot accepted it.
+        ended: Time in s of its result; None if it has none.
+        status: "reached", "failed", "canceled", "passed" without a stop, or "unknown".
+        error: Error code by name, or "".
+        source: Topic or estimate that it is from.
+    """
+
+    name: str
+    pose: Pose2
+    sent: float
+    ended: float | None = None
+    status: str = "unknown"
+    error: str = ""
+    source: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedDrive:
+    """Everything that the reconstruction uses of a log.
+
+    Attributes:
+        name: Name of the log.
+        duration: Time in s of the last message.
+        poses: Best known poses of the base in the map frame (x, y, yaw).
+        pose_source: Where `poses` are from, for people.
+        has_independent_poses: Whether `poses` are a ground truth and not the belief of the robot.
+        belief: Poses that the localizer published, with the covariances xx, xy, xyaw, yy, yyaw, yawyaw (n, 9).
+        corrections: Poses of the odom frame in the map frame (n, 3), from /tf.
+        odometry: Poses in the odom frame and velocities vx, vy, wz (n, 6).
+        commands: Commanded velocities vx, vy, wz (n, 3).
+        turn_rates: Turn rates of the gyroscope about the vertical axis (n, 1), in rad/s.
+        bumper: Whether the bumper is pressed (n, 1).
+        scans: Scans of the first lidar, or None.
+        map: Map of the robot, or None.
+        goals: Goals in the order in which they were sent.
+        result: Final result of the navigation, such as "SUCCEEDED", or "".
+        footprint: Corners of the robot's footprint in the base frame, () if unknown.
+        notes: Remarks for the user.
+    """
+
+    name: str
+    duration: float
+    poses: TimedValues
+    pose_source: str
+    has_independent_poses: bool
+    belief: TimedValues = field(default_factory=lambda: no_values(9))
+    corrections: TimedValues = field(default_factory=lambda: no_values(3))
+    odometry: TimedValues = field(default_factory=lambda: no_values(6))
+    commands: TimedValues = field(default_factory=lambda: no_values(3))
+    turn_rates: TimedValues = field(default_factory=lambda: no_values(1))
+    bumper: TimedValues = field(default_factory=lambda: no_values(1))
+    scans: Scans | None = None
+    map: OccupancyGrid | None = None
+    goals: tuple[RecordedGoal, ...] = ()
+    result: str = ""
+    footprint: Polygon = ()
+    notes: tuple[str, ...] = ()

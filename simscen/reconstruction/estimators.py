@@ -1,0 +1,101 @@
+"""All estimators in their order: what later ones explain must not be taken for what earlier ones look for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from simscen.core.geometry import Pose2
+from simscen.reconstruction.drive.motion_steps import motion_steps
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.reconstruction.evidence import Evidence, FoundFault
+from simscen.reconstruction.faults.commands import command_faults
+from simscen.reconstruction.faults.gyroscope import gyroscope_faults
+from simscen.reconstruction.faults.lidar_calibration import mount_fault, range_error_faults, with_mount_error
+from simscen.reconstruction.faults.lidar_readings import (
+    false_return_faults,
+    invalid_scan_faults,
+    missing_beam_faults,
+    noise_faults,
+    range_faults,
+)
+from simscen.reconstruction.faults.localizer import localizer_faults
+from simscen.reconstruction.faults.message_stream import stream_faults, stuck_scans
+from simscen.reconstruction.faults.odometry import odometry_faults
+from simscen.reconstruction.faults.transparent_walls import glass_fault
+from simscen.reconstruction.objects.find_objects import find_objects
+from simscen.reconstruction.objects.found_object import FoundObject
+from simscen.reconstruction.scans.clusters import usable_scans
+from simscen.reconstruction.scans.scan_model import scan_model
+from simscen.reconstruction.scans.surroundings import Surroundings
+from simscen.reconstruction.scenario.contents import Findings
+from simscen.reconstruction.scenario.incidents import incidents_of
+from simscen.reconstruction.scenario.robot_properties import UNKNOWN_ROBOT, KnownRobot
+
+MAX_SCANS = 3000
+"""Maximum number of scans that are compared with the world; of longer drives, every second, third, … scan is used."""
+MIN_KIDNAP_M = 0.5
+MAX_KIDNAP_S = 0.3
+
+
+def find_all(drive: RecordedDrive, world: Surroundings, robot: KnownRobot = UNKNOWN_ROBOT) -> Findings:
+    """Return everything that the estimators find in a drive."""
+    unknowns: list[str] = []
+    faults, objects = _from_scans(drive, world, robot, unknowns)
+    kidnaps = list(_kidnaps(drive))
+    faults += stream_faults("odom", drive.odometry.times, drive.odometry.arrivals, drive.duration)
+    faults += stream_faults("imu", drive.turn_rates.times, drive.turn_rates.arrivals, drive.duration)
+    if drive.has_independent_poses:
+        faults += odometry_faults(motion_steps(drive), robot.separation, robot.skids)
+        if not kidnaps:
+            faults += gyroscope_faults(drive)
+    else:
+        unknowns.append("errors of odometry, gyroscope, and mount of the lidar, which need a ground truth (--truth)")
+    faults += command_faults(drive)
+    faults += localizer_faults(drive)
+    return Findings(incidents_of(drive), objects, faults, kidnaps, unknowns)
+
+
+def _from_scans(
+    drive: RecordedDrive, world: Surroundings, robot: KnownRobot, unknowns: list[str]
+) -> tuple[list[FoundFault], list[FoundObject]]:
+    scans = drive.scans
+    if scans is None or len(scans) < 3:
+        unknowns.append("objects that are not on the map, and faults of the lidar, because the log has no scans")
+        return [], []
+    faults = [*stream_faults("lidar", scans.times, scans.arrivals, drive.duration)]
+    faults += stuck_scans("lidar", scans, drive.duration)
+    if len(scans) > MAX_SCANS:
+        step = -(-len(scans) // MAX_SCANS)
+        scans = scans.every(step)
+        unknowns.append(f"what only some scans show: of the {step * len(scans)} scans, every {step}th was used")
+    model = scan_model(drive, scans, world)
+    mount = mount_fault(model, world) if drive.has_independent_poses else None
+    if mount is not None:
+        faults.append(mount)
+        model = with_mount_error(model, world)
+    faults += invalid_scan_faults(model, drive.duration)
+    faults += missing_beam_faults(model, drive.duration)
+    limits = [*range_faults(model, drive.duration, robot.lidar_noise)]
+    faults += limits
+    faults += false_return_faults(model, drive.duration)
+    if not any(fault.kind == "rain" for fault in limits):
+        faults += noise_faults(model, drive.duration, robot.lidar_noise, robot.is_known)
+    if drive.has_independent_poses:
+        faults += range_error_faults(model)
+    glass = glass_fault(model, world, usable_scans(model))
+    faults += [] if glass is None else [glass]
+    return faults, find_objects(model, world, drive.has_independent_poses)
+
+
+def _kidnaps(drive: RecordedDrive) -> Iterator[tuple[float, Pose2, Evidence]]:
+    """Yield the jumps of the ground truth that the odometry does not measure."""
+    if not drive.has_independent_poses or len(drive.poses) < 2:
+        return
+    poses, times = drive.poses.values, drive.poses.times
+    jumps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    steps = np.diff(times)
+    for index in np.flatnonzero((jumps > MIN_KIDNAP_M) & (steps < MAX_KIDNAP_S)).tolist():
+        text = f"the true pose jumps by {jumps[index]:.2f} m"
+        yield float(times[index + 1]), Pose2(*poses[index + 1].tolist()), Evidence(text, float(times[index + 1]))

@@ -1,0 +1,1 @@
+"""Estimators of faults: messages, lidar, odometry, gyroscope, commands, and localizer."""

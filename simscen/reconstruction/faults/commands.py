@@ -1,0 +1,148 @@
+"""Faults between command and motion: late or lost commands, weak motors, and lower speed limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from simscen.core.geometry import Array
+from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
+from simscen.reconstruction.evidence import Evidence, FoundFault, windows
+
+GRID_S = 0.025
+MAX_LAG_S, MIN_LAG_S = 1.0, 0.16
+NORMAL_LAG_S = 0.09
+"""Lag of a base without faults, which needs a moment to accelerate."""
+MIN_COMMAND_M_S = 0.1
+IGNORED_SHARE, MIN_IGNORED_S = 0.1, 0.4
+STEADY_S, STEADY_CHANGE = 0.4, 0.05
+MIN_GAIN_ERROR = 0.08
+MIN_STEADY = 20
+CAP_MARGIN_M_S, CAP_SPREAD_M_S = 0.04, 0.03
+SMOOTHING_S = 0.5
+"""Time over which the noise of the odometry is averaged."""
+MIN_CAP_FALL_M_S = 0.05
+MIN_CORRELATION_GAIN = 0.02
+
+
+def command_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
+    """Yield the faults of the commands and of the base that executes them."""
+    times, commanded, driven = _speeds(drive)
+    if len(times) < 80:
+        return
+    lag = _lag(commanded, driven)
+    if lag >= MIN_LAG_S:
+        text = f"the base follows its commands {lag:.2f} s late"
+        values = {"latency": f"{1000 * (lag - NORMAL_LAG_S):.0f} ms"}
+        yield FoundFault(
+            "cmd_vel", "delay", values, evidence=Evidence(text, float(times[0]), float(times[-1]), "medium")
+        )
+    shift = round(lag / GRID_S)
+    if shift:
+        commanded, driven, times = commanded[:-shift], driven[shift:], times[shift:]
+    ignored = _ignored(times, commanded, driven)
+    yield from ignored
+    if not ignored:
+        yield from _limits(times, commanded, driven)
+
+
+def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
+    """Return times (n,) with commanded and driven velocities vx, wz (n, 2)."""
+    commands, odometry = drive.commands, drive.odometry
+    if len(commands) < 2 or len(odometry) < 2:
+        return np.empty(0), np.empty((0, 2)), np.empty((0, 2))
+    begin = max(float(commands.times[0]), float(odometry.times[0]))
+    times = np.arange(begin, min(float(commands.times[-1]), float(odometry.times[-1])), GRID_S)
+    # Commands have no stamp in many logs, so the time of logging counts for both.
+    command = commands.values[np.maximum(np.searchsorted(commands.arrivals, times, side="right") - 1, 0)]
+    moved = odometry.values[np.maximum(np.searchsorted(odometry.times, times, side="right") - 1, 0)]
+    return times, command[:, [0, 2]], moved[:, [3, 5]]
+
+
+def _averaged(speeds: Array) -> Array:
+    """Return speeds (n,) without the noise of the odometry."""
+    result: Array = uniform_filter1d(speeds, round(SMOOTHING_S / GRID_S), mode="nearest")
+    return result
+
+
+def _lag(commanded: Array, driven: Array) -> float:
+    """Return the lag in s with which the driven velocity follows the command best."""
+    best, lag, none = -np.inf, 0, -np.inf
+    scale = np.maximum(np.std(commanded, axis=0), 1e-6)
+    for shift in range(0, min(round(MAX_LAG_S / GRID_S), len(commanded) // 4)):
+        ahead = commanded[: len(commanded) - shift] / scale
+        error = -float(np.mean((ahead - driven[shift:] / scale) ** 2))
+        none = error if shift == 0 else none
+        if error > best + 1e-9:
+            best, lag = error, shift
+    return lag * GRID_S if best - none > MIN_CORRELATION_GAIN else 0.0
+
+
+def _ignored(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
+    """Return the times in which the base stood although it was commanded to drive."""
+    stands = (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S) & (
+        np.abs(driven[:, 0]) < IGNORED_SHARE * np.abs(commanded[:, 0])
+    )
+    found = []
+    for window in windows(stands, times, MIN_IGNORED_S, 0.1):
+        evidence = Evidence("the base stands although it is commanded to drive", window.begin, window.end, "medium")
+        found.append(FoundFault("cmd_vel", "off", {}, max(0.0, window.begin - 0.5), window.length + 0.5, evidence))
+    return found
+
+
+def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
+    """Yield a lower maximum speed, or a constant ratio between driven and commanded speed."""
+    steady = _steady(commanded) & (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S)
+    if int(steady.sum()) < MIN_STEADY:
+        return
+    command, speed, at = np.abs(commanded[steady, 0]), np.abs(_averaged(driven[:, 0]))[steady], times[steady]
+    ratio = speed / command
+    slow = command - speed > CAP_MARGIN_M_S
+    if slow.mean() < 0.2:
+        return
+    evidence_times = float(at[slow][0]), float(at[slow][-1])
+    start, end, drain, spread = _falling_limit(at[slow], speed[slow])
+    if start - end > MIN_CAP_FALL_M_S and spread < CAP_SPREAD_M_S:
+        values = {"start": f"{start:.2f} m/s", "end": f"{max(end, 0.01):.2f} m/s", "drain": f"{drain:.0f} s"}
+        text = f"the speed falls from {start:.2f} to {end:.2f} m/s although more is commanded"
+        yield FoundFault("cmd_vel", "low_battery", values, evidence=Evidence(text, *evidence_times, "medium"))
+        return
+    cap = float(np.median(speed[slow]))
+    below = (command < cap) & ~slow
+    if float(np.std(speed[slow])) < CAP_SPREAD_M_S and (np.std(command[slow]) > CAP_SPREAD_M_S or below.any()):
+        text = f"the robot drives at most {cap:.2f} m/s although more is commanded"
+        values = {"linear": f"{cap:.2f} m/s"}
+        yield FoundFault("cmd_vel", "saturation", values, evidence=Evidence(text, *evidence_times, "medium"))
+    elif abs(float(np.median(ratio)) - 1.0) > MIN_GAIN_ERROR:
+        gain = float(np.median(ratio))
+        text = f"the robot drives {100 * gain:.0f} % of the commanded speed"
+        values = {"linear": f"{100 * gain:.0f} %"}
+        yield FoundFault("cmd_vel", "gain", values, evidence=Evidence(text, *evidence_times, "medium"))
+
+
+def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, float]:
+    """Return the speed at time 0 and in the end, the time until then, and the spread about a limit that falls so."""
+    best = (0.0, 0.0, 0.0, math.inf)
+    for drain in np.linspace(times[0], times[-1], 25)[4:].tolist():
+        share = np.minimum(times, drain) / drain
+        matrix = np.column_stack((1.0 - share, share))
+        solution, *_ = np.linalg.lstsq(matrix, speeds, rcond=None)
+        spread = float(np.std(speeds - matrix @ solution))
+        if spread < best[3]:
+            best = (float(solution[0]), float(solution[1]), drain, spread)
+    return best
+
+
+def _steady(commanded: Array) -> Mask:
+    """Return when the commanded speed has hardly changed for STEADY_S."""
+    count = round(STEADY_S / GRID_S)
+    speed = np.abs(commanded[:, 0])
+    steady = np.zeros(len(speed), dtype=bool)
+    if len(speed) <= count:
+        return steady
+    view = np.lib.stride_tricks.sliding_window_view(speed, count + 1)
+    steady[count:] = np.ptp(view, axis=1) <= STEADY_CHANGE * np.maximum(speed[count:], MIN_COMMAND_M_S)
+    return steady

@@ -1,0 +1,119 @@
+"""Systematic errors of ranges and of the mount of a lidar, from the differences to the static world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.reconstruction.evidence import Evidence, FoundFault
+from simscen.reconstruction.scans.scan_model import ScanModel
+from simscen.reconstruction.scans.surroundings import Surroundings
+
+MAX_SCANS = 40
+"""Number of scans, evenly spread over the drive, that are compared."""
+STEP_M, STEP_RAD = 0.01, math.radians(0.25)
+"""Steps of the numerical derivatives."""
+ITERATIONS = 6
+OUTLIER_M = 0.5
+MIN_BEAMS = 200
+MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)
+"""Smallest error of a mount that is reported; smaller ones are within the errors of poses and walls."""
+MIN_BIAS_M, MIN_SCALE_ERROR, MIN_DRIFT_M_S = 0.03, 0.015, 0.003
+
+
+def mount_error(model: ScanModel, world: Surroundings) -> Pose2:
+    """Return the true pose of the lidar in the frame of its nominal mount (Gauss-Newton on range differences)."""
+    step = max(1, len(model.scans) // MAX_SCANS)
+    chosen = np.flatnonzero(~model.scans.malformed)[::step]
+    error = Pose2(0.0, 0.0, 0.0)
+    if not len(chosen):
+        return error
+    ranges, angles, reach = model.scans.ranges[chosen], model.scans.angles, model.scans.range_max
+    hit = model.is_hit[chosen]
+
+    def differences(offset: Pose2) -> Array:
+        return ranges - world.ranges_from(_shifted(model.poses[chosen], offset), angles, reach)
+
+    outlier = OUTLIER_M
+    for _ in range(ITERATIONS):
+        with np.errstate(invalid="ignore"):
+            base = differences(error)
+            slopes = [
+                (differences(error.compose(change)) - base) / size
+                for change, size in (
+                    (Pose2(STEP_M, 0.0), STEP_M),
+                    (Pose2(0.0, STEP_M), STEP_M),
+                    (Pose2(0.0, 0.0, STEP_RAD), STEP_RAD),
+                )
+            ]
+            jacobian = np.stack(slopes, axis=-1)
+            good = hit & (np.abs(base) < outlier) & (np.abs(jacobian).max(axis=-1) < 20.0)
+        if int(good.sum()) < MIN_BEAMS:
+            return Pose2(0.0, 0.0, 0.0)
+        # A constant error of all ranges must not look like a shift of the mount.
+        matrix = np.column_stack((jacobian[good], -np.ones(int(good.sum()))))
+        solution = np.linalg.lstsq(matrix, -base[good], rcond=None)[0]
+        error = error.compose(Pose2(float(solution[0]), float(solution[1]), float(solution[2])))
+        outlier = max(0.1, outlier / 2)
+    return error
+
+
+def _shifted(poses: Array, offset: Pose2) -> Array:
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x = poses[:, 0] + c * offset.x - s * offset.y
+    y = poses[:, 1] + s * offset.x + c * offset.y
+    return np.column_stack((x, y, poses[:, 2] + offset.yaw))
+
+
+def mount_fault(model: ScanModel, world: Surroundings) -> FoundFault | None:
+    """Return the fault of a lidar that is not where its mount says, if the poses are a ground truth."""
+    error = mount_error(model, world)
+    shift = math.hypot(error.x, error.y)
+    if shift < MIN_OFFSET_M and abs(error.yaw) < MIN_OFFSET_RAD:
+        return None
+    values: dict[str, object] = {}
+    if shift >= MIN_OFFSET_M / 3:
+        values |= {"x": f"{100 * error.x:.1f} cm", "y": f"{100 * error.y:.1f} cm"}
+    if abs(error.yaw) >= MIN_OFFSET_RAD / 3:
+        values["yaw"] = f"{math.degrees(error.yaw):.1f} deg"
+    turned = math.degrees(error.yaw)
+    text = f"the scans fit the walls if the lidar is turned by {turned:.1f} deg and shifted by {shift:.2f} m"
+    return FoundFault("lidar", "extrinsic", values, evidence=Evidence(text, None, None, "medium"))
+
+
+def with_mount_error(model: ScanModel, world: Surroundings) -> ScanModel:
+    """Return the model with the lidar where its scans fit the walls."""
+    error = mount_error(model, world)
+    poses = _shifted(model.poses, error)
+    expected = world.ranges_from(poses, model.scans.angles, model.scans.range_max)
+    return replace(model, poses=poses, expected=expected)
+
+
+def range_error_faults(model: ScanModel) -> Iterator[FoundFault]:
+    """Yield a constant error, a wrong scale, or a drift of all ranges."""
+    residuals = np.where(np.abs(np.nan_to_num(model.residuals, nan=9.0)) < OUTLIER_M, model.residuals, np.nan)
+    rows = np.isfinite(residuals).sum(axis=1) >= 20
+    if int(rows.sum()) < 10:
+        return
+    medians, times = np.nanmedian(residuals[rows], axis=1), model.scans.times[rows]
+    slope, start = np.polyfit(times - times[0], medians, 1).tolist()
+    grown = slope * float(times[-1] - times[0])
+    if abs(slope) > MIN_DRIFT_M_S and abs(grown) > 2 * MIN_BIAS_M and abs(grown) > 2 * abs(start):
+        text = f"the ranges drift by {100 * grown:.1f} cm during the drive"
+        values = {"range": f"{100 * slope:.2f} cm/s"}
+        yield FoundFault("lidar", "drift", values, evidence=Evidence(text, float(times[0]), float(times[-1]), "medium"))
+        return
+    finite = np.isfinite(residuals)
+    expected, errors = model.expected[finite], residuals[finite]
+    scale, bias = np.polyfit(expected, errors, 1).tolist()
+    if abs(scale) > MIN_SCALE_ERROR and abs(scale * float(np.mean(expected))) > abs(bias):
+        text = f"ranges are {100 * (1 + scale):.1f} % of the distances"
+        yield FoundFault("lidar", "scale", {"factor": f"{100 * (1 + scale):.1f} %"}, evidence=Evidence(text))
+    elif abs(float(np.median(errors))) > MIN_BIAS_M:
+        bias = float(np.median(errors))
+        text = f"ranges differ from the distances by {100 * bias:.1f} cm"
+        yield FoundFault("lidar", "bias", {"range": f"{100 * bias:.1f} cm"}, evidence=Evidence(text))

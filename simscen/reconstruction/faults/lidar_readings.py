@@ -1,0 +1,256 @@
+"""Faults in the contents of scans: invalid scans, missing beams, false ranges, and noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from simscen.reconstruction.drive.recorded_drive import Mask
+from simscen.reconstruction.evidence import Evidence, FoundFault, Window, windows
+from simscen.reconstruction.scans.scan_model import ScanModel
+
+LIDAR = "lidar"
+MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR = 0.012, 0.8
+KNOWN_NOISE_FACTOR, MIN_KNOWN_EXTRA_NOISE_M = 1.2, 0.002
+"""Factor of the noise, and additional noise in m, that is reported if the noise of the lidar is known."""
+MIN_NOISE_S = 2.0
+MIN_INVALID = 2
+INVALID_HIT_SHARE, NORMAL_HIT_SHARE = 0.1, 0.3
+MIN_NAN_SHARE = 0.03
+ALWAYS, SELDOM = 0.95, 0.6
+MIN_SECTOR_BEAMS = 3
+MIN_MISSING_SHARE, MAX_IMPURE_SHARE = 0.03, 0.1
+MIN_FALSE_SHARE = 0.015
+JUMP_M = 0.3
+"""Difference in range from which on two neighbor beams ended at different things."""
+MIN_GHOST_SHARE, MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS, MIN_DRIVEN_M = 0.3, 0.02, 2.0, 0.6
+"""Share of the scans in its time that show a ghost, spread of its range in m and in standard deviations of the noise,
+and distance in m that the lidar must move meanwhile."""
+MIN_GHOST_S = 2.0
+MIN_WINDOW_S, MAX_WINDOW_GAP_S = 0.4, 0.6
+RAIN_ALPHA, RAIN_EXPONENT, RAIN_NOISE_PER_M = 0.01, 0.6, 0.02
+"""Model of the fault `rain` (Goodin et al., 2019): extinction α = 0.01 R^0.6 per meter, noise 0.02 z (1 - e^-R)²."""
+WHITE_REFLECTIVITY = 0.9
+HEAVY_RAIN_MM_H = 25.0
+
+
+def invalid_scans(model: ScanModel) -> Mask:
+    """Return which scans (n,) are meaningless: of the wrong length, or with hardly a valid range."""
+    hits = model.is_hit.mean(axis=1)
+    expected = np.isfinite(model.expected).mean(axis=1)
+    result: Mask = model.scans.malformed | ((hits < INVALID_HIT_SHARE) & (expected > NORMAL_HIT_SHARE))
+    return result
+
+
+def invalid_scan_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
+    """Yield the fault of invalid scans among valid ones, or of a time with invalid scans alone."""
+    invalid, times = invalid_scans(model), model.scans.times
+    if int(invalid.sum()) < MIN_INVALID:
+        return
+    indices = np.flatnonzero(invalid)
+    first, last = int(indices[0]), int(indices[-1])
+    share = float(invalid[first : last + 1].mean())
+    whole = times[last] - times[first] > 0.6 * end
+    share = float(invalid.mean()) if whole else share
+    values: dict[str, object] = {}
+    kinds = {_content(model, index) for index in indices.tolist()}
+    if len(kinds) == 1:
+        values["value"] = kinds.pop()
+    if share < 0.9:
+        values["probability"] = f"{100 * share:.0f} %"
+    begin, length = float(times[first]), float(times[last] - times[first]) + model.scans.period
+    evidence = Evidence(f"{len(indices)} scans have no valid ranges", begin, float(times[last]))
+    yield FoundFault(LIDAR, "garbage", values, None if whole else begin, None if whole else length, evidence)
+
+
+def _content(model: ScanModel, index: int) -> str:
+    """Return the name of the content of an invalid scan."""
+    ranges = model.scans.ranges[index]
+    if model.scans.malformed[index]:
+        return "short"
+    if np.isnan(ranges).all():
+        return "nan"
+    if (ranges == np.inf).mean() > 0.9:
+        return "inf"
+    if (ranges < 0).all():
+        return "negative"
+    return "zero" if (ranges == 0).all() else "huge"
+
+
+def missing_beam_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
+    """Yield the faults of beams that return nan: blind sectors, and beams that are lost at random."""
+    usable = ~invalid_scans(model)
+    missing = np.isnan(model.scans.ranges)
+    blind = np.zeros(missing.shape[1], dtype=bool)
+    for window in _windows(missing[:, :].mean(axis=1) > MIN_NAN_SHARE, usable, model):
+        chosen = missing[window.samples][usable[window.samples]]
+        always = chosen.mean(axis=0) > ALWAYS
+        if always.mean() < ALWAYS and (
+            runs := [run for run in _runs(always) if run[1] - run[0] + 1 >= MIN_SECTOR_BEAMS]
+        ):
+            for first, last in runs:
+                blind[first : last + 1] = True
+                angles = np.degrees(model.scans.angles)
+                values = {"from": f"{angles[first]:.0f} deg", "to": f"{angles[last]:.0f} deg"}
+                if last >= len(blind):  # across the seam of a full circle
+                    continue
+                text = f"the beams from {angles[first]:.0f} to {angles[last]:.0f} deg return nothing"
+                yield _fault("sector", values, window, model, end, text)
+        others = chosen[:, ~blind]
+        share = float(others.mean()) if others.size else 0.0
+        if share > MIN_NAN_SHARE:
+            text = f"{100 * share:.0f} % of the beams return nothing"
+            yield _fault("beam_dropout", {"probability": f"{100 * share:.0f} %"}, window, model, end, text)
+
+
+def _runs(mask: Mask) -> list[tuple[int, int]]:
+    """Return first and last index of the runs in which a mask (n,) holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def range_faults(model: ScanModel, end: float, nominal_noise: float) -> Iterator[FoundFault]:
+    """Yield the fault that far objects return nothing: a range limit or, with noise that grows with range, rain."""
+    usable = ~invalid_scans(model)
+    near = np.isfinite(model.expected) & (model.expected < 0.97 * model.scans.range_max)
+    lost = model.is_missing & near
+    for window in _windows(lost.mean(axis=1) > MIN_MISSING_SHARE, usable, model):
+        rows = np.zeros(len(usable), dtype=bool)
+        rows[window.samples] = usable[window.samples]
+        hits = model.scans.ranges[rows][model.is_hit[rows]]
+        if not len(hits):
+            continue
+        limit = float(np.percentile(hits, 99.8))
+        beyond = near[rows] & (model.expected[rows] > limit + 0.3)
+        before = lost[rows] & (model.expected[rows] < limit - 0.3)
+        if before.sum() > MAX_IMPURE_SHARE * max(1, lost[rows].sum()) or not beyond.any():
+            continue
+        if lost[rows][beyond].mean() < 0.8:
+            continue
+        noise = float(np.median(model.noise[rows]))
+        if noise > nominal_noise + MIN_EXTRA_NOISE_M:
+            mean_range = float(np.median(hits))
+            values = rain_values(limit, noise / mean_range, model.scans.range_max)
+            text = f"nothing beyond {limit:.1f} m returns, and ranges have {100 * noise:.1f} cm of noise"
+            yield _fault("rain", values, window, model, end, text)
+        else:
+            text = f"nothing beyond {limit:.1f} m returns"
+            yield _fault("range_limit", {"max": f"{limit:.2f} m"}, window, model, end, text)
+
+
+def rain_values(limit: float, noise_per_meter: float, range_max: float) -> dict[str, object]:
+    """Return the parameters of rain in which objects up to `limit` m are seen, with this noise per meter of range."""
+    share = math.sqrt(min(1.0, noise_per_meter / RAIN_NOISE_PER_M))
+    rate = HEAVY_RAIN_MM_H if share > 0.99 else min(HEAVY_RAIN_MM_H, -math.log(1.0 - share))
+    alpha = RAIN_ALPHA * rate**RAIN_EXPONENT
+    reflectivity = WHITE_REFLECTIVITY * (limit / range_max) ** 2 * math.exp(2 * alpha * limit)
+    return {"rate": f"{rate:.1f} mm/h", "reflectivity": f"{100 * min(1.0, max(0.02, reflectivity)):.0f} %"}
+
+
+def false_return_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
+    """Yield dust: single beams that end in free space; and ghosts: objects that move with the lidar."""
+    usable = ~invalid_scans(model)
+    isolated = isolated_returns(model)
+    for window in _windows(isolated.mean(axis=1) > MIN_FALSE_SHARE, usable, model):
+        rows = usable[window.samples]
+        ranges = np.where(model.is_hit, model.scans.ranges, np.minimum(model.expected, model.scans.range_max))
+        travelled = ranges[window.samples][rows]
+        count = int(isolated[window.samples][rows].sum())
+        if count < 20:
+            continue
+        length = float(np.nansum(np.where(np.isfinite(travelled), travelled, 0.0))) / count
+        text = f"{count} single beams end in free space"
+        yield _fault("dust", {"mean_free_path": f"{length:.0f} m"}, window, model, end, text)
+    for first, last, distance in ghost_beams(model):
+        angles = np.degrees(model.scans.angles)
+        center, width = (angles[first] + angles[last]) / 2, angles[last] - angles[first] + 1.0
+        share = float(model.is_short[usable][:, first : last + 1].mean())
+        values = {
+            "range": f"{distance:.2f} m",
+            "direction": f"{center:.0f} deg",
+            "width": f"{width:.0f} deg",
+            "probability": f"{100 * share:.0f} %",
+        }
+        text = f"something {distance:.2f} m away moves with the lidar"
+        shown = model.is_short[:, first : last + 1].mean(axis=1) > 0.3
+        for window in windows(shown & usable, model.scans.times, MIN_WINDOW_S, 2.0):
+            yield _fault("ghost", values, window, model, end, text)
+            break
+
+
+def isolated_returns(model: ScanModel) -> Mask:
+    """Return the beams (n, beams) that end before the world, and not where their neighbors end."""
+    ranges = np.where(model.is_hit, model.scans.ranges, np.inf)
+    with np.errstate(invalid="ignore"):
+        steps = np.abs(np.diff(ranges, axis=1))
+    apart = np.ones((len(ranges), ranges.shape[1] + 1), dtype=bool)
+    apart[:, 1:-1] = ~(steps < JUMP_M)
+    result: Mask = model.is_short & apart[:, 1:] & apart[:, :-1]
+    return result
+
+
+def ghost_beams(model: ScanModel) -> list[tuple[int, int, float]]:
+    """Return first and last beam and the range of objects that are fixed in the frame of the lidar.
+
+    The robot must have driven while they were seen, so that nothing that stands in the world looks like this.
+    """
+    if float(np.hypot(*np.ptp(model.poses[:, :2], axis=0))) < MIN_DRIVEN_M:
+        return []
+    short = model.is_short & ~invalid_scans(model)[:, None]
+    seen = short.sum(axis=0)
+    ranges = np.where(short, model.scans.ranges, np.nan)
+    center, spread = np.full(len(seen), np.nan), np.full(len(seen), np.inf)
+    chosen = seen >= max(5, 0.1 * len(short))
+    if chosen.any():
+        center[chosen] = np.nanmedian(ranges[:, chosen], axis=0)
+        spread[chosen] = np.nanmedian(np.abs(ranges[:, chosen] - center[chosen]), axis=0)
+    moved = np.zeros(len(seen), dtype=bool)
+    for beam in np.flatnonzero(chosen).tolist():
+        rows = short[:, beam] & (np.abs(ranges[:, beam] - center[beam]) < 2 * MAX_GHOST_SPREAD_M)
+        long = bool(rows.any()) and float(np.ptp(model.scans.times[rows])) > MIN_GHOST_S
+        moved[beam] = long and float(np.hypot(*np.ptp(model.poses[rows, :2], axis=0))) > MIN_DRIVEN_M
+    first, last = np.argmax(short, axis=0), len(short) - 1 - np.argmax(short[::-1], axis=0)
+    share = seen / np.maximum(last - first + 1, 1)
+    limit = max(MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS * float(np.median(model.noise)))
+    fixed = chosen & moved & (spread < limit) & (share > MIN_GHOST_SHARE)
+    return [(a, b, float(np.median(center[a : b + 1]))) for a, b in _runs(fixed) if b - a + 1 >= MIN_SECTOR_BEAMS]
+
+
+def noise_faults(model: ScanModel, end: float, nominal_noise: float, is_known: bool) -> Iterator[FoundFault]:
+    """Yield the times in which ranges have more noise than the lidar has, or than good lidars if its is not known."""
+    usable = ~invalid_scans(model)
+    noise = median_filter(model.noise, size=5, mode="nearest")
+    limit = nominal_noise + max(MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR * nominal_noise)
+    if is_known:
+        limit = max(KNOWN_NOISE_FACTOR * nominal_noise, nominal_noise + MIN_KNOWN_EXTRA_NOISE_M)
+    for window in _windows(noise > limit, usable, model):
+        if window.length < MIN_NOISE_S:
+            continue
+        measured = float(np.sqrt(np.mean(noise[window.samples] ** 2)))
+        extra = math.sqrt(max(0.0, measured**2 - nominal_noise**2))
+        text = f"ranges have {100 * measured:.1f} cm of noise"
+        yield _fault("noise", {"std": f"{100 * extra:.1f} cm"}, window, model, end, text)
+
+
+def _windows(mask: Mask, usable: Mask, model: ScanModel) -> list[Window]:
+    """Return the times in which a mask holds for the usable scans; the others count as the scan before them."""
+    held = mask.copy()
+    newest = np.maximum.accumulate(np.where(usable, np.arange(len(mask)), 0))
+    held = held[newest] & usable[newest]
+    return windows(held, model.scans.times, MIN_WINDOW_S, MAX_WINDOW_GAP_S)
+
+
+def _fault(
+    kind: str, values: Mapping[str, object], window: Window, model: ScanModel, end: float, text: str
+) -> FoundFault:
+    """Return a fault of the lidar in a window; without a start and a duration if it lasts the whole drive."""
+    times, period = model.scans.times, model.scans.period
+    from_start = window.begin <= float(times[0]) + 3 * period
+    until_end = window.end >= min(end, float(times[-1])) - 5 * period
+    begin = None if from_start else max(0.0, window.begin - 0.5 * period)
+    duration = None if until_end else window.end - (begin or 0.0) + 0.5 * period
+    confidence = "high" if window.last - window.first >= 10 else "medium"
+    return FoundFault(LIDAR, kind, values, begin, duration, Evidence(text, window.begin, window.end, confidence))

@@ -1,0 +1,98 @@
+"""Faults of the localizer: outages, and jumps of the estimated pose that come back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from simscen.core.geometry import Pose2, wrap_array
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.reconstruction.evidence import Evidence, FoundFault, windows
+
+MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
+MIN_SILENCE_S, MIN_SILENCE_PERIODS = 1.0, 6.0
+MIN_CORRECTION = 1e-9
+"""Change of the pose of the odom frame on the map, in m and rad, that a working localizer exceeds."""
+MAX_JUMP_S = 30.0
+MIN_DRIVEN_M = 0.6
+"""Distance that the robot must drive meanwhile: more than twice Nav2's update_min_d, 0.25 m."""
+
+
+def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
+    """Yield the faults of the localizer."""
+    if len(drive.belief) < 5:
+        return
+    yield from _jumps(drive)
+    yield from _silence(drive)
+
+
+def _jumps(drive: RecordedDrive) -> Iterator[FoundFault]:
+    """Yield jumps of the belief away from the ground truth and back."""
+    if not drive.has_independent_poses:
+        return
+    belief, truth = drive.belief.values[:, :3], drive.poses.poses_at(drive.belief.times)
+    errors = belief - truth
+    errors[:, 2] = wrap_array(errors[:, 2])
+    distance = np.hypot(*np.diff(errors[:, :2], axis=0).T)
+    turn = np.abs(wrap_array(np.diff(errors[:, 2])))
+    jumps = np.flatnonzero((distance > MIN_JUMP_M) | (turn > MIN_JUMP_RAD)) + 1
+    for out, back in zip(jumps[:-1].tolist(), jumps[1:].tolist(), strict=True):
+        begin, end = float(drive.belief.times[out]), float(drive.belief.times[back])
+        away = np.hypot(*errors[out:back, :2].T)
+        before, after = np.hypot(*errors[out - 1, :2]), np.hypot(*errors[back, :2])
+        if (
+            end - begin > MAX_JUMP_S
+            or _is_carried(drive, begin - 0.5, end + 0.5)
+            or max(before, after) > 0.5 * float(np.median(away))
+        ):
+            continue
+        error = Pose2(*truth[out].tolist()).between(Pose2(*belief[out].tolist()))
+        values = {"x": f"{error.x:.2f} m", "y": f"{error.y:.2f} m", "yaw": f"{math.degrees(error.yaw):.1f} deg"}
+        text = f"the estimated pose jumps by {float(away[0]):.2f} m and back"
+        yield FoundFault("localizer", "jump", values, begin, end - begin, Evidence(text, begin, end))
+        return
+
+
+def _is_carried(drive: RecordedDrive, begin: float, end: float) -> bool:
+    """Return whether the true pose jumps in this time, so that the belief is not what jumps."""
+    chosen = (drive.poses.times >= begin) & (drive.poses.times <= end)
+    steps = np.hypot(*np.diff(drive.poses.values[chosen, :2], axis=0).T)
+    return bool((steps > MIN_JUMP_M).any())
+
+
+def _silence(drive: RecordedDrive) -> Iterator[FoundFault]:
+    """Yield the times without corrections of the odometry although the robot drove."""
+    times = drive.belief.times
+    limit = max(MIN_SILENCE_S, MIN_SILENCE_PERIODS * drive.belief.period)
+    gaps = np.flatnonzero(np.diff(times) > limit)
+    for index in gaps.tolist():
+        begin, end = float(times[index]), float(times[index + 1])
+        if len(drive.odometry) > 1 and _distance(drive, begin, end) > MIN_DRIVEN_M:
+            text = f"no pose from the localizer for {end - begin:.1f} s"
+            yield FoundFault("localizer", "off", {}, begin, end - begin, Evidence(text, begin, end))
+    if not len(gaps):
+        yield from _without_corrections(drive)
+
+
+def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
+    """Yield the times in which the odom frame stays where it is on the map although the robot drives."""
+    corrections = drive.corrections
+    if len(corrections) < 2 or len(drive.odometry) < 2:
+        return
+    still = np.abs(np.diff(corrections.values, axis=0)).max(axis=1) < MIN_CORRECTION
+    usual = windows(still, corrections.times[1:])
+    if len(usual) < 5:
+        return
+    limit = max(MIN_SILENCE_S, MIN_SILENCE_PERIODS * float(np.median([window.length for window in usual])))
+    for window in usual:
+        if window.length > limit and _distance(drive, window.begin, window.end) > MIN_DRIVEN_M:
+            text = f"the localizer does not correct the odometry for {window.length:.1f} s"
+            evidence = Evidence(text, window.begin, window.end, "medium")
+            yield FoundFault("localizer", "off", {}, window.begin, window.length, evidence)
+
+
+def _distance(drive: RecordedDrive, begin: float, end: float) -> float:
+    ends = drive.odometry.poses_at(np.array([begin, end]))
+    return float(np.hypot(*(ends[1, :2] - ends[0, :2])))

@@ -1,0 +1,143 @@
+"""Faults of the stream of messages of a sensor: outages, lost messages, delays, and repeated messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.reconstruction.drive.recorded_drive import Mask, Scans
+from simscen.reconstruction.evidence import Evidence, FoundFault, windows
+
+MIN_OUTAGE_PERIODS = 4.5
+"""Time between two messages, in periods, from which on it is an outage and not a few lost messages."""
+LOST_PERIODS = 1.5
+MIN_LOST_SHARE = 0.03
+MIN_LOST = 4
+MIN_DELAY_PERIODS, MIN_DELAY_S = 0.3, 0.03
+"""Delays below both are those of normal drivers and networks."""
+MIN_OUTAGES_INTERMITTENT = 3
+SLOW_FACTOR = 1.6
+"""Ratio of the period in a part of the drive to the usual period from which on the sensor was slow there."""
+MIN_REPEATED = 3
+MIN_BEAMS_REPEATED = 20
+
+
+def stream_faults(
+    target: str, times: Array, arrivals: Array, end: float, nominal_period: float | None = None
+) -> Iterator[FoundFault]:
+    """Yield the faults of a stream whose messages were measured at `times` (n,) and logged at `arrivals` (n,).
+
+    `end` is the end of the drive in s, and `nominal_period` the period of the sensor in s, if it is known.
+    """
+    if len(times) < 3:
+        return
+    steps = np.diff(times)
+    period = nominal_period or float(np.percentile(steps, 20))
+    if period <= 0.0:
+        return
+    late = list(_delay(target, times, arrivals, period, end))
+    yield from late
+    yield from _gaps(target, times, period, end)
+
+
+def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[FoundFault]:
+    edges = np.append(times, max(end, float(times[-1])))
+    steps = np.diff(edges)
+    steps[-1] = max(steps[-1], period)
+    long = np.flatnonzero(steps > MIN_OUTAGE_PERIODS * period)
+    slow = _slow(target, times, period, end)
+    if slow is not None:
+        yield slow
+        return
+    if len(long) >= MIN_OUTAGES_INTERMITTENT:
+        gaps = steps[long] - period
+        begin, last = float(edges[long[0]] + period), float(edges[long[-1] + 1])
+        down = float(gaps.mean())
+        up = max(period, (last - begin - float(gaps.sum())) / max(1, len(long) - 1))
+        text = f"{len(long)} outages of {down:.2f} s on average"
+        evidence = Evidence(text, begin, last)
+        whole = begin < up * 3 and last > end - 3 * up
+        values = {"up": f"{up:.2f} s", "down": f"{down:.2f} s"}
+        start, length = (None, None) if whole else (begin, last - begin)
+        yield FoundFault(target, "intermittent", values, start, length, evidence)
+        return
+    for index in long.tolist():
+        begin, length = float(edges[index]) + 0.5 * period, float(steps[index]) - period
+        until_end = edges[index + 1] >= end - period
+        evidence = Evidence(f"no message for {steps[index]:.2f} s", float(edges[index]), float(edges[index + 1]))
+        yield FoundFault(target, "off", {}, begin, None if until_end else length, evidence)
+    short = (steps > LOST_PERIODS * period) & (steps <= MIN_OUTAGE_PERIODS * period)
+    lost = int(np.round(steps[short] / period - 1.0).sum())
+    expected = len(times) + lost
+    if lost >= MIN_LOST and lost / expected > MIN_LOST_SHARE:
+        at = np.flatnonzero(short)
+        begin, last = float(edges[at[0]]), float(edges[at[-1] + 1])
+        inside = (times >= begin) & (times <= last)
+        share = lost / (lost + int(inside.sum()))
+        whole = last - begin > 0.7 * (end - float(times[0]))
+        share = lost / expected if whole else share
+        evidence = Evidence(f"{lost} of {expected} messages are missing", begin, last)
+        start, length = (None, None) if whole else (begin, last - begin)
+        yield FoundFault(target, "dropout", {"probability": f"{100 * share:.0f} %"}, start, length, evidence)
+
+
+def _slow(target: str, times: Array, period: float, end: float) -> FoundFault | None:
+    """Return the fault of a stream that is regular, but slower than usual, for at least half a second."""
+    steps = np.diff(times)
+    for window in windows(steps > SLOW_FACTOR * period, times[1:], max_gap=1.2 * period):
+        inside = steps[window.samples]
+        if len(inside) < 4 or float(np.std(inside)) > 0.15 * float(np.mean(inside)):
+            continue
+        step = float(np.median(inside))
+        begin = float(times[window.first])
+        whole = window.length > 0.8 * (end - float(times[0]))
+        evidence = Evidence(f"{1 / step:.2f} messages per second instead of {1 / period:.2f}", begin, window.end)
+        start, length = (None, None) if whole else (begin, window.end - begin)
+        return FoundFault(target, "slow", {"rate": f"{1 / step:.2f} Hz"}, start, length, evidence)
+    return None
+
+
+def _delay(target: str, times: Array, arrivals: Array, period: float, end: float) -> Iterator[FoundFault]:
+    delays = arrivals - times
+    limit = max(MIN_DELAY_S, MIN_DELAY_PERIODS * period)
+    usual = max(0.0, float(np.percentile(delays, 2)))
+    late = delays > limit
+    for window in windows(late, times, max_gap=4 * period):
+        inside = delays[window.samples]
+        if len(inside) < 3:
+            continue
+        least, most = float(np.percentile(inside, 3)), float(np.percentile(inside, 97))
+        whole = window.first <= 2 and window.end > end - 4 * period - most
+        base = 0.0 if whole else usual
+        values = {"latency": f"{1000 * max(0.0, least - base):.0f} ms"}
+        if most - least > 0.25 * period:
+            values["jitter"] = f"{1000 * (most - least):.0f} ms"
+        evidence = Evidence(f"messages arrive {least:.3f} to {most:.3f} s late", window.begin, window.end)
+        start, length = (None, None) if whole else (window.begin, window.length)
+        yield FoundFault(target, "delay", values, start, length, evidence)
+
+
+def repeated_scans(scans: Scans) -> Mask:
+    """Return which scans (n,) repeat the ranges of the previous one, which noise makes impossible."""
+    same = np.zeros(len(scans), dtype=bool)
+    if len(scans) < 2:
+        return same
+    now, before = scans.ranges[1:], scans.ranges[:-1]
+    finite = np.isfinite(now) & np.isfinite(before)
+    equal = (now == before) | ~finite
+    same[1:] = equal.all(axis=1) & (finite.sum(axis=1) >= MIN_BEAMS_REPEATED)
+    return same
+
+
+def stuck_scans(target: str, scans: Scans, end: float) -> Iterator[FoundFault]:
+    """Yield the times in which a lidar repeated its last scan."""
+    for window in windows(repeated_scans(scans), scans.times, max_gap=0.5 * scans.period):
+        if window.last - window.first + 1 < MIN_REPEATED:
+            continue
+        begin = max(0.0, window.begin - 1.5 * scans.period)
+        until_end = window.end >= end - 1.5 * scans.period
+        length = window.end - begin + 0.5 * scans.period
+        evidence = Evidence("the same scan is repeated", window.begin, window.end)
+        yield FoundFault(target, "stuck", {}, begin, None if until_end else length, evidence)

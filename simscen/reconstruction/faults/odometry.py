@@ -1,0 +1,172 @@
+"""Faults of the wheel odometry: wrong scale, drift, slip, and noise, from its difference to the true motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.reconstruction.drive.motion_steps import STEP_S, MotionSteps
+from simscen.reconstruction.drive.recorded_drive import Mask
+from simscen.reconstruction.evidence import Evidence, FoundFault, Window, windows
+
+MIN_DISTANCE_M, MIN_TURN_RAD = 1.0, 1.5
+"""Minimum motion for the estimate of a scale."""
+MIN_SCALE_ERROR, MIN_TURN_SCALE_ERROR, MIN_TURN_PER_METER = 0.02, 0.03, 0.008
+MIN_DRIFT_M_S, MIN_DRIFT_RAD_S = 0.01, 0.01
+MIN_SLIP, MIN_SLIP_STEP_M, MIN_SLIP_S = 0.08, 0.02, 1.0
+MIN_NOISE, MIN_TURN_NOISE = 0.05, 0.05
+"""Standard deviations after one meter, and after one radian, that are reported. Good odometry has 0.01."""
+MIN_EXCESS_SLIP, MIN_ROLLED_M = 0.06, 0.3
+"""Share of the distance that must be lost beyond that in the rest of the drive, if the wheels rolled this far then."""
+REST_M, REST_RAD, MIN_REST_STEPS = 0.002, 0.002, 4
+"""Motion within a step below which the robot stands, and the number of such steps for a drift."""
+LONG_SHARE = 0.75
+"""Share of the drive from which on a difference lasts the whole drive."""
+CONFIDENCE_SIGMAS = 4.0
+
+
+def odometry_faults(steps: MotionSteps, separation: float, skids: bool = False) -> Iterator[FoundFault]:
+    """Yield the faults of the odometry.
+
+    `separation` is the distance of the wheels in m. If the robot `skids` in turns, as skid-steer robots do, wrong turns
+    are no fault.
+    """
+    if len(steps) < 6:
+        return
+    slip = list(_slip(steps, separation))
+    yield from slip
+    if not slip:
+        yield from _systematic(steps, skids)
+
+
+def _slip(steps: MotionSteps, separation: float) -> Iterator[FoundFault]:
+    """Yield the times in which the wheels rolled further than the robot drove."""
+    measured, true = _wheels(steps.measured, separation), _wheels(steps.true, separation)
+    lost = np.abs(measured) - np.abs(true)
+    slips = ((lost > MIN_SLIP * np.abs(measured)) & (lost > MIN_SLIP_STEP_M)).any(axis=1)
+    for window in windows(np.asarray(slips), steps.times, max_gap=2.2 * STEP_S):
+        whole = window.length > LONG_SHARE * float(np.ptp(steps.times))
+        if whole or window.length < MIN_SLIP_S:
+            continue
+        values = _slip_values(measured[window.samples], true[window.samples])
+        outside = np.ones(len(steps), dtype=bool)
+        outside[window.samples] = False
+        excess = _lost_share(measured, true, ~outside) - _lost_share(measured, true, outside)
+        if not values or excess < MIN_EXCESS_SLIP:
+            continue
+        before = steps.times < window.begin
+        target = "odom" if _follows_commands(steps, window) else "wheels"
+        text = "the wheels roll further than the robot drives"
+        begin = None if not before.any() else window.begin
+        evidence = Evidence(text, window.begin, window.end + STEP_S, "medium")
+        yield FoundFault(target, "slip", values, begin, window.length + STEP_S, evidence)
+
+
+def _lost_share(measured: Array, true: Array, chosen: Mask) -> float:
+    """Return the largest share of their distance that the wheels of one side lose in the chosen steps (n,)."""
+    rolled = np.abs(measured[chosen]).sum(axis=0)
+    lost = (np.abs(measured[chosen]) - np.abs(true[chosen])).sum(axis=0)
+    return float((lost / np.maximum(rolled, 1e-6)).max()) if rolled.max() > MIN_ROLLED_M else 0.0
+
+
+def _wheels(motion: Array, separation: float) -> Array:
+    """Return the distances (n, 2) of the left and right wheels in m."""
+    half = motion[:, 2] * separation / 2
+    return np.column_stack((motion[:, 0] - half, motion[:, 0] + half))
+
+
+def _slip_values(measured: Array, true: Array) -> dict[str, object]:
+    rolled = np.abs(measured).sum(axis=0)
+    shares = 1.0 - (true * np.sign(measured)).sum(axis=0) / np.maximum(rolled, 1e-6)
+    shares = np.clip(np.where(rolled > 0.1, shares, 0.0), 0.0, 0.95)
+    if float(shares.max()) < MIN_SLIP:
+        return {}
+    return {"left": f"{100 * shares[0]:.0f} %", "right": f"{100 * shares[1]:.0f} %"}
+
+
+def _follows_commands(steps: MotionSteps, window: Window) -> bool:
+    """Return whether the robot moved as commanded, so that only the odometry was wrong."""
+    commanded = float(np.abs(steps.commanded[window.samples][:, 0]).sum())
+    true, measured = (float(np.abs(one[window.samples][:, 0]).sum()) for one in (steps.true, steps.measured))
+    return commanded > 0.1 and abs(true - commanded) < abs(measured - commanded)
+
+
+def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
+    """Yield scale, bias, drift, and noise, by least squares over the whole drive."""
+    measured, true = steps.measured, steps.true
+    forward = _fit(true[:, :1], measured[:, 0])
+    turn = _fit(true[:, [2, 0]], measured[:, 2])
+    distance, turned = float(np.abs(true[:, 0]).sum()), float(np.abs(true[:, 2]).sum())
+    linear = forward[0][0] - 1.0 if distance > MIN_DISTANCE_M else 0.0
+    angular = turn[0][0] - 1.0 if turned > MIN_TURN_RAD and not skids else 0.0
+    per_meter = turn[0][1] if distance > MIN_DISTANCE_M else 0.0
+    is_linear = abs(linear) > max(MIN_SCALE_ERROR, CONFIDENCE_SIGMAS * forward[1][0])
+    is_angular = abs(angular) > max(MIN_TURN_SCALE_ERROR, CONFIDENCE_SIGMAS * turn[1][0])
+    is_curved = abs(per_meter) > max(MIN_TURN_PER_METER, CONFIDENCE_SIGMAS * turn[1][1])
+    drive = float(steps.times[0]), float(steps.times[-1]) + STEP_S
+    if is_linear and is_angular and abs(linear - angular) < 0.3 * abs(linear) and not is_curved:
+        text = f"the odometry reports {100 * (1 + linear):.1f} % of the motion"
+        yield FoundFault("odom", "scale", {"factor": f"{100 * (1 + linear):.1f} %"}, evidence=Evidence(text, *drive))
+    elif is_linear or is_angular or is_curved:
+        values: dict[str, object] = {}
+        values |= {"linear_scale": round(1 + linear, 3)} if is_linear else {}
+        values |= {"angular_scale": round(1 + angular, 3)} if is_angular else {}
+        values |= {"turn_per_metre": f"{math.degrees(per_meter):.2f} deg"} if is_curved else {}
+        text = (
+            f"the odometry reports {100 * (1 + linear):.1f} % of the distance and {100 * (1 + angular):.1f} % of turns"
+        )
+        text += f", and turns by {math.degrees(per_meter):.2f} deg per meter" if is_curved else ""
+        yield FoundFault("odom", "bias", values, evidence=Evidence(text, *drive))
+    yield from _drift(steps)
+    if not skids:
+        yield from _noise(measured[:, 0], forward[2], true[:, 0], measured[:, 2], turn[2], true[:, 2], drive)
+
+
+def _fit(matrix: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Return the least-squares solution, its standard deviations, and the predicted values."""
+    solution: Array = np.asarray(np.linalg.lstsq(matrix, values, rcond=None)[0], dtype=np.float64)
+    predicted: Array = np.asarray(matrix @ solution, dtype=np.float64)
+    variance = float(np.sum((values - predicted) ** 2)) / max(1, len(values) - matrix.shape[1])
+    covariance = variance * np.linalg.pinv(matrix.T @ matrix)
+    deviations: Array = np.sqrt(np.maximum(np.diag(covariance), 0.0)).astype(np.float64)
+    return solution, deviations, predicted
+
+
+def _drift(steps: MotionSteps) -> Iterator[FoundFault]:
+    """Yield the motion that the odometry reports while the robot stands."""
+    rest = (np.abs(steps.true[:, :2]).max(axis=1) < REST_M) & (np.abs(steps.true[:, 2]) < REST_RAD)
+    if int(rest.sum()) < MIN_REST_STEPS:
+        return
+    linear, _, angular = (np.median(steps.measured[rest], axis=0) / STEP_S).tolist()
+    values: dict[str, object] = {}
+    values |= {"linear": f"{linear:.3f} m/s"} if abs(linear) > MIN_DRIFT_M_S else {}
+    values |= {"angular": f"{angular:.3f} rad/s"} if abs(angular) > MIN_DRIFT_RAD_S else {}
+    if values:
+        times = steps.times[rest]
+        evidence = Evidence("the odometry moves while the robot stands", float(times[0]), float(times[-1]))
+        yield FoundFault("odom", "drift", values, evidence=evidence)
+
+
+def _noise(
+    forward: Array,
+    forward_fit: Array,
+    distance: Array,
+    turn: Array,
+    turn_fit: Array,
+    turned: Array,
+    drive: tuple[float, float],
+) -> Iterator[FoundFault]:
+    values: dict[str, object] = {}
+    moved, rotated = np.abs(distance) > 0.05, np.abs(turned) > 0.05
+    if moved.sum() >= 8:
+        linear = float(np.std((forward - forward_fit)[moved] / np.sqrt(np.abs(distance[moved]))))
+        values |= {"linear": f"{100 * linear:.1f} cm"} if linear > MIN_NOISE else {}
+    if rotated.sum() >= 8:
+        angular = float(np.std((turn - turn_fit)[rotated] / np.sqrt(np.abs(turned[rotated]))))
+        values |= {"angular": f"{math.degrees(angular):.1f} deg"} if angular > MIN_TURN_NOISE else {}
+    if values:
+        text = "the steps of the odometry scatter about the true motion"
+        yield FoundFault("odom", "noise", values, evidence=Evidence(text, *drive, "low"))

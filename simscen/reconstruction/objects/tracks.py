@@ -1,0 +1,131 @@
+"""Tracks of objects: clusters of successive scans that belong to the same object."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.reconstruction.scans.clusters import ScanCluster
+
+MAX_CENTER_DISTANCE_M = 2.5
+GATE_M, GATE_M_S = 0.25, 0.8
+"""Maximum distance between the predicted and the measured hits of an object: fixed, and per second unseen."""
+MAX_UNSEEN_S = 2.0
+CENTER_WEIGHT = 0.3
+"""Weight of the distance of the centers, which depends on the visible part, beside that of the hits."""
+VELOCITY_CLUSTERS, MAX_SPEED_M_S = 6, 2.5
+"""Number of clusters from which the velocity is computed, and the largest possible speed."""
+MOVING_SPEED_M_S = 0.3
+MIN_CLUSTERS, MIN_TRACK_S = 6, 0.6
+MAX_LINK_S, LINK_M, LINK_M_S = 6.0, 0.5, 0.5
+"""Time for which an object may be hidden, and how far from its predicted place it may reappear."""
+
+
+@dataclass(eq=False)
+class ObjectTrack:
+    """Clusters of one object in order of time."""
+
+    clusters: list[ScanCluster] = field(default_factory=list)
+    velocity: Array = field(default_factory=lambda: np.zeros(2))
+
+    @property
+    def begin(self) -> float:
+        """Time in s of the first cluster."""
+        return self.clusters[0].time
+
+    @property
+    def end(self) -> float:
+        """Time in s of the last cluster."""
+        return self.clusters[-1].time
+
+    def add(self, cluster: ScanCluster) -> None:
+        """Add the next cluster and update the velocity."""
+        self.clusters.append(cluster)
+        recent = self.clusters[-VELOCITY_CLUSTERS:]
+        if len(recent) >= 3:
+            times = np.array([one.time for one in recent])
+            offsets = times - times.mean()
+            centers = np.array([one.center for one in recent])
+            velocity = offsets @ centers / max(float(offsets @ offsets), 1e-6)
+            speed = float(np.hypot(*velocity))
+            self.velocity = velocity * min(1.0, MAX_SPEED_M_S / max(speed, 1e-6))
+
+    def distance_to(self, cluster: ScanCluster) -> float:
+        """Return the mean distance in m of the hits of a cluster from the predicted hits, or the other way around."""
+        last = self.clusters[-1]
+        predicted = last.points + self.velocity * (cluster.time - last.time)
+        if float(np.hypot(*(predicted.mean(axis=0) - cluster.points.mean(axis=0)))) > MAX_CENTER_DISTANCE_M:
+            return float("inf")
+        between = np.hypot(*(predicted[:, None, :] - cluster.points[None, :, :]).transpose(2, 0, 1))
+        surfaces = float(min(between.min(axis=0).mean(), between.min(axis=1).mean()))
+        centers = float(np.hypot(*(last.center + self.velocity * (cluster.time - last.time) - cluster.center)))
+        return surfaces + CENTER_WEIGHT * centers
+
+
+def track_objects(scans: list[list[ScanCluster]]) -> list[ObjectTrack]:
+    """Return the tracks of all objects that were seen often enough, in order of their start."""
+    active: list[ObjectTrack] = []
+    done: list[ObjectTrack] = []
+    for clusters in scans:
+        if not clusters:
+            continue
+        time = clusters[0].time
+        done += [track for track in active if time - track.end > MAX_UNSEEN_S]
+        active = [track for track in active if time - track.end <= MAX_UNSEEN_S]
+        _associate(active, clusters)
+    tracks = [track for track in (*done, *active) if _is_object(track)]
+    return _linked(sorted(tracks, key=lambda track: (track.begin, *track.clusters[0].center.tolist())))
+
+
+def _is_object(track: ObjectTrack) -> bool:
+    return len(track.clusters) >= MIN_CLUSTERS and track.end - track.begin >= MIN_TRACK_S
+
+
+def _associate(active: list[ObjectTrack], clusters: list[ScanCluster]) -> None:
+    """Add each cluster to the nearest track, nearest pairs first, or start a new track with it."""
+    pairs = []
+    for number, track in enumerate(active):
+        for index, cluster in enumerate(clusters):
+            distance = track.distance_to(cluster)
+            if distance <= GATE_M + GATE_M_S * (cluster.time - track.end):
+                pairs.append((distance, number, index))
+    used_tracks: set[int] = set()
+    used: set[int] = set()
+    for _, number, index in sorted(pairs):
+        if number not in used_tracks and index not in used:
+            used_tracks.add(number)
+            used.add(index)
+            active[number].add(clusters[index])
+    for index, cluster in enumerate(clusters):
+        if index not in used:
+            track = ObjectTrack()
+            track.add(cluster)
+            active.append(track)
+
+
+def _linked(tracks: list[ObjectTrack]) -> list[ObjectTrack]:
+    """Return the tracks, with those joined that one object made before and after it was hidden."""
+    linked: list[ObjectTrack] = []
+    for track in tracks:
+        before = [(gap, one) for one in linked if (gap := _link_distance(one, track)) is not None]
+        if before:
+            nearest = min(before, key=lambda pair: pair[0])[1]
+            nearest.clusters += track.clusters
+            nearest.velocity = track.velocity
+        else:
+            linked.append(track)
+    return linked
+
+
+def _link_distance(before: ObjectTrack, after: ObjectTrack) -> float | None:
+    """Return how far a track starts from where another one leads, None if that is too far or too late."""
+    gap = after.begin - before.end
+    if not 0.0 < gap <= MAX_LINK_S:
+        return None
+    places = [before.clusters[-1].center + before.velocity * gap]
+    if float(np.hypot(*before.velocity)) < MOVING_SPEED_M_S:
+        places.append(before.clusters[-1].center)
+    distance = min(float(np.hypot(*(after.clusters[0].center - place))) for place in places)
+    return distance if distance <= LINK_M + LINK_M_S * gap else None

@@ -1,0 +1,119 @@
+"""Clusters of beams that end before the static world: what each scan shows of objects that are not on the map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.reconstruction.drive.recorded_drive import Indices, Mask
+from simscen.reconstruction.faults.lidar_readings import ghost_beams, invalid_scans, isolated_returns
+from simscen.reconstruction.faults.message_stream import repeated_scans
+from simscen.reconstruction.scans.scan_model import ScanModel
+from simscen.reconstruction.scans.surroundings import Surroundings
+
+MIN_HITS = 3
+MAX_SKIPPED_BEAMS = 2
+MAX_GAP_M, MAX_GAP_BEAMS = 0.25, 3.0
+"""Distance between neighbor hits of one object: in m, and as a multiple of the distance of two beams."""
+MIN_WALL_DISTANCE_M, WALL_DISTANCE_PER_M = 0.12, 0.0
+BELIEVED_WALL_DISTANCE_M, BELIEVED_WALL_DISTANCE_PER_M = 0.2, 0.02
+"""Distance from a wall on the map, fixed and per meter of range, within which a hit belongs to the wall."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScanCluster:
+    """Hits of one object in one scan: `points` (m, 2) in the map frame, seen from `lidar` (2,) at `time` in s.
+
+    `scan` is the index of the scan, `angle` the angle in rad that the hits cover, and `is_whole` tells whether beams
+    beside it end farther away, so that nothing hides a part of the object.
+    """
+
+    scan: int
+    time: float
+    points: Array
+    lidar: Array
+    angle: float
+    is_whole: bool
+
+    @property
+    def center(self) -> Array:
+        """Center (2,) of the bounding box of the hits."""
+        center: Array = (self.points.min(axis=0) + self.points.max(axis=0)) / 2
+        return center
+
+
+def usable_scans(model: ScanModel) -> Mask:
+    """Return which scans (n,) show the surroundings at their time."""
+    result: Mask = ~invalid_scans(model) & ~repeated_scans(model.scans)
+    return result
+
+
+def scan_clusters(model: ScanModel, world: Surroundings, has_true_poses: bool) -> list[list[ScanCluster]]:
+    """Return the clusters of each scan."""
+    unexplained = model.is_short & ~isolated_returns(model) & usable_scans(model)[:, None]
+    for first, last, _ in ghost_beams(model):
+        unexplained[:, first : last + 1] = False
+    rows, beams = np.nonzero(unexplained)
+    if len(rows):
+        fixed = MIN_WALL_DISTANCE_M if has_true_poses else BELIEVED_WALL_DISTANCE_M
+        growth = WALL_DISTANCE_PER_M if has_true_poses else BELIEVED_WALL_DISTANCE_PER_M
+        limit = fixed + growth * model.scans.ranges[rows, beams]
+        near = world.distance_to_walls(model.ends[rows, beams]) < limit
+        unexplained[rows[near], beams[near]] = False
+    return [[*_clusters(model, row, np.flatnonzero(unexplained[row]))] for row in range(len(model.scans))]
+
+
+def _clusters(model: ScanModel, row: int, beams: Indices) -> Iterator[ScanCluster]:
+    """Yield the clusters of one scan; the ends of a full circle are joined."""
+    if len(beams) < MIN_HITS:
+        return
+    step = abs(float(model.scans.angles[1] - model.scans.angles[0])) if len(model.scans.angles) > 1 else 0.0
+    ranges, points = model.scans.ranges[row], model.ends[row]
+    total = len(ranges)
+    gaps = np.hypot(*(points[beams[1:]] - points[beams[:-1]]).T)
+    limit = np.maximum(MAX_GAP_M, MAX_GAP_BEAMS * step * np.minimum(ranges[beams[1:]], ranges[beams[:-1]]))
+    apart = (np.diff(beams) > MAX_SKIPPED_BEAMS + 1) | (gaps > limit)
+    groups = np.split(beams, np.flatnonzero(apart) + 1)
+    full = abs(total * step - 2 * np.pi) < 1.5 * step
+    seam = points[beams[0]] - points[beams[-1]]
+    is_near = beams[0] + total - beams[-1] <= MAX_SKIPPED_BEAMS + 1 and np.hypot(*seam) <= MAX_GAP_M
+    if full and is_near and len(groups) > 1:
+        groups = [np.concatenate((groups[-1], groups[0])), *groups[1:-1]]
+    for group in groups:
+        if len(group) < MIN_HITS:
+            continue
+        span = (int(group[-1]) - int(group[0])) % total
+        sides = [(int(group[0]) - 1) % total, (int(group[-1]) + 1) % total]
+        if not full and (group[0] == 0 or group[-1] == total - 1):
+            is_whole = False
+        else:
+            with np.errstate(invalid="ignore"):
+                farther = ranges[sides] > ranges[[group[0], group[-1]]]
+            is_whole = bool(farther.all())
+        lidar = model.poses[row, :2]
+        time = float(model.scans.times[row])
+        yield ScanCluster(row, time, points[group], lidar, (span + 1) * step, is_whole)
+
+
+FREE_MARGIN_M = 0.25
+
+
+def share_seen_free(model: ScanModel, points: Array, rows: Indices) -> Array:
+    """Return for each of `rows` (k,) the share of the points (m, 2) that beams pass, nan if all points are hidden."""
+    offsets = points[None, :, :] - model.poses[rows, None, :2]
+    distance = np.hypot(offsets[..., 0], offsets[..., 1])
+    direction = np.arctan2(offsets[..., 1], offsets[..., 0]) - model.poses[rows, None, 2]
+    step = float(model.scans.angles[1] - model.scans.angles[0])
+    beam = np.round(((direction - model.scans.angles[0]) % (2 * np.pi)) / step).astype(np.int64)
+    beam = np.where(beam == round(2 * np.pi / abs(step)), 0, beam)
+    inside = (beam >= 0) & (beam < len(model.scans.angles)) & (distance < model.scans.range_max)
+    measured = model.scans.ranges[rows[:, None], np.where(inside, beam, 0)]
+    with np.errstate(invalid="ignore"):
+        free = inside & (measured > distance + FREE_MARGIN_M)
+        hidden = ~inside | np.isnan(measured) | (measured < distance - FREE_MARGIN_M)
+    visible = (~hidden).sum(axis=1)
+    enough = visible >= max(2, 0.3 * len(points))
+    return np.where(enough, free.sum(axis=1) / np.maximum(visible, 1), np.nan)

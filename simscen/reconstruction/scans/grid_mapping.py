@@ -1,0 +1,68 @@
+"""Map of the static world, built from scans and poses: log odds of each cell, as in occupancy grid mapping."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.geometry import Array, Pose2
+from simscen.reconstruction.drive.recorded_drive import Indices, RecordedDrive
+from simscen.reconstruction.scans.surroundings import beam_ends, lidar_poses
+
+RESOLUTION_M = 0.05
+MARGIN_M = 1.0
+"""Free margin around everything that was measured."""
+MAX_SCANS = 1500
+"""Maximum number of scans that are used; they are evenly spread over the drive."""
+MAX_RANGE_M = 15.0
+"""Range beyond which errors of the heading blur the map."""
+HIT_LOG_ODDS, PASS_LOG_ODDS, MAX_LOG_ODDS = 0.85, -0.4, 20.0
+MIN_OCCUPIED_LOG_ODDS, MAX_FREE_LOG_ODDS = 0.8, -0.4
+"""Thrun, Burgard, Fox: Probabilistic Robotics, table 9.1, with the limits of each cell's belief."""
+
+
+def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
+    """Return the map that the scans of a drive show along its poses; an empty map if there are no scans."""
+    path = drive.poses.values[:, :2]
+    if drive.scans is None or not len(drive.scans):
+        low, high = path.min(axis=0) - 5.0, path.max(axis=0) + 5.0
+        return OccupancyGrid(np.zeros(_shape(low, high), dtype=np.int8), RESOLUTION_M, Pose2(*low.tolist()))
+    step = max(1, len(drive.scans) // MAX_SCANS)
+    scans = drive.scans.every(step)
+    poses, hits = lidar_poses(drive, scans), scans.is_hit() & (scans.ranges <= MAX_RANGE_M)
+    ends = beam_ends(poses, scans.angles, scans.ranges)
+    everything = np.concatenate((ends[hits], path))
+    low, high = everything.min(axis=0) - MARGIN_M, everything.max(axis=0) + MARGIN_M
+    low = np.floor(low / RESOLUTION_M) * RESOLUTION_M
+    odds = np.zeros(_shape(low, high))
+    for row in range(len(scans)):
+        if hits[row].any():
+            _add_scan(odds, poses[row, :2] - low, ends[row][hits[row]] - low)
+    cells = np.where(odds > MIN_OCCUPIED_LOG_ODDS, OCCUPIED, np.where(odds < MAX_FREE_LOG_ODDS, FREE, UNKNOWN))
+    return OccupancyGrid(cells.astype(np.int8), RESOLUTION_M, Pose2(float(low[0]), float(low[1]), 0.0))
+
+
+def _shape(low: Array, high: Array) -> tuple[int, int]:
+    columns, rows = np.ceil((high - low) / RESOLUTION_M).astype(int).tolist()
+    return rows + 1, columns + 1
+
+
+def _add_scan(odds: Array, origin: Array, ends: Array) -> None:
+    """Add the beams of one scan from `origin` (2,) to `ends` (n, 2), relative to the corner of the map."""
+    reach = np.hypot(*(ends - origin).T)
+    steps = np.arange(0.0, float(reach.max()), RESOLUTION_M)
+    share = steps[None, :] / np.maximum(reach, 1e-9)[:, None]
+    passes = share < 1.0 - RESOLUTION_M / np.maximum(reach, RESOLUTION_M)[:, None]
+    points = origin + share[..., None] * (ends - origin)[:, None, :]
+    through = np.unique(_index(points[passes], odds.shape))
+    hit = np.unique(_index(ends, odds.shape))
+    through = np.setdiff1d(through, hit, assume_unique=True)
+    flat = odds.reshape(-1)
+    flat[through] = np.maximum(flat[through] + PASS_LOG_ODDS, -MAX_LOG_ODDS)
+    flat[hit] = np.minimum(flat[hit] + HIT_LOG_ODDS, MAX_LOG_ODDS)
+
+
+def _index(points: Array, shape: tuple[int, ...]) -> Indices:
+    cells = np.clip((points / RESOLUTION_M).astype(np.int64), 0, [shape[1] - 1, shape[0] - 1])
+    result: Indices = cells[:, 1] * shape[1] + cells[:, 0]
+    return result

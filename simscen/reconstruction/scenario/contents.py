@@ -1,0 +1,160 @@
+"""Reconstruction of a scenario from a drive: the estimators in their order, and the contents of the scenario file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal
+from simscen.reconstruction.evidence import Evidence, FoundFault
+from simscen.reconstruction.objects.found_object import FoundObject
+from simscen.reconstruction.scenario.criteria import criteria_of
+from simscen.reconstruction.scenario.incidents import Incident
+from simscen.reconstruction.scenario.scenario_text import ScenarioContents, ScenarioGoal
+
+INVALID_GOAL_CODES = frozenset({"GOAL_OCCUPIED", "GOAL_OUTSIDE_MAP"})
+"""Error codes of goals that no robot can reach. A scenario must expect them."""
+MIN_WAIT_S = 0.3
+"""Minimum time between a result and the next goal that counts as a wait at the goal."""
+MIN_TIMEOUT_S, TIMEOUT_FACTOR = 30.0, 2.0
+UNFINISHED_TIMEOUT_FACTOR = 1.1
+MAX_TIME_LIMIT_S = 8000.0
+NEAR_TRUTH_M, NEAR_TRUTH_RAD = 0.15, math.radians(6)
+"""Errors of the first belief within which the default initial estimate is kept."""
+UNKNOWN_START_STD_M = 1.5
+"""Standard deviation of the first belief from which on the start was unknown to the localizer."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What the estimators found in a drive."""
+
+    incidents: Sequence[Incident]
+    objects: Sequence[FoundObject] = ()
+    faults: Sequence[FoundFault] = ()
+    kidnaps: Sequence[tuple[float, Pose2, Evidence]] = ()
+    unknowns: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class GivenParts:
+    """Parts of the scenario that do not depend on estimates: world, map, robot, and stack, each with its evidence."""
+
+    world: str | Mapping[str, Any]
+    map: str
+    robot: str
+    seed: int
+    stack: Mapping[str, Any] = field(default_factory=dict)
+    evidence: Mapping[str, Evidence] = field(default_factory=dict)
+    unknowns: Sequence[str] = ()
+
+
+def contents_of(
+    drive: RecordedDrive, given: GivenParts, findings: Findings, name: str, source: str
+) -> ScenarioContents:
+    """Return the contents of the scenario file."""
+    start = start_pose(drive)
+    estimate, estimate_evidence = _estimate(drive, start, bool(given.map == "none"))
+    goals = [*_goals(drive)]
+    invalid = bool(goals) and all(goal.expect for goal in goals)
+    evidence = dict(given.evidence)
+    evidence["start"] = Evidence(f"first pose of the drive, from {drive.pose_source}", 0.0)
+    if estimate_evidence is not None:
+        evidence["estimate"] = estimate_evidence
+    slowest = max((goal.timeout for goal in goals), default=MIN_TIMEOUT_S)
+    time_limit = min(MAX_TIME_LIMIT_S, max(60.0, 2 * drive.duration, drive.duration + slowest))
+    return ScenarioContents(
+        name=name,
+        source=source,
+        summary=[*_summary(drive, findings)],
+        seed=given.seed,
+        world=given.world,
+        map=given.map,
+        robot=given.robot,
+        start=start,
+        estimate=estimate,
+        stack=given.stack,
+        navigation="navigate_through_poses" if any(goal.status == "passed" for goal in drive.goals) else "",
+        goals=goals,
+        stops_at_failure=not any(goal.status == "failed" for goal in drive.goals[:-1]),
+        time_limit=time_limit,
+        objects=findings.objects,
+        kidnaps=findings.kidnaps,
+        faults=findings.faults,
+        criteria=criteria_of(drive, findings.incidents, findings.faults, invalid),
+        evidence=evidence,
+        unknowns=[*given.unknowns, *findings.unknowns, *drive.notes],
+    )
+
+
+def start_pose(drive: RecordedDrive) -> Pose2:
+    """Return the pose at the start of the drive."""
+    return Pose2(*drive.poses.poses_at(np.zeros(1))[0].tolist())
+
+
+def _estimate(
+    drive: RecordedDrive, start: Pose2, mapless: bool
+) -> tuple[tuple[Pose2, tuple[float, float, float]] | str | None, Evidence | None]:
+    """Return the initial estimate of the localizer if it differs from the default, with its evidence."""
+    if mapless or not len(drive.belief):
+        return None, None
+    values = drive.belief.values[0]
+    pose = Pose2(*values[:3].tolist())
+    std = tuple(math.sqrt(max(value, 1e-6)) for value in values[[3, 6, 8]].tolist())
+    time = float(drive.belief.times[0])
+    if max(std[:2]) > UNKNOWN_START_STD_M:
+        text = f"the first belief has a standard deviation of {max(std[:2]):.1f} m, so the start was unknown"
+        return "unknown", Evidence(text, time, None, "medium")
+    if pose.distance(start) <= NEAR_TRUTH_M and abs(wrap(pose.yaw - start.yaw)) <= NEAR_TRUTH_RAD:
+        return None, None
+    text = f"the first belief was {pose.distance(start):.2f} m from the start"
+    return (pose, (max(std[0], 0.1), max(std[1], 0.1), max(std[2], 0.05))), Evidence(text, time, None, "medium")
+
+
+def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
+    taken: set[str] = set()
+    for number, goal in enumerate(drive.goals):
+        name = goal.name.replace("#", " loop ") or f"goal-{number + 1}"
+        if name in taken:
+            name = f"{name}-{number + 1}"
+        taken.add(name)
+        following = drive.goals[number + 1] if number + 1 < len(drive.goals) else None
+        expect = goal.error if goal.error in INVALID_GOAL_CODES else ""
+        yield ScenarioGoal(
+            name, goal.pose, _timeout(goal, drive.duration), _goal_evidence(goal), expect, _wait(goal, following)
+        )
+
+
+def _goal_evidence(goal: RecordedGoal) -> Evidence:
+    result = {"unknown": "its result is unknown"}.get(
+        goal.status, f"{goal.status}{f' ({goal.error})' if goal.error else ''}"
+    )
+    confidence = "high" if goal.source.startswith("/") else "medium"
+    return Evidence(f"{goal.source}; {result}", goal.sent, goal.ended, confidence)
+
+
+def _timeout(goal: RecordedGoal, duration: float) -> float:
+    if goal.ended is None:
+        return max(MIN_TIMEOUT_S, math.ceil(UNFINISHED_TIMEOUT_FACTOR * (duration - goal.sent)))
+    return max(MIN_TIMEOUT_S, math.ceil(TIMEOUT_FACTOR * (goal.ended - goal.sent)))
+
+
+def _wait(goal: RecordedGoal, following: RecordedGoal | None) -> float:
+    if following is None or goal.ended is None or goal.status not in ("reached", "unknown"):
+        return 0.0
+    gap = following.sent - goal.ended
+    return round(gap, 1) if gap >= MIN_WAIT_S else 0.0
+
+
+def _summary(drive: RecordedDrive, findings: Findings) -> Iterator[str]:
+    yield f"Reconstructed from a recorded drive of {drive.duration:.1f} s."
+    for incident in findings.incidents:
+        x, y = incident.place
+        yield f"At {incident.time:.1f} s, at ({x:.2f}, {y:.2f}): {incident.kind}, {incident.detail}."
+    if not findings.incidents:
+        yield "The drive had no incident."

@@ -1,0 +1,116 @@
+"""Criteria that a drive suggests: what it held with a margin, and what an incident broke."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.reconstruction.evidence import Evidence, FoundFault
+from simscen.reconstruction.scenario.incidents import LOST_ERROR_M, STUCK_S, Incident
+
+TIME_MARGIN, PATH_MARGIN, ERROR_MARGIN = 1.25, 1.25, 1.5
+"""Factors between a measured value and the limit that a criterion allows."""
+MIN_ERROR_LIMIT_M = 0.25
+MIN_TIME_LIMIT_S = 10.0
+MIN_STEP_M = 0.01
+"""Minimum move that counts for the length of a path, as in the criterion path_length."""
+STOP_TIME_FACTOR, MAX_STOP_S = 1.5, 3.0
+REST_SPEED_M_S = 0.01
+
+
+@dataclass(frozen=True)
+class ProposedCriterion:
+    """Criterion in the scenario language with the evidence for its limit."""
+
+    kind: str
+    values: Mapping[str, object]
+    evidence: Evidence
+
+
+def criteria_of(
+    drive: RecordedDrive, incidents: Sequence[Incident], faults: Sequence[FoundFault], invalid_goals: bool
+) -> list[ProposedCriterion]:
+    """Return criteria for a drive. With `invalid_goals`, all goals are refused as soon as they are sent."""
+    return [*_criteria(drive, incidents, faults, invalid_goals)]
+
+
+def _criteria(
+    drive: RecordedDrive, incidents: Sequence[Incident], faults: Sequence[FoundFault], invalid_goals: bool
+) -> Iterator[ProposedCriterion]:
+    broken = {incident.criterion: incident for incident in incidents}
+    if drive.goals:
+        yield ProposedCriterion("goals_reached", {}, _broken(broken, "goals_reached", "all goals were reached"))
+    contact = _broken(broken, "collisions", "no contact was recorded")
+    yield ProposedCriterion("collisions", {"max": 0}, contact)
+    if "stuck" in broken:
+        yield ProposedCriterion("stuck", {"max": f"{STUCK_S:g} s"}, _broken(broken, "stuck", ""))
+    if drive.has_independent_poses and len(drive.belief):
+        yield _localization(drive, broken)
+    if not invalid_goals and not {"goals_reached", "stuck"} & set(broken):
+        yield from _efficiency(drive)
+    yield from _stops(drive, faults)
+
+
+def _broken(broken: Mapping[str, Incident], criterion: str, held: str) -> Evidence:
+    incident = broken.get(criterion)
+    if incident is None:
+        return Evidence(f"held: {held}")
+    return Evidence(f"broken: {incident.detail}", incident.time)
+
+
+def _localization(drive: RecordedDrive, broken: Mapping[str, Incident]) -> ProposedCriterion:
+    errors = np.hypot(*(drive.belief.values[:, :2] - drive.poses.poses_at(drive.belief.times)[:, :2]).T)
+    largest = float(errors.max())
+    limit = LOST_ERROR_M if "localization_error" in broken else max(MIN_ERROR_LIMIT_M, ERROR_MARGIN * largest)
+    text = f"the largest error was {largest:.2f} m"
+    return ProposedCriterion(
+        "localization_error", {"max": round(limit, 2)}, _broken(broken, "localization_error", text)
+    )
+
+
+def _efficiency(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
+    if not drive.goals or drive.goals[-1].ended is None:
+        return
+    took = drive.goals[-1].ended - drive.goals[0].sent
+    limit = max(MIN_TIME_LIMIT_S, TIME_MARGIN * took)
+    yield ProposedCriterion("time_to_goal", {"max": f"{limit:.0f} s"}, Evidence(f"held: it took {took:.1f} s"))
+    length = path_length(drive.poses.values[:, :2])
+    if length > 1.0:
+        values = {"max": f"{PATH_MARGIN * length:.1f} m"}
+        yield ProposedCriterion("path_length", values, Evidence(f"held: the robot drove {length:.2f} m"))
+
+
+def _stops(drive: RecordedDrive, faults: Sequence[FoundFault]) -> Iterator[ProposedCriterion]:
+    """Yield a limit for the time to stop, for each outage of a lidar at which the robot stopped."""
+    for fault in faults:
+        if (fault.target, fault.kind) != ("lidar", "off") or fault.begin is None or fault.duration is None:
+            continue
+        stop = time_to_rest(drive, fault.begin, fault.begin + fault.duration)
+        if stop is not None and 0.05 < stop < MAX_STOP_S:
+            values = {"time": f"{STOP_TIME_FACTOR * stop + 0.2:.1f} s", "after": "lidar.off"}
+            yield ProposedCriterion("stopped_within", values, Evidence(f"held: the robot stopped after {stop:.2f} s"))
+            return
+
+
+def time_to_rest(drive: RecordedDrive, begin: float, end: float) -> float | None:
+    """Return the time in s from `begin` until the robot first rests before `end`; None if it does not."""
+    chosen = (drive.odometry.times >= begin) & (drive.odometry.times <= end)
+    speeds = np.abs(drive.odometry.values[chosen][:, 3:6]).max(axis=1) if chosen.any() else np.empty(0)
+    rest = np.flatnonzero(speeds < REST_SPEED_M_S)
+    return float(drive.odometry.times[chosen][rest[0]] - begin) if len(rest) else None
+
+
+def path_length(places: Array) -> float:
+    """Return the length in m of a path (n, 2), in moves of at least MIN_STEP_M."""
+    if not len(places):
+        return 0.0
+    length, last = 0.0, places[0]
+    for place in places[1:]:
+        step = float(np.hypot(*(place - last)))
+        if step >= MIN_STEP_M:
+            length, last = length + step, place
+    return length

@@ -1,0 +1,170 @@
+"""World, map, robot, and stack of a reconstructed scenario: from options, the header of the log, or its messages."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.environment.world_model import World
+from simscen.core.errors import InvalidInput, Problem
+from simscen.loading.builders import load_map, world_from_file
+from simscen.loading.files.discovery import default_root
+from simscen.loading.files.single_files import load_world_file
+from simscen.model.world import WorldSpec
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.reconstruction.drive.run_description import RunDescription
+from simscen.reconstruction.evidence import Evidence
+from simscen.reconstruction.scans.grid_mapping import map_from_scans
+from simscen.reconstruction.scans.surroundings import Surroundings, world_from_map
+from simscen.reconstruction.scenario.contents import GivenParts
+from simscen.worlds.maps.ros_map import save_map
+from simscen.worlds.world_file import world_from_spec
+
+DEFAULT_LIDAR_HEIGHT_M = 0.2
+DEFAULT_ROBOT = "turtlebot"
+MAX_EQUAL_MAP_DIFFERENCE = 0.002
+"""Share of cells in which two maps of the same world may differ."""
+
+
+@dataclass(frozen=True)
+class GivenFiles:
+    """Files that the user names instead of what the log says."""
+
+    world: Path | None = None
+    map: Path | None = None
+    robot: str = ""
+
+
+@dataclass
+class WorldChoice:
+    """World of the scenario: how it is written, as data, and why."""
+
+    written: str | Mapping[str, Any]
+    world: World
+    evidence: Evidence
+    map: str = ""
+    map_evidence: Evidence | None = None
+    unknowns: list[str] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+    """Files that were written beside the scenario."""
+
+
+def choose_world(drive: RecordedDrive, described: RunDescription, files: GivenFiles, out: Path) -> WorldChoice:
+    """Return the world and the map, and write those that the log contains beside the scenario `out`.
+
+    Raises InvalidInput for an unusable file, and OSError.
+    """
+    if files.world is not None:
+        choice = _world_of_file(files.world, out, Evidence("given with --world"))
+    elif isinstance(described.world, Path):
+        choice = _world_of_file(described.world, out, Evidence("world file in the header of the log"))
+    elif isinstance(described.world, Mapping):
+        spec = WorldSpec.model_validate(described.world)
+        world = world_from_spec(spec, spec.name or "world")
+        choice = WorldChoice(described.world, world, Evidence("walls and obstacles in the header of the log"))
+    else:
+        return _world_of_map(drive, files, out)
+    height = DEFAULT_LIDAR_HEIGHT_M if drive.scans is None else drive.scans.height
+    if not described.has_map:
+        choice.map, choice.map_evidence = "none", Evidence("the log has no map")
+    elif files.map is not None:
+        choice.map, choice.map_evidence = relative(files.map, out), Evidence("given with --map")
+    elif drive.map is not None and _differs(drive.map, Surroundings(choice.world, height).grid):
+        file = out.with_name(f"{_stem(out)}_map.yaml")
+        save_map(drive.map, file)
+        choice.files += [file, file.with_suffix(".pgm")]
+        choice.map, choice.map_evidence = file.name, Evidence("the map on /map differs from the world", 0.0)
+    return choice
+
+
+def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldChoice:
+    """Return a world whose walls are those of a map: a given one, that on /map, or one built from the scans."""
+    if files.map is not None:
+        loaded = load_world_file(files.map, default_root([files.map]))
+        if loaded.map is None:
+            raise InvalidInput(
+                [Problem(str(files.map), 0, 0, "SC320", "not a ROS map", "use --world for other worlds")]
+            )
+        grid, written = load_map(loaded.map), relative(files.map, out)
+        return WorldChoice(written, world_from_map(grid, _stem(out)), Evidence("given with --map"))
+    file = out.with_name(f"{_stem(out)}_map.yaml")
+    unknowns = ["walls and objects that no scan shows"]
+    if drive.map is not None:
+        grid, evidence = drive.map, Evidence("the walls are the occupied cells of /map", 0.0)
+    else:
+        grid = map_from_scans(drive)
+        evidence = Evidence("built from the scans along the poses, because the log has no map", None, None, "medium")
+        unknowns.append("which parts of the built map were on the robot's own map")
+    save_map(grid, file)
+    written_files = [file, file.with_suffix(".pgm")]
+    return WorldChoice(file.name, world_from_map(grid, _stem(out)), evidence, unknowns=unknowns, files=written_files)
+
+
+def _world_of_file(file: Path, out: Path, evidence: Evidence) -> WorldChoice:
+    root = default_root([file])
+    loaded = load_world_file(file, root)
+    home = default_root([out])
+    written, copies = relative(file, out), list[Path]()
+    if not file.resolve().is_relative_to(home.resolve()):
+        copy = out.with_name(f"{_stem(out)}{''.join(file.suffixes[-2:])}")
+        if loaded.map is not None:
+            save_map(load_map(loaded.map), copy)
+        else:
+            shutil.copyfile(file, copy)
+        written, copies = copy.name, [copy]
+    return WorldChoice(written, world_from_file(loaded, root), evidence, files=copies)
+
+
+def _differs(given: OccupancyGrid, drawn: OccupancyGrid) -> bool:
+    """Return whether the robot's map has other walls than the world."""
+    if given.shape != drawn.shape or given.origin.distance(drawn.origin) > 1e-6:
+        return True
+    return float(np.mean((given.cells > 50) != (drawn.cells > 50))) > MAX_EQUAL_MAP_DIFFERENCE
+
+
+def given_parts(described: RunDescription, choice: WorldChoice, files: GivenFiles, out: Path) -> GivenParts:
+    """Return the parts of the scenario that are not estimated."""
+    evidence = {"world": choice.evidence}
+    if choice.map_evidence is not None:
+        evidence["map"] = choice.map_evidence
+    unknowns = [*choice.unknowns, *described.notes]
+    robot = _robot(described, files, out)
+    if files.robot:
+        evidence["robot"] = Evidence("given with --robot")
+    elif described.robot is not None:
+        evidence["robot"] = Evidence("robot in the header of the log")
+    else:
+        evidence["robot"] = Evidence(f"{DEFAULT_ROBOT}, because the log does not name its robot", None, None, "low")
+        unknowns.append("shape, mass, limits, and sensors of the robot; name its file with --robot")
+    if described.stack:
+        evidence["stack"] = Evidence("configuration of the stack in the header of the log")
+    else:
+        unknowns.append(
+            "parameters of the navigation stack; the defaults are used"
+        ) if described.robot is None else None
+    return GivenParts(choice.written, choice.map, robot, described.seed, described.stack, evidence, unknowns)
+
+
+def _robot(described: RunDescription, files: GivenFiles, out: Path) -> str:
+    """Return the robot as the scenario names it."""
+    if files.robot:
+        return relative(Path(files.robot), out) if Path(files.robot).is_file() else files.robot
+    if isinstance(described.robot, Path):
+        return relative(described.robot, out)
+    return described.robot or DEFAULT_ROBOT
+
+
+def relative(file: Path, out: Path) -> str:
+    """Return the path of a file relative to the folder of the scenario."""
+    return os.path.relpath(file.resolve(), out.parent.resolve())
+
+
+def _stem(out: Path) -> str:
+    return out.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario")

@@ -1,0 +1,115 @@
+"""Incidents of a drive: contact, standstill with a goal, wrong localization, failed goals, and time-outs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.reconstruction.evidence import windows
+
+STUCK_RADIUS_M, STUCK_S = 0.5, 10.0
+"""A robot with a goal is stuck if it stays within this radius for this time, as in Nav2's progress checker."""
+LOST_ERROR_M = 0.5
+"""Localization error above which the robot is lost."""
+MAX_STD_M = 1.0
+"""Standard deviation of the belief above which the robot is lost, if no ground truth exists."""
+
+
+@dataclass(frozen=True)
+class Incident:
+    """Something that went wrong.
+
+    Attributes:
+        kind: "contact", "stuck", "lost", "failed goal", or "unfinished goal".
+        time: When it began, in s.
+        place: Position of the robot then.
+        detail: What happened, in words.
+        criterion: Criterion that it breaks.
+    """
+
+    kind: str
+    time: float
+    place: tuple[float, float]
+    detail: str
+    criterion: str
+
+
+def incidents_of(drive: RecordedDrive) -> list[Incident]:
+    """Return the incidents of a drive in order of time."""
+    found = [*_contacts(drive), *_standstills(drive), *_lost(drive), *_goals(drive)]
+    return sorted(found, key=lambda incident: (incident.time, incident.kind))
+
+
+def _place(drive: RecordedDrive, time: float) -> tuple[float, float]:
+    x, y, _ = drive.poses.poses_at(np.array([time]))[0].tolist()
+    return x, y
+
+
+def _contacts(drive: RecordedDrive) -> Iterator[Incident]:
+    """Yield the times at which the bumper was pressed."""
+    for pressed in windows(drive.bumper.values[:, 0] > 0.5, drive.bumper.times, max_gap=0.3):
+        detail = f"the bumper was pressed for {max(pressed.length, 0.05):.2f} s"
+        yield Incident("contact", pressed.begin, _place(drive, pressed.begin), detail, "collisions")
+
+
+def _standstills(drive: RecordedDrive) -> Iterator[Incident]:
+    """Yield the longest standstill during each goal that lasts STUCK_S."""
+    for goal in drive.goals:
+        end = drive.duration if goal.ended is None else goal.ended
+        chosen = (drive.poses.times >= goal.sent) & (drive.poses.times <= end)
+        times, places = drive.poses.times[chosen], drive.poses.values[chosen, :2]
+        begin, length = longest_stay(times, places, STUCK_RADIUS_M)
+        if length > STUCK_S:
+            detail = f"the robot stayed within {STUCK_RADIUS_M} m for {length:.1f} s"
+            yield Incident("stuck", begin, _place(drive, begin), detail, "stuck")
+
+
+def longest_stay(times: Array, places: Array, radius: float) -> tuple[float, float]:
+    """Return the start and length in s of the longest time within `radius` of a position (n, 2), (0, 0) if empty."""
+    best, begin = 0.0, 0.0
+    at = 0
+    while at < len(times):
+        away = np.flatnonzero(np.hypot(*(places[at:] - places[at]).T) > radius)
+        end = at + (int(away[0]) if len(away) else len(times) - at)
+        last = min(end, len(times) - 1)
+        if times[last] - times[at] > best:
+            best, begin = float(times[last] - times[at]), float(times[at])
+        if not len(away):
+            break
+        at += max(1, int(np.searchsorted(times[at:], times[at] + 0.25)))
+    return begin, best
+
+
+def _lost(drive: RecordedDrive) -> Iterator[Incident]:
+    """Yield the times at which the belief was wrong or, without a ground truth, uncertain."""
+    if not len(drive.belief):
+        return
+    belief = drive.belief
+    if drive.has_independent_poses:
+        errors = np.hypot(*(belief.values[:, :2] - drive.poses.poses_at(belief.times)[:, :2]).T)
+        for window in windows(errors > LOST_ERROR_M, belief.times, max_gap=1.0):
+            largest = float(errors[window.samples].max())
+            detail = f"the localization error reached {largest:.2f} m"
+            yield Incident("lost", window.begin, _place(drive, window.begin), detail, "localization_error")
+        return
+    deviation = np.sqrt(np.maximum(belief.values[:, 3], belief.values[:, 6]))
+    for window in windows(deviation > MAX_STD_M, belief.times, min_length=0.5, max_gap=1.0):
+        detail = f"the localizer reported a standard deviation of {float(deviation[window.samples].max()):.2f} m"
+        yield Incident("lost", window.begin, _place(drive, window.begin), detail, "localization_error")
+
+
+def _goals(drive: RecordedDrive) -> Iterator[Incident]:
+    for number, goal in enumerate(drive.goals):
+        name = goal.name or f"goal-{number + 1}"
+        if goal.status == "failed" and goal.ended is not None:
+            code = f" with {goal.error}" if goal.error else ""
+            yield Incident(
+                "failed goal", goal.ended, _place(drive, goal.ended), f"`{name}` failed{code}", "goals_reached"
+            )
+        elif goal.ended is None and number == len(drive.goals) - 1:
+            detail = f"`{name}` has no result when the log ends"
+            yield Incident("unfinished goal", drive.duration, _place(drive, drive.duration), detail, "goals_reached")

@@ -1,0 +1,253 @@
+"""Text of a reconstructed scenario: YAML in which a comment gives the evidence for each part."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from simscen.core.geometry import Pose2
+from simscen.loading.files.single_files import CompactDumper
+from simscen.loading.yaml.scalars import to_yaml
+from simscen.reconstruction.evidence import Evidence, FoundFault
+from simscen.reconstruction.objects.found_object import FoundObject
+from simscen.reconstruction.scenario.criteria import ProposedCriterion
+
+MAX_COLUMNS = 118
+OBJECT_HEIGHT_M = 1.0
+PERSON_HEIGHT_M = 1.7
+MIN_PERSON_RADIUS_M, MAX_PERSON_RADIUS_M = 0.15, 0.4
+_PLAIN = re.compile(r"[\w./ %-]+")
+"""Scalars that need no quotes in flow style."""
+
+
+@dataclass(frozen=True)
+class ScenarioGoal:
+    """Goal of the reconstructed scenario."""
+
+    name: str
+    pose: Pose2
+    timeout: float
+    evidence: Evidence
+    expect: str = ""
+    wait: float = 0.0
+
+
+@dataclass(frozen=True)
+class ScenarioContents:
+    """Everything that the text of a scenario holds.
+
+    Attributes:
+        name: Name of the scenario.
+        source: Name of the log.
+        summary: Sentences about the drive.
+        seed: Seed of the run.
+        world: World file, or an inline world.
+        map: Map file or "none"; "" for the map of the world.
+        robot: Robot file or name of a shipped robot.
+        start: True start pose.
+        estimate: Initial estimate with standard deviations x, y, yaw; None for the default, "unknown" for anywhere.
+        stack: Configuration of the stack.
+        navigation: Navigation action; "" for the default.
+        time_limit: Time limit in s.
+        evidence: Evidence by key of the scenario.
+        unknowns: What the log does not tell.
+    """
+
+    name: str
+    source: str
+    summary: Sequence[str]
+    seed: int
+    world: str | Mapping[str, Any]
+    map: str
+    robot: str
+    start: Pose2
+    estimate: tuple[Pose2, tuple[float, float, float]] | str | None
+    stack: Mapping[str, Any]
+    navigation: str
+    goals: Sequence[ScenarioGoal]
+    stops_at_failure: bool
+    time_limit: float
+    objects: Sequence[FoundObject]
+    kidnaps: Sequence[tuple[float, Pose2, Evidence]]
+    faults: Sequence[FoundFault]
+    criteria: Sequence[ProposedCriterion]
+    evidence: Mapping[str, Evidence]
+    unknowns: Sequence[str]
+
+
+def scenario_text(contents: ScenarioContents) -> str:
+    """Return the scenario as YAML."""
+    return "\n".join(_lines(contents)) + "\n"
+
+
+def _lines(contents: ScenarioContents) -> Iterator[str]:
+    yield from _comment(f"Written by `simscen new --from-log` from {contents.source}. Times count from its start.")
+    if contents.unknowns:
+        yield from _comment("The log does not tell:")
+        for unknown in contents.unknowns:
+            yield from _comment(f"- {unknown}", hanging="  ")
+    yield "simscen: 1"
+    yield f"name: {_text(contents.name)}"
+    yield "description: >"
+    for line in textwrap.wrap(" ".join(contents.summary), MAX_COLUMNS - 2, break_long_words=False):
+        yield f"  {line}"
+    yield "tags: [from-log]"
+    yield f"seed: {contents.seed}"
+    yield ""
+    yield from _evidence(contents, "world")
+    yield from _entry("world", contents.world)
+    if contents.map:
+        yield from _evidence(contents, "map")
+        yield from _entry("map", contents.map)
+    yield from _robot(contents)
+    if contents.stack:
+        yield from _evidence(contents, "stack")
+        yield from _entry("stack", dict(contents.stack))
+    if contents.navigation:
+        yield f"navigation: {{mode: {contents.navigation}}}"
+    if not contents.stops_at_failure:
+        yield "on_goal_failure: continue"
+    yield from _goals(contents)
+    yield f"time_limit: {contents.time_limit:.0f} s"
+    yield from _events(contents)
+    if contents.faults:
+        yield ""
+        yield "faults:"
+        for fault in contents.faults:
+            yield from _comment(fault.evidence.comment, "  ")
+            yield f"  - {_flow(_fault_entry(fault))}"
+    yield ""
+    yield "pass:"
+    for criterion in contents.criteria:
+        yield from _comment(criterion.evidence.comment, "  ")
+        yield f"  - {criterion.kind}: {_flow(dict(criterion.values))}"
+
+
+def _comment(text: str, indent: str = "", hanging: str = "") -> list[str]:
+    return textwrap.wrap(
+        text,
+        MAX_COLUMNS,
+        initial_indent=f"{indent}# ",
+        subsequent_indent=f"{indent}# {hanging}",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def _evidence(contents: ScenarioContents, key: str) -> list[str]:
+    evidence = contents.evidence.get(key)
+    return [] if evidence is None else _comment(evidence.comment)
+
+
+def _robot(contents: ScenarioContents) -> Iterator[str]:
+    yield ""
+    yield from _evidence(contents, "robot")
+    yield "robot:"
+    yield f"  model: {_text(contents.robot)}"
+    if (start := contents.evidence.get("start")) is not None:
+        yield from _comment(start.comment, "  ")
+    yield f"  pose: {_pose(contents.start)}"
+    if contents.estimate is None:
+        return
+    if (estimate := contents.evidence.get("estimate")) is not None:
+        yield from _comment(estimate.comment, "  ")
+    if isinstance(contents.estimate, str):
+        yield f"  initial_estimate: {contents.estimate}"
+        return
+    pose, (x, y, yaw) = contents.estimate
+    std = f"[{x:.3f}, {y:.3f}, {math.degrees(yaw):.1f} deg]"
+    yield f"  initial_estimate: {_pose(pose)[:-1]}, std: {std}}}"
+
+
+def _goals(contents: ScenarioContents) -> Iterator[str]:
+    yield ""
+    yield "goals:" if contents.goals else "goals: []"
+    for goal in contents.goals:
+        yield from _comment(goal.evidence.comment, "  ")
+        entry = f"name: {_text(goal.name)}, pose: {_pose(goal.pose)}, timeout: {goal.timeout:.0f} s"
+        entry += f", expect: {{error_code: {goal.expect}}}" if goal.expect else ""
+        entry += f", on_reached: {{wait: {goal.wait:.1f} s}}" if goal.wait else ""
+        yield f"  - {{{entry}}}"
+
+
+def _events(contents: ScenarioContents) -> Iterator[str]:
+    if not contents.objects and not contents.kidnaps:
+        return
+    yield ""
+    yield "events:"
+    for thing in contents.objects:
+        yield from _comment(thing.evidence.comment, "  ")
+        yield from _object(thing)
+    for time, pose, evidence in contents.kidnaps:
+        yield from _comment(evidence.comment, "  ")
+        yield f"  - name: robot is carried off at {time:.1f} s"
+        yield f"    when: {{time: {time:.2f} s}}"
+        yield f"    do: {{kidnap: {{pose: {_pose(pose)}}}}}"
+
+
+def _object(thing: FoundObject) -> Iterator[str]:
+    begin = thing.appears or 0.0
+    _, x, y, yaw = thing.keyframes[0]
+    is_person = thing.is_moving and thing.is_cylinder and MIN_PERSON_RADIUS_M <= thing.size[0] <= MAX_PERSON_RADIUS_M
+    height = PERSON_HEIGHT_M if is_person else OBJECT_HEIGHT_M
+    size = ", ".join(f"{value:.2f}" for value in (*thing.size, height))
+    shape = f"{'cylinder' if thing.is_cylinder else 'box'}: [{size}]"
+    spawn = f"spawn: {{name: {_text(thing.name)}, {shape}, pose: {_pose(Pose2(x, y, yaw))}}}"
+    yield f"  - name: {_text(f'{thing.name} appears' if begin else f'{thing.name} is there')}"
+    yield f"    when: {{time: {begin:.2f} s}}"
+    if thing.is_moving:
+        yield "    do:"
+        yield f"      - {spawn}"
+        yield f"      - move: {{name: {_text(thing.name)}, keyframes: ["
+        for time, x, y, yaw in thing.keyframes:
+            yield f"          [{max(time - begin, 0.0):.2f}, {x:.3f}, {y:.3f}, {math.degrees(yaw):.1f} deg],"
+        yield "        ]}"
+    else:
+        yield f"    do: {{{spawn}}}"
+    if thing.disappears is not None:
+        yield f"  - name: {_text(f'{thing.name} disappears')}"
+        yield f"    when: {{time: {thing.disappears:.2f} s}}"
+        yield f"    do: {{remove: {{name: {_text(thing.name)}}}}}"
+
+
+def _fault_entry(fault: FoundFault) -> dict[str, Any]:
+    entry: dict[str, Any] = {"sensor": fault.target, fault.kind: dict(fault.values)}
+    if fault.begin is not None:
+        entry["when"] = {"time": f"{fault.begin:.2f} s"}
+    if fault.duration is not None:
+        entry["for"] = f"{fault.duration:.2f} s"
+    return entry
+
+
+def _pose(pose: Pose2) -> str:
+    return f"{{x: {pose.x:.3f}, y: {pose.y:.3f}, yaw: {math.degrees(pose.yaw):.1f} deg}}"
+
+
+def _text(text: str) -> str:
+    """Return a text as a YAML scalar that is also valid in flow style."""
+    plain = to_yaml({"x": text}).removeprefix("x: ").rstrip("\n")
+    return plain if _PLAIN.fullmatch(plain) else json.dumps(text, ensure_ascii=False)
+
+
+def _entry(key: str, value: Any) -> list[str]:
+    if isinstance(value, str):
+        return [f"{key}: {_text(value)}"]
+    return to_yaml({key: value}, CompactDumper).rstrip("\n").split("\n")
+
+
+def _flow(value: Any) -> str:
+    """Return a value in YAML's flow style, on one line."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_flow(item) for item in value) + "]"
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value)

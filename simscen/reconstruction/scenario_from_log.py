@@ -1,0 +1,82 @@
+"""Entry point of the reconstruction: a log becomes a scenario file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput
+from simscen.loading.files.discovery import default_root
+from simscen.loading.scenario import try_variations
+from simscen.reconstruction.drive.reader import DriveOptions, read_drive
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.reconstruction.drive.run_description import read_description
+from simscen.reconstruction.estimators import find_all
+from simscen.reconstruction.scans.surroundings import Surroundings
+from simscen.reconstruction.scenario.contents import Findings, contents_of
+from simscen.reconstruction.scenario.given_parts import DEFAULT_LIDAR_HEIGHT_M, GivenFiles, choose_world, given_parts
+from simscen.reconstruction.scenario.robot_properties import known_robot
+from simscen.reconstruction.scenario.scenario_text import ScenarioContents, scenario_text
+
+
+@dataclass(frozen=True)
+class ReconstructionOptions:
+    """How to read the log, and files that the user names."""
+
+    drive: DriveOptions = field(default_factory=DriveOptions)
+    files: GivenFiles = field(default_factory=GivenFiles)
+    root: Path | None = None
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """A written scenario with the drive that it is from. `files` are all that were written, the scenario first."""
+
+    log: Path
+    files: tuple[Path, ...]
+    drive: RecordedDrive
+    findings: Findings
+    contents: ScenarioContents
+    surroundings: Surroundings
+
+    @property
+    def file(self) -> Path:
+        """The scenario."""
+        return self.files[0]
+
+    def summary(self) -> Iterator[str]:
+        """Yield lines that say what was found."""
+        moving = sum(thing.is_moving for thing in self.findings.objects)
+        standing = len(self.findings.objects) - moving
+        counts = (
+            (len(self.contents.goals), "goal"),
+            (moving, "moving object"),
+            (standing, "standing object"),
+            (len(self.findings.faults), "fault"),
+        )
+        yield "found " + ", ".join(f"{count} {name}{'' if count == 1 else 's'}" for count, name in counts)
+        for fault in self.findings.faults:
+            yield f"  {fault.target}.{fault.kind}: {fault.evidence.comment}"
+        for incident in self.findings.incidents:
+            yield f"  incident at {incident.time:.2f} s: {incident.kind}, {incident.detail}"
+
+
+def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> Reconstruction:
+    """Write a scenario from a log, and its map beside it if it needs one. Raises InvalidInput and OSError."""
+    drive = read_drive(log, options.drive)
+    described = read_description(log, options.root or Path.cwd())
+    choice = choose_world(drive, described, options.files, out)
+    given = given_parts(described, choice, options.files, out)
+    height = DEFAULT_LIDAR_HEIGHT_M if drive.scans is None else drive.scans.height
+    surroundings = Surroundings(choice.world, height)
+    is_known = bool(options.files.robot) or described.robot is not None
+    robot = known_robot(given.robot, out.parent, is_known)
+    findings = find_all(drive, surroundings, robot)
+    name = out.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario").replace("_", " ")
+    contents = contents_of(drive, given, findings, name, log.name)
+    out.write_text(scenario_text(contents), encoding="utf-8")
+    loaded = try_variations(out, default_root([out]))
+    if isinstance(loaded, list):
+        raise InvalidInput(loaded)
+    return Reconstruction(log, (out, *choice.files), drive, findings, contents, surroundings)

@@ -1,0 +1,213 @@
+"""Comparison of a run of the reconstructed scenario with the drive that it is from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.loading.files.discovery import default_root
+from simscen.loading.scenario import load_scenario
+from simscen.reconstruction.drive.reader import DriveOptions, read_drive
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal
+from simscen.reconstruction.scenario.criteria import path_length
+from simscen.reconstruction.scenario.incidents import Incident, incidents_of
+from simscen.reconstruction.scenario_from_log import Reconstruction
+from simscen.run.preparation import prepare
+from simscen.run.simulate import simulate
+
+STEP_S = 0.1
+SAME_PLACE_M = 0.3
+"""Maximum distance between both robots at which their scans are compared."""
+SAME_RANGE_M = 0.2
+"""Maximum difference between two ranges that show the same."""
+MAX_INCIDENT_DISTANCE_M, MAX_INCIDENT_TIME_S = 1.0, 5.0
+"""Distance and time within which the same kind of incident counts as the same incident."""
+
+
+@dataclass(frozen=True)
+class ComparedQuantity:
+    """One row of the comparison, as text."""
+
+    name: str
+    log: str
+    run: str
+    difference: str
+
+
+@dataclass(frozen=True)
+class ComparedIncident:
+    """An incident of the log, and the nearest incident of the same kind in the run; None if there is none."""
+
+    recorded: Incident
+    repeated: Incident | None
+
+    @property
+    def distance(self) -> float:
+        """Distance in m between both places; inf if it did not happen again."""
+        if self.repeated is None:
+            return float("inf")
+        return float(np.hypot(*(np.array(self.recorded.place) - np.array(self.repeated.place))))
+
+    @property
+    def is_reproduced(self) -> bool:
+        """Whether it happened again, near the same place and time."""
+        if self.repeated is None:
+            return False
+        late = abs(self.repeated.time - self.recorded.time)
+        return self.distance <= MAX_INCIDENT_DISTANCE_M and late <= MAX_INCIDENT_TIME_S
+
+    @property
+    def sentence(self) -> str:
+        """What became of the incident."""
+        what = f"{self.recorded.kind} at {self.recorded.time:.2f} s ({self.recorded.detail})"
+        if self.repeated is None:
+            return f"not reproduced: {what}"
+        late = self.repeated.time - self.recorded.time
+        near = f"{abs(late):.2f} s {'later' if late >= 0 else 'earlier'} and {self.distance:.2f} m away"
+        return f"{'reproduced' if self.is_reproduced else 'only similar'}: {what}, {near}"
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Result of a verification.
+
+    Attributes:
+        drive: The recorded drive.
+        repeated: The drive of the run, read from its log.
+        log: Log of the run.
+        quantities: Rows of the comparison.
+        incidents: Incidents of the log.
+        new_incidents: Incidents of the run that the log does not have.
+        failed: Criteria that failed in the run.
+    """
+
+    drive: RecordedDrive
+    repeated: RecordedDrive
+    log: Path
+    quantities: Sequence[ComparedQuantity]
+    incidents: Sequence[ComparedIncident]
+    new_incidents: Sequence[Incident]
+    failed: Sequence[str]
+
+    @property
+    def reproduces(self) -> bool:
+        """Whether all incidents of the log happened again."""
+        return all(incident.is_reproduced for incident in self.incidents)
+
+
+def verify(made: Reconstruction) -> Verification:
+    """Run a reconstructed scenario and compare the run with the log. Raises RunError, InvalidInput, and OSError."""
+    log = made.file.with_name(f"{made.file.name.partition('.')[0]}.verified.mcap")
+    prepared = prepare(load_scenario(made.file, default_root([made.file])))
+    run = simulate(prepared, log=log)
+    repeated = read_drive(log, DriveOptions())
+    incidents, others = compare_incidents(incidents_of(made.drive), incidents_of(repeated))
+    failed = [verdict.id for verdict in run.result.verdicts if verdict.status.value != "pass"]
+    quantities = [*compare_drives(made.drive, repeated)]
+    return Verification(made.drive, repeated, log, quantities, incidents, others, failed)
+
+
+def compare_incidents(
+    recorded: Sequence[Incident], repeated: Sequence[Incident]
+) -> tuple[list[ComparedIncident], list[Incident]]:
+    """Return for each recorded incident the nearest repeated one of its kind, and the repeated ones without a match."""
+    left = [*repeated]
+    compared = []
+    for incident in recorded:
+        same = [one for one in left if one.kind == incident.kind]
+        nearest = min(same, key=lambda one: abs(one.time - incident.time), default=None)
+        if nearest is not None:
+            left.remove(nearest)
+        compared.append(ComparedIncident(incident, nearest))
+    return compared, left
+
+
+def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator[ComparedQuantity]:
+    """Yield the rows that compare paths, times, clearances, and scans."""
+    times = common_times(recorded, repeated)
+    apart = distances_between(recorded, repeated, times)
+    if len(apart):
+        rms = float(np.sqrt(np.mean(apart**2)))
+        yield ComparedQuantity("distance at the same time", "", "", f"{rms:.2f} m RMS, at most {apart.max():.2f} m")
+    off = distances_to_path(repeated.poses.values[:, :2], recorded.poses.values[:, :2])
+    yield ComparedQuantity("distance from the log's path", "", "", f"at most {float(off.max()):.2f} m")
+    lengths = [path_length(one.poses.values[:, :2]) for one in (recorded, repeated)]
+    yield _numbers("path length", lengths[0], lengths[1], "m")
+    yield _numbers("duration", recorded.duration, repeated.duration, "s")
+    for number, goal in enumerate(recorded.goals):
+        if number < len(repeated.goals):
+            yield _goal(number, recorded, repeated)
+        else:
+            name = goal.name or f"goal-{number + 1}"
+            yield ComparedQuantity(f"goal {name}", goal.status, "not sent", "")
+    clearances = nearest_return(recorded), nearest_return(repeated)
+    if None not in clearances:
+        yield _numbers("nearest return of the lidar", float(clearances[0] or 0), float(clearances[1] or 0), "m")
+    seen = share_seen_alike(recorded, repeated, times)
+    if seen is not None:
+        text = f"{100 * seen:.0f} % within {SAME_RANGE_M:g} m"
+        yield ComparedQuantity("ranges at the same place", "", "", text)
+
+
+def _numbers(name: str, log: float, run: float, unit: str) -> ComparedQuantity:
+    return ComparedQuantity(name, f"{log:.2f} {unit}", f"{run:.2f} {unit}", f"{run - log:+.2f} {unit}")
+
+
+def _goal(number: int, recorded: RecordedDrive, repeated: RecordedDrive) -> ComparedQuantity:
+    one, other = recorded.goals[number], repeated.goals[number]
+    name = f"goal {one.name or f'goal-{number + 1}'}"
+    difference = "" if one.ended is None or other.ended is None else f"{other.ended - one.ended:+.2f} s"
+    return ComparedQuantity(name, _outcome(one), _outcome(other), difference)
+
+
+def _outcome(goal: RecordedGoal) -> str:
+    end = "" if goal.ended is None else f" at {goal.ended:.2f} s"
+    return f"{goal.status}{end}{f' ({goal.error})' if goal.error else ''}"
+
+
+def common_times(recorded: RecordedDrive, repeated: RecordedDrive) -> Array:
+    """Return the times (n,), every STEP_S, that both drives have."""
+    times: Array = np.arange(0.0, min(recorded.duration, repeated.duration), STEP_S)
+    return times
+
+
+def distances_between(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> Array:
+    """Return the distances (n,) in m between both robots at `times` (n,)."""
+    apart: Array = np.hypot(*(recorded.poses.poses_at(times)[:, :2] - repeated.poses.poses_at(times)[:, :2]).T)
+    return apart
+
+
+def distances_to_path(points: Array, path: Array) -> Array:
+    """Return the distances (n,) of points (n, 2) from the nearest of the points (m, 2) of a path."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(path).query(points)[0], dtype=np.float64)
+
+
+def nearest_return(drive: RecordedDrive) -> float | None:
+    """Return the smallest range in m that at least three scans have measured; None without scans."""
+    if drive.scans is None or len(drive.scans) < 3:
+        return None
+    ranges = np.where(drive.scans.is_hit(), drive.scans.ranges, np.inf).min(axis=1)
+    return float(np.sort(ranges)[2])
+
+
+def share_seen_alike(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> float | None:
+    """Return the share of the beams that show the same while both robots are near the same pose; None if never."""
+    one, other = recorded.scans, repeated.scans
+    if one is None or other is None or not len(one) or not len(other) or len(one.angles) != len(other.angles):
+        return None
+    near = distances_between(recorded, repeated, times) < SAME_PLACE_M
+    first = np.clip(np.searchsorted(one.times, times[near]), 0, len(one) - 1)
+    second = np.clip(np.searchsorted(other.times, times[near]), 0, len(other) - 1)
+    if not len(first):
+        return None
+    a, b = one.ranges[first], other.ranges[second]
+    both = np.isfinite(a) & np.isfinite(b)
+    if not both.any():
+        return None
+    return float(np.mean(np.abs(a[both] - b[both]) <= SAME_RANGE_M))
