@@ -9,6 +9,7 @@ import typer
 from simscen.cli import completions
 from simscen.cli.completions import shipped_scenarios
 from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.session.from_log import FromLogOptions, write_scenario_from_log
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
 from simscen.loading.files.discovery import BASE_SUFFIXES, SCENARIO_SUFFIXES, default_root
@@ -19,7 +20,9 @@ from simscen.loading.yaml.textfile import os_error_reason
 
 
 def command(
-    name: Annotated[str, typer.Argument(help="Name or path, e.g. `aisle` for aisle.scenario.yaml.")],
+    name: Annotated[
+        str, typer.Argument(help="Name or path, e.g. `aisle` for aisle.scenario.yaml; not with --out.")
+    ] = "",
     like: Annotated[
         str,
         typer.Option(
@@ -28,6 +31,39 @@ def command(
             autocompletion=completions.shipped,
         ),
     ] = "",
+    from_log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="LOG",
+            help="Reconstruct the scenario from a recorded drive: an MCAP file or a rosbag2 folder.",
+            autocompletion=completions.logs,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="With --from-log: output file; default: NAME, or that of the log.")
+    ] = None,
+    map_: Annotated[
+        Path | None, typer.Option("--map", help="With --from-log: ROS map (yaml) to use instead of that in the log.")
+    ] = None,
+    world: Annotated[
+        Path | None, typer.Option(help="With --from-log: world file to use instead of walls from the map.")
+    ] = None,
+    robot: Annotated[str, typer.Option(help="With --from-log: robot file, or the name of a shipped robot.")] = "",
+    truth: Annotated[
+        str | None,
+        typer.Option(help="With --from-log: topic of the true pose, or `none`; default: that of simscen's own logs."),
+    ] = None,
+    topic: Annotated[
+        list[str] | None,
+        typer.Option(help="With --from-log: NAME=TOPIC, other name of a standard topic, e.g. scan=/front/scan."),
+    ] = None,
+    root: Annotated[
+        Path | None,
+        typer.Option(help="With --from-log: root of the recorded scenario, to find its world; default: this folder."),
+    ] = None,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="With --from-log: run the scenario, and compare the run with the log.")
+    ] = False,
 ) -> None:
     """Write a commented scenario to start from.
 
@@ -35,7 +71,26 @@ def command(
     the project are copied into a folder beside it. A name that ends in .base.yaml, or defaults.yaml, creates a base
     file for scenarios to extend. If the project has a folder `schemas`, the file refers to the schema for editors.
     Existing files are never overwritten.
+
+    With --from-log, it is reconstructed from a recorded drive: goals, objects that are not on the map, faults of
+    sensors, and criteria that the drive held or broke. A comment gives the evidence for each part, and the first lines
+    list what the log does not tell. The log can be of simscen or of a real robot (MCAP, or a rosbag2 folder). --verify
+    runs the scenario, prints how near the run comes to the log, and writes a page that shows both.
     """
+    if from_log is not None:
+        if like:
+            raise UsageError("--like and --from-log exclude each other")
+        options = FromLogOptions(from_log, _target(name, out, from_log), map_, world, robot, truth, topic or [], root)
+        write_scenario_from_log(options, verify)
+        return
+    if given := [
+        option for option, value in (("--out", out), ("--map", map_), ("--world", world)) if value is not None
+    ]:
+        raise UsageError(f"{given[0]} needs --from-log")
+    if verify or robot or truth or topic or root:
+        raise UsageError("--robot, --truth, --topic, --root, and --verify need --from-log")
+    if not name:
+        raise UsageError("missing argument NAME")
     last = name.rpartition("/")[2]
     if is_unusable_name(
         next((last.removesuffix(suffix) for suffix in SCENARIO_SUFFIXES if last.endswith(suffix)), last)
@@ -65,6 +120,16 @@ def command(
         print_text(f"wrote {escaped(str(other))}")
     verb = "validate" if is_base else "run"
     print_text(f"wrote {escaped(str(file))}; try: simscen {verb} {escaped(str(file))}")
+
+
+def _target(name: str, out: Path | None, log: Path) -> Path:
+    """Return the file of a scenario from a log. Raises UsageError."""
+    if name and out is not None:
+        raise UsageError("give either NAME or --out")
+    written = str(out) if out is not None else name or log.resolve().name.partition(".")[0]
+    if is_unusable_name(written.rpartition("/")[2].partition(".")[0]):
+        raise UsageError(f"{written!r} is not a valid scenario name")
+    return Path(written if written.endswith((".yaml", ".yml")) else f"{written}{SCENARIO[0]}")
 
 
 def _starter(file: Path, kind: str) -> list[Path]:
