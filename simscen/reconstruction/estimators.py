@@ -11,10 +11,10 @@ from simscen.reconstruction.drive.motion_steps import motion_steps
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.evidence import Evidence, FoundFault
 from simscen.reconstruction.faults.commands import command_faults
+from simscen.reconstruction.faults.false_returns import false_return_faults
 from simscen.reconstruction.faults.gyroscope import gyroscope_faults
 from simscen.reconstruction.faults.lidar_calibration import mount_fault, range_error_faults, with_mount_error
 from simscen.reconstruction.faults.lidar_readings import (
-    false_return_faults,
     invalid_scan_faults,
     missing_beam_faults,
     noise_faults,
@@ -24,9 +24,9 @@ from simscen.reconstruction.faults.localizer import localizer_faults
 from simscen.reconstruction.faults.message_stream import stream_faults, stuck_scans
 from simscen.reconstruction.faults.odometry import odometry_faults
 from simscen.reconstruction.faults.transparent_walls import glass_fault
+from simscen.reconstruction.objects.clusters import usable_scans
 from simscen.reconstruction.objects.find_objects import find_objects
 from simscen.reconstruction.objects.found_object import FoundObject
-from simscen.reconstruction.scans.clusters import usable_scans
 from simscen.reconstruction.scans.scan_model import scan_model
 from simscen.reconstruction.scans.surroundings import Surroundings
 from simscen.reconstruction.scenario.contents import Findings
@@ -79,9 +79,12 @@ def _from_scans(
     faults += missing_beam_faults(model, drive.duration)
     limits = [*range_faults(model, drive.duration, robot.lidar_noise)]
     faults += limits
-    faults += false_return_faults(model, drive.duration)
+    false_returns = [*false_return_faults(model, drive.duration)]
+    faults += false_returns
     if not any(fault.kind == "rain" for fault in limits):
-        faults += noise_faults(model, drive.duration, robot.lidar_noise, robot.is_known)
+        # Single beams that end early look like a little noise.
+        is_known = robot.is_known and not false_returns
+        faults += noise_faults(model, drive.duration, robot.lidar_noise, is_known)
     if drive.has_independent_poses:
         faults += range_error_faults(model)
     glass = glass_fault(model, world, usable_scans(model))

@@ -16,6 +16,7 @@ import numpy as np
 from simscen.core.errors import SimscenError
 from simscen.core.records.trace import Samples
 from simscen.loading.scenario_text import spec_of_text
+from simscen.reconstruction.drive.reader import DriveOptions
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.scenario_from_log import Reconstruction, ReconstructionOptions, scenario_from_log
 from simscen.record.log_reader.read import Log, read_log
@@ -78,12 +79,15 @@ class Row:
         return not self.problem and not self.missing and not self.extra
 
 
-def compare(file: Path, out: Path) -> Row:
-    """Reconstruct the scenario of one log, and compare it with the log's own."""
+def compare(file: Path, out: Path, truth: str | None = None) -> Row:
+    """Reconstruct the scenario of one log, and compare it with the log's own.
+
+    With `truth` "none", use the poses that the robot believed, as for a real robot.
+    """
     log = read_log(file)
     row = Row(log.header.name.removeprefix("scenarios/"))
     try:
-        made = scenario_from_log(file, out, ReconstructionOptions(root=ROOT))
+        made = scenario_from_log(file, out, ReconstructionOptions(DriveOptions(truth), root=ROOT))
     except SimscenError as error:
         row.problem = str(error).splitlines()[0]
         return row
@@ -172,6 +176,7 @@ def main() -> int:
     parser.add_argument("runs", nargs="?", type=Path, help="output folder of `simscen run scenarios`")
     parser.add_argument("-k", default="", help="only scenarios whose name contains this text")
     parser.add_argument("--keep", type=Path, help="folder for the reconstructed scenarios; default: a temporary one")
+    parser.add_argument("--belief", action="store_true", help="use the poses that the robot believed")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=ROOT) as temporary:
         runs = arguments.runs or Path(temporary) / "runs"
@@ -183,7 +188,7 @@ def main() -> int:
         for file in sorted(runs.glob("runs/**/run.mcap")):
             name = "_".join(file.relative_to(runs).parts[2:-1])
             if arguments.k in name and "multi_robot" not in name:
-                rows.append(compare(file, keep / f"{name}.scenario.yaml"))
+                rows.append(compare(file, keep / f"{name}.scenario.yaml", "none" if arguments.belief else None))
                 print(_line(rows[-1]), flush=True)
     good = [sum(getattr(row, name) for row in rows) for name in ("poses_agree", "objects_agree", "faults_agree")]
     print(f"{len(rows)} scenarios: poses agree in {good[0]}, moving objects in {good[1]}, faults in {good[2]}")

@@ -15,11 +15,11 @@ BIN_S = 0.5
 MIN_BINS = 8
 MIN_BIAS_RAD_S, MIN_DRIFTED_RAD_S = 0.006, 0.006
 MIN_SCALE_ERROR, MIN_TURN_RAD = 0.03, 2.0
-MAX_RATE_CHANGE_RAD_S = 0.1
+MAX_RATE_CHANGE_RAD_S = 0.2
 """Change of the turn rate between two bins above which small errors of the times would look like errors of the rate."""
 MIN_RAMP_S, MIN_RAMP_SIGMAS = 4.0, 4.0
 BETTER = 0.2
-"""Share of the squared error of a constant bias below which a drift explains the differences better."""
+"""Share of the squared error below which a drift, or a scale, explains the differences better than a constant."""
 
 
 def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
@@ -29,7 +29,8 @@ def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
         return
     turned = float(np.abs(true).sum() * BIN_S)
     scale = float(true @ measured) / max(float(true @ true), 1e-9) if turned > MIN_TURN_RAD else 1.0
-    if abs(scale - 1.0) > MIN_SCALE_ERROR:
+    explained = float(np.sum((measured - scale * true) ** 2)) < BETTER * float(np.sum((measured - true) ** 2))
+    if abs(scale - 1.0) > MIN_SCALE_ERROR and explained:
         text = f"the gyroscope reports {100 * scale:.1f} % of the turns"
         yield FoundFault("imu", "scale", {"factor": f"{100 * scale:.1f} %"}, evidence=Evidence(text, float(times[0])))
         return

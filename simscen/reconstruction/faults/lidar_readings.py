@@ -1,4 +1,4 @@
-"""Faults in the contents of scans: invalid scans, missing beams, false ranges, and noise."""
+"""Faults in the contents of scans: invalid scans, missing beams, a limited range, rain, and noise."""
 
 from __future__ import annotations
 
@@ -23,13 +23,6 @@ MIN_NAN_SHARE = 0.03
 ALWAYS, SELDOM = 0.95, 0.6
 MIN_SECTOR_BEAMS = 3
 MIN_MISSING_SHARE, MAX_IMPURE_SHARE = 0.03, 0.1
-MIN_FALSE_SHARE = 0.015
-JUMP_M = 0.3
-"""Difference in range from which on two neighbor beams ended at different things."""
-MIN_GHOST_SHARE, MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS, MIN_DRIVEN_M = 0.3, 0.02, 2.0, 0.6
-"""Share of the scans in its time that show a ghost, spread of its range in m and in standard deviations of the noise,
-and distance in m that the lidar must move meanwhile."""
-MIN_GHOST_S = 2.0
 MIN_WINDOW_S, MAX_WINDOW_GAP_S = 0.4, 0.6
 RAIN_ALPHA, RAIN_EXPONENT, RAIN_NOISE_PER_M = 0.01, 0.6, 0.02
 """Model of the fault `rain` (Goodin et al., 2019): extinction α = 0.01 R^0.6 per meter, noise 0.02 z (1 - e^-R)²."""
@@ -85,11 +78,11 @@ def missing_beam_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
     usable = ~invalid_scans(model)
     missing = np.isnan(model.scans.ranges)
     blind = np.zeros(missing.shape[1], dtype=bool)
-    for window in _windows(missing[:, :].mean(axis=1) > MIN_NAN_SHARE, usable, model):
+    for window in usable_windows(missing[:, :].mean(axis=1) > MIN_NAN_SHARE, usable, model):
         chosen = missing[window.samples][usable[window.samples]]
         always = chosen.mean(axis=0) > ALWAYS
         if always.mean() < ALWAYS and (
-            runs := [run for run in _runs(always) if run[1] - run[0] + 1 >= MIN_SECTOR_BEAMS]
+            runs := [run for run in mask_runs(always) if run[1] - run[0] + 1 >= MIN_SECTOR_BEAMS]
         ):
             for first, last in runs:
                 blind[first : last + 1] = True
@@ -98,15 +91,15 @@ def missing_beam_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
                 if last >= len(blind):  # across the seam of a full circle
                     continue
                 text = f"the beams from {angles[first]:.0f} to {angles[last]:.0f} deg return nothing"
-                yield _fault("sector", values, window, model, end, text)
+                yield fault_in_window("sector", values, window, model, end, text)
         others = chosen[:, ~blind]
         share = float(others.mean()) if others.size else 0.0
         if share > MIN_NAN_SHARE:
             text = f"{100 * share:.0f} % of the beams return nothing"
-            yield _fault("beam_dropout", {"probability": f"{100 * share:.0f} %"}, window, model, end, text)
+            yield fault_in_window("beam_dropout", {"probability": f"{100 * share:.0f} %"}, window, model, end, text)
 
 
-def _runs(mask: Mask) -> list[tuple[int, int]]:
+def mask_runs(mask: Mask) -> list[tuple[int, int]]:
     """Return first and last index of the runs in which a mask (n,) holds."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -117,7 +110,7 @@ def range_faults(model: ScanModel, end: float, nominal_noise: float) -> Iterator
     usable = ~invalid_scans(model)
     near = np.isfinite(model.expected) & (model.expected < 0.97 * model.scans.range_max)
     lost = model.is_missing & near
-    for window in _windows(lost.mean(axis=1) > MIN_MISSING_SHARE, usable, model):
+    for window in usable_windows(lost.mean(axis=1) > MIN_MISSING_SHARE, usable, model):
         rows = np.zeros(len(usable), dtype=bool)
         rows[window.samples] = usable[window.samples]
         hits = model.scans.ranges[rows][model.is_hit[rows]]
@@ -135,10 +128,10 @@ def range_faults(model: ScanModel, end: float, nominal_noise: float) -> Iterator
             mean_range = float(np.median(hits))
             values = rain_values(limit, noise / mean_range, model.scans.range_max)
             text = f"nothing beyond {limit:.1f} m returns, and ranges have {100 * noise:.1f} cm of noise"
-            yield _fault("rain", values, window, model, end, text)
+            yield fault_in_window("rain", values, window, model, end, text)
         else:
             text = f"nothing beyond {limit:.1f} m returns"
-            yield _fault("range_limit", {"max": f"{limit:.2f} m"}, window, model, end, text)
+            yield fault_in_window("range_limit", {"max": f"{limit:.2f} m"}, window, model, end, text)
 
 
 def rain_values(limit: float, noise_per_meter: float, range_max: float) -> dict[str, object]:
@@ -150,75 +143,6 @@ def rain_values(limit: float, noise_per_meter: float, range_max: float) -> dict[
     return {"rate": f"{rate:.1f} mm/h", "reflectivity": f"{100 * min(1.0, max(0.02, reflectivity)):.0f} %"}
 
 
-def false_return_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
-    """Yield dust: single beams that end in free space; and ghosts: objects that move with the lidar."""
-    usable = ~invalid_scans(model)
-    isolated = isolated_returns(model)
-    for window in _windows(isolated.mean(axis=1) > MIN_FALSE_SHARE, usable, model):
-        rows = usable[window.samples]
-        ranges = np.where(model.is_hit, model.scans.ranges, np.minimum(model.expected, model.scans.range_max))
-        travelled = ranges[window.samples][rows]
-        count = int(isolated[window.samples][rows].sum())
-        if count < 20:
-            continue
-        length = float(np.nansum(np.where(np.isfinite(travelled), travelled, 0.0))) / count
-        text = f"{count} single beams end in free space"
-        yield _fault("dust", {"mean_free_path": f"{length:.0f} m"}, window, model, end, text)
-    for first, last, distance in ghost_beams(model):
-        angles = np.degrees(model.scans.angles)
-        center, width = (angles[first] + angles[last]) / 2, angles[last] - angles[first] + 1.0
-        share = float(model.is_short[usable][:, first : last + 1].mean())
-        values = {
-            "range": f"{distance:.2f} m",
-            "direction": f"{center:.0f} deg",
-            "width": f"{width:.0f} deg",
-            "probability": f"{100 * share:.0f} %",
-        }
-        text = f"something {distance:.2f} m away moves with the lidar"
-        shown = model.is_short[:, first : last + 1].mean(axis=1) > 0.3
-        for window in windows(shown & usable, model.scans.times, MIN_WINDOW_S, 2.0):
-            yield _fault("ghost", values, window, model, end, text)
-            break
-
-
-def isolated_returns(model: ScanModel) -> Mask:
-    """Return the beams (n, beams) that end before the world, and not where their neighbors end."""
-    ranges = np.where(model.is_hit, model.scans.ranges, np.inf)
-    with np.errstate(invalid="ignore"):
-        steps = np.abs(np.diff(ranges, axis=1))
-    apart = np.ones((len(ranges), ranges.shape[1] + 1), dtype=bool)
-    apart[:, 1:-1] = ~(steps < JUMP_M)
-    result: Mask = model.is_short & apart[:, 1:] & apart[:, :-1]
-    return result
-
-
-def ghost_beams(model: ScanModel) -> list[tuple[int, int, float]]:
-    """Return first and last beam and the range of objects that are fixed in the frame of the lidar.
-
-    The robot must have driven while they were seen, so that nothing that stands in the world looks like this.
-    """
-    if float(np.hypot(*np.ptp(model.poses[:, :2], axis=0))) < MIN_DRIVEN_M:
-        return []
-    short = model.is_short & ~invalid_scans(model)[:, None]
-    seen = short.sum(axis=0)
-    ranges = np.where(short, model.scans.ranges, np.nan)
-    center, spread = np.full(len(seen), np.nan), np.full(len(seen), np.inf)
-    chosen = seen >= max(5, 0.1 * len(short))
-    if chosen.any():
-        center[chosen] = np.nanmedian(ranges[:, chosen], axis=0)
-        spread[chosen] = np.nanmedian(np.abs(ranges[:, chosen] - center[chosen]), axis=0)
-    moved = np.zeros(len(seen), dtype=bool)
-    for beam in np.flatnonzero(chosen).tolist():
-        rows = short[:, beam] & (np.abs(ranges[:, beam] - center[beam]) < 2 * MAX_GHOST_SPREAD_M)
-        long = bool(rows.any()) and float(np.ptp(model.scans.times[rows])) > MIN_GHOST_S
-        moved[beam] = long and float(np.hypot(*np.ptp(model.poses[rows, :2], axis=0))) > MIN_DRIVEN_M
-    first, last = np.argmax(short, axis=0), len(short) - 1 - np.argmax(short[::-1], axis=0)
-    share = seen / np.maximum(last - first + 1, 1)
-    limit = max(MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS * float(np.median(model.noise)))
-    fixed = chosen & moved & (spread < limit) & (share > MIN_GHOST_SHARE)
-    return [(a, b, float(np.median(center[a : b + 1]))) for a, b in _runs(fixed) if b - a + 1 >= MIN_SECTOR_BEAMS]
-
-
 def noise_faults(model: ScanModel, end: float, nominal_noise: float, is_known: bool) -> Iterator[FoundFault]:
     """Yield the times in which ranges have more noise than the lidar has, or than good lidars if its is not known."""
     usable = ~invalid_scans(model)
@@ -226,16 +150,16 @@ def noise_faults(model: ScanModel, end: float, nominal_noise: float, is_known: b
     limit = nominal_noise + max(MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR * nominal_noise)
     if is_known:
         limit = max(KNOWN_NOISE_FACTOR * nominal_noise, nominal_noise + MIN_KNOWN_EXTRA_NOISE_M)
-    for window in _windows(noise > limit, usable, model):
+    for window in usable_windows(noise > limit, usable, model):
         if window.length < MIN_NOISE_S:
             continue
         measured = float(np.sqrt(np.mean(noise[window.samples] ** 2)))
         extra = math.sqrt(max(0.0, measured**2 - nominal_noise**2))
         text = f"ranges have {100 * measured:.1f} cm of noise"
-        yield _fault("noise", {"std": f"{100 * extra:.1f} cm"}, window, model, end, text)
+        yield fault_in_window("noise", {"std": f"{100 * extra:.1f} cm"}, window, model, end, text)
 
 
-def _windows(mask: Mask, usable: Mask, model: ScanModel) -> list[Window]:
+def usable_windows(mask: Mask, usable: Mask, model: ScanModel) -> list[Window]:
     """Return the times in which a mask holds for the usable scans; the others count as the scan before them."""
     held = mask.copy()
     newest = np.maximum.accumulate(np.where(usable, np.arange(len(mask)), 0))
@@ -243,7 +167,7 @@ def _windows(mask: Mask, usable: Mask, model: ScanModel) -> list[Window]:
     return windows(held, model.scans.times, MIN_WINDOW_S, MAX_WINDOW_GAP_S)
 
 
-def _fault(
+def fault_in_window(
     kind: str, values: Mapping[str, object], window: Window, model: ScanModel, end: float, text: str
 ) -> FoundFault:
     """Return a fault of the lidar in a window; without a start and a duration if it lasts the whole drive."""

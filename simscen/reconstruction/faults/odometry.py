@@ -112,8 +112,8 @@ def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
         yield FoundFault("odom", "scale", {"factor": f"{100 * (1 + linear):.1f} %"}, evidence=Evidence(text, *drive))
     elif is_linear or is_angular or is_curved:
         values: dict[str, object] = {}
-        values |= {"linear_scale": round(1 + linear, 3)} if is_linear else {}
-        values |= {"angular_scale": round(1 + angular, 3)} if is_angular else {}
+        values |= {"linear_scale": round(float(1 + linear), 3)} if is_linear else {}
+        values |= {"angular_scale": round(float(1 + angular), 3)} if is_angular else {}
         values |= {"turn_per_metre": f"{math.degrees(per_meter):.2f} deg"} if is_curved else {}
         text = (
             f"the odometry reports {100 * (1 + linear):.1f} % of the distance and {100 * (1 + angular):.1f} % of turns"

@@ -10,10 +10,10 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Indices
 from simscen.reconstruction.evidence import Evidence
+from simscen.reconstruction.objects.clusters import scan_clusters, share_seen_free, usable_scans
 from simscen.reconstruction.objects.found_object import FoundObject, Keyframe
 from simscen.reconstruction.objects.shapes import ObjectShape, fit_shape
 from simscen.reconstruction.objects.tracks import ObjectTrack, track_objects
-from simscen.reconstruction.scans.clusters import scan_clusters, share_seen_free, usable_scans
 from simscen.reconstruction.scans.scan_model import ScanModel
 from simscen.reconstruction.scans.surroundings import Surroundings
 

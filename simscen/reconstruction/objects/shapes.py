@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.evidence import windows
-from simscen.reconstruction.scans.clusters import ScanCluster
+from simscen.reconstruction.objects.clusters import ScanCluster
 
 MAX_ROUND_RADIUS_M, MAX_ROUND_ERROR_M = 0.6, 0.035
 """An object is round if its radius is at most this, and its hits are this close to a circle."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.reconstruction.scans.clusters import ScanCluster
+from simscen.reconstruction.objects.clusters import ScanCluster
 
 MAX_CENTER_DISTANCE_M = 2.5
 GATE_M, GATE_M_S = 0.25, 0.8

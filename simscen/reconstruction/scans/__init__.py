@@ -1,1 +1,1 @@
-"""Scans beside the static world: which beams it explains, clusters of those that it does not, and maps from scans."""
+"""Scans beside the static world: which beams it explains, and maps from scans."""

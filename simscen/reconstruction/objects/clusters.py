@@ -9,7 +9,8 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Indices, Mask
-from simscen.reconstruction.faults.lidar_readings import ghost_beams, invalid_scans, isolated_returns
+from simscen.reconstruction.faults.false_returns import ghost_beams, isolated_returns
+from simscen.reconstruction.faults.lidar_readings import invalid_scans
 from simscen.reconstruction.faults.message_stream import repeated_scans
 from simscen.reconstruction.scans.scan_model import ScanModel
 from simscen.reconstruction.scans.surroundings import Surroundings

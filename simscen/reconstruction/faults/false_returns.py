@@ -1,0 +1,96 @@
+"""False returns of a lidar: dust, which ends single beams early, and ghosts, which move with the lidar."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from simscen.reconstruction.drive.recorded_drive import Mask
+from simscen.reconstruction.evidence import FoundFault, windows
+from simscen.reconstruction.faults.lidar_readings import (
+    MIN_SECTOR_BEAMS,
+    MIN_WINDOW_S,
+    fault_in_window,
+    invalid_scans,
+    mask_runs,
+    usable_windows,
+)
+from simscen.reconstruction.scans.scan_model import ScanModel
+
+MIN_FALSE_SHARE = 0.015
+JUMP_M = 0.3
+"""Difference in range from which on two neighbor beams ended at different things."""
+MIN_GHOST_SHARE, MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS, MIN_DRIVEN_M = 0.3, 0.02, 2.0, 0.6
+"""Share of the scans in its time that show a ghost, spread of its range in m and in standard deviations of the noise,
+and distance in m that the lidar must move meanwhile."""
+MIN_GHOST_S = 2.0
+
+
+def false_return_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
+    """Yield dust: single beams that end in free space; and ghosts: objects that move with the lidar."""
+    usable = ~invalid_scans(model)
+    isolated = isolated_returns(model)
+    for window in usable_windows(isolated.mean(axis=1) > MIN_FALSE_SHARE, usable, model):
+        rows = usable[window.samples]
+        ranges = np.where(model.is_hit, model.scans.ranges, np.minimum(model.expected, model.scans.range_max))
+        travelled = ranges[window.samples][rows]
+        count = int(isolated[window.samples][rows].sum())
+        if count < 20:
+            continue
+        length = float(np.nansum(np.where(np.isfinite(travelled), travelled, 0.0))) / count
+        text = f"{count} single beams end in free space"
+        yield fault_in_window("dust", {"mean_free_path": f"{length:.0f} m"}, window, model, end, text)
+    for first, last, distance in ghost_beams(model):
+        angles = np.degrees(model.scans.angles)
+        center, width = (angles[first] + angles[last]) / 2, angles[last] - angles[first] + 1.0
+        share = float(model.is_short[usable][:, first : last + 1].mean())
+        values = {
+            "range": f"{distance:.2f} m",
+            "direction": f"{center:.0f} deg",
+            "width": f"{width:.0f} deg",
+            "probability": f"{100 * share:.0f} %",
+        }
+        text = f"something {distance:.2f} m away moves with the lidar"
+        shown = model.is_short[:, first : last + 1].mean(axis=1) > 0.3
+        for window in windows(shown & usable, model.scans.times, MIN_WINDOW_S, 2.0):
+            yield fault_in_window("ghost", values, window, model, end, text)
+            break
+
+
+def isolated_returns(model: ScanModel) -> Mask:
+    """Return the beams (n, beams) that end before the world, and not where their neighbors end."""
+    ranges = np.where(model.is_hit, model.scans.ranges, np.inf)
+    with np.errstate(invalid="ignore"):
+        steps = np.abs(np.diff(ranges, axis=1))
+    apart = np.ones((len(ranges), ranges.shape[1] + 1), dtype=bool)
+    apart[:, 1:-1] = ~(steps < JUMP_M)
+    result: Mask = model.is_short & apart[:, 1:] & apart[:, :-1]
+    return result
+
+
+def ghost_beams(model: ScanModel) -> list[tuple[int, int, float]]:
+    """Return first and last beam and the range of objects that are fixed in the frame of the lidar.
+
+    The robot must have driven while they were seen, so that nothing that stands in the world looks like this.
+    """
+    if float(np.hypot(*np.ptp(model.poses[:, :2], axis=0))) < MIN_DRIVEN_M:
+        return []
+    short = model.is_short & ~invalid_scans(model)[:, None]
+    seen = short.sum(axis=0)
+    ranges = np.where(short, model.scans.ranges, np.nan)
+    center, spread = np.full(len(seen), np.nan), np.full(len(seen), np.inf)
+    chosen = seen >= max(5, 0.1 * len(short))
+    if chosen.any():
+        center[chosen] = np.nanmedian(ranges[:, chosen], axis=0)
+        spread[chosen] = np.nanmedian(np.abs(ranges[:, chosen] - center[chosen]), axis=0)
+    moved = np.zeros(len(seen), dtype=bool)
+    for beam in np.flatnonzero(chosen).tolist():
+        rows = short[:, beam] & (np.abs(ranges[:, beam] - center[beam]) < 2 * MAX_GHOST_SPREAD_M)
+        long = bool(rows.any()) and float(np.ptp(model.scans.times[rows])) > MIN_GHOST_S
+        moved[beam] = long and float(np.hypot(*np.ptp(model.poses[rows, :2], axis=0))) > MIN_DRIVEN_M
+    first, last = np.argmax(short, axis=0), len(short) - 1 - np.argmax(short[::-1], axis=0)
+    share = seen / np.maximum(last - first + 1, 1)
+    limit = max(MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS * float(np.median(model.noise)))
+    fixed = chosen & moved & (spread < limit) & (share > MIN_GHOST_SHARE)
+    return [(a, b, float(np.median(center[a : b + 1]))) for a, b in mask_runs(fixed) if b - a + 1 >= MIN_SECTOR_BEAMS]

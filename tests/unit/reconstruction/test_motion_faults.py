@@ -1,0 +1,140 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import synthetic_drives as drives
+
+from simscen.core.geometry import Pose2
+from simscen.reconstruction.drive.motion_steps import motion_steps
+from simscen.reconstruction.faults.commands import command_faults
+from simscen.reconstruction.faults.gyroscope import gyroscope_faults
+from simscen.reconstruction.faults.localizer import localizer_faults
+from simscen.reconstruction.faults.odometry import odometry_faults
+
+
+def number(fault, key):
+    return float(str(fault.values[key]).split()[0])
+
+
+def with_odometry(change):
+    """Return a drive whose odometry integrates changed increments (forward, turn) at each time."""
+    plain = drives.drive()
+    times = plain.odometry.times
+    steps = np.diff(plain.poses.values, axis=0)
+    forward = np.hypot(steps[:, 0], steps[:, 1])
+    at, poses = Pose2(0.0, 0.0, 0.0), [Pose2(0.0, 0.0, 0.0)]
+    for time, distance, turn in zip(times.tolist(), forward.tolist(), steps[:, 2].tolist(), strict=False):
+        reported, turned = change(time, distance, turn)
+        at = at.compose(Pose2(reported, 0.0, turned))
+        poses.append(at)
+    values = np.column_stack((np.array(poses), plain.odometry.values[:, 3:]))
+    return replace(plain, odometry=drives.signal(times, values))
+
+
+def odometry(drive):
+    return list(odometry_faults(motion_steps(drive), separation=0.3))
+
+
+def test_correct_odometry_has_no_fault():
+    assert odometry(with_odometry(lambda time, distance, turn: (distance, turn))) == []
+
+
+def test_odometry_that_scales_all_motion_has_a_scale():
+    (fault,) = odometry(with_odometry(lambda time, distance, turn: (1.08 * distance, 1.08 * turn)))
+    assert (fault.kind, number(fault, "factor")) == ("scale", pytest.approx(108, abs=1))
+
+
+def test_odometry_that_turns_while_it_drives_has_a_bias():
+    (fault,) = odometry(with_odometry(lambda time, distance, turn: (distance, turn + np.radians(2) * distance)))
+    assert (fault.kind, number(fault, "turn_per_metre")) == ("bias", pytest.approx(2.0, abs=0.2))
+
+
+def test_wheels_that_roll_further_for_a_while_slip():
+    (fault,) = odometry(with_odometry(lambda time, distance, turn: ((1.5 if 4 <= time < 8 else 1.0) * distance, turn)))
+    assert (fault.kind, fault.begin) == ("slip", pytest.approx(4.0, abs=0.6))
+    assert fault.duration == pytest.approx(4.0, abs=0.8)
+    assert number(fault, "left") == pytest.approx(33, abs=5)
+
+
+def test_a_correct_gyroscope_has_no_fault():
+    assert list(gyroscope_faults(drives.drive())) == []
+
+
+def test_a_constant_turn_rate_is_a_bias_of_the_gyroscope():
+    plain = drives.drive()
+    rates = drives.signal(plain.turn_rates.times, plain.turn_rates.values + 0.05)
+    (fault,) = gyroscope_faults(replace(plain, turn_rates=rates))
+    assert (fault.kind, number(fault, "gyro")) == ("bias", pytest.approx(0.05, abs=0.002))
+
+
+def test_a_growing_error_of_the_gyroscope_is_a_drift():
+    plain = drives.drive()
+    grown = 0.02 * np.clip(plain.turn_rates.times - 3.0, 0.0, None)
+    rates = drives.signal(plain.turn_rates.times, plain.turn_rates.values[:, 0] + grown)
+    (fault,) = gyroscope_faults(replace(plain, turn_rates=rates))
+    assert (fault.kind, number(fault, "gyro")) == ("drift", pytest.approx(0.02, rel=0.1))
+    assert fault.begin == pytest.approx(3.0, abs=0.8)
+
+
+def speeds(times):
+    return np.where(times % 4 < 2, 0.5, 0.25)
+
+
+def with_motion(driven, commanded=speeds):
+    plain = drives.drive()
+    times = plain.commands.times
+    values = np.zeros((len(times), 3))
+    values[:, 0] = commanded(times)
+    moved = np.column_stack((plain.odometry.values[:, :3], driven(times), np.zeros((len(times), 2))))
+    return replace(plain, commands=drives.signal(times, values), odometry=drives.signal(times, moved))
+
+
+def test_a_base_that_follows_its_commands_has_no_fault():
+    assert list(command_faults(with_motion(speeds))) == []
+
+
+def test_a_base_that_follows_late_has_a_delay():
+    (fault,) = command_faults(with_motion(lambda times: speeds(times - 0.4)))
+    assert (fault.kind, number(fault, "latency")) == ("delay", pytest.approx(310, abs=40))
+
+
+def test_a_base_that_stands_although_it_should_drive_loses_its_commands():
+    faults = list(command_faults(with_motion(lambda times: np.where((times > 5) & (times < 7), 0.0, speeds(times)))))
+    assert [fault.kind for fault in faults] == ["off"]
+    assert faults[0].begin == pytest.approx(4.5, abs=0.2)
+
+
+def test_a_base_that_drives_a_share_of_each_command_has_a_gain():
+    (fault,) = command_faults(with_motion(lambda times: 0.7 * speeds(times)))
+    assert (fault.kind, number(fault, "linear")) == ("gain", pytest.approx(70, abs=3))
+
+
+def test_a_base_that_never_exceeds_a_speed_is_saturated():
+    (fault,) = command_faults(with_motion(lambda times: np.minimum(0.35, speeds(times))))
+    assert (fault.kind, number(fault, "linear")) == ("saturation", pytest.approx(0.35, abs=0.02))
+
+
+def test_a_speed_that_falls_is_a_low_battery():
+    def falling(times):
+        return np.maximum(0.4 - 0.02 * times, 0.2)
+
+    (fault,) = command_faults(with_motion(falling, lambda times: np.full(len(times), 0.5)))
+    assert fault.kind == "low_battery"
+    assert [number(fault, key) for key in ("start", "end")] == pytest.approx([0.4, 0.2], abs=0.03)
+
+
+def test_a_belief_that_jumps_and_comes_back_is_a_fault_of_the_localizer():
+    plain = drives.drive()
+    values = plain.belief.values.copy()
+    values[(plain.belief.times >= 4.0) & (plain.belief.times < 6.0), 1] += 0.5
+    (fault,) = localizer_faults(replace(plain, belief=drives.signal(plain.belief.times, values)))
+    assert (fault.kind, fault.begin, fault.duration) == ("jump", pytest.approx(4.0), pytest.approx(2.0))
+    assert number(fault, "y") == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_localizer_without_messages_while_the_robot_drives_is_off():
+    plain = drives.drive()
+    kept = (plain.belief.times < 3.0) | (plain.belief.times > 8.0)
+    silent = drives.signal(plain.belief.times[kept], plain.belief.values[kept])
+    (fault,) = localizer_faults(replace(plain, belief=silent))
+    assert (fault.kind, fault.duration) == ("off", pytest.approx(5.1, abs=0.2))
