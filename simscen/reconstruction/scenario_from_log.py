@@ -67,9 +67,9 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
     drive = read_drive(log, options.drive)
     described = read_description(log, options.root or Path.cwd())
     choice = choose_world(drive, described, options.files, out)
-    given = given_parts(described, choice, options.files, out)
     height = DEFAULT_LIDAR_HEIGHT_M if drive.scans is None else drive.scans.height
     surroundings = Surroundings(choice.world, height)
+    given = given_parts(drive, described, choice, options.files, out, surroundings)
     is_known = bool(options.files.robot) or described.robot is not None
     robot = known_robot(given.robot, out.parent, is_known)
     findings = find_all(drive, surroundings, robot)

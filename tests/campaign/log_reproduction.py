@@ -7,6 +7,7 @@ judged with the criteria of the recorded one. Exit code 1 if fewer than 80 % fai
 
 import argparse
 import copy
+import json
 import shutil
 import subprocess
 import sys
@@ -21,7 +22,6 @@ import yaml
 from simscen.core.errors import SimscenError
 from simscen.core.records.verdict import Status
 from simscen.judge.run_result import judge_run
-from simscen.loading.scenario import try_variations
 from simscen.loading.scenario_text import spec_of_text
 from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
 from simscen.record.log_reader.read import Log, read_log
@@ -55,8 +55,15 @@ def write_broken_scenarios(root: Path) -> None:
                         target.parent.mkdir(parents=True, exist_ok=True)
                         source = ROOT / "scenarios" / file.stem / f"{name}.scenario.yaml"
                         target.write_text(yaml.safe_dump(changed(source, values)))
-                        if isinstance(try_variations(target, root), list):  # it is refused before it runs
-                            target.unlink()
+
+
+def remove_refused(root: Path) -> None:
+    """Remove the scenarios that are refused before they run, such as those with too short a timeout."""
+    command = [sys.executable, "-m", "simscen", "validate", str(root / "scenarios"), "--root", str(root)]
+    told = subprocess.run([*command, "--format", "json"], check=False, cwd=root, capture_output=True, text=True)
+    for problem in json.loads(told.stdout)["problems"]:
+        if problem["severity"] == "error":
+            (root / problem["path"]).unlink(missing_ok=True)
 
 
 def changed(file: Path, changes: dict[str, Any]) -> dict[str, Any]:
@@ -113,6 +120,7 @@ def main() -> int:
         if runs is None:
             root, runs = work / "broken", work / "runs"
             write_broken_scenarios(root)
+            remove_refused(root)
             simscen_run(root / "scenarios", runs, root)
         return _report(runs, root, work, arguments.k)
 

@@ -12,6 +12,7 @@ import numpy as np
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.reconstruction.drive.drive_window import from_first_goal
 from simscen.reconstruction.drive.goals import goals_of
 from simscen.reconstruction.drive.log_messages import Logged, LogMessages, collect_messages
 from simscen.reconstruction.drive.recorded_drive import Polygon, RecordedDrive, Scans, TimedValues, no_values
@@ -44,7 +45,7 @@ def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
         if truth is None and not path.is_dir() and is_simscen_log(path):
             truth = topics.TRUTH.name
         messages = collect_messages(path, options.topics, None if truth == NO_TRUTH else truth)
-        return _DriveReader(path, messages).drive()
+        return from_first_goal(_DriveReader(path, messages).drive())
     except UnusableLog as error:
         raise invalid_log(path, "SC804", str(error), error.hint) from error
     except OSError as error:

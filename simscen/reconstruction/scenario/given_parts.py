@@ -22,13 +22,17 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import RunDescription
 from simscen.reconstruction.evidence import Evidence
 from simscen.reconstruction.scans.grid_mapping import map_from_scans
+from simscen.reconstruction.scans.scan_model import scan_model
 from simscen.reconstruction.scans.surroundings import Surroundings, world_from_map
 from simscen.reconstruction.scenario.contents import GivenParts
+from simscen.reconstruction.scenario.robot_file import observed_limits, write_robot_file
+from simscen.reconstruction.scenario.robot_properties import UNKNOWN_ROBOT
 from simscen.worlds.maps.ros_map import save_map
 from simscen.worlds.world_file import world_from_spec
 
 DEFAULT_LIDAR_HEIGHT_M = 0.2
-DEFAULT_ROBOT = "turtlebot"
+MAX_NOISE_SCANS = 100
+"""Number of scans, evenly spread over the drive, from which the noise of a lidar is computed."""
 MAX_EQUAL_MAP_DIFFERENCE = 0.002
 """Share of cells in which two maps of the same world may differ."""
 
@@ -129,36 +133,47 @@ def _differs(given: OccupancyGrid, drawn: OccupancyGrid) -> bool:
     return float(np.mean((given.cells > 50) != (drawn.cells > 50))) > MAX_EQUAL_MAP_DIFFERENCE
 
 
-def given_parts(described: RunDescription, choice: WorldChoice, files: GivenFiles, out: Path) -> GivenParts:
-    """Return the parts of the scenario that are not estimated."""
+def given_parts(
+    drive: RecordedDrive,
+    described: RunDescription,
+    choice: WorldChoice,
+    files: GivenFiles,
+    out: Path,
+    surroundings: Surroundings,
+) -> GivenParts:
+    """Return the parts of the scenario that are not estimated. Writes a robot file if no robot is named."""
     evidence = {"world": choice.evidence}
     if choice.map_evidence is not None:
         evidence["map"] = choice.map_evidence
     unknowns = [*choice.unknowns, *described.notes]
-    robot = _robot(described, files, out)
+    stack = dict(described.stack)
     if files.robot:
+        robot = relative(Path(files.robot), out) if Path(files.robot).is_file() else files.robot
         evidence["robot"] = Evidence("given with --robot")
     elif described.robot is not None:
+        robot = relative(described.robot, out) if isinstance(described.robot, Path) else described.robot
         evidence["robot"] = Evidence("robot in the header of the log")
     else:
-        evidence["robot"] = Evidence(f"{DEFAULT_ROBOT}, because the log does not name its robot", None, None, "low")
-        unknowns.append("shape, mass, limits, and sensors of the robot; name its file with --robot")
-    if described.stack:
+        written = write_robot_file(drive, out.with_name(f"{_stem(out)}.robot.yaml"), _lidar_noise(drive, surroundings))
+        choice.files.append(written.file)
+        robot, unknowns = written.file.name, [*unknowns, *written.unknowns]
+        evidence["robot"] = Evidence(written.evidence, None, None, "medium")
+    if stack:
         evidence["stack"] = Evidence("configuration of the stack in the header of the log")
-    else:
-        unknowns.append(
-            "parameters of the navigation stack; the defaults are used"
-        ) if described.robot is None else None
-    return GivenParts(choice.written, choice.map, robot, described.seed, described.stack, evidence, unknowns)
+    elif described.robot is None:
+        unknowns.append("parameters of the navigation stack, besides the speed; the defaults are used")
+        speed = observed_limits(drive)[0]
+        stack = {"controller": {"type": "regulated_pure_pursuit", "desired_linear_vel": speed}}
+        evidence["stack"] = Evidence(f"the robot drives at up to {speed:.2f} m/s", None, None, "medium")
+    return GivenParts(choice.written, choice.map, robot, described.seed, stack, evidence, unknowns)
 
 
-def _robot(described: RunDescription, files: GivenFiles, out: Path) -> str:
-    """Return the robot as the scenario names it."""
-    if files.robot:
-        return relative(Path(files.robot), out) if Path(files.robot).is_file() else files.robot
-    if isinstance(described.robot, Path):
-        return relative(described.robot, out)
-    return described.robot or DEFAULT_ROBOT
+def _lidar_noise(drive: RecordedDrive, surroundings: Surroundings) -> float:
+    """Return the usual noise of the ranges in m."""
+    if drive.scans is None or len(drive.scans) < 3:
+        return UNKNOWN_ROBOT.lidar_noise
+    scans = drive.scans.every(max(1, len(drive.scans) // MAX_NOISE_SCANS))
+    return float(np.median(scan_model(drive, scans, surroundings).noise))
 
 
 def relative(file: Path, out: Path) -> str:

@@ -1,0 +1,126 @@
+"""Robot file for the robot of a log that names none: size, limits, and sensors as far as the messages show them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.loading.files.single_files import CompactDumper
+from simscen.loading.yaml.scalars import to_yaml
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans, TimedValues
+
+TICK_RATE_HZ = 240
+"""Default tick rate of scenarios, which the rates of sensors must divide."""
+DEFAULT_RADIUS_M = 0.22
+DEFAULT_MASS_KG, DEFAULT_ACCELERATION, DEFAULT_TURN_ACCELERATION = 5.0, 1.0, 3.2
+BODY_TOP_M, BODY_BOTTOM_M, MIN_LIDAR_HEIGHT_M = 0.12, 0.03, 0.15
+WHEEL_RADIUS_M, SEPARATION_PER_RADIUS = 0.033, 1.3
+SPEED_PERCENTILE, SPEED_MARGIN = 99.0, 1.05
+MIN_SPEED_M_S, MIN_TURN_RATE_RAD_S = 0.1, 0.5
+MAX_BEAMS = 4096
+
+
+@dataclass(frozen=True)
+class WrittenRobot:
+    """A robot file, what it is from in words, and what the log does not tell about the robot."""
+
+    file: Path
+    evidence: str
+    unknowns: list[str]
+
+
+def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float) -> WrittenRobot:
+    """Write a robot file with what a drive shows of its robot. `lidar_noise` is that of the ranges in m."""
+    speed, turn_rate = observed_limits(drive)
+    unknowns = ["mass, wheels, and accelerations of the robot; usual values are assumed"]
+    radius = max((math.hypot(*corner) for corner in drive.footprint), default=DEFAULT_RADIUS_M)
+    outline: dict[str, Any] = {"radius": radius}
+    body: dict[str, Any] = {"cylinder": [round(radius, 3), round(BODY_TOP_M - BODY_BOTTOM_M, 3)], "z": BODY_BOTTOM_M}
+    if drive.footprint:
+        corners = [list(corner) for corner in drive.footprint]
+        outline = {"footprint": corners}
+        body = {"polygon": corners, "height": round(BODY_TOP_M - BODY_BOTTOM_M, 3), "z": BODY_BOTTOM_M}
+    else:
+        unknowns.append(f"footprint of the robot; a radius of {DEFAULT_RADIUS_M} m is assumed")
+    data = {
+        "simscen": 1,
+        "name": f"robot of {drive.name}",
+        "mass": DEFAULT_MASS_KG,
+        **outline,
+        "body": [body],
+        "drive": {
+            "type": "differential",
+            "wheel_radius": WHEEL_RADIUS_M,
+            "wheel_separation": round(SEPARATION_PER_RADIUS * _inner_radius(drive, radius), 3),
+        },
+        "limits": {
+            "linear": speed,
+            "angular": turn_rate,
+            "linear_acceleration": DEFAULT_ACCELERATION,
+            "angular_acceleration": DEFAULT_TURN_ACCELERATION,
+        },
+        "sensors": _sensors(drive, lidar_noise),
+    }
+    file.write_text(to_yaml(data, CompactDumper), encoding="utf-8")
+    known = ["speed limits", *(["footprint"] if drive.footprint else []), *(["lidar"] if drive.scans else [])]
+    return WrittenRobot(file, f"{', '.join(known)} as seen in the log", unknowns)
+
+
+def observed_limits(drive: RecordedDrive) -> tuple[float, float]:
+    """Return the largest forward speed in m/s and turn rate in rad/s of a drive, from its odometry and commands."""
+    speeds = _largest(drive.odometry, 3), _largest(drive.commands, 0)
+    turns = _largest(drive.odometry, 5), _largest(drive.commands, 2)
+    speed = math.ceil(100 * SPEED_MARGIN * max(speeds)) / 100
+    turn_rate = math.ceil(100 * SPEED_MARGIN * max(turns)) / 100
+    return max(speed, MIN_SPEED_M_S), max(turn_rate, MIN_TURN_RATE_RAD_S)
+
+
+def _largest(signal: TimedValues, column: int) -> float:
+    return float(np.percentile(np.abs(signal.values[:, column]), SPEED_PERCENTILE)) if len(signal) else 0.0
+
+
+def _inner_radius(drive: RecordedDrive, radius: float) -> float:
+    """Return half the width of the robot in m."""
+    return max((abs(y) for _, y in drive.footprint), default=radius)
+
+
+def _sensors(drive: RecordedDrive, lidar_noise: float) -> dict[str, Any]:
+    sensors: dict[str, Any] = {}
+    if drive.scans is not None:
+        sensors["lidar"] = {"lidar": _lidar(drive.scans, lidar_noise)}
+    sensors["odom"] = {"odometry": {"rate": _rate(drive.odometry.times, 40.0)}}
+    if len(drive.turn_rates) > 1:
+        sensors["imu"] = {"imu": {"rate": _rate(drive.turn_rates.times, 60.0)}}
+    return sensors
+
+
+def _lidar(scans: Scans, noise: float) -> dict[str, Any]:
+    beams = min(len(scans.angles), MAX_BEAMS)
+    step = abs(float(scans.angles[1] - scans.angles[0])) if beams > 1 else 0.01
+    view = beams * step
+    full = view > 2 * math.pi - 1.5 * step
+    center = 0.0 if full else float(scans.angles.mean())
+    x, y, yaw = scans.mount
+    mount = {"x": round(x, 3), "y": round(y, 3), "z": round(max(scans.height, MIN_LIDAR_HEIGHT_M), 3)}
+    mount["yaw"] = round(yaw + center, 4)
+    return {
+        "rate": _rate(scans.times, 10.0),
+        "beams": beams,
+        "field_of_view": round(2 * math.pi if full else view, 5),
+        "min_range": round(float(scans.range_min), 3),
+        "max_range": round(float(min(scans.range_max, 100.0)), 2),
+        "noise": round(noise, 4),
+        "mount": mount,
+    }
+
+
+def _rate(times: Array, usual: float) -> float:
+    """Return the rate in Hz nearest to that of a signal that divides the tick rate."""
+    measured = 1.0 / max(float(np.median(np.diff(times))), 1e-3) if len(times) > 1 else usual
+    divisors = [rate for rate in range(1, TICK_RATE_HZ + 1) if TICK_RATE_HZ % rate == 0]
+    return float(min(divisors, key=lambda rate: abs(math.log(rate / measured))))

@@ -1,0 +1,173 @@
+"""Scenarios from logs of robots that simscen never met, written with rosbags from its own message definitions."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import synthetic_drives as drives
+from typer.testing import CliRunner
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "record"))
+import foreign_logs as logs
+from rosbags.rosbag2 import StoragePlugin
+
+from simscen.cli.main import app
+from simscen.core.errors import InvalidInput
+from simscen.loading.scenario import load_scenario
+from simscen.reconstruction.drive.reader import DriveOptions, read_drive
+from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
+from simscen.worlds.maps.ros_map import save_map
+
+LIDAR_SILENT = (8.0, 9.5)
+GOAL = (6.9, 2.9)
+
+
+def walk(time):
+    """Return the position of a person who crosses the way of the robot."""
+    return 5.0, 0.8 + 0.4 * time
+
+
+def messages(with_map=True, with_goal=True, idle=0.0):
+    """Return what a robot with a lidar, odometry, and AMCL logs; it stands for `idle` s before its goal."""
+    measured = drives.scans(lambda time: [drives.body(*walk(time), 0.0, (0.25,))])
+    times = np.arange(0.0, drives.DURATION_S, 0.05)
+    at = drives.poses(times)
+    rng = np.random.default_rng(7)
+    said = []
+
+    def add(topic, time, message):
+        said.append(logs.Said(topic, logs.BEGIN + round((time + idle) * logs.SECOND) + 5_000_000, message))
+
+    def stamp(time):
+        return logs.BEGIN + round((time + idle) * logs.SECOND)
+
+    add("/tf_static", -idle, logs.link(stamp(-idle), "base_link", "lidar", 0.0))
+    if with_map:
+        add("/map", -idle, occupancy_grid(stamp(-idle)))
+    if with_goal:
+        add("/goal_pose", 0.0, goal(stamp(0.0)))
+    early = [(-1.0 * wait, at[0]) for wait in np.arange(idle, 0.0, -0.05).tolist()]
+    for time, (x, y, yaw) in [*early, *zip(times.tolist(), at, strict=True)]:
+        add("/odom", time, odometry(stamp(time), x - 1.0, y - 3.0, yaw))
+        if round(time * 20) % 4 == 0:
+            add("/amcl_pose", time, believed(stamp(time), x + rng.normal(0, 0.01), y + rng.normal(0, 0.01), yaw))
+    for time, ranges in zip(measured.times.tolist(), measured.ranges, strict=True):
+        if not LIDAR_SILENT[0] <= time < LIDAR_SILENT[1]:
+            add("/scan", time, scan(stamp(time), ranges))
+    return sorted(said, key=lambda one: one.time)
+
+
+def occupancy_grid(time):
+    grid = drives.room().grid
+    T = logs.T
+    info = T["nav_msgs/msg/MapMetaData"](
+        map_load_time=logs.stamp_of(0), resolution=grid.resolution, width=grid.shape[1], height=grid.shape[0],
+        origin=logs.pose(grid.origin.x, grid.origin.y),
+    )  # fmt: skip
+    return T["nav_msgs/msg/OccupancyGrid"](header=logs.header(time, "map"), info=info, data=grid.cells.reshape(-1))
+
+
+def goal(time):
+    return logs.T["geometry_msgs/msg/PoseStamped"](header=logs.header(time, "map"), pose=logs.pose(*GOAL))
+
+
+def odometry(time, x, y, yaw):
+    message = logs.odometry(time, "odom", x, drives.SPEED_M_S)
+    message.pose.pose = logs.pose(x, y, yaw)
+    return message
+
+
+def believed(time, x, y, yaw):
+    message = logs.believed(time, x)
+    message.pose.pose = logs.pose(x, y, yaw)
+    return message
+
+
+def scan(time, ranges):
+    return logs.T["sensor_msgs/msg/LaserScan"](
+        header=logs.header(time, "lidar"), angle_min=float(drives.ANGLES[0]), angle_max=float(drives.ANGLES[-1]),
+        angle_increment=float(drives.ANGLES[1] - drives.ANGLES[0]), time_increment=0.0, scan_time=0.1,
+        range_min=0.12, range_max=12.0, ranges=ranges.astype(np.float32), intensities=np.zeros(0, dtype=np.float32),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("plugin", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
+def test_a_bag_becomes_a_scenario_with_its_goal_person_and_outage(plugin, tmp_path):
+    bag = logs.write_bag(tmp_path / "bag", messages(), plugin)
+    made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    loaded = load_scenario(made.file, tmp_path)
+    assert loaded.robot.path.name == "site.robot.yaml"
+    assert made.contents.start.distance(drives.Pose2(1.0, 3.0)) < 0.1
+    (only,) = made.contents.goals
+    assert math.dist(only.pose[:2], GOAL) < 0.1
+    (person,) = [thing for thing in made.findings.objects if thing.is_moving]
+    frames = np.array(person.keyframes)
+    true = np.array([walk(time) for time in frames[:, 0].tolist()])
+    assert float(np.sqrt(np.mean(np.sum((frames[:, 1:3] - true) ** 2, axis=1)))) < 0.3
+    (fault,) = [fault for fault in made.findings.faults if fault.target == "lidar"]
+    assert (fault.kind, fault.begin) == ("off", pytest.approx(LIDAR_SILENT[0], abs=0.15))
+    assert fault.duration == pytest.approx(1.5, abs=0.2)
+
+
+def test_without_a_map_the_walls_are_built_from_the_scans(tmp_path):
+    bag = logs.write_bag(tmp_path / "bag", messages(with_map=False))
+    made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    load_scenario(made.file, tmp_path)
+    occupied = np.argwhere(made.surroundings.grid.cells == 100)
+    far = drives.room().distance_to_walls(made.surroundings.grid.center_of(occupied))
+    assert len(occupied) > 200
+    assert np.percentile(far, 95) < 0.15
+
+
+def test_the_user_can_give_the_map(tmp_path):
+    save_map(drives.room().grid, tmp_path / "office.yaml")
+    bag = logs.write_bag(tmp_path / "bag", messages(with_map=False))
+    arguments = ["new", "--from-log", str(bag), "--out", str(tmp_path / "site"), "--map", str(tmp_path / "office.yaml")]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert load_scenario(tmp_path / "site.scenario.yaml", tmp_path).world.path.name == "office.yaml"
+
+
+def test_without_goals_the_end_of_the_motion_is_the_goal(tmp_path):
+    bag = logs.write_bag(tmp_path / "bag", messages(with_goal=False))
+    drive = read_drive(bag, DriveOptions())
+    (only,) = drive.goals
+    assert only.pose.distance(drives.Pose2(*drives.poses(np.array([drives.DURATION_S - 0.05]))[0].tolist())) < 0.1
+
+
+def test_what_the_log_holds_before_the_first_goal_is_left_out(tmp_path):
+    drive = read_drive(logs.write_bag(tmp_path / "bag", messages(idle=5.0)), DriveOptions())
+    assert drive.goals[0].sent == 0.0
+    assert drive.duration == pytest.approx(drives.DURATION_S, abs=0.2)
+    assert any("before the first goal" in note for note in drive.notes)
+
+
+def test_a_log_without_poses_is_refused_with_a_hint(tmp_path):
+    only_scans = [said for said in messages() if said.topic == "/scan"]
+    with pytest.raises(InvalidInput, match="no poses of the robot") as error:
+        read_drive(logs.write_bag(tmp_path / "bag", only_scans), DriveOptions())
+    assert "--topic" in error.value.problems[0].hint
+
+
+def test_a_log_without_scans_says_what_could_not_be_found(tmp_path):
+    without = [said for said in messages() if said.topic != "/scan"]
+    bag = logs.write_bag(tmp_path / "bag", without)
+    made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    assert made.findings.objects == []
+    assert any("no scans" in unknown for unknown in made.contents.unknowns)
+
+
+@pytest.mark.parametrize(("name", "content"), [
+    ("missing.mcap", None),
+    ("text.mcap", b"not a log"),
+    ("empty.mcap", b""),
+    ("ros1.bag", b"#ROSBAG V2.0\n"),
+])  # fmt: skip
+def test_an_unusable_log_ends_with_exit_code_2_and_leaves_no_file(name, content, tmp_path):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    target = tmp_path / "new.scenario.yaml"
+    result = CliRunner().invoke(app, ["new", "--from-log", str(tmp_path / name), "--out", str(target)])
+    assert isinstance(result.exception, InvalidInput) or result.exit_code == 2
+    assert not target.exists()
