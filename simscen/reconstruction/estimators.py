@@ -52,6 +52,8 @@ def find_all(drive: RecordedDrive, world: Surroundings, robot: KnownRobot = UNKN
             faults += gyroscope_faults(drive)
     else:
         unknowns.append("errors of odometry, gyroscope, and mount of the lidar, which need a ground truth (--truth)")
+    if any(thing.is_moving for thing in objects):
+        unknowns.append("whether moving objects react to the robot; they follow their recorded tracks")
     faults += command_faults(drive)
     faults += localizer_faults(drive)
     return Findings(incidents_of(drive), objects, faults, kidnaps, unknowns)

@@ -9,15 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.loading.files.discovery import default_root
-from simscen.loading.scenario import load_scenario
 from simscen.reconstruction.drive.reader import DriveOptions, read_drive
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal
 from simscen.reconstruction.scenario.criteria import path_length
 from simscen.reconstruction.scenario.incidents import Incident, incidents_of
 from simscen.reconstruction.scenario_from_log import Reconstruction
-from simscen.run.preparation import prepare
-from simscen.run.simulate import simulate
+from simscen.record.log_file import attached_result
 
 STEP_S = 0.1
 SAME_PLACE_M = 0.3
@@ -99,14 +96,12 @@ class Verification:
         return all(incident.is_reproduced for incident in self.incidents)
 
 
-def verify(made: Reconstruction) -> Verification:
-    """Run a reconstructed scenario and compare the run with the log. Raises RunError, InvalidInput, and OSError."""
-    log = made.file.with_name(f"{made.file.name.partition('.')[0]}.verified.mcap")
-    prepared = prepare(load_scenario(made.file, default_root([made.file])))
-    run = simulate(prepared, log=log)
+def compare_with_run(made: Reconstruction, log: Path) -> Verification:
+    """Compare a drive with the log of a run of its reconstructed scenario. Raises InvalidInput for an unusable log."""
     repeated = read_drive(log, DriveOptions())
     incidents, others = compare_incidents(incidents_of(made.drive), incidents_of(repeated))
-    failed = [verdict.id for verdict in run.result.verdicts if verdict.status.value != "pass"]
+    verdicts = (attached_result(log) or {}).get("verdicts", [])
+    failed = [verdict["id"] for verdict in verdicts if verdict["status"] != "pass"]
     quantities = [*compare_drives(made.drive, repeated)]
     return Verification(made.drive, repeated, log, quantities, incidents, others, failed)
 
