@@ -1,0 +1,81 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import synthetic_drives as drives
+
+from simscen.reconstruction.objects.found_object import FoundObject
+from simscen.reconstruction.scenario.incidents import Incident
+from simscen.reconstruction.verifying.comparison import (
+    Verification,
+    compare_drives,
+    compare_incidents,
+    share_seen_alike,
+)
+from simscen.reconstruction.verifying.page import verification_page
+
+STUCK = Incident("stuck", 10.0, (3.0, 2.0), "the robot stayed", "stuck")
+
+
+def shifted(drive, metres):
+    return replace(drive, poses=drives.signal(drive.poses.times, drive.poses.values + np.array([0.0, metres, 0.0])))
+
+
+def test_equal_drives_have_no_difference():
+    one = drives.drive(drives.scans())
+    rows = {row.name: row.difference for row in compare_drives(one, one)}
+    assert rows["distance at the same time"] == "0.00 m RMS, at most 0.00 m"
+    assert rows["duration"] == "+0.00 s"
+    assert rows["ranges at the same place"].startswith("100 %")
+
+
+def test_a_shifted_drive_is_that_far_away():
+    rows = {row.name: row.difference for row in compare_drives(drives.drive(), shifted(drives.drive(), 0.2))}
+    assert rows["distance at the same time"] == "0.20 m RMS, at most 0.20 m"
+
+
+def test_scans_are_compared_only_where_both_robots_are_at_one_place():
+    one = drives.drive(drives.scans())
+    assert share_seen_alike(one, shifted(one, 1.0), np.arange(0.0, 10.0, 0.1)) is None
+
+
+def test_the_same_incident_nearby_is_reproduced():
+    ((found,), others) = compare_incidents([STUCK], [replace(STUCK, time=11.0, place=(3.2, 2.0))])
+    assert found.is_reproduced and not others
+    assert found.sentence == "reproduced: stuck at 10.00 s (the robot stayed), 1.00 s later and 0.20 m away"
+
+
+def test_an_incident_far_away_is_only_similar():
+    ((found,), _) = compare_incidents([STUCK], [replace(STUCK, place=(6.0, 2.0))])
+    assert not found.is_reproduced
+    assert found.sentence.startswith("only similar")
+
+
+def test_another_kind_of_incident_does_not_count():
+    contact = replace(STUCK, kind="contact")
+    ((found,), others) = compare_incidents([STUCK], [contact])
+    assert found.sentence == "not reproduced: stuck at 10.00 s (the robot stayed)"
+    assert others == [contact]
+
+
+def test_the_page_loads_nothing_and_escapes_names():
+    one = drives.drive()
+    incidents, others = compare_incidents([STUCK], [])
+    verified = Verification(one, one, Path("x.mcap"), [*compare_drives(one, one)], incidents, others, ["stuck"])
+    thing = FoundObject("<b>cart</b>", (0.9, 0.6), ((0.0, 4.0, 1.0, 0.0),))
+    page = verification_page("<script>", drives.room().grid, [thing], verified)
+    assert "<script>" not in page and "<b>cart" not in page
+    assert "http" not in page.replace("http-equiv", "")
+    assert "default-src 'none'" in page
+    assert page.count("<svg") == 3
+    assert "not reproduced: stuck" in page
+
+
+@pytest.mark.parametrize("steps", [0.0, 0.3])
+def test_a_drive_is_compared_with_a_shorter_one(steps):
+    one = drives.drive()
+    kept = one.poses.times < 5.0 + steps
+    short = replace(one, duration=5.0 + steps, poses=drives.signal(one.poses.times[kept], one.poses.values[kept]))
+    rows = {row.name: row.difference for row in compare_drives(one, short)}
+    assert rows["distance at the same time"].startswith("0.00 m")

@@ -1,0 +1,90 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import synthetic_drives as drives
+
+from simscen.core.geometry import Pose2
+from simscen.reconstruction.drive.recorded_drive import RecordedGoal
+from simscen.reconstruction.scenario.criteria import criteria_of
+from simscen.reconstruction.scenario.incidents import incidents_of, longest_stay
+
+REACHED = RecordedGoal("shelf", Pose2(7.0, 3.0), 0.0, 11.5, "reached", source="/goal_pose")
+
+
+def drive(**changes):
+    return replace(drives.drive(), goals=(REACHED,), **changes)
+
+
+def kinds(one):
+    return [incident.kind for incident in incidents_of(one)]
+
+
+def limits(one, invalid_goals=False):
+    return {one.kind: dict(one.values) for one in criteria_of(one, incidents_of(one), (), invalid_goals)}
+
+
+def test_a_drive_that_reaches_its_goal_has_no_incident():
+    assert kinds(drive()) == []
+
+
+def test_a_pressed_bumper_is_a_contact_at_its_time_and_place():
+    times = np.arange(0.0, drives.DURATION_S, 0.05)
+    (contact,) = incidents_of(drive(bumper=drives.signal(times, (times > 4.0) & (times < 4.3))))
+    assert (contact.kind, contact.criterion) == ("contact", "collisions")
+    assert contact.time == pytest.approx(4.05, abs=0.06)
+    assert contact.place == pytest.approx(tuple(drives.poses(np.array([4.05]))[0, :2]), abs=0.05)
+
+
+def test_a_belief_far_from_the_truth_is_lost():
+    plain = drive()
+    values = plain.belief.values.copy()
+    values[plain.belief.times > 6.0, 0] += 1.0
+    assert kinds(replace(plain, belief=drives.signal(plain.belief.times, values))) == ["lost"]
+
+
+def test_without_a_ground_truth_an_uncertain_belief_is_lost():
+    plain = drive(has_independent_poses=False)
+    values = plain.belief.values.copy()
+    values[plain.belief.times > 6.0, 3] = 4.0
+    assert kinds(replace(plain, belief=drives.signal(plain.belief.times, values))) == ["lost"]
+
+
+def test_a_robot_that_stays_in_place_with_a_goal_is_stuck():
+    times = np.arange(0.0, 30.0, 0.1)
+    stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))
+    goal = replace(REACHED, ended=None, status="unknown")
+    one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,))
+    assert "stuck" in kinds(one) and "unfinished goal" in kinds(one)
+
+
+def test_a_failed_goal_is_an_incident_with_its_code():
+    failed = replace(REACHED, status="failed", error="NO_VALID_PATH")
+    (incident,) = incidents_of(replace(drives.drive(), goals=(failed,)))
+    assert (incident.kind, incident.criterion) == ("failed goal", "goals_reached")
+    assert "NO_VALID_PATH" in incident.detail
+
+
+def test_the_longest_stay_begins_where_the_robot_stops():
+    times = np.arange(0.0, 20.0, 0.1)
+    x = np.minimum(times, 8.0)
+    begin, length = longest_stay(times, np.column_stack((x, np.zeros(len(x)))), 0.5)
+    assert begin == pytest.approx(7.5, abs=0.3)
+    assert length == pytest.approx(12.4, abs=0.4)
+
+
+def test_held_criteria_leave_a_margin():
+    found = limits(drive())
+    assert list(found) == ["goals_reached", "collisions", "localization_error", "time_to_goal", "path_length"]
+    assert found["time_to_goal"] == {"max": "14 s"}
+    assert found["localization_error"] == {"max": 0.25}
+
+
+def test_a_broken_criterion_has_the_limit_that_was_broken():
+    times = np.arange(0.0, 30.0, 0.1)
+    stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))
+    goal = replace(REACHED, ended=None, status="unknown")
+    one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,))
+    found = limits(one)
+    assert found["stuck"] == {"max": "10 s"}
+    assert "time_to_goal" not in found
