@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput
+from simscen.core.errors import InvalidInput, Problem
+from simscen.loading.checks.scene_runner import check_in_world
 from simscen.loading.files.discovery import default_root
 from simscen.loading.scenario import try_variations
+from simscen.loading.world_cache import WorldCache
 from simscen.reconstruction.drive.reader import DriveOptions, read_drive
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import read_description
 from simscen.reconstruction.estimators import find_all
 from simscen.reconstruction.scans.surroundings import Surroundings
-from simscen.reconstruction.scenario.contents import Findings, contents_of
+from simscen.reconstruction.scenario.contents import Findings, GivenParts, contents_of
 from simscen.reconstruction.scenario.given_parts import DEFAULT_LIDAR_HEIGHT_M, GivenFiles, choose_world, given_parts
 from simscen.reconstruction.scenario.robot_properties import known_robot
 from simscen.reconstruction.scenario.scenario_text import ScenarioContents, scenario_text
@@ -62,6 +64,40 @@ class Reconstruction:
             yield f"  incident at {incident.time:.2f} s: {incident.kind}, {incident.detail}"
 
 
+def _write_valid(
+    drive: RecordedDrive, given: GivenParts, findings: Findings, name: str, log: Path, out: Path
+) -> tuple[ScenarioContents, Findings]:
+    """Write the scenario without the objects that `simscen validate` refuses, such as one inside the robot.
+
+    Return what was written. What else is refused is listed among what the log does not tell. Raises InvalidInput if
+    the scenario cannot be loaded.
+    """
+    while True:
+        contents = contents_of(drive, given, findings, name, log.name)
+        out.write_text(scenario_text(contents), encoding="utf-8")
+        wrong = {problem.message for problem in _errors(out)}
+        refused = {thing.name for thing in findings.objects if any(f"`{thing.name}`" in message for message in wrong)}
+        if not refused:
+            break
+        objects = [thing for thing in findings.objects if thing.name not in refused]
+        unknowns = [f"how {name} fits, which was left out because it makes the scenario invalid" for name in refused]
+        findings = replace(findings, objects=objects, unknowns=[*findings.unknowns, *sorted(unknowns)])
+    if wrong:
+        unknowns = [f"what to correct, so that the scenario can run: {message}" for message in wrong]
+        findings = replace(findings, unknowns=[*findings.unknowns, *sorted(unknowns)])
+        contents = contents_of(drive, given, findings, name, log.name)
+        out.write_text(scenario_text(contents), encoding="utf-8")
+    return contents, findings
+
+
+def _errors(scenario: Path) -> list[Problem]:
+    """Return what `simscen validate` refuses in the scenario's world. Raises InvalidInput if it cannot be loaded."""
+    loaded = try_variations(scenario, default_root([scenario]))
+    if isinstance(loaded, list):
+        raise InvalidInput(loaded)
+    return [problem for problem in check_in_world(loaded[0], WorldCache()) if problem.severity == "error"]
+
+
 def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> Reconstruction:
     """Write a scenario from a log, and its map beside it if it needs one. Raises InvalidInput and OSError."""
     drive = read_drive(log, options.drive)
@@ -74,9 +110,5 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
     robot = known_robot(given.robot, out.parent, is_known)
     findings = find_all(drive, surroundings, robot)
     name = out.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario").replace("_", " ")
-    contents = contents_of(drive, given, findings, name, log.name)
-    out.write_text(scenario_text(contents), encoding="utf-8")
-    loaded = try_variations(out, default_root([out]))
-    if isinstance(loaded, list):
-        raise InvalidInput(loaded)
+    contents, findings = _write_valid(drive, given, findings, name, log, out)
     return Reconstruction(log, (out, *choice.files), drive, findings, contents, surroundings)

@@ -17,6 +17,10 @@ MAX_SCANS = 40
 """Number of scans, evenly spread over the drive, that are compared."""
 STEP_M, STEP_RAD = 0.01, math.radians(0.25)
 """Steps of the numerical derivatives."""
+TRIED_YAWS_RAD = tuple(math.radians(yaw) for yaw in range(-24, 25, 3))
+"""Rotations of the mount from which the estimate may start."""
+BETTER_FIT = 0.7
+"""Ratio of the median differences below which it starts there and not at the nominal mount."""
 ITERATIONS = 6
 OUTLIER_M = 0.5
 MIN_BEAMS = 200
@@ -38,6 +42,13 @@ def mount_error(model: ScanModel, world: Surroundings) -> Pose2:
     def differences(offset: Pose2) -> Array:
         return ranges - world.ranges_from(_shifted(model.poses[chosen], offset), angles, reach)
 
+    with np.errstate(invalid="ignore"):
+        misfit = {
+            yaw: float(np.nanmedian(np.where(hit, np.minimum(np.abs(differences(Pose2(0.0, 0.0, yaw))), 1.0), np.nan)))
+            for yaw in TRIED_YAWS_RAD
+        }
+    nearest = min(TRIED_YAWS_RAD, key=lambda yaw: (misfit[yaw], abs(yaw)))
+    error = Pose2(0.0, 0.0, nearest if misfit[nearest] < BETTER_FIT * misfit[0.0] else 0.0)
     outlier = OUTLIER_M
     for _ in range(ITERATIONS):
         with np.errstate(invalid="ignore"):

@@ -31,6 +31,8 @@ PART_MARGIN_M, PART_SHARE = 0.15, 0.5
 """A track belongs to a moving object if this share of its clusters is within this distance of it."""
 MIN_SIZE_M = 0.06
 MAX_KEYFRAMES = 400
+MAX_OBJECT_SPEED_M_S = 4.0
+"""Keyframes that an object would reach only at a higher speed are errors of its track."""
 
 
 def find_objects(model: ScanModel, world: Surroundings, has_true_poses: bool) -> list[FoundObject]:
@@ -190,4 +192,9 @@ def simplified(shape: ObjectShape) -> list[Keyframe]:
             kept.add(first + worst)
             parts += [(first, first + worst), (first + worst, last)]
     frames = [_keyframe(shape, index) for index in sorted(kept)]
-    return [frame for k, frame in enumerate(frames) if k == 0 or frame[0] > frames[k - 1][0] + 1e-6]
+    slow = frames[:1]
+    for frame in frames[1:]:
+        step = frame[0] - slow[-1][0]
+        if step > 1e-6 and math.dist(frame[1:3], slow[-1][1:3]) <= MAX_OBJECT_SPEED_M_S * step:
+            slow.append(frame)
+    return slow

@@ -136,6 +136,20 @@ def test_without_goals_the_end_of_the_motion_is_the_goal(tmp_path):
     assert only.pose.distance(drives.Pose2(*drives.poses(np.array([drives.DURATION_S - 0.05]))[0].tolist())) < 0.1
 
 
+def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path):
+    said = messages(with_goal=False)
+    end = logs.T["geometry_msgs/msg/PoseStamped"](header=logs.header(logs.BEGIN, "map"), pose=logs.pose(*GOAL))
+    plan = logs.T["nav_msgs/msg/Path"](header=logs.header(logs.BEGIN, "map"), poses=[end, end])
+    said.append(logs.Said("/plan", logs.BEGIN + 100_000_000, plan))
+    for time, status in ((0.1, 2), (11.0, 4)):
+        at = logs.BEGIN + round(time * logs.SECOND)
+        said.append(logs.Said("/navigate_to_pose/_action/status", at, logs.statuses((1, logs.BEGIN, status))))
+    drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(said, key=lambda one: one.time)), DriveOptions())
+    (only,) = drive.goals
+    assert math.dist(only.pose[:2], GOAL) < 0.01
+    assert (only.status, only.ended) == ("reached", pytest.approx(11.0, abs=0.2))
+
+
 def test_what_the_log_holds_before_the_first_goal_is_left_out(tmp_path):
     drive = read_drive(logs.write_bag(tmp_path / "bag", messages(idle=5.0)), DriveOptions())
     assert drive.goals[0].sent == 0.0
