@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,6 +36,8 @@ from simscen.reconstruction.scenario.robot_properties import UNKNOWN_ROBOT, Know
 
 MAX_SCANS = 3000
 """Maximum number of scans that are compared with the world; of longer drives, every second, third, … scan is used."""
+SENSORS = ("lidar", "odom", "imu")
+"""Usual names of the sensors that faults are found for."""
 MIN_KIDNAP_M = 0.5
 MAX_KIDNAP_S = 0.3
 
@@ -56,7 +59,21 @@ def find_all(drive: RecordedDrive, world: Surroundings, robot: KnownRobot = UNKN
         unknowns.append("whether moving objects react to the robot; they follow their recorded tracks")
     faults += command_faults(drive)
     faults += localizer_faults(drive)
+    faults = _on_own_sensors(faults, robot, unknowns)
     return Findings(incidents_of(drive), objects, faults, kidnaps, unknowns)
+
+
+def _on_own_sensors(faults: list[FoundFault], robot: KnownRobot, unknowns: list[str]) -> list[FoundFault]:
+    """Return the faults with the names that the robot file gives to the sensors, without those of missing sensors."""
+    if not robot.sensors:
+        return faults
+    found = []
+    for fault in faults:
+        if fault.target in SENSORS and fault.target not in robot.sensors:
+            unknowns.append(f"where to put {fault.target}.{fault.kind}, because the robot file has no such sensor")
+        else:
+            found.append(replace(fault, target=robot.sensors.get(fault.target, fault.target)))
+    return found
 
 
 def _from_scans(

@@ -67,8 +67,8 @@ def _moves(model: ScanModel, track: ObjectTrack, usable: Indices) -> bool:
     centers = shape.poses[:, :2]
     start = np.median(centers[:ENDS], axis=0)
     away = np.hypot(*(centers - start).T)
-    far = int(np.argmax(uniform(away)))
-    if float(uniform(away)[far]) < MIN_DISPLACEMENT_M:
+    far = int(np.argmax(median_of_three(away)))
+    if float(median_of_three(away)[far]) < MIN_DISPLACEMENT_M:
         return False
     first = np.concatenate([cluster.points for cluster in track.clusters[:ENDS]])
     near = max(0, far - ENDS // 2)
@@ -81,7 +81,7 @@ def _moves(model: ScanModel, track: ObjectTrack, usable: Indices) -> bool:
     return max(_largest(freed), _largest(was_free)) > MIN_FREED_SHARE
 
 
-def uniform(values: Array) -> Array:
+def median_of_three(values: Array) -> Array:
     """Return the medians (n,) over three neighbors of values (n,)."""
     if len(values) < 3:
         return values

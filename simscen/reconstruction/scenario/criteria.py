@@ -20,6 +20,8 @@ MIN_STEP_M = 0.01
 """Minimum move that counts for the length of a path, as in the criterion path_length."""
 STOP_TIME_FACTOR, MAX_STOP_S = 1.5, 3.0
 REST_SPEED_M_S = 0.01
+NO_SENSORS = ("cmd_vel", "wheels", "localizer")
+"""Targets of faults after which a stop is not required."""
 
 
 @dataclass(frozen=True)
@@ -85,13 +87,13 @@ def _efficiency(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
 
 
 def _stops(drive: RecordedDrive, faults: Sequence[FoundFault]) -> Iterator[ProposedCriterion]:
-    """Yield a limit for the time to stop, for each outage of a lidar at which the robot stopped."""
+    """Yield a limit for the time to stop, for the first outage of a sensor at which the robot stopped."""
     for fault in faults:
-        if (fault.target, fault.kind) != ("lidar", "off") or fault.begin is None or fault.duration is None:
+        if fault.kind != "off" or fault.target in NO_SENSORS or fault.begin is None or fault.duration is None:
             continue
         stop = time_to_rest(drive, fault.begin, fault.begin + fault.duration)
         if stop is not None and 0.05 < stop < MAX_STOP_S:
-            values = {"time": f"{STOP_TIME_FACTOR * stop + 0.2:.1f} s", "after": "lidar.off"}
+            values = {"time": f"{STOP_TIME_FACTOR * stop + 0.2:.1f} s", "after": f"{fault.target}.off"}
             yield ProposedCriterion("stopped_within", values, Evidence(f"held: the robot stopped after {stop:.2f} s"))
             return
 

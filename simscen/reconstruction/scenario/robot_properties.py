@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from simscen.core.errors import SimscenError
@@ -18,12 +19,14 @@ class KnownRobot:
         lidar_noise: Standard deviation of the ranges of the lidar in m.
         separation: Distance of the left and right wheels in m.
         skids: Whether the wheels skid in turns.
+        sensors: Names of its sensors by the usual name: "lidar", "odom", "imu". Empty if they are unknown.
         is_known: Whether the properties are those of the robot; otherwise they are those of a usual one.
     """
 
     lidar_noise: float = 0.01
     separation: float = 0.287
     skids: bool = False
+    sensors: Mapping[str, str] = field(default_factory=dict)
     is_known: bool = False
 
 
@@ -43,4 +46,8 @@ def known_robot(written: str, folder: Path, is_known: bool) -> KnownRobot:
     lidars = [sensor.lidar for sensor in spec.sensors.values() if sensor.lidar]
     noise = lidars[0].noise if lidars else UNKNOWN_ROBOT.lidar_noise
     separation = float(getattr(spec.drive, "wheel_separation", UNKNOWN_ROBOT.separation))
-    return KnownRobot(noise, separation, spec.drive.type == "skid_steer", is_known)
+    names: dict[str, str] = {}
+    for name, sensor in spec.sensors.items():
+        kinds = ("lidar", sensor.lidar), ("odom", sensor.odometry), ("imu", sensor.imu)
+        names |= {usual: name for usual, given in kinds if given and usual not in names}
+    return KnownRobot(noise, separation, spec.drive.type == "skid_steer", names, is_known)

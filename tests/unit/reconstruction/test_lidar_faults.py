@@ -121,3 +121,19 @@ def test_beams_that_pass_through_a_named_obstacle_are_glass():
         ["shelf"],
         pytest.approx(100, abs=10),
     )
+
+
+def test_faults_have_the_names_of_the_robots_own_sensors():
+    measured = drives.scans()
+    drive = drives.drive(drives.with_ranges(measured, np.where(measured.ranges > 3.0, np.inf, measured.ranges)))
+    robot = KnownRobot(sensors={"lidar": "front laser"}, is_known=True)
+    (fault,) = find_all(drive, drives.room(), robot).faults
+    assert (fault.target, fault.kind) == ("front laser", "range_limit")
+
+
+def test_a_fault_of_a_sensor_that_the_robot_lacks_is_only_mentioned():
+    drive = drives.drive(drives.scans())
+    rates = drives.signal(drive.turn_rates.times, drive.turn_rates.values + 0.05)
+    found = find_all(replace(drive, turn_rates=rates), drives.room(), KnownRobot(sensors={"lidar": "lidar"}))
+    assert found.faults == []
+    assert any("imu.bias" in unknown for unknown in found.unknowns)
