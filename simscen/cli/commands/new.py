@@ -76,6 +76,9 @@ def command(
     sensors, and criteria that the drive held or broke. A comment gives the evidence for each part, and the first lines
     list what the log does not tell. The log can be of simscen or of a real robot (MCAP, or a rosbag2 folder). --verify
     runs the scenario, prints how near the run comes to the log, and writes a page that shows both.
+
+    Exit code 0: written; 1: with --verify, an incident of the log does not happen again; 2: an input is unusable, or a
+    file cannot be written; 3: with --verify, the run could not be completed.
     """
     if from_log is not None:
         if like:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ MIN_ERROR_LIMIT_M = 0.25
 MIN_TIME_LIMIT_S = 10.0
 MIN_STEP_M = 0.01
 """Minimum move that counts for the length of a path, as in the criterion path_length."""
+SPEED_PERCENTILE, SPEED_MARGIN = 99.5, 1.25
+"""Percentile of the speeds that is the observed limit, because odometry is noisy, and factor to the limit."""
 STOP_TIME_FACTOR, MAX_STOP_S = 1.5, 3.0
 REST_SPEED_M_S = 0.01
 NO_SENSORS = ("cmd_vel", "wheels", "localizer")
@@ -54,7 +57,18 @@ def _criteria(
         yield _localization(drive, broken)
     if not invalid_goals and not {"goals_reached", "stuck"} & set(broken):
         yield from _efficiency(drive)
+    yield from _speed(drive)
     yield from _stops(drive, faults)
+
+
+def _speed(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
+    """Yield the observed speed limit."""
+    if not len(drive.odometry):
+        return
+    fastest = float(np.percentile(np.hypot(*drive.odometry.values[:, 3:5].T), SPEED_PERCENTILE))
+    if fastest > REST_SPEED_M_S:
+        limit = math.ceil(10 * SPEED_MARGIN * fastest) / 10
+        yield ProposedCriterion("speed", {"max": f"{limit:.1f} m/s"}, Evidence(f"held: at most {fastest:.2f} m/s"))
 
 
 def _broken(broken: Mapping[str, Incident], criterion: str, held: str) -> Evidence:

@@ -75,7 +75,9 @@ def test_the_longest_stay_begins_where_the_robot_stops():
 
 def test_held_criteria_leave_a_margin():
     found = limits(drive())
-    assert list(found) == ["goals_reached", "collisions", "localization_error", "time_to_goal", "path_length"]
+    efficiency = ["time_to_goal", "path_length", "speed"]
+    assert list(found) == ["goals_reached", "collisions", "localization_error", *efficiency]
+    assert found["speed"] == {"max": "0.7 m/s"}
     assert found["time_to_goal"] == {"max": "14 s"}
     assert found["localization_error"] == {"max": 0.25}
 
