@@ -57,7 +57,7 @@ def find_all(drive: RecordedDrive, world: Surroundings, robot: KnownRobot = UNKN
         unknowns.append("errors of odometry, gyroscope, and mount of the lidar, which need a ground truth (--truth)")
     if any(thing.is_moving for thing in objects):
         unknowns.append("whether moving objects react to the robot; they follow their recorded tracks")
-    faults += command_faults(drive)
+    faults += command_faults(drive, 0.0 if robot.skids else robot.separation)
     faults += localizer_faults(drive)
     faults = _on_own_sensors(faults, robot, unknowns)
     return Findings(incidents_of(drive), objects, faults, kidnaps, unknowns)

@@ -21,15 +21,22 @@ IGNORED_SHARE, MIN_IGNORED_S = 0.1, 0.4
 STEADY_S, STEADY_CHANGE = 0.4, 0.05
 MIN_GAIN_ERROR = 0.08
 MIN_STEADY = 20
+MIN_SIDE_DIFFERENCE, MAX_UNEXPLAINED = 0.1, 0.05
+"""Difference of the gains of both sides, and share of the motion that they do not explain, for a fault of one side."""
 CAP_MARGIN_M_S, CAP_SPREAD_M_S = 0.04, 0.03
 SMOOTHING_S = 0.5
 """Time over which the noise of the odometry is averaged."""
 MIN_CAP_FALL_M_S = 0.05
 MIN_CORRELATION_GAIN = 0.02
+MIN_SPREAD = 0.05
+"""Standard deviation of a commanded velocity, in m/s or rad/s, below which its changes say nothing about the lag."""
 
 
-def command_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the faults of the commands and of the base that executes them."""
+def command_faults(drive: RecordedDrive, separation: float = 0.0) -> Iterator[FoundFault]:
+    """Yield the faults of the commands and of the base that executes them.
+
+    `separation` is the distance of the wheels in m, 0 for a base without sides.
+    """
     times, commanded, driven = _speeds(drive)
     if len(times) < 80:
         return
@@ -45,7 +52,11 @@ def command_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
         commanded, driven, times = commanded[:-shift], driven[shift:], times[shift:]
     ignored = _ignored(times, commanded, driven)
     yield from ignored
-    if not ignored:
+    if ignored:
+        return
+    sides = [*_side_gains(times, commanded, driven, separation)]
+    yield from sides
+    if not sides:
         yield from _limits(times, commanded, driven)
 
 
@@ -71,7 +82,11 @@ def _averaged(speeds: Array) -> Array:
 def _lag(commanded: Array, driven: Array) -> float:
     """Return the lag in s with which the driven velocity follows the command best."""
     best, lag, none = -np.inf, 0, -np.inf
-    scale = np.maximum(np.std(commanded, axis=0), 1e-6)
+    varies = np.std(commanded, axis=0) >= MIN_SPREAD
+    if not varies.any():
+        return 0.0
+    commanded, driven = commanded[:, varies], driven[:, varies]
+    scale = np.std(commanded, axis=0)
     for shift in range(0, min(round(MAX_LAG_S / GRID_S), len(commanded) // 4)):
         ahead = commanded[: len(commanded) - shift] / scale
         error = -float(np.mean((ahead - driven[shift:] / scale) ** 2))
@@ -91,6 +106,25 @@ def _ignored(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
         evidence = Evidence("the base stands although it is commanded to drive", window.begin, window.end, "medium")
         found.append(FoundFault("cmd_vel", "off", {}, max(0.0, window.begin - 0.5), window.length + 0.5, evidence))
     return found
+
+
+def _side_gains(times: Array, commanded: Array, driven: Array, separation: float) -> Iterator[FoundFault]:
+    """Yield the fault that the wheels of one side drive another share of their commands than those of the other."""
+    if separation <= 0.0:
+        return
+    half = separation / 2
+    gains, remaining = [], []
+    for side in (-half, half):
+        command, speed = (_averaged(one[:, 0] + side * one[:, 1]) for one in (commanded, driven))
+        gain = float(command @ speed) / max(float(command @ command), 1e-9)
+        gains.append(gain)
+        remaining.append(float(np.mean((speed - gain * command) ** 2)) / max(float(np.mean(speed**2)), 1e-9))
+    if abs(gains[0] - gains[1]) < MIN_SIDE_DIFFERENCE or max(remaining) > MAX_UNEXPLAINED:
+        return
+    left, right = (f"{100 * gain:.0f} %" for gain in gains)
+    text = f"the left wheels drive {left} and the right ones {right} of their commands"
+    evidence = Evidence(text, float(times[0]), float(times[-1]), "medium")
+    yield FoundFault("wheels", "gain", {"left": left, "right": right}, evidence=evidence)
 
 
 def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.geometry import Pose2, wrap_array
+from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.evidence import Evidence, FoundFault, windows
 
@@ -38,6 +38,8 @@ def _jumps(drive: RecordedDrive) -> Iterator[FoundFault]:
     distance = np.hypot(*np.diff(errors[:, :2], axis=0).T)
     turn = np.abs(wrap_array(np.diff(errors[:, 2])))
     jumps = np.flatnonzero((distance > MIN_JUMP_M) | (turn > MIN_JUMP_RAD)) + 1
+    if len(jumps) == 1:
+        yield from _lasting_jump(drive, belief, truth, int(jumps[0]))
     for out, back in zip(jumps[:-1].tolist(), jumps[1:].tolist(), strict=True):
         begin, end = float(drive.belief.times[out]), float(drive.belief.times[back])
         away = np.hypot(*errors[out:back, :2].T)
@@ -48,11 +50,26 @@ def _jumps(drive: RecordedDrive) -> Iterator[FoundFault]:
             or max(before, after) > 0.5 * float(np.median(away))
         ):
             continue
-        error = Pose2(*truth[out].tolist()).between(Pose2(*belief[out].tolist()))
-        values = {"x": f"{error.x:.2f} m", "y": f"{error.y:.2f} m", "yaw": f"{math.degrees(error.yaw):.1f} deg"}
+        values = _jump_values(truth[out], belief[out])
         text = f"the estimated pose jumps by {float(away[0]):.2f} m and back"
         yield FoundFault("localizer", "jump", values, begin, end - begin, Evidence(text, begin, end))
         return
+
+
+def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, out: int) -> Iterator[FoundFault]:
+    """Yield a jump of the belief at the sample `out` that does not come back until the end of the drive."""
+    begin, errors = float(drive.belief.times[out]), np.hypot(*(belief - truth)[:, :2].T)
+    stays = float(errors[out:].min()) > MIN_JUMP_M and float(errors[:out].max()) < MIN_JUMP_M
+    if stays and not _is_carried(drive, begin - 0.5, begin + 0.5):
+        text = f"the estimated pose jumps by {float(errors[out]):.2f} m and stays there"
+        evidence = Evidence(text, begin, float(drive.belief.times[-1]), "medium")
+        yield FoundFault("localizer", "jump", _jump_values(truth[out], belief[out]), begin, None, evidence)
+
+
+def _jump_values(truth: Array, belief: Array) -> dict[str, object]:
+    """Return the parameters of a jump from the true pose (3,) to the believed one."""
+    error = Pose2(*truth.tolist()).between(Pose2(*belief.tolist()))
+    return {"x": f"{error.x:.2f} m", "y": f"{error.y:.2f} m", "yaw": f"{math.degrees(error.yaw):.1f} deg"}
 
 
 def _is_carried(drive: RecordedDrive, begin: float, end: float) -> bool:
@@ -83,14 +100,16 @@ def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
         return
     still = np.abs(np.diff(corrections.values, axis=0)).max(axis=1) < MIN_CORRECTION
     usual = windows(still, corrections.times[1:])
-    if len(usual) < 5:
+    if not usual or still.all():
         return
-    limit = max(MIN_SILENCE_S, MIN_SILENCE_PERIODS * float(np.median([window.length for window in usual])))
+    shortest = float(np.percentile([window.length for window in usual], 25)) if len(usual) >= 5 else 0.0
+    limit = max(MIN_SILENCE_S, MIN_SILENCE_PERIODS * shortest)
     for window in usual:
         if window.length > limit and _distance(drive, window.begin, window.end) > MIN_DRIVEN_M:
             text = f"the localizer does not correct the odometry for {window.length:.1f} s"
             evidence = Evidence(text, window.begin, window.end, "medium")
-            yield FoundFault("localizer", "off", {}, window.begin, window.length, evidence)
+            until_end = window.end >= float(corrections.times[-1]) - MIN_SILENCE_S
+            yield FoundFault("localizer", "off", {}, window.begin, None if until_end else window.length, evidence)
 
 
 def _distance(drive: RecordedDrive, begin: float, end: float) -> float:

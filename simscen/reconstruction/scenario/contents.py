@@ -19,6 +19,10 @@ from simscen.reconstruction.scenario.scenario_text import ScenarioContents, Scen
 
 INVALID_GOAL_CODES = frozenset({"GOAL_OCCUPIED", "GOAL_OUTSIDE_MAP"})
 """Error codes of goals that no robot can reach. A scenario must expect them."""
+TIMEOUT_CODE = "NAVIGATE_TIMEOUT"
+"""Error code of a goal whose time was up, so that its timeout is known."""
+MAX_REFUSAL_S = 1.0
+"""Time within which a robot refuses a goal that it cannot reach. Later, something else went wrong."""
 MIN_WAIT_S = 0.3
 """Minimum time between a result and the next goal that counts as a wait at the goal."""
 MIN_TIMEOUT_S, TIMEOUT_FACTOR = 30.0, 2.0
@@ -124,7 +128,8 @@ def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
             name = f"{name}-{number + 1}"
         taken.add(name)
         following = drive.goals[number + 1] if number + 1 < len(drive.goals) else None
-        expect = goal.error if goal.error in INVALID_GOAL_CODES else ""
+        refused = goal.ended is not None and goal.ended - goal.sent < MAX_REFUSAL_S
+        expect = goal.error if refused and goal.error in INVALID_GOAL_CODES else ""
         yield ScenarioGoal(
             name, goal.pose, _timeout(goal, drive.duration), _goal_evidence(goal), expect, _wait(goal, following)
         )
@@ -139,6 +144,8 @@ def _goal_evidence(goal: RecordedGoal) -> Evidence:
 
 
 def _timeout(goal: RecordedGoal, duration: float) -> float:
+    if goal.ended is not None and goal.error == TIMEOUT_CODE:
+        return goal.ended - goal.sent
     if goal.ended is None:
         return max(MIN_TIMEOUT_S, math.ceil(UNFINISHED_TIMEOUT_FACTOR * (duration - goal.sent)))
     return max(MIN_TIMEOUT_S, math.ceil(TIMEOUT_FACTOR * (goal.ended - goal.sent)))

@@ -169,7 +169,7 @@ def _goals(contents: ScenarioContents) -> Iterator[str]:
     yield "goals:" if contents.goals else "goals: []"
     for goal in contents.goals:
         yield from _comment(goal.evidence.comment, "  ")
-        entry = f"name: {_text(goal.name)}, pose: {_pose(goal.pose)}, timeout: {goal.timeout:.0f} s"
+        entry = f"name: {_text(goal.name)}, pose: {_pose(goal.pose)}, timeout: {goal.timeout:g} s"
         entry += f", expect: {{error_code: {goal.expect}}}" if goal.expect else ""
         entry += f", on_reached: {{wait: {goal.wait:.1f} s}}" if goal.wait else ""
         yield f"  - {{{entry}}}"

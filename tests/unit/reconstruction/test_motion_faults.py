@@ -109,6 +109,17 @@ def test_a_base_that_drives_a_share_of_each_command_has_a_gain():
     assert (fault.kind, number(fault, "linear")) == ("gain", pytest.approx(70, abs=3))
 
 
+def test_wheels_of_one_side_that_drive_less_have_a_gain():
+    plain = with_motion(speeds)
+    moved = plain.odometry.values.copy()
+    left = 0.7 * moved[:, 3]
+    right = moved[:, 3].copy()
+    moved[:, 3], moved[:, 5] = (left + right) / 2, (right - left) / 0.3
+    (fault,) = command_faults(replace(plain, odometry=drives.signal(plain.odometry.times, moved)), separation=0.3)
+    assert (fault.target, fault.kind) == ("wheels", "gain")
+    assert [number(fault, key) for key in ("left", "right")] == pytest.approx([70, 100], abs=4)
+
+
 def test_a_base_that_never_exceeds_a_speed_is_saturated():
     (fault,) = command_faults(with_motion(lambda times: np.minimum(0.35, speeds(times))))
     assert (fault.kind, number(fault, "linear")) == ("saturation", pytest.approx(0.35, abs=0.02))
@@ -130,6 +141,14 @@ def test_a_belief_that_jumps_and_comes_back_is_a_fault_of_the_localizer():
     (fault,) = localizer_faults(replace(plain, belief=drives.signal(plain.belief.times, values)))
     assert (fault.kind, fault.begin, fault.duration) == ("jump", pytest.approx(4.0), pytest.approx(2.0))
     assert number(fault, "y") == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_belief_that_jumps_and_stays_is_a_fault_until_the_end():
+    plain = drives.drive()
+    values = plain.belief.values.copy()
+    values[plain.belief.times >= 4.0, 0] -= 1.0
+    (fault,) = localizer_faults(replace(plain, belief=drives.signal(plain.belief.times, values)))
+    assert (fault.kind, fault.begin, fault.duration) == ("jump", pytest.approx(4.0), None)
 
 
 def test_a_localizer_without_messages_while_the_robot_drives_is_off():
