@@ -18,6 +18,8 @@ NORMAL_LAG_S = 0.09
 """Lag of a base without faults, which needs a moment to accelerate."""
 MIN_COMMAND_M_S = 0.1
 IGNORED_SHARE, MIN_IGNORED_S = 0.1, 0.4
+KEPT_SHARE, MIN_KEPT_S = 0.5, 0.6
+"""Ratio of commanded to driven speed below which the base should slow down, for longer than braking takes."""
 STEADY_S, STEADY_CHANGE = 0.4, 0.05
 MIN_GAIN_ERROR = 0.08
 MIN_STEADY = 20
@@ -50,7 +52,7 @@ def command_faults(drive: RecordedDrive, separation: float = 0.0) -> Iterator[Fo
     shift = round(lag / GRID_S)
     if shift:
         commanded, driven, times = commanded[:-shift], driven[shift:], times[shift:]
-    ignored = _ignored(times, commanded, driven)
+    ignored = [*_ignored(times, commanded, driven), *_kept(times, commanded, driven)]
     yield from ignored
     if ignored:
         return
@@ -106,6 +108,18 @@ def _ignored(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
         evidence = Evidence("the base stands although it is commanded to drive", window.begin, window.end, "medium")
         found.append(FoundFault("cmd_vel", "off", {}, max(0.0, window.begin - 0.5), window.length + 0.5, evidence))
     return found
+
+
+def _kept(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
+    """Yield the times in which the base kept its speed although it was commanded to stop."""
+    speed = _averaged(driven[:, 0])
+    keeps = (np.abs(speed) > MIN_COMMAND_M_S) & (np.abs(commanded[:, 0]) < KEPT_SHARE * np.abs(speed))
+    for window in windows(keeps, times, MIN_KEPT_S, 0.1):
+        if float(np.std(speed[window.samples])) < CAP_SPREAD_M_S:
+            text = "the base keeps its speed although it is commanded to stop"
+            evidence = Evidence(text, window.begin, window.end, "medium")
+            begin = max(0.0, window.begin - STEADY_S)
+            yield FoundFault("cmd_vel", "stuck", {}, begin, window.end - begin, evidence)
 
 
 def _side_gains(times: Array, commanded: Array, driven: Array, separation: float) -> Iterator[FoundFault]:

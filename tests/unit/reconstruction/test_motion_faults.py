@@ -104,6 +104,15 @@ def test_a_base_that_stands_although_it_should_drive_loses_its_commands():
     assert faults[0].begin == pytest.approx(4.5, abs=0.2)
 
 
+def test_a_base_that_drives_on_although_it_should_stop_keeps_its_command():
+    def commanded(times):
+        return np.where((times > 5) & (times < 8), 0.0, 0.5)
+
+    (fault,) = command_faults(with_motion(lambda times: np.full(len(times), 0.5), commanded))
+    assert (fault.kind, fault.begin) == ("stuck", pytest.approx(4.6, abs=0.3))
+    assert fault.duration == pytest.approx(3.4, abs=0.4)
+
+
 def test_a_base_that_drives_a_share_of_each_command_has_a_gain():
     (fault,) = command_faults(with_motion(lambda times: 0.7 * speeds(times)))
     assert (fault.kind, number(fault, "linear")) == ("gain", pytest.approx(70, abs=3))
