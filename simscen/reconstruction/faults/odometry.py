@@ -138,6 +138,8 @@ def _fit(matrix: Array, values: Array) -> tuple[Array, Array, Array]:
 def _drift(steps: MotionSteps) -> Iterator[FoundFault]:
     """Yield the motion that the odometry reports while the robot stands."""
     rest = (np.abs(steps.true[:, :2]).max(axis=1) < REST_M) & (np.abs(steps.true[:, 2]) < REST_RAD)
+    # Wheels also turn in place when something holds the robot that is commanded to drive.
+    rest &= np.abs(steps.commanded).max(axis=1) < REST_M
     if int(rest.sum()) < MIN_REST_STEPS:
         return
     linear, _, angular = (np.median(steps.measured[rest], axis=0) / STEP_S).tolist()

@@ -56,6 +56,27 @@ def test_wheels_that_roll_further_for_a_while_slip():
     assert number(fault, "left") == pytest.approx(33, abs=5)
 
 
+def standing(odometry_speed, command):
+    """Return a drive that stands although its odometry moves."""
+    plain = drives.drive()
+    times = plain.odometry.times
+    moved = np.zeros((len(times), 6))
+    moved[:, 0] = odometry_speed * times
+    still = np.tile(plain.poses.values[0], (len(times), 1))
+    commands = np.tile([command, 0.0, 0.0], (len(times), 1))
+    signals = {"poses": still, "odometry": moved, "commands": commands}
+    return replace(plain, **{name: drives.signal(times, values) for name, values in signals.items()})
+
+
+def test_odometry_that_moves_at_rest_drifts():
+    (fault,) = odometry(standing(0.05, 0.0))
+    assert (fault.kind, number(fault, "linear")) == ("drift", pytest.approx(0.05, abs=0.002))
+
+
+def test_wheels_that_turn_in_place_against_an_obstacle_are_no_drift():
+    assert [fault.kind for fault in odometry(standing(0.05, 0.5)) if fault.kind == "drift"] == []
+
+
 def test_a_correct_gyroscope_has_no_fault():
     assert list(gyroscope_faults(drives.drive())) == []
 
