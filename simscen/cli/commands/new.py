@@ -26,7 +26,7 @@ def command(
     like: Annotated[
         str,
         typer.Option(
-            metavar="SCENARIO",
+            metavar="SCENARIO_SUFFIXES",
             help="Copy this scenario and the files it needs: a file, or the name of a shipped scenario.",
             autocompletion=completions.shipped,
         ),
@@ -132,7 +132,7 @@ def _target(name: str, out: Path | None, log: Path) -> Path:
     written = str(out) if out is not None else name or log.resolve().name.partition(".")[0]
     if is_unusable_name(written.rpartition("/")[2].partition(".")[0]):
         raise UsageError(f"{written!r} is not a valid scenario name")
-    return Path(written if written.endswith((".yaml", ".yml")) else f"{written}{SCENARIO[0]}")
+    return Path(written if written.endswith((".yaml", ".yml")) else f"{written}{SCENARIO_SUFFIXES[0]}")
 
 
 def _starter(file: Path, kind: str) -> list[Path]:

@@ -96,12 +96,12 @@ def _world_keys(parts: SceneParts) -> Keys:
     return () if parts.file.kind == "world" else ("world",)
 
 
-def _world_file(parts: SceneParts, display_name: str) -> str:
+def _world_file(parts: SceneParts, shown: str) -> str:
     """Return the name of the world file if the things of the world are written there; "" otherwise."""
     if parts.is_inline or parts.world is None:
         return ""
     name = parts.assets.library.sandbox.display_name(parts.world.path)
-    return "" if name == display_name or parts.world.spec is None else name
+    return "" if name == shown or parts.world.spec is None else name
 
 
 def _object_data(one: MapObject, parts: SceneParts, own: SourceNode | None) -> dict[str, Any]:
