@@ -59,6 +59,7 @@ pass: [{goals_reached: {}}, {collisions: {max: 0}}]
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
 @pytest.mark.parametrize("what", RUNS)
 def test_a_robot_reaches_its_goal_in(what: str, tmp_path: Path) -> None:

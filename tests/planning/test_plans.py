@@ -90,6 +90,7 @@ def test_plan_takes_the_cheaper_of_two_similar_paths(kind: str, number: int, see
     assert rates.along(points[:, :2]) < 1.045 * cheapest(rates, start, goal)
 
 
+@pytest.mark.slow
 def test_path_through_a_50_m_maze_is_found() -> None:
     """Regression: too many samples for the iterations of one search gave NO_VALID_PATH."""
     view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(2, 40, 27), RATE)).view
@@ -190,6 +191,7 @@ def test_plans_on_coarse_maps_are_found(resolution: float) -> None:
     assert rates.along(points[:, :2]) < 1.06 * cheapest(rates, start, goal)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("planner", [ompl, medial_axis])
 def test_a_passage_of_a_single_row_of_cells_is_found(planner: Callable[..., Planner]) -> None:
     world = Flatland().room(16, 12)

@@ -159,6 +159,7 @@ def test_json_and_markdown(folder: Callable[..., Path]) -> None:
     assert "| a | 1/1 | 0/1 |" in lines
 
 
+@pytest.mark.slow
 def test_equal_versions_are_called_worse_with_at_most_the_stated_probability() -> None:
     """Runs of three scenarios that fail by chance, and two metrics with noise; judged as the exit code is."""
     rng, alarms, trials, alpha = np.random.default_rng(7), 0, 300, 0.1

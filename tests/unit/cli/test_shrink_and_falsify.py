@@ -74,6 +74,7 @@ def test_only_what_causes_the_failure_is_left(tmp_path: Path) -> None:
     assert simscen(tmp_path, "run", file.name).returncode == 1
 
 
+@pytest.mark.slow
 def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(tmp_path: Path) -> None:
     varied = SCENARIO + "variations: {grid: {robot.pose.x: [4, 6], robot.motor_torque: [90 %, 100 %]}}\n"
     (tmp_path / "a.scenario.yaml").write_text(varied)
@@ -108,6 +109,7 @@ def test_unshrinkable_run_is_an_error(tmp_path: Path, options: list[str], told: 
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_spent_budget_still_writes_a_smaller_scenario(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     done = simscen(tmp_path, "shrink", "a.scenario.yaml", "--runs", 6)
@@ -129,6 +131,7 @@ variations:
 """
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("method", ["tpe", "sobol", "random"])
 def test_a_found_failure_is_written_as_a_scenario_that_fails(tmp_path: Path, method: str) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES)

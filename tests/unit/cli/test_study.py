@@ -124,6 +124,7 @@ def test_a_sequential_claim_stops_early_and_can_be_resumed(tmp_path: Path) -> No
     assert results(tmp_path)["study"] == found["study"]
 
 
+@pytest.mark.slow
 def test_chosen_values_have_no_interval_and_carry_no_claim(tmp_path: Path) -> None:
     pairwise = (
         "variations: {pairwise: {robot.pose.x: [1 m, 2 m, 3 m], robot.pose.y: [9, 10, 11], "
@@ -142,6 +143,7 @@ def test_chosen_values_have_no_interval_and_carry_no_claim(tmp_path: Path) -> No
     assert "not independent random draws" in claimed.stderr
 
 
+@pytest.mark.slow
 def test_conditions_are_met_and_their_share_is_reported(tmp_path: Path) -> None:
     text = SCENARIO + RANDOM + "  require: ['robot.pose.x > 1.4']\n"
     done = study(tmp_path, text, "--out", "out")
@@ -156,6 +158,7 @@ def test_conditions_are_met_and_their_share_is_reported(tmp_path: Path) -> None:
     assert "none of 10000 draws in a row meets the conditions" in impossible.stderr
 
 
+@pytest.mark.slow
 def test_a_failed_run_is_repeated_by_its_command(tmp_path: Path) -> None:
     study(tmp_path, SCENARIO + RANDOM.replace("count: 40", "count: 2000"), "--out", "out", "--runs", 8)
     runs = results(tmp_path)["runs"]

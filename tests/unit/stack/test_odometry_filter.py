@@ -158,7 +158,7 @@ CASES: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("case", CASES)
 def test_the_covariance_agrees_with_the_error(case: str) -> None:
     """The average NEES after 5 and after 20 s lies within the 99.9 % bounds for three degrees of freedom."""

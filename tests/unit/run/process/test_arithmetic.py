@@ -85,6 +85,7 @@ def test_logs_of_processors_with_avx2_are_equal(digest: Callable[..., str], core
     assert digest() == digest(**{**kernel_variables(), "OPENBLAS_CORETYPE": core})
 
 
+@pytest.mark.slow
 @needs_avx512
 def test_logs_with_kernels_for_avx512_differ(digest: Callable[..., str]) -> None:
     """This shows that the scenario above depends on the kernels."""

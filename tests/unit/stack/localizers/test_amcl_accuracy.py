@@ -36,6 +36,7 @@ def test_an_estimate_half_a_meter_and_twenty_degrees_off_is_corrected() -> None:
     assert measure.wrong_start(measure.PROB, SEEDS).found.all()
 
 
+@pytest.mark.slow
 def test_robot_without_initial_pose_localizes() -> None:
     assert measure.global_start(measure.MANY, SEEDS[:3]).found.all()
 
@@ -51,7 +52,7 @@ def test_people_moved_furniture_and_slipping_wheels_do_not_make_recovery_throw_a
     assert measure.among_people(measure.RECOVERING, SEEDS_AMONG_PEOPLE, 40.0).max() <= 1.5
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["clutter", "pillars"])
 def test_recovery_does_not_take_a_good_cloud_apart_with_what_it_puts_anywhere(world: str) -> None:
     """Errors of 5 and 16 m when as large a share as the averages asked for went anywhere with each scan, of 2.3 m in

@@ -42,7 +42,7 @@ def test_a_precise_gyroscope_corrects_the_heading_of_the_wheels() -> None:
     assert abs(subject.belief.pose.yaw) < 0.01
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("imu", [False, True])
 def test_the_covariance_agrees_with_the_error(imu: bool) -> None:
     """The average NEES lies within the 99.9 % bounds of a consistent filter with three degrees of freedom."""
