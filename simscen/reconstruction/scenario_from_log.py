@@ -69,7 +69,7 @@ def _write_valid(
 ) -> tuple[ScenarioContents, Findings]:
     """Write the scenario without the objects that `simscen validate` refuses, such as one inside the robot.
 
-    Return what was written. What else is refused is listed among what the log does not tell. Raises InvalidInput if
+    Return what was written. What else is refused is listed among what the log does not show. Raises InvalidInput if
     the scenario cannot be loaded.
     """
     while True:

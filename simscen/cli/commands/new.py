@@ -26,7 +26,7 @@ def command(
     like: Annotated[
         str,
         typer.Option(
-            metavar="SCENARIO_SUFFIXES",
+            metavar="SCENARIO",
             help="Copy this scenario and the files it needs: a file, or the name of a shipped scenario.",
             autocompletion=completions.shipped,
         ),
@@ -74,7 +74,7 @@ def command(
 
     With --from-log, it is reconstructed from a recorded drive: goals, objects that are not on the map, faults of
     sensors, and criteria that the drive held or broke. A comment gives the evidence for each part, and the first lines
-    list what the log does not tell. The log can be of simscen or of a real robot (MCAP, or a rosbag2 folder). --verify
+    list what the log does not show. The log can be of simscen or of a real robot (MCAP, or a rosbag2 folder). --verify
     runs the scenario, prints how near the run comes to the log, and writes a page that shows both.
 
     Exit code 0: written; 1: with --verify, an incident of the log does not happen again; 2: an input is unusable, or a

@@ -42,7 +42,7 @@ def write_scenario_from_log(options: FromLogOptions, verify: bool) -> None:
     name = escaped(str(options.out))
     print_text(f"wrote {name}; try: simscen run {name}")
     for unknown in made.contents.unknowns:
-        print_text(f"note: the log does not tell: {escaped(unknown)}", sys.stderr)
+        print_text(f"note: the log does not show: {escaped(unknown)}", sys.stderr)
     if verify:
         from simscen.cli.session.verification import verify_reconstruction
 

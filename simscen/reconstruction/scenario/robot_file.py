@@ -27,7 +27,7 @@ MAX_BEAMS = 4096
 
 @dataclass(frozen=True)
 class WrittenRobot:
-    """A robot file, what it is from in words, and what the log does not tell about the robot."""
+    """A robot file, what it is from in words, and what the log does not show about the robot."""
 
     file: Path
     evidence: str

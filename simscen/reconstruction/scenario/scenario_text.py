@@ -55,7 +55,7 @@ class ScenarioContents:
         navigation: Navigation action; "" for the default.
         time_limit: Time limit in s.
         evidence: Evidence by key of the scenario.
-        unknowns: What the log does not tell.
+        unknowns: What the log does not show.
     """
 
     name: str
@@ -88,7 +88,7 @@ def scenario_text(contents: ScenarioContents) -> str:
 def _lines(contents: ScenarioContents) -> Iterator[str]:
     yield from _comment(f"Written by `simscen new --from-log` from {contents.source}. Times count from its start.")
     if contents.unknowns:
-        yield from _comment("The log does not tell:")
+        yield from _comment("The log does not show:")
         for unknown in contents.unknowns:
             yield from _comment(f"- {unknown}", hanging="  ")
     yield "simscen: 1"
