@@ -308,7 +308,7 @@ def test_invalid_map_yaml_is_an_error(with_map, lines: str, place: str, told: st
 def test_map_with_huge_resolution_is_an_error(with_world, folder: Path) -> None:
     (folder / "map.pgm").write_bytes(b"P5 40 40 255\n" + b"\xff" * 1600)
     told = with_world(MAP.replace("0.05", "1000"), "map.yaml")
-    assert told.startswith("map.pgm: error[SC320] map too large: 40 x 40 pixels of 1000 m reach 40000 m")
+    assert told.startswith("map.pgm: error[SC320] map too large: 40 x 40 pixels of 1000 m extend to 40000 m")
 
 
 @pytest.mark.parametrize(

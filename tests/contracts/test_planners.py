@@ -41,7 +41,7 @@ def test_path_of_a_car_keeps_its_turning_radius(space: str, kind: str) -> None:
     """Also where the direction of travel changes."""
     contract = PlannerContract(Spec(type=kind, state_space=space, max_iterations=2000, improving_iterations=100), CAR)
     for seed in (1, 2, 3):
-        points = contract.planned(contract.build(), contract.view(), seed)
+        points = contract.plan(contract.build(), contract.view(), seed)
         step = np.hypot(*np.diff(points[:, :2], axis=0).T)
         turn = np.abs((np.diff(points[:, 2]) + np.pi) % (2 * np.pi) - np.pi)
         assert (turn <= step / CAR.turning_radius + 1e-3).all()

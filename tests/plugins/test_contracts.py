@@ -28,7 +28,7 @@ def test_types_of_the_package_meet_their_contracts(yardwork, kind: str, name: st
 
 @pytest.mark.parametrize(
     ("target", "told"),
-    [("reversing=0.1", 3), ("reversing", "e.g. reversing=1.0"), ("dwell=3", "3 is no JSON object")],
+    [("reversing=0.1", 3), ("reversing", "e.g. reversing=1.0"), ("dwell=3", "3 is not a JSON object")],
 )
 def test_a_bare_value_is_given_as_it_is_written(yardwork, target: str, told: int | str) -> None:
     if isinstance(told, int):

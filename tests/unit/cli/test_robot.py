@@ -208,7 +208,7 @@ def test_drifting_skid_steered_base_is_reported(check):
     code, output, _ = check("cart.urdf", cart_urdf=urdf(four, size="0.7 0.4 0.2", mass=45, z=0.25, i=1.5, x=-0.1))
     assert code == 1
     assert "FAILED  turn: off the spot" in output
-    assert "behind the middle of its wheels" in output
+    assert "behind the center of its wheels" in output
 
 
 MECANUM = "{{type: mecanum, wheel_radius: 0.05, wheel_separation: {}, wheel_base: 0.4}}"

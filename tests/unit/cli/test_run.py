@@ -16,7 +16,7 @@ import pytest
         (("--resume", "nowhere"), "nowhere: error[SC810] the folder has no events.jsonl"),
         (("--shard", "3/2"), "cannot read --shard 3/2"),
         (("--shard", "half"), "cannot read --shard half"),
-        (("--seed", "4294967295", "--repeat", "2"), "beyond the largest, 4294967295"),
+        (("--seed", "4294967295", "--repeat", "2"), "above the largest seed, 4294967295"),
     ],
 )
 def test_invalid_options_are_reported_before_any_run(simscen, tmp_path: Path, options, expected_text) -> None:

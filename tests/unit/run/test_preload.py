@@ -31,7 +31,7 @@ job = Job(0, loaded, loaded.key(1), folder, 60.0)
 warm_process._warm_up(job)
 before = set(sys.modules)
 inflation_layer.squared_distances = static_layer.squared_distances = None  # what a fork need not work out any more
-assert warm_process._perform(job, lambda seconds: None)["outcome"] == "passed"
+assert warm_process._execute(job, lambda seconds: None)["outcome"] == "passed"
 print("late:", *sorted(name for name in set(sys.modules) - before if name.split(".")[0] in ("simscen", "ompl", "PIL")))
 """
 
