@@ -12,7 +12,7 @@ from simscen.core.records.events import Event, EventKind
 from simscen.model.stack_files import ExternalStackSpec
 from simscen.run.external.build import build_external_stack
 from simscen.run.faults.injector import FaultInjector
-from simscen.run.faults.interfaces import CommandLink, FaultContexts, LocalizerWithFaults
+from simscen.run.faults.interfaces import CommandLink, FaultSettingFactory, LocalizerWithFaults
 from simscen.run.live_world.costmap_filters import CostmapFilters
 from simscen.run.live_world.director import Director
 from simscen.run.live_world.pedestrians import PedestrianSimulation
@@ -124,7 +124,7 @@ def _build_robot(
     world, sent = prepared.built.world, prepared.case.sent
     filters = CostmapFilters(prepared.stack, world.regions, prepared.masks)
     stage = LiveStage(world, simulation, robot, stack, filters, clock, sent, pedestrians, Streams(seed), stages)
-    settings = FaultContexts(
+    settings = FaultSettingFactory(
         prepared.robot,
         clock,
         lambda: simulation.tick,

@@ -1,4 +1,7 @@
-"""Handshake with an external stack: contents of HELLO and GOAL, and its WELCOME."""
+"""Handshake with an external stack: the content of HELLO and GOAL, and the parsed WELCOME.
+
+docs/reference/stack-protocol.md defines these frames.
+"""
 
 import json
 from dataclasses import dataclass, field, replace
@@ -18,8 +21,14 @@ from simscen.stack.protocols import RobotModel, Surroundings
 class RunParameters:
     """Parameters of a run that a stack receives besides its surroundings.
 
-    `control_period` is in ticks. By sensor name, `sensors` are reading types, `mounts` poses, `rates` in Hz.
-    `robot_name` is "" for a single robot.
+    Attributes:
+        control_period: Ticks between two commands.
+        sensors: Type of the readings by sensor name, a class of simscen.core.messages.sensor_data such as "Scan".
+        mounts: Pose in the base frame by sensor name; sensors without a mount are missing.
+        rates: Readings per second by sensor name; sensors without a known rate are missing.
+        robot_description: URDF of the robot.
+        stop_on_failure: Whether the stack must stop after a failed goal instead of going on to the next one.
+        robot_name: Name of the robot; "" for a single robot.
     """
 
     seed: int
@@ -40,7 +49,11 @@ def hello_content(
     sensor_topics: list[tuple[str, Topic]],
     answer_limit: float,
 ) -> dict[str, Any]:
-    """Return the content of HELLO; `sensor_topics` are pairs of sensor name and topic."""
+    """Return the content of HELLO.
+
+    `topic_table` numbers the topics of the run. `sensor_topics` are pairs of a sensor name and a topic of that sensor.
+    `answer_limit` is the wall time in s that the stack may take for each answer.
+    """
     masks = surroundings.masks
     sensor_of = {topic.name: sensor for sensor, topic in sensor_topics}
     return {
@@ -75,7 +88,7 @@ def hello_content(
 
 
 def goal_content(estimate: Estimate, goals: tuple[Goal, ...], parameters: RunParameters) -> dict[str, Any]:
-    """Return the content of GOAL."""
+    """Return the content of GOAL: the initial estimate of the pose, all goals, and how to drive to them."""
     pose = estimate.pose
     return {
         "initial_estimate": {"pose": None if pose is None else list(pose), "std": list(estimate.std)},
@@ -86,7 +99,7 @@ def goal_content(estimate: Estimate, goals: tuple[Goal, ...], parameters: RunPar
 
 
 def goal_data(goal: Goal) -> dict[str, Any]:
-    """Return a goal as in GOAL and PREEMPT."""
+    """Return a goal as JSON data, in the form in which GOAL and PREEMPT contain it."""
     x, y, yaw = map(float, goal.pose)
     tolerances = {"xy_tolerance": goal.xy_tolerance, "yaw_tolerance": goal.yaw_tolerance}
     drive = {"timeout": goal.timeout, "via": goal.via, "wait": goal.wait}
@@ -126,7 +139,10 @@ def _topic(topic: Topic, number: int, sensor_of: dict[str, str]) -> dict[str, An
 
 
 def _grid(grid: OccupancyGrid | None) -> dict[str, Any] | None:
-    """Return the facts of a grid that nav_msgs/msg/OccupancyGrid rounds."""
+    """Return the exact resolution (m), size (cells), and origin of a grid, without its cells; None for no grid.
+
+    The cells are sent as nav_msgs/msg/OccupancyGrid, which rounds the resolution to 32 bits.
+    """
     if grid is None:
         return None
     height, width = grid.shape
@@ -144,7 +160,16 @@ MAX_FIRST_ANSWER_S = 3700
 
 @dataclass(frozen=True)
 class Welcome:
-    """WELCOME of an external stack: name, version, requested topics, step mode, and further information."""
+    """WELCOME of an external stack: who it is, and what it requests.
+
+    Attributes:
+        name: Name of the stack.
+        version: Version of the stack.
+        topics: Names of the topics to send to the stack.
+        every_beat: Whether the stack requests a step at each beat with messages, not only when a command is due.
+        about: Further information that the stack gives about itself, for the log.
+        first_answer_limit: Wall time in s for the first answer; it counts only if it is longer than `answer_limit`.
+    """
 
     name: str = ""
     version: str = ""
@@ -152,7 +177,6 @@ class Welcome:
     every_beat: bool = False
     about: dict[str, Any] = field(default_factory=dict)
     first_answer_limit: float = 0.0
-    """Wall time in seconds that the first answer may take, if the stack requests more than the usual limit."""
 
     @classmethod
     def parse(cls, kind: int, body: bytes, topic_table: TopicTable, mode: Mode = "navigate_to_pose") -> "Welcome":
@@ -190,7 +214,7 @@ class Welcome:
         )
 
     def with_bye(self, body: bytes) -> "Welcome":
-        """Return a copy with the information of BYE. An invalid BYE is ignored, since the run is over."""
+        """Return a copy in which the `about` of a BYE frame is added. An invalid BYE is ignored: the run is over."""
         try:
             return replace(self, about=self.about | _about(wire.from_json(body)))
         except (ProtocolViolation, wire.Malformed):
@@ -198,7 +222,7 @@ class Welcome:
 
     @property
     def facts(self) -> dict[str, str]:
-        """Facts for the log."""
+        """Facts about the stack for the log header: name, version, protocol version, and `about` as JSON."""
         about = {"about": json.dumps(self.about, sort_keys=True)} if self.about else {}
         return {"name": self.name, "version": self.version, "protocol": str(wire.PROTOCOL), **about}
 

@@ -20,12 +20,13 @@ from simscen.sensors.lidar import floor_distances
 from simscen.sensors.sensor import SensorView
 from simscen.stack.protocols import Localizer
 
-RayCasterFactory = Callable[[TriangleMesh, frozenset[str]], RayCaster]
-"""Creates a ray caster for a static mesh and all moving objects except the named ones."""
+CreateRayCaster = Callable[[TriangleMesh, frozenset[str]], RayCaster]
+"""Function that creates a ray caster for a static mesh and all moving objects, except moving objects with these names.
+"""
 
 
-class FaultContexts:
-    """Creates the FaultSetting of each fault of one robot."""
+class FaultSettingFactory:
+    """Creates the FaultSetting, i.e. what a fault knows of its target, for the faults of one robot."""
 
     def __init__(
         self,
@@ -34,13 +35,14 @@ class FaultContexts:
         now: Callable[[], int],
         view: SensorView,
         mesh: TriangleMesh,
-        rays: RayCasterFactory,
+        create_ray_caster: CreateRayCaster,
     ) -> None:
+        """`now` returns the current tick, `view` is the robot as its sensors see it, `mesh` the static world."""
         self._robot, self._clock, self._now, self._view = robot, clock, now, view
-        self._rays = cache(lambda names: rays(_without(mesh, names), names))
+        self._ray_caster_without = cache(lambda names: create_ray_caster(_without(mesh, names), names))
 
     def __call__(self, entry: FaultEntry) -> FaultSetting:
-        """Return the setting for the fault of an entry."""
+        """Return the setting for the fault in this entry of the scenario."""
         sensor = self._robot.sensors.get(entry.sensor)
         return FaultSetting(
             separation=getattr(self._robot.drive, "wheel_separation", 0.0),
@@ -51,7 +53,7 @@ class FaultContexts:
         )
 
     def _sight(self, name: str, spec: object) -> Sight:
-        return HypotheticalSensor(spec, self._view, self._rays, self._now, name)
+        return HypotheticalSensor(spec, self._view, self._ray_caster_without, self._now, name)
 
 
 def _without(mesh: TriangleMesh, names: frozenset[str]) -> TriangleMesh:
@@ -61,17 +63,24 @@ def _without(mesh: TriangleMesh, names: frozenset[str]) -> TriangleMesh:
     return TriangleMesh(mesh.vertices, mesh.faces[kept], mesh.owners[kept], mesh.names)
 
 
-RayCasterWithout = Callable[[frozenset[str]], RayCaster]
-"""Creates a ray caster that ignores the named objects."""
+CreateRayCasterWithout = Callable[[frozenset[str]], RayCaster]
+"""Function that creates a ray caster for the world without the objects with these names, static or moving."""
 
 
 class HypotheticalSensor:
     """Readings that a lidar or camera would produce from another pose or without some objects (faults.base.Sight)."""
 
     def __init__(
-        self, spec: object, view: SensorView, rays: RayCasterWithout, now: Callable[[], int], name: str
+        self,
+        spec: object,
+        view: SensorView,
+        ray_caster_without: CreateRayCasterWithout,
+        now: Callable[[], int],
+        name: str,
     ) -> None:
-        self._spec, self._view, self._rays, self._now, self._name = spec, view, rays, now, name
+        """`spec` and `name` are those of the sensor, and `now` returns the current tick."""
+        self._spec, self._view, self._now, self._name = spec, view, now, name
+        self._ray_caster_without = ray_caster_without
         mount = getattr(spec, "mount", None)
         self._mount = mount if isinstance(mount, Mount) else Mount()
 
@@ -82,7 +91,7 @@ class HypotheticalSensor:
         flat = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))
         directions = flat @ pose.rotation().T
         origins = np.repeat([pose.position], len(directions), axis=0)
-        hits = self._rays(frozenset(without)).cast(origins, directions, 2 * scan.range_max)
+        hits = self._ray_caster_without(frozenset(without)).cast(origins, directions, 2 * scan.range_max)
         if error is None and self._mount.is_level:
             return hits
         return np.minimum(hits, floor_distances(pose.z, directions[:, 2]))
@@ -105,8 +114,8 @@ class CommandLink:
     """The cmd_vel connection between stack and base, in which commands can be late or lost.
 
     The stack sends one message each `period` ticks, and another one whenever the command changes. The base stops if no
-    message arrives for `timeout` ticks, like the drives of ros2_control (`cmd_vel_timeout`). The timeout is at least
-    one period, because the base could never drive otherwise.
+    message arrives for `timeout` ticks, like the drives of ros2_control (`cmd_vel_timeout`). A timeout shorter than one
+    period is extended to one period; otherwise the base would stop between any two messages.
     """
 
     def __init__(self, period: int, timeout: int) -> None:

@@ -16,7 +16,10 @@ from simscen.run.random_streams import stream_names
 
 
 def apply_map_faults(prepared: PreparedScenario, seed: int) -> PreparedScenario:
-    """Return the scenario with the disturbed map of each robot for this seed, and the indices of the faults applied."""
+    """Return the scenario in which map faults have changed the map of each robot, as drawn for this seed.
+
+    Its field `map_faults` lists the indices of the faults that changed the map.
+    """
     if not prepared.robots:
         return _apply_to_robot(prepared, Streams(seed))
     parts = {name: _apply_to_robot(part, Streams(seed, name)) for name, part in prepared.robots.items()}

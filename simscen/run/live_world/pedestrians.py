@@ -82,7 +82,7 @@ class PedestrianSimulation:
             self._crowd.remove(name)
 
     def has_room(self, place: Point, radius: float, walls_only: bool) -> bool:
-        """Return whether a pedestrian with this radius in m fits at a place."""
+        """Return whether a pedestrian with this radius in m fits at a place; `walls_only` ignores all but walls."""
         if walls_only or self._walls.distance(place) < radius:
             return self._walls.distance(place) >= radius
         surroundings = self._surroundings()

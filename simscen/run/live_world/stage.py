@@ -31,6 +31,10 @@ class LiveStage:
     """The world from the point of view of one robot: implements core.stage.Stage and keeps the robot's events.
 
     An event of the world is added to the events of all robots.
+
+    The lockstep loop runs in beats: ticks at which a sensor, a stack, or a truth sample is due. A beat can be due for
+    some of the robots only. An order is a request of an action to the robot's stack: a new goal, a cancellation, or a
+    change of zones. An order is delivered at once at a beat of this robot, else at the robot's next beat.
     """
 
     def __init__(
@@ -62,36 +66,36 @@ class LiveStage:
         self._clearance: float | None = None
         self._scan_ticks: dict[str, int] = {}
         self._travelled = 0.0
-        self._due = True
+        self._is_due = True
         self.pending_orders: list[Callable[[int], None]] = []
-        """Orders to deliver to the stack at its next beat."""
+        """Orders to deliver to the stack at the robot's next beat; each is called with the current tick."""
         self._history: tuple[Event, ...] = ()
         self.new_events: list[Event] = []
         """Events since the last call of `take_events`."""
         self.is_observed = True
-        """Whether a director uses the stage. Otherwise it is not updated at each beat."""
+        """Whether a Director observes this stage. If not, the stage need not be updated at each beat."""
 
     # Updates by the lockstep loop
 
-    def begin_beat(self, truth: Truth | None, due: bool = True) -> None:
-        """Update the robot's pose, from the truth sample if there is one.
+    def begin_beat(self, truth: Truth | None, is_due: bool = True) -> None:
+        """Update the robot's pose at a beat, from the truth sample if there is one.
 
-        If the beat is due for another robot only, the stack receives orders at its own next beat.
+        `is_due` states whether the beat is due for this robot. If not, orders wait until the robot's next beat.
         """
-        self._due = due
+        self._is_due = is_due
         previous = self._pose
         self._update_pose(truth)
         self._travelled += math.hypot(self._pose.x - previous.x, self._pose.y - previous.y)
 
     def deliver_orders(self, tick: int) -> None:
-        """Deliver the pending orders to the stack."""
+        """Deliver the pending orders to the stack. Called at a beat of this robot."""
         orders, self.pending_orders = self.pending_orders, []
         for order in orders:
             order(tick)
 
     def _send_order(self, order: Callable[[int], None]) -> None:
         self.pending_orders.append(order)
-        if self._due:
+        if self._is_due:
             self.deliver_orders(self.tick)
 
     def _update_pose(self, truth: Truth | None = None) -> None:
@@ -136,7 +140,7 @@ class LiveStage:
         return tuple(self._stages) if len(self._stages) > 1 else ()
 
     def of(self, robot: str) -> "LiveStage":
-        """Return the stage of another robot."""
+        """Return the stage of the robot with this name."""
         return self._stages[robot]
 
     @property
@@ -206,7 +210,7 @@ class LiveStage:
         self.record_world_event(Event(0, EventKind.OBJECT_SPAWNED, walker.name, data))
 
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Return whether a pedestrian with this radius in m fits at a place."""
+        """Return whether a pedestrian with this radius in m fits at a place; `walls_only` ignores all but walls."""
         return self._pedestrians.has_room(place, radius, walls_only)
 
     def rng(self, name: str) -> np.random.Generator:

@@ -1,7 +1,7 @@
 """Fast search of paths between upright solids, to find out whether a goal can be reached.
 
-If no path is found here, there may still be one; then `shortest_paths` searches. It needs NumPy and SciPy, whose import
-takes longer than this whole search.
+If no path is found here, there may still be one; then `shortest_paths` searches. That module needs NumPy and SciPy,
+whose import takes longer than this whole search.
 """
 
 import heapq
@@ -17,23 +17,23 @@ Point = tuple[float, float]
 Cell = tuple[int, int]
 
 STEP_M = 0.2
-"""Distance between the points of the search."""
-HALF_STEP_M = STEP_M * math.sqrt(0.5)
-"""Maximum distance of a point on a diagonal move from the nearer end."""
+"""Distance between neighboring points of the search grid, along x and y."""
+HALF_DIAGONAL_STEP_M = STEP_M * math.sqrt(0.5)
+"""Half of the length of a diagonal move: no point of a move is farther from the nearer end of the move."""
 SAMPLING_MARGIN_M = 0.02
 """Additional clearance, because straight lines are checked at single points."""
 MAX_POINTS = 4000
-"""Maximum number of points of a search. For more, the search with SciPy is faster."""
+"""Maximum number of grid points that a search visits. Beyond it, the search with SciPy is faster."""
 
 
 class SimplePaths:
-    """Paths of a disc of `radius` m between upright solids with convex bases."""
+    """Finds paths of a disc of `radius` m that avoid upright prisms with convex bases."""
 
     def __init__(self, prisms: Iterable[UprightPrism], radius: float) -> None:
         self._radius = radius
         self._lengths: dict[tuple[Point, Point], float] = {}
         self._near: dict[Cell, list[UprightPrism]] = {}
-        search_radius = radius + HALF_STEP_M + SAMPLING_MARGIN_M
+        search_radius = radius + HALF_DIAGONAL_STEP_M + SAMPLING_MARGIN_M
         for prism in prisms:
             left, bottom, right, top = prism.rectangle
             columns = range(math.floor(left - search_radius), math.floor(right + search_radius) + 1)
@@ -42,7 +42,7 @@ class SimplePaths:
                 self._near.setdefault(bucket, []).append(prism)
 
     def length(self, start: Point, goal: Point) -> float:
-        """Return the length in m of a path, which may not be the shortest; inf if none was found."""
+        """Return the length in m of a path from start to goal, not always the shortest one; inf if none was found."""
         if (start, goal) not in self._lengths:
             self._lengths[start, goal] = self._length(start, goal)
         return self._lengths[start, goal]
@@ -58,7 +58,10 @@ class SimplePaths:
         return self._search(start, goal, last_leg)
 
     def can_enter(self, start: Point, towards: Point, is_inside: Callable[[Point], bool]) -> bool:
-        """Return whether a path was found to a point for which `is_inside` is true, searching towards `towards`."""
+        """Return whether a path was found from `start` to any point for which `is_inside` is true.
+
+        The search prefers points near `towards`.
+        """
         return (
             is_inside(start)
             or self._search(start, towards, lambda here: 0.0 if is_inside(here) else math.inf) < math.inf
@@ -90,7 +93,7 @@ class SimplePaths:
 
     def _can_move(self, here: Point, there: Point, first: bool) -> bool:
         """Return whether the disc can move to a neighbor. Only the start may have less clearance than required."""
-        return self._has_clearance(there, HALF_STEP_M) and (not first or self._is_clear(here, there))
+        return self._has_clearance(there, HALF_DIAGONAL_STEP_M) and (not first or self._is_clear(here, there))
 
     def _is_clear(self, a: Point, b: Point) -> bool:
         pieces = max(1, math.ceil(math.dist(a, b) / (2 * SAMPLING_MARGIN_M)))
@@ -109,7 +112,10 @@ MOVES = [move for move in product((-1, 0, 1), repeat=2) if move != (0, 0)]
 
 
 def simple_paths_between(solids: Iterable[Solid], radius: float, z_range: ZRange) -> SimplePaths | None:
-    """Return the paths between solids between two heights; None if one of these solids is not upright."""
+    """Return the search for paths that avoid the solids in a range of heights.
+
+    Returns None if one of the solids is not an upright prism with a convex base.
+    """
     prisms = [upright_prism(solid) for solid in solids]
     if any(prism is None for prism in prisms):
         return None
