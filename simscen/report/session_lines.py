@@ -36,9 +36,10 @@ SYMBOLS: dict[Outcome, tuple[str, Role]] = {
 
 @dataclass(frozen=True)
 class RunNaming:
-    """Short unique names of the runs of a session, padded to `width`.
+    """Short unique names of the runs of a session, padded to `width` characters.
 
-    `every_seed` adds the seed to each name, and `prefix` is removed from IDs. `columns` is the width of the terminal.
+    If `every_seed` is true, each name contains the seed. `prefix` is removed from the scenario IDs. `columns` is the
+    width of the terminal; None for no limit.
     """
 
     every_seed: bool = False
@@ -122,9 +123,10 @@ def violation_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
-    """Yield a line such as "13 passed, 1 failed · 402 s simulated in 4.1 s · junit.xml", and a line with the report.
+    """Yield a line such as "13 passed, 1 failed · 402 s simulated in 4.1 s · junit.xml", and a line with the page.
 
-    `unfinished` are numbers of runs that were not finished, by description.
+    `unfinished` is the number of runs that did not start or did not finish, by a description such as "not run". The
+    page is report.html.
     """
     yield (*outcome_counts(session, unfinished), *_timing_and_junit(session))
     if session.page:
@@ -134,7 +136,8 @@ def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> I
 def outcome_counts(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledText]:
     """Yield the numbers of outcomes, for example "13 passed, 1 failed, 2 errors, 3 not run".
 
-    Runs in `unfinished` have errors in the reports, but are counted separately here.
+    `unfinished` is the number of runs that did not start or did not finish, by a description such as "not run". They
+    are part of `session.errors`, but this line counts them separately.
     """
     counts: list[tuple[int, str, Role]] = [
         (session.passed, "passed", "good"),
@@ -286,7 +289,12 @@ def _statuses(run: RunFinished) -> list[tuple[str, str]]:
 
 
 def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
-    """Yield a line with the numbers of outcomes, and a line with the report and the option to resume the session."""
+    """Yield the two last lines of an interrupted session.
+
+    The first line has the numbers of outcomes, with `unfinished` as in `outcome_counts`. The second line has the path
+    of report.html and the option --resume that continues the session; each is omitted if there is no such file or
+    folder.
+    """
     yield (StyledText("interrupted: ", "warning"), *outcome_counts(session, unfinished))
     page = (
         [StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page)] if session.page else []

@@ -13,11 +13,15 @@ _new_pose = tuple.__new__  # faster than the constructor of the class
 
 
 class PredictedPoses:
-    """Poses of objects at `ticks`: moving ones (`names`) in `table` (tick, object, pose), others in `everything`."""
+    """Poses of objects at `ticks`, as far as scripted paths determine them.
 
-    def __init__(self, ticks: range, names: tuple[str, ...], table: Array, everything: Mapping[str, Pose3]) -> None:
-        self.ticks, self.names, self.table, self.everything = ticks, names, table, everything
-        self.complete = len(names) == len(everything)
+    `names` are the objects that move during these ticks, and `table` (ticks, names, 7) has their poses. `all_objects`
+    has a pose of each object by name, moving or at rest; only the poses of objects at rest are used.
+    """
+
+    def __init__(self, ticks: range, names: tuple[str, ...], table: Array, all_objects: Mapping[str, Pose3]) -> None:
+        self.ticks, self.names, self.table, self.all_objects = ticks, names, table, all_objects
+        self.complete = len(names) == len(all_objects)
         """Whether all objects move."""
 
     def at(self, tick: int) -> "PosesAtTick | None":
@@ -54,7 +58,7 @@ class PosesAtTick(Mapping[str, Pose3]):
 
     @property
     def table(self) -> Array:
-        """Poses (object, pose) of the moving objects."""
+        """Poses (names, 7) of the moving objects: x, y, z and a quaternion."""
         row: Array = self.predicted.table[self.row]
         return row
 
@@ -62,20 +66,20 @@ class PosesAtTick(Mapping[str, Pose3]):
         predicted = self.predicted
         column = predicted.columns.get(name)
         return (
-            predicted.everything[name]
+            predicted.all_objects[name]
             if column is None
             else _new_pose(Pose3, predicted.table[self.row, column].tolist())
         )
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.predicted.everything)
+        return iter(self.predicted.all_objects)
 
     def __len__(self) -> int:
-        return len(self.predicted.everything)
+        return len(self.predicted.all_objects)
 
 
 class BatchPathSampler:
-    """Paths at heights z, sampled at many times at once, bit-identical to `PathSampler.at`.
+    """Samples many paths at many times at once, bit-identical to `PathSampler.at`. Each path is at a constant height.
 
     Segments with rotation or easing are sampled one by one, because a sine of numpy may differ in the last bit. Most
     segments have a constant heading.

@@ -22,7 +22,7 @@ _EVIDENCE: dict[str, frozenset[Evidence]] = {
 
 
 class MessageCounts:
-    """Counts the messages of each topic and checks the order of their times."""
+    """Counts the messages of each topic, checks the order of their times, and compares the counts with the log's."""
 
     def __init__(self) -> None:
         self._topics: dict[int, str] = {}
@@ -32,7 +32,7 @@ class MessageCounts:
         self._expected: dict[str, int] | None = None
 
     def add_channel(self, channel: int, topic: str, message_type: str) -> None:
-        """Add a channel."""
+        """Add a channel of the log, by its number; it holds the messages of one topic."""
         self._topics[channel] = topic
         if message_type == topics.SCAN_TYPE:
             self._scans.add(topic)
@@ -54,7 +54,11 @@ class MessageCounts:
             }
 
     def coverage(self) -> LogCoverage:
-        """Return the evidence with missing messages, and the number of messages as the reason."""
+        """Return which evidence the log lacks because it holds fewer messages than were recorded.
+
+        Evidence is missing if all messages of its topic are lost, and partial if some of them are. The reason states
+        both counts. Without recorded counts, all evidence is partial.
+        """
         if self._expected is None:
             return LogCoverage(partial=dict.fromkeys(Evidence, NO_COUNTS))
         found = {topic: self._found.get(channel, 0) for channel, topic in self._topics.items()}

@@ -61,12 +61,16 @@ class PathPacker:
     def __init__(self, frame: str) -> None:
         head = Template().slot("iI", "*stamp").string(frame).slot("I", "count")
         self._pack = head.packer()
-        self._first = self._pose(frame, len(head.buffer) - len(HEADER))
-        self._next = self._pose(frame, 0)
+        self._first = self._frame_bytes(frame, len(head.buffer) - len(HEADER))
+        self._following = self._frame_bytes(frame, 0)
 
     @staticmethod
-    def _pose(frame: str, start: int) -> bytes:
-        """Return the bytes of a pose between its stamp and its numbers."""
+    def _frame_bytes(frame: str, start: int) -> bytes:
+        """Return the constant part of a geometry_msgs/msg/PoseStamped: the frame name, padded to eight bytes.
+
+        It is preceded by the stamp and followed by the seven numbers of the pose. The message starts `start` bytes
+        after the begin of the alignment.
+        """
         pose = Template(prefix=b"", start=start).put("iI", 0, 0).string(frame).align(8)
         return bytes(pose.buffer[8:])
 
@@ -76,10 +80,10 @@ class PathPacker:
         if not len(points):
             return head
         poses, stamp_bytes = planar_poses(points).astype("<f8"), struct.pack("<iI", *stamp)
-        first, other = stamp_bytes + self._first, stamp_bytes + self._next
-        rest = np.empty((len(points) - 1, len(other) + 56), dtype=np.uint8)
-        rest[:, : len(other)] = np.frombuffer(other, dtype=np.uint8)
-        rest[:, len(other) :] = poses[1:].view(np.uint8).reshape(-1, 56)
+        first, following = stamp_bytes + self._first, stamp_bytes + self._following
+        rest = np.empty((len(points) - 1, len(following) + 56), dtype=np.uint8)
+        rest[:, : len(following)] = np.frombuffer(following, dtype=np.uint8)
+        rest[:, len(following) :] = poses[1:].view(np.uint8).reshape(-1, 56)
         return b"".join((head, first, poses[0].tobytes(), rest.tobytes()))
 
 
@@ -105,10 +109,10 @@ class TransformsPacker:
 
     def __init__(self) -> None:
         self._first_packers: dict[tuple[str, str, int], Callable[[Stamp, Pose3], bytes]] = {}
-        self._other_packers: dict[tuple[str, str], Callable[[Stamp, Pose3], bytes]] = {}
+        self._following_packers: dict[tuple[str, str], Callable[[Stamp, Pose3], bytes]] = {}
 
     def __call__(self, links: list[Link]) -> bytes:
-        """Encode links."""
+        """Encode one message with a transform for each link."""
         if not links:
             return HEADER + bytes(4)
         frame, child, stamp, pose = links[0]
@@ -117,13 +121,14 @@ class TransformsPacker:
         if pack is None:
             pack = self._first_packers[key] = _transform_packer(frame, child, HEADER + struct.pack("<I", len(links)), 4)
         message = pack(stamp, pose)
-        return message if len(links) == 1 else b"".join((message, *map(self._pack_other, links[1:])))
+        return message if len(links) == 1 else b"".join((message, *map(self._pack_following, links[1:])))
 
-    def _pack_other(self, link: Link) -> bytes:
+    def _pack_following(self, link: Link) -> bytes:
+        """Encode a transform that is not the first one of its message."""
         frame, child, stamp, pose = link
-        pack = self._other_packers.get((frame, child))
+        pack = self._following_packers.get((frame, child))
         if pack is None:
-            pack = self._other_packers[frame, child] = _transform_packer(frame, child, b"", 0)
+            pack = self._following_packers[frame, child] = _transform_packer(frame, child, b"", 0)
         return pack(stamp, pose)
 
 
@@ -167,11 +172,14 @@ def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
 Bytes = npt.NDArray[np.uint8]
 
 
-class PrecomputedTransforms:
-    """Encoder of all transforms but the first of tf2_msgs/msg/TFMessage, for many messages with the same links."""
+class TransformBatchPacker:
+    """Encoder of transforms with the same links for many tf2_msgs/msg/TFMessage, in one call.
+
+    Each message has another transform before these, because the first transform has another layout.
+    """
 
     def __init__(self, links: Sequence[tuple[str, str]]) -> None:
-        """Each link is (frame, child frame)."""
+        """Prepare the layout of the transforms; each link is (frame, child frame)."""
         message = Template(prefix=b"")
         self._slices = list[tuple[slice, slice]]()
         for frame, child in links:
@@ -181,10 +189,14 @@ class PrecomputedTransforms:
             self._slices.append((stamp, _reserve(message, "7d")))
         self._empty = np.frombuffer(message.buffer, np.uint8)
         self.size = len(self._empty)
-        """Number of bytes per message."""
+        """Number of bytes of the transforms of one message."""
 
     def __call__(self, stamps: Sequence[Stamp], poses: Array) -> Bytes:
-        """Return the bytes (n, size) of n messages. `poses` (n, links, 7) are those of the children in their frames."""
+        """Return the bytes (n, size) of the transforms of n messages.
+
+        All transforms of a message have its stamp. `poses` (n, links, 7) are the poses of the child frames in their
+        frames.
+        """
         packed = np.tile(self._empty, (len(poses), 1))
         times, numbers = np.array(stamps, "<u4").view(np.uint8), np.ascontiguousarray(poses, "<f8").view(np.uint8)
         for column, (stamp, pose) in enumerate(self._slices):

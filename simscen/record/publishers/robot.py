@@ -20,7 +20,7 @@ from simscen.record.messages.encode_arrays import (
     Bytes,
     ParticleCloudPacker,
     PathPacker,
-    PrecomputedTransforms,
+    TransformBatchPacker,
     TransformsPacker,
 )
 from simscen.record.publishers.channels import BatchWriter, LogPublisher, MessageSink, NamespacedPublisher
@@ -192,7 +192,7 @@ class TruthPublisher:
         if previous is not None and previous.predicted.names == names:
             transforms, layout = previous.transforms, previous.layout
         else:
-            transforms = PrecomputedTransforms([(frame_names.MAP, frame_names.object_frame(name)) for name in names])
+            transforms = TransformBatchPacker([(frame_names.MAP, frame_names.object_frame(name)) for name in names])
             tf = encode.transforms([(frame_names.MAP, self._frame, "pose")], len(names), transforms.size)
             layout = self._out.batch_writer((*self._common_layouts, (topics.TF, tf)))
         stamps = [self._time.stamp(tick) for tick in predicted.ticks]
@@ -209,6 +209,6 @@ class _PrecomputedBatch(NamedTuple):
     """Messages for objects whose poses are known in advance; `packed` are the transforms of each tick."""
 
     predicted: PredictedPoses
-    transforms: PrecomputedTransforms
+    transforms: TransformBatchPacker
     layout: BatchWriter
     packed: Bytes
