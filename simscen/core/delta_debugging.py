@@ -9,10 +9,10 @@ FirstFailing = Callable[[Sequence[Sequence[Part]]], int | None]
 
 
 def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[Part]:
-    """Return a subset of parts from which no single part can be removed, in their order.
+    """Return a subset of the parts that still has the property, but loses it if any single part is removed.
 
-    `first_failing` gets candidates, each a subset of the parts, in the order in which they are preferred. (Zeller and
-    Hildebrandt: Simplifying and Isolating Failure-Inducing Input, 2002; with complements only.)
+    `first_failing` gets candidates, each a subset of the parts in their original order; earlier candidates are
+    preferred. (Zeller and Hildebrandt: Simplifying and Isolating Failure-Inducing Input, 2002; with complements only.)
     """
     remaining = list(parts)
     if not remaining or first_failing([[]]) is not None:

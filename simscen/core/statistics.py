@@ -77,8 +77,8 @@ Z_95 = 1.959963984540054
 def wilson_interval(successes: float, runs: int, z: float = Z_95) -> tuple[float, float]:
     """Return the Wilson score interval of a rate after `successes` of `runs`.
 
-    It is also valid at 0 and 1, where the normal interval has no width. (Wilson 1927, JASA 22(158).) Half a success is
-    one of two runs that count as one. Raises ValueError without runs.
+    It is also valid at 0 and 1, where the normal interval has no width. (Wilson 1927, JASA 22(158).) If two runs count
+    as one, and one of them succeeded, that is half a success. Raises ValueError without runs.
     """
     if runs < 1 or not 0 <= successes <= runs:
         raise ValueError(f"{successes} successes of {runs} runs")

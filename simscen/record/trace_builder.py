@@ -154,7 +154,7 @@ class TraceBuilder:
     """
 
     def __init__(self, clock: Clock, thinning: Thinning | None = None) -> None:
-        """`thinning` is that of a log that receives each moment next, so that each sample is checked only once."""
+        """Share `thinning` with a Recorder that gets each moment right afterwards, to check each sample only once."""
         self._clock = clock
         self._thinning = Thinning(clock.rate) if thinning is None else thinning
         self._rows = TraceRows()

@@ -31,10 +31,10 @@ TIME_LIMIT = "time limit"
 
 
 class EndCondition:
-    """Condition that ends a robot's part of a run: `linger` after its navigation task, or at the time limit.
+    """Condition that ends a robot's part of a run: `linger` seconds after its navigation task, or at the time limit.
 
-    A goal that an event sends in the meantime cancels the end. A run ends at a regular sample of the truth, or
-    exactly at the time limit, where an additional sample is taken.
+    A goal that an event sends during these `linger` seconds cancels the end. A run ends at a regular sample of the
+    truth, or exactly at the time limit, where an additional sample is taken.
     """
 
     def __init__(self, clock: Clock, time_limit: float, linger: float, idle: bool = False) -> None:

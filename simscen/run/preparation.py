@@ -76,7 +76,7 @@ class PreparedScenario:
 
     @property
     def each(self) -> Mapping[str, "PreparedScenario"]:
-        """The prepared scenario of each robot by name; a single robot has no name."""
+        """The prepared scenario of each robot by name; the name of a single robot is ""."""
         return self.robots or {ROBOT_NAME: self}
 
     @property
@@ -86,11 +86,11 @@ class PreparedScenario:
 
 
 BuildWorld = Callable[[LoadedScenario, float], BuiltWorld]
-"""Returns the built world of a scenario, mapped by a lidar at a height in m."""
+"""Returns the built world of a scenario; its map is drawn as a lidar at this height in m sees the world."""
 
 
 FindLegs = Callable[[BuiltWorld, Sequence[tuple[Pose2, Goal]], float], list[Leg]]
-"""Returns the shortest path of a disc with a radius from each pose to its goal."""
+"""Returns the shortest path from each pose to its goal, for a disc with this radius in m."""
 
 
 def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:

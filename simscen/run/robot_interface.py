@@ -150,7 +150,7 @@ class TickSchedule:
         return remaining
 
 
-def _is_covered_by(offset: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Return whether the ticks of `other` include all ticks of `offset`; both are (period, offset)."""
-    (period, ticks), (other_period, other_ticks) = offset, other
-    return offset != other and period % other_period == 0 and ticks % other_period == other_ticks
+def _is_covered_by(one: tuple[int, int], other: tuple[int, int]) -> bool:
+    """Return whether `other` includes all ticks of `one`; both are (period, offset) in ticks, and must differ."""
+    (period, offset), (other_period, other_offset) = one, other
+    return one != other and period % other_period == 0 and offset % other_period == other_offset

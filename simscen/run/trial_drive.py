@@ -68,7 +68,7 @@ class RestingState:
 
 @dataclass(frozen=True)
 class _Leg:
-    """A motion from rest to rest: m forward, m to the left, and rad, simultaneously."""
+    """A motion from rest to rest: `forward` and `left` in m, and `turn` in rad counterclockwise, all at once."""
 
     forward: float = 0.0
     left: float = 0.0

@@ -71,6 +71,7 @@ def disc_outline(center: tuple[float, float], radius: float) -> Polygon:
 Behavior = Literal["regular", "impassive", "surprised", "scared", "curious", "threatening"]
 """Reaction of a pedestrian to the robot, with the names of HuNavSim."""
 Unseen = Literal["robots", "people", "objects"]
+"""What a pedestrian can ignore; "people" are other pedestrians."""
 Repeat = Literal["once", "loop", "back_and_forth"]
 
 BODY_HEIGHT_M = 1.7

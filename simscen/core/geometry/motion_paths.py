@@ -15,6 +15,7 @@ MAX_STEP_M = 0.1
 """Longest distance that any part of a scripted body may move per tick. Contact is tested once per tick, so a faster
 body could pass through a robot unnoticed. All robots are wider than this."""
 Step = tuple[float, float, float]
+"""Displacement along x and y in m, and rotation in rad; or their rates per second."""
 _new_pose = tuple.__new__  # faster than the constructor of the class
 
 
@@ -76,9 +77,11 @@ class PathSampler:
 
 
 class PathSegment(NamedTuple):
-    """Segment between two poses of a path: start time, duration, start pose, and displacement.
+    """Segment between two poses of a path.
 
-    `qz` and `qw` are the quaternion of the initial heading.
+    `begin` and `duration` are in s of path time. `x`, `y` and `yaw` are the start pose. `dx` and `dy` are the
+    displacement in m, and `turn` is the rotation in rad over the whole segment. `qz` and `qw` are the quaternion of the
+    initial heading.
     """
 
     begin: float

@@ -20,9 +20,10 @@ AT_BASE = Pose3()
 def level_scan(scan: Scan) -> Scan:
     """Return the scan that a level lidar at the same place would report, as pointcloud_to_laserscan does.
 
-    Each beam reports the nearest hit that a tilted beam has in its direction; it is nan if there is none between
-    MIN_HEIGHT_M and MAX_HEIGHT_M, since what is above or below remains unknown. For a lidar that is mounted upside
-    down this is exact. Other directions are rounded to the nearest beam.
+    Each level beam reports the nearest range of the tilted beams in its direction. Hits count only between MIN_HEIGHT_M
+    and MAX_HEIGHT_M; a tilted beam without a hit counts as inf. Without such a beam, the range is nan, because what is
+    at these heights remains unknown. For a lidar that is mounted upside down this is exact. Other directions are
+    rounded to the nearest beam.
     """
     if scan.tilted_mount is None:
         return scan
@@ -43,7 +44,10 @@ def level_scan(scan: Scan) -> Scan:
 
 
 def imu_in_base_frame(imu: Imu) -> Imu:
-    """Return the reading along the axes of the base; it keeps the centripetal acceleration at the sensor."""
+    """Return the reading rotated to the axes of the base.
+
+    The acceleration remains that at the position of the sensor, including the centripetal acceleration there.
+    """
     if imu.mount == AT_BASE:
         return imu
     quaternion = imu.mount.quaternion

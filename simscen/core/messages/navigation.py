@@ -57,7 +57,10 @@ _THROUGH_POSES = {**{code + 100: code for code in range(200, 209)}, **{code + 10
 
 
 def error_code(number: int) -> ErrorCode | int:
-    """Return the code of a number, with the code for one pose also for several poses; unknown numbers unchanged."""
+    """Return Nav2's error code for a number, or an unknown number itself.
+
+    The codes of the actions through several poses become those of the same errors of the actions to one pose.
+    """
     number = _THROUGH_POSES.get(number, number)
     return ErrorCode(number) if number in {int(code) for code in ErrorCode} else number
 
@@ -106,7 +109,10 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Initial estimate for a localizer: `pose` with standard deviations (m, m, rad); None for any pose on the map."""
+    """Initial estimate for a localizer: `pose`, or None if the robot can be anywhere on the map.
+
+    `std` are the standard deviations of x, y (m) and yaw (rad).
+    """
 
     pose: Pose2 | None
     std: tuple[float, float, float] = (0.5, 0.5, 0.2618)

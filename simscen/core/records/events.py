@@ -86,10 +86,10 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class DisturbanceOutcome:
-    """Outcome of a disturbance: the ticks at which it `fired`, and whether it changed anything at any of them.
+    """Outcome of a disturbance: the ticks at which its trigger `fired`, and whether it changed anything (`happened`).
 
-    `effect` describes in one line what it changed, or why it had no effect; `tick` is the first at which it did, or
-    tried to.
+    `effect` describes in one line what the disturbance changed, or why it had no effect. `tick` is the first tick at
+    which it changed something, or at which it failed to.
     """
 
     disturbance: Disturbance

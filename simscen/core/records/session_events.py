@@ -75,9 +75,9 @@ class ScenarioChange:
 class BaselineComparison:
     """Comparison of one stack or session with the baseline, over the `pairs` of completed runs.
 
-    `broken` pairs contain a run that could not be completed, `alone` runs have no partner. `parted` counts the pairs of
-    which only one reached the last goal; only their collisions are compared. `p` is the p-value of the sign test of the
-    flips. `changes` are the significant changes.
+    `broken` counts the pairs with a run that could not be completed, `alone` the runs without a partner, and `parted`
+    the pairs of which only one run reached the last goal; of the latter, only collisions are compared. `p` is the
+    p-value of the sign test of the flips. `changes` are the significant changes.
     """
 
     stack: str

@@ -98,8 +98,8 @@ POSITION = frozenset({Evidence.TRUTH, Evidence.ALIGNMENT})
 class LogCoverage:
     """Evidence that a log lacks, each with the reason: `missing` completely, or `partial` for a part of the time.
 
-    `recorded_by_simscen` is False for the log of another recorder, whose signals may be irregular or not finite. In a
-    log of simscen's own, that means that the simulation or the log is broken.
+    `recorded_by_simscen` is False for the log of another recorder, whose signals may be irregular or not finite. If
+    signals in simscen's own logs are irregular or not finite, the simulation or the log is broken.
     """
 
     missing: Mapping[Evidence, str] = field(default_factory=dict)

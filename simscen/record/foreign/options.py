@@ -26,7 +26,7 @@ class ForeignLogOptions:
 
     Attributes:
         truth: Ground truth: a topic, or two frames such as `map:base_link`. None if there is no ground truth.
-        topics: Names of topics that differ from TOPICS.
+        topics: Topic by the names in TOPICS, where the log uses other topics than the defaults.
         tick_rate: Ticks per second of the trace.
         clock: Source of times.
         same_frame: Treat the frame of the ground truth as the map frame, even if its name differs.

@@ -85,7 +85,7 @@ def _edges(outline: Array, height: float) -> Iterator[Array]:
 
 
 OBJECT_COLOR: Color = (0.0, 0.41, 0.58, 1.0)
-PERSON_COLOR: Color = (0.48, 0.24, 0.51, 1.0)
+PEDESTRIAN_COLOR: Color = (0.48, 0.24, 0.51, 1.0)
 DOOR_COLOR: Color = (0.59, 0.38, 0.0, 1.0)
 KEEPOUT_COLOR: Color = (0.76, 0.19, 0.06, 1.0)
 SPEED_COLOR: Color = (0.9, 0.62, 0.0, 1.0)
@@ -154,7 +154,7 @@ class ScenePublisher:
         for name, event in self._spawned.items():
             group, color = "things", OBJECT_COLOR
             if event.data.get("person"):
-                group, color = "people", PERSON_COLOR
+                group, color = "people", PEDESTRIAN_COLOR
             elif name in self._doors:
                 group, color = "doors", DOOR_COLOR
             frame = frame_names.object_frame(name)

@@ -29,8 +29,9 @@ class SensorPublisher:
     """Publishes readings when the stack receives them. The stamp of a message is the time of the measurement.
 
     The first sensor of a type gets the default topic, for example /scan, and others a topic with their name in front.
-    `sensors` are reading types by sensor name, in this order; `declared` are their topics. A sensor that is missing
-    there gets its topic with its first reading. `mounts` are the poses of sensors on the base.
+    `sensors` maps sensor names to reading types, in the order in which sensors get their topics; `declared` lists these
+    topics with the sensor names. A sensor that is missing in `sensors` gets its topic with its first reading. `mounts`
+    are the poses of sensors on the base.
     """
 
     def __init__(

@@ -134,7 +134,7 @@ def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
         ("robot", "robot at the end", _robot),
         ("object", "object at the end; before: color of the time", _block(palette.OBJECT)),
         ("door", "door at the end; dashed: open and closed", _door),
-        ("person", "person at the end, with heading", _person),
+        ("person", "person at the end, with heading", _pedestrian),
         ("keepout zone", "keepout zone", _hatched(palette.RED, -6)),
         ("speed zone", "zone with a speed limit", _hatched(palette.AMBER, 6)),
         ("ground", "ramp or sill; chevrons point uphill", _block(palette.GROUND)),
@@ -191,9 +191,9 @@ def _door(draw: Pen, x: float, y: float) -> None:
         draw.line([(x + 2, y - 2 - 3 * k), (x + 2, y - 3 - 3 * k)], fill=palette.OBJECT)
 
 
-def _person(draw: Pen, x: float, y: float) -> None:
-    draw.ellipse((x + 6, y - 6, x + 18, y + 6), fill=(*palette.PERSON, 150), outline=palette.PERSON)
-    draw.line([(x + 12, y), (x + 23, y)], fill=palette.PERSON, width=2)
+def _pedestrian(draw: Pen, x: float, y: float) -> None:
+    draw.ellipse((x + 6, y - 6, x + 18, y + 6), fill=(*palette.PEDESTRIAN, 150), outline=palette.PEDESTRIAN)
+    draw.line([(x + 12, y), (x + 23, y)], fill=palette.PEDESTRIAN, width=2)
 
 
 def _hatched(color: Color, down: float) -> DrawSymbol:

@@ -153,7 +153,7 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         samples, event = trace.objects.get(name), spawned.get(name)
         person = event is not None and event.data.get("person") is True
         kind = "person" if person else "door" if name in doors else "object"
-        color = palette.PERSON if person else palette.OBJECT
+        color = palette.PEDESTRIAN if person else palette.OBJECT
         if samples is not None:
             _object_path(canvas, scene, samples, shapes[name])
         if name in doors:
@@ -203,7 +203,7 @@ def _door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -> Non
 def _heading_line(canvas: Canvas, pose: Pose2, outline: Array) -> None:
     """Draw the heading of a pedestrian."""
     radius = float(np.hypot(*(outline - (pose.x, pose.y)).T).max())
-    canvas.line(pose.apply(np.array([(0.0, 0.0), (1.5 * radius, 0.0)])), palette.PERSON, 2.0)
+    canvas.line(pose.apply(np.array([(0.0, 0.0), (1.5 * radius, 0.0)])), palette.PEDESTRIAN, 2.0)
 
 
 def _earlier_poses(samples: Samples) -> list[int]:

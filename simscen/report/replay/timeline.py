@@ -44,7 +44,19 @@ _HIDDEN_KEYS = {"tick", "entry", "parts", "points", "waypoints", "times", "index
 
 @dataclass(frozen=True)
 class TimelineEntry:
-    """One entry of a lane. Intervals have the end tick `until`. `line` is the line in the scenario (0 = unknown)."""
+    """One entry of a lane of the timeline: an event, or an interval between two events.
+
+    Attributes:
+        tick: Tick of the event, or the first tick of the interval.
+        kind: Kind of the event, as in EventKind.
+        lane: Name of the lane in which the entry is drawn.
+        until: Last tick of an interval; None for a single event.
+        ended: Kind of the event that ended the interval; "" if the run ended first.
+        bad: Whether the event is a failure, such as a collision.
+        line: Line in the scenario file; 0 if unknown.
+        place: Position (x, y) in m if the event has one.
+        about: Data of the event that the page needs to draw the world.
+    """
 
     tick: int
     kind: str
@@ -91,7 +103,7 @@ def _is_world_event(event: Event) -> bool:
 
 def _entry(event: Event, lines: SourceLines) -> TimelineEntry:
     x, y = event.data.get("x"), event.data.get("y")
-    place = (round(float(x), 3), round(float(y), 3)) if _number(x) and _number(y) else ()  # type: ignore[arg-type]
+    place = (round(float(x), 3), round(float(y), 3)) if _is_number(x) and _is_number(y) else ()  # type: ignore[arg-type]
     details = ", ".join(_details(event))
     return TimelineEntry(
         tick=event.tick,
@@ -119,7 +131,7 @@ def _short(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _number(value: object) -> bool:
+def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

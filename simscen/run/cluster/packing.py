@@ -26,7 +26,7 @@ class SentFile:
 
 @dataclass(frozen=True)
 class PackedJob:
-    """A job for another machine: its pickle, in which paths are marked, and its input files by absolute path."""
+    """A job for another machine: `data` is its pickle with marked paths, `files` its input files by absolute path."""
 
     number: int
     data: bytes
@@ -34,7 +34,10 @@ class PackedJob:
 
 
 def pack(job: Job, send: Callable[[Path], SentFile]) -> PackedJob:
-    """Return a job without its output folder, which is different there. `send` is called for each input file."""
+    """Return a job for another machine, without its output folder, which differs there.
+
+    `send` is called for each input file.
+    """
     buffer = io.BytesIO()
     pickler = _Pickler(buffer)
     pickler.dump(replace(job, folder=Path()))
@@ -93,7 +96,7 @@ def digest_of(data: bytes) -> str:
 
 
 class _Pickler(pickle.Pickler):
-    """Marks paths, and collects them in `paths`; those in the package are relative to it."""
+    """Pickler that marks each path as "package" (stored relative to the package) or "path", collected in `paths`."""
 
     def __init__(self, file: io.BytesIO) -> None:
         super().__init__(file)
@@ -109,7 +112,7 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    """Restores paths: `moved` ones are below `folder`."""
+    """Unpickler that restores marked paths. Files whose paths are in `moved` are found below `folder` instead."""
 
     def __init__(self, file: io.BytesIO, moved: frozenset[str], folder: Path) -> None:
         super().__init__(file)

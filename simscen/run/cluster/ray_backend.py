@@ -58,8 +58,8 @@ class _Runner:
 class RayBackend:
     """Runs jobs on all nodes of a running Ray cluster, at most `workers` at a time.
 
-    Each node needs the same simscen, and the plug-ins of the scenarios. Input files travel by content. A job whose node
-    or runner is lost is tried once more. Results do not depend on the number of nodes.
+    Each node needs the same simscen, and the plug-ins of the scenarios. The content of input files is sent. A job whose
+    node or runner is lost is tried once more. Results do not depend on the number of nodes.
     """
 
     def __init__(self, address: str, workers: int, entry: Sequence[str]) -> None:
@@ -216,7 +216,7 @@ class RayBackend:
 
 
 def connect(address: str) -> None:
-    """Connect to a running Ray cluster, unless that is done. Raises UsageError."""
+    """Connect to a running Ray cluster, unless this process is already connected. Raises UsageError."""
     if ray.is_initialized():
         return
     # Ray prints the end of nodes to standard output, which is for results.

@@ -36,7 +36,7 @@ _PLANAR_INDICES = (0, 1, 5, 6, 7, 11, 30, 31, 35)
 _PLANAR_DIAGONAL = (0, 7, 35)
 """Indices of the variances of x, y, yaw in the 36 numbers of a message."""
 ODOMETRY_COLUMNS = 19
-"""Tick, pose, twist, variances of the twist, and covariance of the pose."""
+"""Numbers per reading: tick (1), x, y, yaw (3), vx, vy, wz (3), their variances (3), and pose covariance (9)."""
 _TYPES = {topic.name: topic.type for topic in STACK_TOPICS}
 
 MessagesByTopic = dict[str, list[bytes]]
@@ -49,7 +49,10 @@ MAX_QUATERNION_COMPONENT = 1.01
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A decoded answer; None for missing messages. A path without poses means that no plan is followed."""
+    """A decoded answer; None for missing messages. A path without poses means that no plan is followed.
+
+    `correction` is the pose of the odom frame in the map frame.
+    """
 
     command: Twist | None = None
     plan: Path | None = None

@@ -68,9 +68,10 @@ def _start_failure(error: Exception) -> str:
 
 
 def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> bool:
-    """Wait for the end of the run; report the exit of the stack if that comes first.
+    """Wait for the end of the run; if the stack exits earlier, report its exit and continue to wait.
 
-    Returns False if the worker has died: then it closes the pipe without a byte.
+    Returns True if the worker requested the end, and False if the worker has died: its end of the pipe `control` is
+    then closed without a byte.
     """
     pidfd = os.pidfd_open(process.pid)
     waiting = [control, pidfd]

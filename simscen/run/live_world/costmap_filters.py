@@ -10,7 +10,7 @@ from simscen.model.stack_base import StackBase
 
 @dataclass
 class _Filter:
-    """State of one filter; `zones` are speed limit in m/s (0 for none) and whether it is enabled, by region."""
+    """State of one filter; `zones` maps each region to its speed limit in m/s (0 for none) and "is enabled"."""
 
     zones: dict[str, tuple[float, bool]]
     has_mask: bool

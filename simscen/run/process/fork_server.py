@@ -105,7 +105,10 @@ class WorkerHandle:
             os.close(descriptor)
 
     def end(self, status: int, cpu: float, peak_bytes: int) -> dict[str, Any]:
-        """Return the exit message for the supervisor. Call this after the worker was reaped."""
+        """Return the exit message for the supervisor. Call this after the worker was reaped.
+
+        `status` is the wait status of the process, `cpu` its processor time in s, and `peak_bytes` its peak memory.
+        """
         for read in (self.read_messages, self.read_output):
             try:
                 while read():

@@ -89,7 +89,7 @@ class ForkServerProcess:
         return data
 
     def close(self) -> None:
-        """Close its input, so that it kills its workers and exits; kill it if it does not."""
+        """Close the input of the fork server, so that it kills its workers and exits; kill it if it does not exit."""
         os.close(self._send_pipe)
         try:
             self._process.wait(timeout=5)
@@ -99,7 +99,7 @@ class ForkServerProcess:
         self._output.close()
 
     def abort(self) -> None:
-        """Make it dump its stack and exit."""
+        """Make the fork server dump its Python stack and exit."""
         self._process.send_signal(signal.SIGABRT)
 
     def collect_death(self) -> ProcessDeath:

@@ -48,7 +48,20 @@ class Job:
 
 @dataclass(frozen=True)
 class ProcessEnd:
-    """How a worker process ended, with its final message and the end of its output. Times in s."""
+    """How a worker process ended.
+
+    Attributes:
+        number: Number of the job.
+        code: Exit code; None if a signal ended the process.
+        signal: Number of the signal that ended the process, or None.
+        killed_for: "timeout" if the process was killed at its wall limit, else None.
+        final_message: End record that the worker sent, or None.
+        wall: Wall time in s.
+        cpu: Processor time in s.
+        peak_bytes: Peak memory.
+        left_processes: Whether the worker left processes behind, which were killed.
+        output: End of the output.
+    """
 
     number: int
     code: int | None
@@ -66,7 +79,8 @@ class ProcessEnd:
 class ForkServerDeath:
     """The fork server died while a job was running, or was killed because it did not respond.
 
-    `was_preparing` means that it was preparing this job; `output` is the end of its output.
+    `was_preparing` means that the fork server was preparing this job, `timed_out` that it did not respond. `output` is
+    the end of its output.
     """
 
     description: str

@@ -144,7 +144,10 @@ def delete_log(run: RunFinished) -> RunFinished:
 
 
 def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
-    """Return the second of two runs with equal seed, as an error with the first difference if their logs differ."""
+    """Return `run`, or an error with the first difference if its log differs from that of `twin`.
+
+    `twin` is the first of two runs with the same seed, and `run` the second; without their logs, `run` is returned.
+    """
     if twin is None or not run.artifacts.mcap or not twin.artifacts.mcap:
         return run
     if filecmp.cmp(run.artifacts.mcap, twin.artifacts.mcap, shallow=False):

@@ -40,7 +40,7 @@ def first_solid_in_disc(
 
 
 def _horizontal_distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within: float) -> float:
-    """Return the horizontal distance in meters to a solid between two heights; inf if it is not `within` that."""
+    """Return the horizontal distance in m to a solid between two heights; inf if it is greater than `within` m."""
     prism = upright_prism(solid)
     if prism is not None:
         return prism.distance(point, z_range)

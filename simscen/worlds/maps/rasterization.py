@@ -96,7 +96,7 @@ def _is_inside_out(cut: CrossSection) -> Cells:
 def expand_ranges(
     first: npt.NDArray[np.int64], stop: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Return the index of the range and the value, for all integers of half-open ranges."""
+    """Return all integers of the half-open ranges from first[k] to stop[k], in one array after the index k of each."""
     lengths = np.maximum(stop - first, 0)
     which = np.repeat(np.arange(len(first)), lengths)
     offsets = np.arange(len(which)) - np.repeat(np.cumsum(lengths) - lengths, lengths)

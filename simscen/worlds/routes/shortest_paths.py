@@ -72,14 +72,17 @@ class ShortestPaths:
         return self._field.exact(points)
 
     def leg(self, start: Pose2, goal: Pose2, name: str) -> Leg:
-        """Return the shortest path to the goal `name`; if there is none, length inf and the gap that is too narrow."""
+        """Return the shortest path to the goal `name`, with its passages.
+
+        If there is no path, the length is inf, and the only passage is the gap that is too narrow for the disc.
+        """
         path = self.path(start, goal)
         if path is not None:
             return Leg(polyline_length(path), find_passages(path, name, self._field))
         return Leg(math.inf, self._too_narrow_gap(start, goal, name))
 
     def _too_narrow_gap(self, start: Pose2, goal: Pose2, name: str) -> tuple[Passage, ...]:
-        """Return the gap that is too narrow; empty if start or goal is occupied, or if there is no gap."""
+        """Return the gap that is too narrow, as one passage; empty if start or goal is occupied, or without a gap."""
         if not self._field.has_clearance(np.array([start[:2], goal[:2]]), self._min_clearance).all():
             return ()
         gap = narrowest_gap_in(self._field, (start, goal), self._radius)

@@ -17,7 +17,7 @@ from simscen.worlds.sdf.model_tree import ModelNode
 from simscen.worlds.sdf.report import ImportReport
 from simscen.worlds.sdf.shapes import ShapeReader
 
-PERSON_SHAPE = Cylinder(0.3, 1.8)
+ACTOR_SHAPE = Cylinder(0.3, 1.8)
 """Shape of an actor that has a skin and no collision geometry."""
 
 Waypoint = tuple[float, Pose3]
@@ -55,10 +55,10 @@ def _actor_solids(
         return ()
     report.note(
         actor.element.place,
-        f"has no collision geometry: a cylinder of radius {PERSON_SHAPE.radius:g} m and height {PERSON_SHAPE.length:g} "
+        f"has no collision geometry: a cylinder of radius {ACTOR_SHAPE.radius:g} m and height {ACTOR_SHAPE.length:g} "
         "m stands in for its skin",
     )
-    return (Solid(PERSON_SHAPE, Pose3(z=PERSON_SHAPE.length / 2), actor.name),)
+    return (Solid(ACTOR_SHAPE, Pose3(z=ACTOR_SHAPE.length / 2), actor.name),)
 
 
 def _read_waypoints(script: Element) -> list[Waypoint]:

@@ -39,7 +39,7 @@ def test_every_text_of_a_page_can_be_read_on_it(theme, text):
         assert contrast(rgb(theme[text]), rgb(theme[ground])) >= 4.5
 
 
-@pytest.mark.parametrize("color", [palette.RED, palette.AMBER, palette.GREEN, palette.OBJECT, palette.PERSON])
+@pytest.mark.parametrize("color", [palette.RED, palette.AMBER, palette.GREEN, palette.OBJECT, palette.PEDESTRIAN])
 def test_every_text_of_a_picture_can_be_read_on_it(color):
     assert contrast(color, palette.PAGE) >= 4.5
 
