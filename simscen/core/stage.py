@@ -27,7 +27,7 @@ class Effect:
 
 
 class Situation(Protocol):
-    """State of the run at one step, as triggers see it; all in the world frame."""
+    """State of the run at one beat, as triggers see it; all poses are in the world frame."""
 
     @property
     def tick(self) -> int:

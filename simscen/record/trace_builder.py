@@ -162,7 +162,7 @@ class TraceBuilder:
         """Columns: pose, twist and clearance; x, y, yaw; x, y, yaw and covariance. `finish` converts them to rows."""
 
     def append(self, moment: Moment) -> None:
-        """Add one moment. Only appends numbers, because this runs in every step."""
+        """Add one moment. Only appends numbers, because this is called at every beat."""
         tick, truth, decision = moment.tick, moment.truth, moment.decision
         rows, thinning = self._rows, self._thinning
         if truth is not None:

@@ -82,8 +82,8 @@ def excluded_text(against: BaselineComparison) -> str:
     return "left out: " + ", ".join(parts) if parts else ""
 
 
-def unfinished_text(against: BaselineComparison) -> str:
-    """Return the number of pairs in which only one run reached its goals, or ""."""
+def unequal_progress_text(against: BaselineComparison) -> str:
+    """Return a note on the pairs in which only one run reached its goals, with their number; "" without such pairs."""
     if not against.parted:
         return ""
     return f"in {pairs_text(against.parted)} only one run reached its goals, so their metrics are not compared"
@@ -172,7 +172,7 @@ def _comparison_section(
         yield (StyledText(f"    and {len(against.flips) - MAX_FLIPS} more, in the JSON results", "quiet"),)
     yield from _differences(baseline, against)
     yield from _changes(against, prefix)
-    for note in (unfinished_text(against), excluded_text(against)):
+    for note in (unequal_progress_text(against), excluded_text(against)):
         if note:
             yield (StyledText(f"    {note}", "quiet"),)
 

@@ -17,7 +17,7 @@ from simscen.report.comparison import (
     listed_outcomes,
     outcome_text,
     session_verdict,
-    unfinished_text,
+    unequal_progress_text,
     with_changed_metrics,
 )
 from simscen.report.display_text import one_line
@@ -82,7 +82,7 @@ def as_markdown(comparison: Comparison, links: Links = NO_LINKS, changed_only: b
         lines += [f"- {change_verdict(one)}: {cell(change_text(one))}" for one in against.changes[:MAX_CHANGES]]
         more = len(against.changes) - MAX_CHANGES
         lines += [f"- and {more} more significant changes, in the JSON results"] if more > 0 else []
-        lines += [f"\n{cell(note)}" for note in (unfinished_text(against), excluded_text(against)) if note]
+        lines += [f"\n{cell(note)}" for note in (unequal_progress_text(against), excluded_text(against)) if note]
     return [*lines, "", EXPLANATION]
 
 
@@ -123,7 +123,7 @@ def _against_html(baseline: str, against: BaselineComparison) -> str:
     )
     notes = "".join(
         f'<p class="quiet">{_html_text(note)}</p>'
-        for note in (unfinished_text(against), excluded_text(against))
+        for note in (unequal_progress_text(against), excluded_text(against))
         if note
     )
     return (

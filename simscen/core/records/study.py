@@ -21,9 +21,17 @@ class ClaimStatus(str, Enum):
 class ClaimResult:
     """Result of the claim that the pass rate is at least `min_rate`.
 
-    `passed` of the `runs` that decided it have passed; `errors` runs could not be completed. `limits` are the lower and
-    upper confidence limits of the rate, each with the probability `confidence`; for `anytime`, both together. None for
-    `sprt`, which has no valid limits, and before the first run.
+    Attributes:
+        method: Statistical method that decides the claim.
+        confidence: Probability, for example 0.95, with which the decision that the claim holds must be right.
+        max_runs: Maximum number of runs.
+        passed: Number of passed runs among `runs`.
+        runs: Number of runs that decide the claim.
+        errors: Number of runs that could not be completed.
+        limits: Lower and upper confidence limits of the pass rate, each with the probability `confidence`; for the
+            method `anytime`, both together. None for `sprt`, which has no valid limits, and before the first run.
+        target: Pass rate of a robot that `sprt` should accept; None for other methods.
+        power: Minimum probability that `sprt` does not reject such a robot; None for other methods.
     """
 
     method: str

@@ -1,4 +1,4 @@
-"""Pictures for `simscen robot`, test drives in panels, and for `simscen localize`, belief and reference on a map."""
+"""Pictures of test drives for `simscen robot`, and of believed and reference paths on a map for `simscen localize`."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -38,7 +38,10 @@ def error_code_text(event: Event) -> str:
 
 
 def goal_outcome(goal: Goal, scene: Scene) -> GoalOutcome:
-    """Return the outcome of a goal. It has failed if the robot reports success, but the criterion is violated."""
+    """Return the outcome of a goal.
+
+    The goal counts as failed if the robot reports success, but the criterion on reaching the goal is violated.
+    """
     ends = [event for event in scene.trace.of_kind(*_GOAL_END_KINDS) if event.name == goal.name]
     if not ends:
         if any(event.name == goal.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)):

@@ -25,7 +25,7 @@ _MAX_COVERED_SHARE = 0.2
 class Label:
     """Text for an object at (x, y) in meters with a radius of `rim` pixels.
 
-    Labels with a low `rank` are placed first. `plate` is the color of a box behind the text. An `optional` label is
+    Labels with a low `rank` are placed first. `box` is the color of a box behind the text. An `optional` label is
     omitted if there is no free space.
     """
 
@@ -36,7 +36,7 @@ class Label:
     color: Color
     size: int = 12
     rim: float = 6.0
-    plate: Color | None = None
+    box: Color | None = None
     optional: bool = False
 
 
@@ -59,10 +59,10 @@ def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
         distance = math.dist((u, v), end)
         if distance > label.rim + _LEADER_DISTANCE_PX:
             share = label.rim / distance
-            canvas.leader((u + share * (end[0] - u), v + share * (end[1] - v)), end, label.plate or label.color)
-        halo = None if label.plate else palette.FREE
+            canvas.leader((u + share * (end[0] - u), v + share * (end[1] - v)), end, label.box or label.color)
+        halo = None if label.box else palette.FREE
         middle = (left + right) / 2, (top + bottom) / 2
-        canvas.text(TextItem(*middle, label.text, label.size, label.color, "mm", label.plate, halo))
+        canvas.text(TextItem(*middle, label.text, label.size, label.color, "mm", label.box, halo))
         canvas.add_part(f"label {label.text}", [(label.x, label.y)])
 
 

@@ -61,7 +61,7 @@ NodeUpdate = JobStarted | JobProgressed | FilePiece | JobEnded
 
 
 class JobQueue:
-    """Jobs that wait for a node, and the numbers of those that each node took."""
+    """Jobs that wait for a runner, and the numbers of the jobs that each runner took; `runner` is its name."""
 
     def __init__(self) -> None:
         self._waiting: deque[PackedJob] = deque()

@@ -53,9 +53,10 @@ def _input_files(scenario: LoadedScenario) -> Iterable[Path]:
 
 
 class Unpacker:
-    """Restores packed jobs. If this machine lacks one of the input files, they are written below `folder`.
+    """Restores packed jobs.
 
-    Files that exist at the same path with the same content, as in a shared folder, are not copied.
+    If all input files of a job exist here at the same paths with the same content, as in a shared folder, they are used
+    in place. Otherwise all of them are written below `folder`.
     """
 
     def __init__(self, folder: Path, receive: Callable[[Any], bytes]) -> None:

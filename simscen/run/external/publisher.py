@@ -33,7 +33,7 @@ class StepPublisher:
     """Collects the messages to send with the next step."""
 
     def __init__(self, tick_rate: int, sensors: Mapping[str, str], mounts: Mapping[str, Pose3]) -> None:
-        """`sensors` are the reading types by sensor name, `mounts` their poses on the base."""
+        """`sensors` are the reading types and `mounts` the poses in the base frame, both by sensor name."""
         self._queue: Messages = []
         self._numbers: dict[str, int] = {}
         self._requested_topics: frozenset[str] = frozenset()

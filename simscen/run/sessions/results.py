@@ -97,21 +97,21 @@ def _failure(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
         )
     peak = f"peak memory {end.peak_bytes / 2**20:.0f} MiB of {MAX_MEMORY_BYTES / 2**20:.0f} MiB"
     if end.killed_for == "timeout":
-        return _fault(end, f"stopped after {end.wall:.0f} s of wall time{_place(end)}", "timeout")
+        return _worker_failure(end, f"stopped after {end.wall:.0f} s of wall time{_place(end)}", "timeout")
     if end.signal == signal.SIGKILL:
-        return _fault(end, f"killed (SIGKILL; possibly out of memory; {peak})")
+        return _worker_failure(end, f"killed (SIGKILL; possibly out of memory; {peak})")
     if end.signal is not None:
-        return _fault(end, f"crashed: {signal.Signals(end.signal).name}{_place(end)} ({peak})")
+        return _worker_failure(end, f"crashed: {signal.Signals(end.signal).name}{_place(end)} ({peak})")
     if end.code != 0:
-        return _fault(end, f"exited {end.code} ({peak})")
+        return _worker_failure(end, f"exited {end.code} ({peak})")
     if end.final_message is None:
-        return _fault(end, "exited 0 without a result")
+        return _worker_failure(end, "exited 0 without a result")
     if "error" in end.final_message:
         output = end.final_message.get("tail") or output_tail(end.output)
         by_stack = end.final_message.get("by_stack", False)
         return RunFailure(end.final_message["error"], end.final_message["message"], output, by_stack)
     if end.left_processes:
-        return _fault(end, "left a process behind, which was killed")
+        return _worker_failure(end, "left a process behind, which was killed")
     return None
 
 
@@ -133,7 +133,7 @@ def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
     return replace(failure, message=f"{failure.message}; its log until then is {log.name}{note}")
 
 
-def _fault(end: ProcessEnd, message: str, kind: str = "crashed") -> RunFailure:
+def _worker_failure(end: ProcessEnd, message: str, kind: str = "crashed") -> RunFailure:
     return RunFailure(kind, message, output_tail(end.output))
 
 

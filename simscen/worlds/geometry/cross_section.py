@@ -86,7 +86,7 @@ def _triangles_near(mesh: TriangleMesh, point: tuple[float, float], distance: fl
 
 
 def winds_around(segments: Array, point: tuple[float, float]) -> bool:
-    """Return whether segments (n, 2, 2) wind anticlockwise around a point, counted both towards +x and towards -x.
+    """Return whether segments (n, 2, 2) wind counterclockwise around a point, counted both towards +x and towards -x.
 
     For closed outlines both counts are equal. For meshes with holes, a single count would report points outside.
     """
@@ -150,7 +150,7 @@ class OpenCrossSection(ValueError):
 
 
 def rings_from_segments(segments: Array) -> list[Ring]:
-    """Return closed rings of directed segments (n, 2, 2), anticlockwise around solid.
+    """Return closed rings of directed segments (n, 2, 2), counterclockwise around solid.
 
     Segments of a closed mesh meet in exactly equal points. Where rings touch at a corner, they are separated, so that
     no ring visits a point twice. Raises OpenCrossSection if a ring is not closed.
@@ -195,7 +195,7 @@ def simple_polygons(rings: list[Ring]) -> list[Ring]:
 
 
 def signed_area(ring: Ring) -> float:
-    """Return the area in m², positive for an anticlockwise ring."""
+    """Return the area in m², positive for an counterclockwise ring."""
     x, y = np.array(ring).T
     return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2)
 
@@ -208,8 +208,8 @@ def _triangles(rings: list[Ring]) -> list[Ring]:
     ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
     faces = mapbox_earcut.triangulate_float64(points, ends).reshape(-1, 3)
     triangles = [[(float(x), float(y)) for x, y in points[face]] for face in faces]
-    anticlockwise = [ring if signed_area(ring) > 0 else ring[::-1] for ring in triangles]
-    return [ring for ring in anticlockwise if signed_area(ring) > STRAIGHTNESS_M**2]
+    counterclockwise = [ring if signed_area(ring) > 0 else ring[::-1] for ring in triangles]
+    return [ring for ring in counterclockwise if signed_area(ring) > STRAIGHTNESS_M**2]
 
 
 def _without_straight_corners(ring: Ring) -> Ring:

@@ -19,7 +19,7 @@ from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid, facet_
 
 
 class UprightPrism(NamedTuple):
-    """A prism over a convex anticlockwise polygon, from the height `bottom` to the height `top`, in meters."""
+    """A prism over a convex counterclockwise polygon, from the height `bottom` to the height `top`, in meters."""
 
     base: Polygon
     bottom: float
@@ -63,7 +63,7 @@ def upright_prism(solid: Solid, frame: Pose3 | None = None) -> UprightPrism | No
             return None
     for pose in poses:
         base, bottom, top = _place(base, pose), bottom + pose.z, top + pose.z
-    base = next((ring for ring in (base, base[::-1]) if _is_convex_and_anticlockwise(ring)), ())
+    base = next((ring for ring in (base, base[::-1]) if _is_convex_and_counterclockwise(ring)), ())
     return UprightPrism(base, bottom, top) if base else None
 
 
@@ -78,7 +78,7 @@ def _place(base: Polygon, pose: Pose3) -> Polygon:
     return tuple((c * x - s * y + pose.x, s * x + c * y + pose.y) for x, y in base)
 
 
-def _is_convex_and_anticlockwise(base: Polygon) -> bool:
+def _is_convex_and_counterclockwise(base: Polygon) -> bool:
     """Return whether every corner turns left and the sum of turns is 360°; for a star it is 720°."""
     edges = [(bx - ax, by - ay) for (ax, ay), (bx, by) in zip(base, (*base[1:], base[0]), strict=True)]
     turns = [

@@ -154,7 +154,7 @@ def _extrude(polygon: Array, height: float) -> Mesh:
         polygon = polygon[::-1]
     n = len(polygon)
     cap = mapbox_earcut.triangulate_float64(np.ascontiguousarray(polygon), np.array([n], dtype=np.uint32))
-    cap_faces = _anticlockwise(cap.reshape(-1, 3).astype(np.int32), polygon)
+    cap_faces = _counterclockwise(cap.reshape(-1, 3).astype(np.int32), polygon)
     this, following = np.arange(n), (np.arange(n) + 1) % n
     lower_sides = np.column_stack((this, following, following + n))
     upper_sides = np.column_stack((this, following + n, this + n))
@@ -165,7 +165,7 @@ def _extrude(polygon: Array, height: float) -> Mesh:
     return Mesh(vertices, faces.astype(np.int32))
 
 
-def _anticlockwise(triangles: Faces, points: Array) -> Faces:
+def _counterclockwise(triangles: Faces, points: Array) -> Faces:
     a, b, c = points[triangles].swapaxes(0, 1)
     is_clockwise = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
     result: Faces = np.where(is_clockwise[:, None], triangles[:, ::-1], triangles)

@@ -99,7 +99,7 @@ def _cells_in_convex_hull(occupied: Cells) -> Cells:
     first = np.argmax(occupied[rows], axis=1)
     last = occupied.shape[1] - 1 - np.argmax(occupied[rows, ::-1], axis=1)
     points = np.column_stack((np.concatenate((first, last)), np.concatenate((rows, rows)))) + 0.5
-    corners = points[ConvexHull(points).vertices]  # anticlockwise
+    corners = points[ConvexHull(points).vertices]  # counterclockwise
     segments = np.stack((corners, np.roll(corners, -1, axis=0)), axis=1)
     return filled_cells(CrossSection(segments, np.zeros(len(segments), np.int32)), occupied.shape)
 

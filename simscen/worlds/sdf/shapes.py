@@ -142,7 +142,7 @@ def _read_polylines(polylines: list[Element]) -> tuple[Solid, ...]:
 
 
 def _read_outline(polyline: Element) -> Array:
-    """Return the corners (n, 2) of one outline, anticlockwise, without repeated points."""
+    """Return the corners (n, 2) of one outline, counterclockwise, without repeated points."""
     rows = [read_numbers(point, 2) for point in polyline.all("point")]
     if any(abs(coordinate) > MAX_COORDINATE_M for row in rows for coordinate in row):
         raise polyline.unusable(f"farther than {MAX_COORDINATE_M:g} m")
@@ -156,9 +156,9 @@ def _read_outline(polyline: Element) -> Array:
 
 
 def trapezoids(outlines: list[Array]) -> list[Array]:
-    """Cut the area inside an odd number of `outlines` (n, 2) into anticlockwise triangles and trapezoids (3 or 4, 2).
+    """Cut the area inside an odd number of `outlines` (n, 2) into triangles and trapezoids.
 
-    The cuts are horizontal lines through all corners and crossings, which is exact for straight edges.
+    Each piece (3 or 4, 2) is counterclockwise. The cuts are horizontal lines through all corners and crossings, which is exact for straight edges.
     """
     starts, ends = _edges(outlines)
     levels = np.unique(np.concatenate([starts[:, 1], _crossing_levels(outlines)]))

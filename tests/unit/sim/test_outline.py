@@ -44,7 +44,7 @@ def test_extremes_of_a_box_are_its_corners():
     assert hull_points(Box((2.0, 4.0, 6.0))).max(axis=0).tolist() == [1.0, 2.0, 3.0]
 
 
-def test_a_circle_has_its_corners_on_the_circle_anticlockwise():
+def test_a_circle_has_its_corners_on_the_circle_counterclockwise():
     corners = circle(0.22)
     assert [math.hypot(x, y) for x, y in corners] == pytest.approx([0.22] * len(corners))
     assert Polygon(corners).exterior.is_ccw

@@ -20,7 +20,7 @@ def test_the_whole_robot_weighs_what_its_specification_says(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_footprint_is_anticlockwise_and_holds_the_base(name):
+def test_the_footprint_is_counterclockwise_and_holds_the_base(name):
     outline = Polygon(build_robot_body(shipped(name)).footprint)
     assert outline.exterior.is_ccw
     assert outline.contains(Point(0, 0))

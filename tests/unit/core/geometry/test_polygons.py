@@ -39,7 +39,7 @@ def test_a_ring_is_sound_exactly_when_shapely_says_so(ring):
 
 
 @given(RINGS)
-def test_the_pieces_are_convex_anticlockwise_and_cover_the_ring_exactly_once(ring):
+def test_the_pieces_are_convex_counterclockwise_and_cover_the_ring_exactly_once(ring):
     if polygon_defect(ring) is not None:
         return
     pieces = [shapely.Polygon(piece) for piece in convex_pieces(ring)]
