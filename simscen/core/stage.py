@@ -120,7 +120,10 @@ class Stage(Situation, Protocol):
         ...
 
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Return whether a pedestrian of `radius` m fits at `place` without touching anything."""
+        """Return whether a pedestrian of `radius` m fits at `place` without touching anything.
+
+        If `walls_only` is true, only walls count.
+        """
         ...
 
     def rng(self, name: str) -> np.random.Generator:

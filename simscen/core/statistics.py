@@ -44,7 +44,9 @@ def bootstrap_mean_interval(
 
 
 def sign_test(more: int, less: int) -> float:
-    """Return the p-value of the exact two-sided sign test; pairs without a difference do not count.
+    """Return the p-value of the exact two-sided sign test.
+
+    `more` pairs have an increase and `less` pairs a decrease; pairs without a difference do not count.
 
     For passes that became failures and vice versa, this is McNemar's exact test. (Conover: Practical Nonparametric
     Statistics, 1999, section 3.4.)

@@ -29,7 +29,10 @@ class Message(NamedTuple):
 
 
 class Step:
-    """One step: the sensor messages, and the answer, which is sent when the loop continues."""
+    """One step: the sensor messages, and the answer, which is sent when the loop continues.
+
+    `messages` are the messages since the last step. `canceled` is true if simscen has canceled a goal since then.
+    """
 
     def __init__(self, peer: Peer, header: wire.StepHeader, received: list[Message], canceled: bool) -> None:
         self._peer, self._header = peer, header
@@ -88,9 +91,9 @@ class Peer:
     """Connection of a stack to simscen. Iterating gives one Step after another until the run ends.
 
     `topics` are the topics to receive, None = all. With `every_beat` there is a step whenever a sensor publishes;
-    otherwise one for each command, with the readings since the last. `modes` are the supported ways to take goals, by
-    the names of Nav2's actions; a stack with navigate_through_poses passes goals with `via` without stopping. `about`
-    is kept in the run's log.
+    otherwise there is one for each command, with the readings since the last step. `modes` are the supported ways to
+    take goals, by the names of Nav2's actions; a stack with navigate_through_poses passes goals with `via` without
+    stopping. `about` is kept in the run's log.
 
     Raises wire.Malformed or Refused for protocol errors, Disconnected when simscen closes the connection.
     """

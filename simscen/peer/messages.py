@@ -218,7 +218,7 @@ def read(kind: str, data: bytes) -> Any:
 
 
 def twist(vx: float, vy: float, wz: float) -> bytes:
-    """Return a planar geometry_msgs/msg/Twist."""
+    """Return a planar geometry_msgs/msg/Twist: m/s forward, m/s to the left, rad/s counterclockwise."""
     return Writer().put("6d", vx, vy, 0.0, 0.0, 0.0, wz).done()
 
 
@@ -302,7 +302,7 @@ def particle_cloud(stamp: Stamp, particles: Sequence[Sequence[float]]) -> bytes:
 
 
 def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
-    """Return a rcl_interfaces/msg/Log."""
+    """Return an rcl_interfaces/msg/Log: `name` is the logger; `level` is 10 debug, 20 info, 30 warning, 40 error."""
     message = Writer().put("iI", *stamp).put("B", level)
     for field in (name, text, "", ""):
         message.string(field)

@@ -96,7 +96,10 @@ class Chunk:
 
 
 class Channel:
-    """Messages of one topic. `entries` alternates times (ns) and offsets of the messages in the current chunk."""
+    """Channel of one topic, with its `number` in the file, which writes its messages to `chunk`.
+
+    `entries` alternates times (ns) and offsets of the messages in the current chunk.
+    """
 
     def __init__(self, number: int, chunk: Chunk) -> None:
         self.number, self.chunk = number, chunk
@@ -148,8 +151,9 @@ class Sink(Protocol):
 
 
 class McapWriter:
-    """Writes an MCAP file. Messages must be added in the order of their times.
+    """Writes an MCAP file to `sink`. Messages must be added in the order of their times.
 
+    `profile` and `library` are the fields of the MCAP header, for example "ros2" and "simscen".
     A chunk is written when it is full, or at `flush_if_due`. `finish` writes the last chunk and the index.
     """
 

@@ -20,9 +20,9 @@ from simscen.record.publishers.robot import RobotPublisher
 class Recorder:
     """Writes the moments of each robot in the order of their ticks. Equal moments give equal bytes.
 
-    `target` is a path or a sink of bytes. A file has a partial name until `close`; leaving the context without `close`
-    keeps the partial file, with an index unless the disk is full. Raises RunError of kind "output" if the log cannot be
-    written.
+    `header` describes the run. `target` is the path of the log, or a sink for its bytes. A log file has a partial name
+    until `close`; leaving the context without `close` keeps the partial file, with an index unless the disk is full.
+    Raises RunError of kind "output" if the log cannot be written.
     """
 
     def __init__(self, target: "str | Path | Sink", clock: Clock, header: LogHeader) -> None:

@@ -93,7 +93,7 @@ class Thinning:
 
 
 class Throttle:
-    """Limits messages to `rate` hertz of simulated time."""
+    """Limits messages to `rate` messages per second of simulated time."""
 
     def __init__(self, ticks_per_second: int, rate: int) -> None:
         self._period = max(1, ticks_per_second // rate)

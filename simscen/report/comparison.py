@@ -42,7 +42,7 @@ def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | No
 
 
 def session_comparison_lines(comparison: Comparison, links: Links, is_worse: bool) -> Iterator[StyledLine]:
-    """Yield the comparison of a session with the baseline: changed outcomes first, and the verdict last."""
+    """Yield the comparison of a session with the baseline: changed outcomes first, and the verdict `is_worse` last."""
     (against,) = comparison.against
     yield from _comparison_section(comparison.baseline, with_changed_metrics(against), "", links)
     yield from _outcome_table(comparison, "", None, changed_only=True)

@@ -14,7 +14,10 @@ from simscen.report.journal_reader import JournaledSession, read_journal
 
 
 def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, JournaledSession]:
-    """Read the journals of shards. Raises InvalidInput if one is missing, or if they are not shards of one session."""
+    """Read the journals of shards, by folder.
+
+    Raises InvalidInput if they are not shards of one session, or if a shard is missing and not `allow_missing`.
+    """
     sessions = {folder: read_journal(folder) for folder in folders}
     folders_by_key: dict[RunKey, Path] = {}
     problems = [] if allow_missing else _missing_shards(sessions)

@@ -35,7 +35,10 @@ def cache_folder(environment: Mapping[str, str]) -> Path | None:
 
 
 class DiskCache:
-    """Cache with one file per key, a hexadecimal number. Concurrent sessions can share the folder."""
+    """Cache with one file per key, a hexadecimal number. Concurrent sessions can share the folder.
+
+    Without a `folder`, the cache is disabled. `max_bytes` limits the size of all entries together.
+    """
 
     def __init__(self, folder: Path | None, max_bytes: int = MAX_CACHE_BYTES) -> None:
         self._folder, self._max_bytes = folder, max_bytes

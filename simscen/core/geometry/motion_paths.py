@@ -24,7 +24,7 @@ def pose_at(path: MotionPath, seconds: float) -> Pose2:
     times = path.times
     if len(times) == 1:
         return path.poses[0]
-    local = min(max(_local(path, path.elapsed(seconds)), times[0]), times[-1])
+    local = min(max(_fold_repetitions(path, path.elapsed(seconds)), times[0]), times[-1])
     leg = min(bisect_right(times, local), len(times) - 1) - 1
     begin, end = path.poses[leg], path.poses[leg + 1]
     duration = times[leg + 1] - times[leg]
@@ -59,7 +59,7 @@ class PathSampler:
         running = seconds - path.start
         local = path.phase + running if running > 0 else path.phase
         if not self._once:
-            local = _local(path, local)
+            local = _fold_repetitions(path, local)
         if local < self._first:
             local = self._first
         elif local > self._last:
@@ -233,8 +233,8 @@ def _meters(step: Step, reach: float) -> float:
     return math.hypot(step[0], step[1]) + reach * abs(step[2])
 
 
-def _local(path: MotionPath, seconds: float) -> float:
-    """Return the path time, with repetitions folded into `times`."""
+def _fold_repetitions(path: MotionPath, seconds: float) -> float:
+    """Return the path time with the same pose in the first repetition; unchanged if the path does not repeat."""
     first, duration = path.times[0], path.times[-1] - path.times[0]
     since = seconds - first
     if duration <= 0 or since <= 0 or path.mode == "once":

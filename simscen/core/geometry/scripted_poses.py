@@ -49,7 +49,7 @@ class PredictedPoses:
 
 
 class PosesAtTick(Mapping[str, Pose3]):
-    """Poses of all objects at one tick; created on access."""
+    """Poses of all objects at the tick of one `row` of `predicted.table`; each pose is created on access."""
 
     __slots__ = ("predicted", "row")
 

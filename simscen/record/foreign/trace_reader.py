@@ -88,7 +88,7 @@ _EVIDENCE_OF_ROLE = {"cmd_vel": Evidence.COMMANDS, "scan": Evidence.SCANS, "plan
 
 
 class ForeignTraceReader:
-    """Converts one log.
+    """Converts one log: the `decoded` messages of the topics with roles, and the message types of all `topics`.
 
     Attributes:
         rows: Signals and events.

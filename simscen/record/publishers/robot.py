@@ -55,7 +55,10 @@ class EventPublisher:
 
 
 class RobotPublisher:
-    """Publishes the moments of a robot in the order of their ticks, and with `clock` also the time."""
+    """Publishes the moments of a robot in the order of their ticks, and with `clock` also the time on /clock.
+
+    `header` and `scenery` describe the run before it starts. `robot` is the robot's name; "" for a single robot.
+    """
 
     def __init__(
         self,

@@ -103,7 +103,7 @@ _TEXT_POSE = Pose3(0.0, 0.0, 0.5)
 
 
 class ScenePublisher:
-    """Publishes all markers whenever one of them changes. Poses of moving objects are on /tf."""
+    """Publishes all markers of `robot` whenever one of them changes. Poses of moving objects are on /tf."""
 
     def __init__(self, out: MessageSink, case: Case, scenery: Scenery, frames: RobotFrames, robot: str) -> None:
         self._out, self._case, self._frames, self._robot, self._scenery = out, case, frames, robot, scenery

@@ -34,7 +34,11 @@ def full_run_name(key: RunKey) -> str:
 def run_element(
     run: RunFinished, folder: str, picture: str, past: Sequence[PastOutcome | None], is_one_of_many: bool = False
 ) -> str:
-    """Return the entry of a run. Failures are expanded."""
+    """Return the entry of a run. Failures are expanded.
+
+    `picture` is the source of its picture, `past` are its earlier outcomes. `is_one_of_many` shortens the name of a run
+    below the heading of its scenario.
+    """
     extra = ", ".join(part for part in (f"seed {run.key.seed}", run.key.stack_name) if part)
     name = (run.key.variation or extra) if is_one_of_many else run.key.test
     outcomes = [None if one is None else one.outcome for one in past]

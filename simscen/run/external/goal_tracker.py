@@ -25,6 +25,7 @@ class GoalTracker:
     """The goals of a run and their state as reported by the stack."""
 
     def __init__(self, stop_on_failure: bool, tick_rate: int, mode: Mode = "navigate_to_pose") -> None:
+        """If `stop_on_failure` is true, a failed goal ends the task. `mode` is the action by which goals are sent."""
         self._events: list[Event] = []
         self._task = Task(stop_on_failure, clock=Clock(tick_rate), mode=mode)
         self._rate = tick_rate

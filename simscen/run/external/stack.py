@@ -31,7 +31,10 @@ _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANC
 
 
 class ExternalStack:
-    """A stack in another process: `begin` and `start` start it, `end`, `finish`, `release`, and `close` end it.
+    """A stack in another process.
+
+    The order of calls is `begin` (start the process), `start` (handshake), `decide` at each beat, `end` (announce the
+    end), `finish` (wait for the exit), and `close`. `release` and `close` also end the process after an error.
 
     With several robots, call each method for all stacks before the next one, so that the processes start and end
     concurrently.
@@ -47,6 +50,10 @@ class ExternalStack:
         parameters: RunParameters,
         log_file: FilePath | None = None,
     ) -> None:
+        """`name` is the stack's name in error messages, and `command` its program, whose output goes to `log_file`.
+
+        HELLO describes `surroundings` and `parameters` to the stack.
+        """
         self._name, self._command, self._log_file = name, command, log_file
         self._surroundings, self._parameters = surroundings, parameters
         self._time = SimTime(surroundings.tick_rate)

@@ -59,9 +59,11 @@ class FaultInjector:
         emit: Callable[[Event], None],
         map_faults: Collection[int] = (),
     ) -> None:
-        """`emit` receives a `fault.took_effect` event when a fault changes its first message or command.
+        """Prepare the `faults` of a scenario; none is active until `begin`.
 
-        `map_faults` are the indices of the faults that changed the map before the run.
+        `setting` returns what a fault knows of its target. Commands reach the base through `link`. `emit` receives a
+        `fault.took_effect` event when a fault changes its first message or command. `map_faults` are the indices of the
+        faults that changed the map before the run.
         """
         self._map_faults = set(map_faults)
         self._faults, self._streams, self._setting, self._link, self._emit = faults, streams, setting, link, emit

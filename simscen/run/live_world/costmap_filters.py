@@ -25,6 +25,7 @@ class CostmapFilters:
     """Tracks which zones are enabled; `zones` is the state to send to the stack."""
 
     def __init__(self, stack: StackBase, regions: Mapping[str, Polygon], masks: FilterMasks) -> None:
+        """`stack` names the zones at the start of the run, and `regions` has the polygons of all regions by name."""
         self._regions, self._masks = regions, masks
         keepout = dict.fromkeys(stack.keepout, (0.0, True))
         speed = {zone.region: (zone.speed_limit, True) for zone in stack.speed_zones}

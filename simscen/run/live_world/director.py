@@ -28,6 +28,7 @@ class Director:
         stage: LiveStage,
         injector: FaultInjector,
     ) -> None:
+        """Triggers observe `stage`, and the actions of `steps` change it; `injector` starts and ends the `faults`."""
         self._stage, self._injector, self._faults = stage, injector, faults
         self._steps = [
             (step, TriggerState(step.when or _AT_ONCE, streams.generator(f"event{stream}")))
@@ -158,6 +159,7 @@ class RelativeSituation:
     """View of the run for a step of a sequence: time, distance, and events count from the end of the previous step."""
 
     def __init__(self, now: Situation, others: "dict[str, RelativeSituation] | None" = None) -> None:
+        """Start the view at the state `now`. `others` are the views for the other robots; None creates them."""
         self._now, self._others = now, {} if others is None else others
         if others is None:
             self._others |= {name: RelativeSituation(now.of(name), self._others) for name in now.robots}

@@ -39,7 +39,11 @@ SendMessage = Callable[[dict[str, Any]], None]
 
 
 class WorkerHandle:
-    """A worker process. `send_message` forwards its progress messages; its final message is kept for `end`."""
+    """A worker process, as the fork server supervises it.
+
+    `report` and `output` are pipes from the worker, for messages and for its output, which goes to `log`.
+    `send_message` forwards the progress messages to the supervisor; the final message is kept for `end`.
+    """
 
     def __init__(self, job: Job, pid: int, report: int, output: int, log: CappedLog, send_message: SendMessage) -> None:
         self.job, self.pid, self.pidfd, self.report, self.output = job, pid, os.pidfd_open(pid), report, output
@@ -145,6 +149,10 @@ class ForkServer:
     """Runs jobs until its input ends, then kills all workers."""
 
     def __init__(self, jobs: int, replies: int, warm_up: Callable[[Job], object], execute: ExecuteJob) -> None:
+        """`jobs` and `replies` are file descriptors of pipes from and to the supervisor.
+
+        `warm_up` prepares the scenario of a job before the fork, and `execute` runs the job in the worker.
+        """
         self._jobs, self._replies, self._warm_up, self._execute = jobs, replies, warm_up, execute
         self._selector = selectors.DefaultSelector()
         self._children: dict[int, WorkerHandle] = {}

@@ -118,7 +118,7 @@ def _redirect_output(output: int) -> None:
 
 
 class ProgressReporter:
-    """A log that reports the progress of a run."""
+    """A MomentSink that reports the progress of a run: `send` receives the simulated time in s."""
 
     def __init__(self, tick_rate: int, send: Callable[[float], None]) -> None:
         self._rate, self._send = tick_rate, send

@@ -158,7 +158,8 @@ def _read_outline(polyline: Element) -> Array:
 def trapezoids(outlines: list[Array]) -> list[Array]:
     """Cut the area inside an odd number of `outlines` (n, 2) into triangles and trapezoids.
 
-    Each piece (3 or 4, 2) is counterclockwise. The cuts are horizontal lines through all corners and crossings, which is exact for straight edges.
+    The corners (3 or 4, 2) of each piece are counterclockwise. The cuts are horizontal lines through all corners and
+    crossings, which is exact for straight edges.
     """
     starts, ends = _edges(outlines)
     levels = np.unique(np.concatenate([starts[:, 1], _crossing_levels(outlines)]))
