@@ -13,7 +13,7 @@ CPUINFO = Path("/proc/cpuinfo")
 _FIRST_PROCESSOR_BYTES = 8192
 _AVX512_BEFORE_2_4 = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL"
 _AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"
-"""NumPy's names of the kernels for AVX-512. A name that it does not know causes a warning."""
+"""Names of the kernels for AVX-512, before NumPy 2.4 and since. NumPy warns about names that it does not know."""
 
 _pinned: set[str] = set()
 

@@ -14,7 +14,7 @@ class ExternalCommand:
     """Program that implements the stack protocol: its arguments, its whole environment, and its working folder.
 
     `start_limit` is the wall time in s until the program has subscribed, and `answer_limit` the wall time of each
-    answer after that. The program is searched in the PATH of `env`, like in a shell. `digest` changes with the
+    answer after that. The program is searched in the PATH of `env`, like in a shell. `digest` is a hash of the
     arguments, the requested variables, and the content of files among the arguments. It does not include the rest of
     the environment, which must not appear in logs or reports.
     """

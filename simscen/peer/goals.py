@@ -16,7 +16,7 @@ class Goal(NamedTuple):
     """A pose to reach in the map, within tolerances (m, rad), in at most `timeout` simulated seconds (None = any).
 
     `via`: pass without stopping, with any heading, in one drive with the next goal. `wait`: simulated seconds to stay
-    there.
+    at the goal.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Goals:
         self._events: list[dict[str, Any]] = []
 
     def start(self, goals: Sequence[Goal]) -> None:
-        """Replace all goals by these."""
+        """Replace all goals by `goals`, to be driven to in this order."""
         self.current, self.waiting, self._wait_until = None, list(goals), 0.0
 
     def accept(self) -> Goal | None:

@@ -17,7 +17,7 @@ from simscen.core.records.run_result import RunKey
 
 FORMAT = "1"
 STACK_RECORD = "simscen.stack"
-"""Metadata record that describes the external stacks. It is written at the end of the log, when it is complete."""
+"""Metadata record that describes the external stacks. Written at the end of the log, when all facts are known."""
 _FACT_PREFIX = "fact."
 STACK_FACT, STACK_NAME_FACT, VARIATION_FACT = "stack", "variation", "varied"
 """Names of facts: the --stack NAME=VALUE that replaced the scenario's stack, the name of the stack if several are

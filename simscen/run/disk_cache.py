@@ -67,7 +67,7 @@ class DiskCache:
         return content if hashlib.sha256(key.encode() + content).digest() == data[:_DIGEST] else None
 
     def put(self, key: str, content: bytes) -> None:
-        """Store an entry if it fits and the folder belongs to this user alone."""
+        """Store an entry, unless it is too large or the folder does not belong to this user alone."""
         data = hashlib.sha256(key.encode() + content).digest() + content
         if self._folder is None or len(data) > min(MAX_ENTRY_BYTES, self._max_bytes):
             return

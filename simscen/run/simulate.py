@@ -41,7 +41,9 @@ def simulate(
     attach: Attach | None = None,
     stack_log: Path | None = None,
 ) -> Run:
-    """Run a prepared scenario with a seed (default: its own) and judge it; `log` is the MCAP file to write.
+    """Run a prepared scenario with a seed (default: the scenario's own) and judge the run.
+
+    `log` is the MCAP file to write; None writes no log.
 
     `stack_log` is the file for the output of an external stack; with several robots, each name is added to it.
 

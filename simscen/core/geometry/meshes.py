@@ -123,8 +123,8 @@ def upward_faces(mesh: TriangleMesh, max_slope: float = MAX_SLOPE_RAD) -> Mask:
 def drivable_solids(mesh: TriangleMesh, reach: float) -> Owners:
     """Return the indices of the fixed solids that wheels can roll on if they can climb steps of `reach` m.
 
-    A solid with an upward face at most `reach` m above the floor is drivable, and so are the solids that continue from
-    there. All other solids are walls, which only the hull touches.
+    A solid with an upward face at most `reach` m above the floor is drivable, and so are solids that wheels can reach
+    from a drivable solid. All other solids are walls, which only the hull of the robot touches.
     """
     faces = np.flatnonzero(upward_faces(mesh))
     corners = mesh.vertices[mesh.faces[faces]]

@@ -122,8 +122,8 @@ class Estimate:
 class Belief:
     """Output of a localizer: `pose` in the map frame and its covariance (3, 3) over (x, y, yaw).
 
-    `map_from_odom` is the transform that it publishes on /tf. `particles` (n, 4) are x, y, yaw, weight, if it has any.
-    `updated` is the tick of the newest measurement that it used.
+    `map_from_odom` is the transform that the localizer publishes on /tf. `particles` (n, 4) are x, y, yaw, weight;
+    empty for a localizer without particles. `updated` is the tick of the newest measurement that it used.
     """
 
     pose: Pose2

@@ -11,7 +11,7 @@ from simscen.core.records.verdict import Verdict
 
 
 class Outcome(str, Enum):
-    """Outcome of a run. `error` means that it could not be completed, which says nothing about the robot."""
+    """Outcome of a run. `error` means that the run could not be completed, which says nothing about the robot."""
 
     PASSED = "passed"
     FAILED = "failed"

@@ -76,7 +76,7 @@ class BaselineComparison:
     """Comparison of one stack or session with the baseline, over the `pairs` of completed runs.
 
     `broken` counts the pairs with a run that could not be completed, `alone` the runs without a partner, and `parted`
-    the pairs of which only one run reached the last goal; of the latter, only collisions are compared. `p` is the
+    the pairs of which only one run reached the last goal; of `parted` pairs, only collisions are compared. `p` is the
     p-value of the sign test of the flips. `changes` are the significant changes.
     """
 

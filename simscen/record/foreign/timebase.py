@@ -62,9 +62,9 @@ def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
     """Return the index of the first message after the clock of the stamps was set, and the change in ns; or None.
 
     Both times are those of one topic, in ns, in the order of logging. No message is logged before its stamp, so the
-    largest difference of stamp and time of logging is that of the clocks. It changes permanently only if a clock
-    is set. A delayed or repeated message, a slow recorder, and a paused simulation do not change it permanently, or
-    they change the interval of logging rather than that of the stamps.
+    largest difference of stamp and time of logging is the difference of the two clocks. It changes permanently only if
+    a clock is set. A delayed or repeated message, a slow recorder, and a paused simulation change it for a short time
+    only, or they change the interval of logging rather than that of the stamps.
     """
     count = MIN_MESSAGES_AROUND_STEP
     if len(stamps) < 2 * count:

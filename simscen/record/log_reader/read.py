@@ -120,7 +120,9 @@ def invalid_log(path: Path, code: str, message: str, hint: str = "") -> InvalidI
 
 
 def recover(path: Path) -> bool:
-    """Rewrite the log of an aborted run with an index, which other tools need. Return False if it already has one.
+    """Rewrite the log of an aborted run with an index, which other tools need.
+
+    Returns whether the log was rewritten; False if it already has an index.
 
     The log keeps its name, and remains the log of an aborted run. Raises InvalidInput if the file cannot be read or is
     not MCAP, RunError of kind "output" if the new file cannot be written.
@@ -147,7 +149,7 @@ def recover(path: Path) -> bool:
 
 
 def _ends_with_magic(stream: IO[bytes]) -> bool:
-    """Return whether the file ends as an MCAP file does. Raises NotSimscenLog if it does not start as one."""
+    """Return whether the file ends like a complete MCAP file. Raises NotSimscenLog if it does not start like one."""
     if stream.read(len(MAGIC)) != MAGIC:
         raise NotSimscenLog("it is not an MCAP file")
     size = stream.seek(0, os.SEEK_END)

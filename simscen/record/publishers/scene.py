@@ -112,7 +112,7 @@ class ScenePublisher:
         own_zones = (zone for zone in scenery.zones if zone.robot == robot)
         self._zones: dict[tuple[str, str], FilterZone] = {(zone.filter, zone.region): zone for zone in own_zones}
         self.has_published = False
-        """Whether `write` was called. If so, it must be called again only for ticks with events."""
+        """Whether `write` was called. After the first call, `write` is needed only at ticks with events."""
 
     def write(self, now: int, events: Sequence[Event]) -> None:
         """Update the markers after events, and publish them at `now` nanoseconds if they have changed."""

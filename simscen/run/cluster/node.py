@@ -151,7 +151,7 @@ def _files(job: Job) -> Iterator[FilePiece]:
 
 
 def _same_plugin(entry: Entry) -> Entry:
-    """Return the same plug-in as installed on this node. Raises UsageError if it is missing or another version."""
+    """Return the plug-in as installed on this node. Raises UsageError if it is missing or has another version here."""
     installed = find(entry.group, entry.name)
     required = requirement_of(entry)
     if installed is None or requirement_of(installed) != required:

@@ -31,7 +31,7 @@ ROUNDING = 1e-9
 
 @dataclass
 class _Active:
-    """An active fault; `changed_count` is the number of messages and commands that it changed or withheld."""
+    """An active fault; `changed_count` is how many messages and commands it has changed or withheld so far."""
 
     index: int
     sensor: str

@@ -50,7 +50,7 @@ class CostmapFilters:
         return f"`{order.region}` was {state} already" if on == order.enabled and same else ""
 
     def switch(self, order: ZoneSwitch) -> tuple[str, ...]:
-        """Carry out an order. Return the regions that it switches, "" for the mask."""
+        """Carry out an order, and return the names of the regions that it switched; "" stands for the mask."""
         target = self._filters[order.filter]
         if order.region is None:
             target.enabled = order.enabled

@@ -16,7 +16,7 @@ from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd, pack_job
 from simscen.spec.registry import Entry
 
 MAX_SILENCE_S = 30.0
-"""Time without a message after which the fork server counts as dead. It sends a heartbeat each second."""
+"""Time without a message after which the fork server counts as dead. A live fork server sends one each second."""
 
 
 class Interrupted(BaseException):
@@ -30,8 +30,8 @@ class Interrupted(BaseException):
 class Supervisor:
     """Runs jobs in worker processes of a fork server on this machine, `workers` at a time.
 
-    `entry` are the Python arguments that start the fork server, e.g. `-m module`. It starts with the first job, is kept
-    until the context is left, and is restarted if it dies.
+    `entry` are the Python arguments that start the fork server, e.g. `-m module`. The fork server starts with the first
+    job, is kept until the context is left, and is restarted if it dies.
 
     If the fork server dies while it prepares a job, this job fails, and the others that were running are repeated.
     Otherwise any running job may be the cause: these are suspects, each of which is repeated alone and fails if the

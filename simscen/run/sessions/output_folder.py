@@ -19,7 +19,7 @@ RUNS_FOLDER = "runs"
 def create_output_folder(out: Path | None) -> Path:
     """Create the folder `out`, which must be new or empty, or simscen-out/<UTC time>-<4 hex> with a link `latest`.
 
-    Raises UsageError if it cannot be created or written to. Existing files are never changed.
+    Raises UsageError if the folder cannot be created or written to. Existing files are never changed.
     """
     folder = out or DEFAULT_FOLDER / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}"
     try:

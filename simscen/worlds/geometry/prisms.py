@@ -32,7 +32,7 @@ class UprightPrism(NamedTuple):
         return min(xs), min(ys), max(xs), max(ys)
 
     def distance(self, point: tuple[float, float], z_range: tuple[float, float]) -> float:
-        """Return the horizontal distance to the prism between two heights: 0 inside, inf if it is not there."""
+        """Return the horizontal distance to the prism between two heights: 0 inside, inf if it has no part there."""
         low, high = z_range
         if self.bottom >= high or self.top <= low:
             return math.inf

@@ -99,7 +99,10 @@ def _crossing_index(ends: Array, path: Array) -> float | None:
 
 
 def _narrowest(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
-    """Return the two points of the outline near these, on opposite sides, that are nearest to each other."""
+    """Return the two sides of a passage, as indices of outline points, at its narrowest place near `one` and `other`.
+
+    `one` and `other` are returned themselves if they are more than NARROW_WIDTH_M apart.
+    """
     assert field.outline is not None
     data = field.outline.data
     width = float(np.linalg.norm(data[one] - data[other]))

@@ -20,7 +20,7 @@ from simscen.worlds.routes.narrow_gaps import narrowest_gap_in
 from simscen.worlds.routes.passages import find_passages, passage_between
 
 Z_RANGE = (0.03, 0.4)
-"""Heights in m between which a robot touches solids: above sills that it drives over, below what it passes under."""
+"""Heights in m between which solids block a robot: lower ones are sills to drive over, higher ones leave room below."""
 MIN_RESOLUTION_M = 0.05
 """Size of the grid cells of the search."""
 MAX_CELLS = 1_000_000
