@@ -43,17 +43,17 @@ class Garbage(Spec, Fault):
     """Probability that a message is garbage."""
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Allow a wrong size only for messages of variable size."""
+        """Return `value` and the reason if messages of the target have a fixed size and cannot be empty or short."""
         if self.value not in WRONG_SIZES or target.kind in ("Scan", "Image"):
             return None
         return "value", f"its messages cannot be {self.value}: they have a fixed number of values"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
-        """Draw for each message."""
-        return _Garbled(rng, self)
+        """Start the fault: draw for each message whether it is garbage, and its content."""
+        return _RandomGarbage(rng, self)
 
 
-class _Garbled(Disturbance):
+class _RandomGarbage(Disturbance):
     def __init__(self, rng: np.random.Generator, garbage: Garbage) -> None:
         self._rng, self._garbage = rng, garbage
 
@@ -66,10 +66,10 @@ class _Garbled(Disturbance):
         content = random_content if self._garbage.value == "anything" else self._garbage.value
         match reading:
             case Scan(ranges=ranges):
-                return replace(reading, ranges=_garbled(ranges, content))
+                return replace(reading, ranges=_garbage_values(ranges, content))
             case Image(rgb=rgb, depth=depth):
-                colors = rgb if content in VALUES else _garbled(rgb, content)
-                return replace(reading, rgb=colors, depth=_garbled(depth, content))
+                colors = rgb if content in VALUES else _garbage_values(rgb, content)
+                return replace(reading, rgb=colors, depth=_garbage_values(depth, content))
             case Odometry():
                 value = VALUES[content]
                 return replace(reading, pose=Pose2(value, value, value), twist=Twist(value, value, value))
@@ -80,7 +80,7 @@ class _Garbled(Disturbance):
                 return reading
 
 
-def _garbled(values: npt.NDArray[T], content: str) -> npt.NDArray[T]:
+def _garbage_values(values: npt.NDArray[T], content: str) -> npt.NDArray[T]:
     """Return the values, or rows of values, with meaningless content or a wrong size."""
     if content == "empty":
         return values[:0]

@@ -83,7 +83,10 @@ STYLES = {"plain": "", "name": "bold", "good": "green", "bad": "red", "warning":
 
 
 class ColorReporter(PlainReporter):
-    """Prints the lines of PlainReporter in color, except for lines that a CI system could read as a command."""
+    """Prints the lines of PlainReporter in color, except for lines that a CI system could read as a command.
+
+    `slow` is the number of slowest runs to list at the end; 0 lists all, None none.
+    """
 
     def __init__(self, out: TextIO, style: TerminalStyle, slow: int | None = None) -> None:
         super().__init__(out, style, slow)
@@ -97,7 +100,10 @@ class ColorReporter(PlainReporter):
 
 
 class LiveReporter:
-    """Prints the lines in color, and below them one line per running scenario with its simulated time."""
+    """Prints the lines in color, and below them one line per running scenario with its simulated time.
+
+    `slow` is the number of slowest runs to list at the end; 0 lists all, None none. `clock` returns seconds.
+    """
 
     def __init__(
         self, out: TextIO, style: TerminalStyle, slow: int | None = None, clock: Callable[[], float] = monotonic

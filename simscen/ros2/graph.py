@@ -116,7 +116,7 @@ class Graph:
         return servers[0].node
 
     def subscription_profile(self, name: str) -> QoSProfile:
-        """Return a quality of service that all publishers of a topic of the graph in other nodes offer."""
+        """Return a quality of service that all publishers of the ROS topic `name` offer, except those of this node."""
         return subscription_qos([end for end in self.node.get_publishers_info_by_topic(name) if end.node_name != NODE])
 
     def spin_once(self, seconds: float = 0.0) -> None:
@@ -148,11 +148,11 @@ class Graph:
         return sorted({(n, s) for n, s in found if n != NODE and not n.startswith("_")})
 
     def publishers_of(self, name: str) -> List[Endpoint]:
-        """Return the publishers of a topic of the graph in other nodes."""
+        """Return the publishers of the ROS topic `name` that belong to other nodes."""
         return _endpoints(self.node.get_publishers_info_by_topic(name))
 
     def subscribers_of(self, name: str) -> List[Endpoint]:
-        """Return the subscriptions of a topic of the graph in other nodes."""
+        """Return the subscriptions to the ROS topic `name` that belong to other nodes."""
         return _endpoints(self.node.get_subscriptions_info_by_topic(name))
 
     def topics(self) -> Dict[str, List[str]]:
@@ -213,7 +213,10 @@ def subscription_qos(publishers: Sequence[Any]) -> QoSProfile:
 
 
 def incompatible_policies(offered: QoSProfile, requested: QoSProfile) -> List[Tuple[str, str, str]]:
-    """Return the policies by which a subscription receives nothing: (policy, offered, requested)."""
+    """Return the policies that keep a subscription from receiving anything from a publisher.
+
+    Each is (policy, value that the publisher offers, value that the subscription requests).
+    """
     found = []
     if requested.reliability == ReliabilityPolicy.RELIABLE and offered.reliability == ReliabilityPolicy.BEST_EFFORT:
         found.append(("reliability", "best effort", "reliable"))

@@ -22,7 +22,10 @@ from simscen.stack.localizers.recovery import Recovery
 ODOMETRY_SHARE = 0.2
 """Share of the particles that follow odometry where odometry and scan matching disagree."""
 FIRST_SCAN_WEIGHT = 0.2
-"""Exponent of the first scan's likelihood; it grows to 1 over `settling_distance`."""
+"""Weight of the first scan after an initial pose: the exponent of the scan's likelihood.
+
+The weight grows to 1 while the robot drives the parameter `settling_distance`.
+"""
 CERTAIN_FIT = 0.9
 """Minimum share of a scan's beams that fit the map for the filter to be certain."""
 
@@ -63,10 +66,12 @@ class ScanMatchingParticleFilter(ParticleFilter):
         super().move(delta)
 
     def follow(self, step: Step, delta: Pose2) -> None:
-        """Move each particle by its own sample of a motion from scan matching. `delta` is the same by odometry.
+        """Move each particle by its own sample of a motion from scan matching.
 
-        Where the two disagree, wheels slip, people walk next to the robot, or the match is wrong. Some particles then
-        follow the motion model of odometry, and the map decides, unless it does not show the surroundings.
+        `delta` is the motion that odometry measured in the same time, in the base frame. If `step` and `delta` disagree,
+        wheels slip, pedestrians walk next to the robot, or the match is wrong. Some particles then follow the motion
+        model of odometry, and later scans show which particles fit the map. If the map does not show the surroundings,
+        all particles follow scan matching.
         """
         self._settle(delta)
         poses = apply_step(self.particles.poses, step, self._rng)
@@ -76,9 +81,10 @@ class ScanMatchingParticleFilter(ParticleFilter):
         self.particles = Particles(poses, self.particles.weights)
 
     def _settle(self, delta: Pose2) -> None:
-        """Increase the weight of scans with the distance driven since the initial pose was given.
+        """Increase the weight of scans by the motion `delta`, up to 1 after `settling_distance`.
 
-        One scan of a room fits many poses; several rooms together do not. Until then the initial pose counts more.
+        One scan of a room fits many poses; scans of several rooms together do not. Early scans therefore count less
+        than the initial pose. Turns count as distance, too.
         """
         if self._scan_weight < 1.0:
             distance = math.hypot(delta.x, delta.y) + METERS_PER_RAD * abs(delta.yaw)

@@ -16,10 +16,16 @@ from simscen.core.random_streams import Streams
 CELL_SIZE_M = 0.15
 """Distance between cylinders, which is twice their radius."""
 COLUMNS, FIELD_ROWS, ROWS = 30, 30, 64
-"""Size of the grid. The field fills the upper FIELD_ROWS. Columns of cylinders on both sides close the lane."""
+"""Size of the grid in cells: the lane that the robot drives along has ROWS x COLUMNS.
+
+The field fills the last FIELD_ROWS (largest y). The first and last columns are walls of cylinders.
+"""
 HEIGHT_M = 1.0
 FILL_RANGE = (0.20, 0.35)
-"""Range of the share of cells that are filled first. It gives densities of 5 to 22 %, like six worlds of BARN."""
+"""Range of the share of cells that are filled at random, before smoothing.
+
+After smoothing, 5 to 22 % of the cells between the walls are filled, as in six worlds of BARN.
+"""
 FILL_NEIGHBORS, CLEAR_NEIGHBORS = 5, 1
 """Smallest number of filled neighbors, of eight, that fills a cell, and largest number that clears it."""
 START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)

@@ -64,7 +64,7 @@ def write_reports(
 ) -> NoReturn:
     """Write the reports of an output folder from its journal, print the session, and exit with its code."""
     require_writable(junit, folder)
-    reports = Reports(folder, junit, junit_family.value, only=only_junit)
+    reports = Reports(folder, junit, junit_family.value, junit_only=only_junit)
     finished_runs = past.runs
     with screen(format_) as output:
         output(past.start_event(folder))

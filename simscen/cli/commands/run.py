@@ -56,8 +56,8 @@ def command(
         bool,
         typer.Option(
             "--check-determinism",
-            help="Run everything twice and compare the logs byte for byte; followed by the output folder of an earlier "
-            "session, the same as --check-against.",
+            help="Run everything twice and compare the logs byte for byte. If one of PATHS is the output folder of an "
+            "earlier session, run once and compare with that session, as --check-against does.",
         ),
     ] = False,
     check_against: Annotated[

@@ -1,4 +1,4 @@
-"""Output files of a session: results.json, junit.xml, report.html, and run.json; and its exit code."""
+"""Writing of the output files of a session (results.json, junit.xml, report.html, run.json), and its exit code."""
 
 import errno
 import json
@@ -41,7 +41,7 @@ from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, writ
 
 PAGE = "report.html"
 RESERVED_NAMES = ("results.json", PAGE, "run.json", JOURNAL_FILE, RUNS_FOLDER)
-"""Names that a session uses in its output folder, without junit.xml."""
+"""Names in the output folder that `--junit` must not use. junit.xml is not among them: it is the JUnit report."""
 
 
 class JunitFamily(str, Enum):
@@ -57,8 +57,7 @@ JunitFamilyOption = Annotated[JunitFamily, typer.Option(help="xunit2 omits what 
 class Reports:
     """Writer of the reports of a session in `folder`, and of the JUnit report `junit`.
 
-    With `only`, only `junit` is written. `used` are the installed packages and external stacks of the
-    runs.
+    With `junit_only`, no other report is written. `used` are the installed packages and external stacks of the runs.
     """
 
     def __init__(
@@ -66,10 +65,10 @@ class Reports:
         folder: Path,
         junit: Path | None,
         family: Family,
-        only: bool = False,
+        junit_only: bool = False,
         used: Mapping[str, object] | None = None,
     ) -> None:
-        self.folder, self.junit, self._only = folder, junit or folder / "junit.xml", only
+        self.folder, self.junit, self._junit_only = folder, junit or folder / "junit.xml", junit_only
         self._used = used or {}
         self._missing: frozenset[Path] = frozenset()
         self._family: Family = family
@@ -87,10 +86,10 @@ class Reports:
         """Write the reports and return whether all were written; if one cannot be written, its old file remains."""
         results = map(str.encode, json_parts(finished_runs, str(self.folder), comparison, study))
         documents: dict[Path, bytes | Iterable[bytes]] = {}
-        if not self._only:
+        if not self._junit_only:
             documents[self.folder / "results.json"] = results
             documents[self.folder / PAGE] = self._page(finished_runs, comparison, study)
-        for path in {self.junit: None} if self._only else {self.folder / "junit.xml": None, self.junit: None}:
+        for path in {self.junit: None} if self._junit_only else {self.folder / "junit.xml": None, self.junit: None}:
             documents[path] = xml_parts(finished_runs, self._family, study=study)
         self._missing = frozenset(path for path, data in documents.items() if not _write(path, data))
         return not self._missing
@@ -120,7 +119,7 @@ class Reports:
         comparison: Comparison | None = None,
         study: Study | None = None,
     ) -> SessionFinished:
-        """Return the last event of a session, without reports that could not be written."""
+        """Return the last event of a session. The path of a report that could not be written is empty."""
         count, simulated = Counter[Outcome](), 0.0
         for finished in finished_runs:
             count[finished.outcome] += 1
@@ -137,7 +136,7 @@ class Reports:
             comparison=comparison,
             expected=count[Outcome.FAILED_AS_EXPECTED],
             skipped=count[Outcome.SKIPPED],
-            page="" if self._only or self.folder / PAGE in self._missing else str(self.folder / PAGE),
+            page="" if self._junit_only or self.folder / PAGE in self._missing else str(self.folder / PAGE),
             study=study,
         )
 
@@ -151,7 +150,10 @@ CLAIM_EXITS = {
 
 
 def exit_code(finished_runs: Sequence[RunFinished], study: Study | None = None) -> Exit:
-    """Return the exit code of a session that was not interrupted; that of the claim if there is one."""
+    """Return the exit code of a session that was not interrupted.
+
+    If the session is a study with a claim, the status of the claim determines it; otherwise, the outcomes of the runs.
+    """
     if study is not None and study.claim is not None:
         return CLAIM_EXITS[study.claim.status]
     outcomes = {finished.outcome for finished in finished_runs}

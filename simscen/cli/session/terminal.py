@@ -22,7 +22,7 @@ from simscen.run.sessions.output_folder import probe_writable
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 PICTURES_URL = "SIMSCEN_PICTURES_URL"
-"""Variable with the address of the pictures of the output folder, for the summary of a step."""
+"""Environment variable with the URL of the uploaded output folder, from which the job summary shows pictures."""
 
 
 class Format(str, Enum):
@@ -37,17 +37,20 @@ FormatOption = Annotated[Format, typer.Option("--format", help="Output format.")
 
 
 class Screen:
-    """Prints events until printing fails. `lost` is the error of stdout, `lost_summary` that of the summary of the
-    step."""
+    """Prints events until printing fails.
+
+    `stdout_error` is the first error of writing to stdout, `summary_error` that of writing the job summary; None if
+    there was none.
+    """
 
     def __init__(self, printer: Reporter) -> None:
         self._printer = printer
-        self.lost: OSError | None = None
-        self.lost_summary: OSError | None = None
+        self.stdout_error: OSError | None = None
+        self.summary_error: OSError | None = None
 
     def __call__(self, event: SessionEvent) -> None:
         """Print an event."""
-        if self.lost is None:
+        if self.stdout_error is None:
             with self.suppress_errors():
                 self._printer(event)
 
@@ -58,7 +61,7 @@ class Screen:
         try:
             yield
         except OSError as error:
-            self.lost = self.lost or error
+            self.stdout_error = self.stdout_error or error
             null = os.open(os.devnull, os.O_WRONLY)
             os.dup2(null, sys.stdout.fileno())
             os.close(null)
@@ -69,14 +72,14 @@ class Screen:
             with Path(os.environ[STEP_SUMMARY]).open("a", encoding="utf-8") as file:
                 file.write(text)
         except OSError as error:
-            self.lost_summary = error
+            self.summary_error = error
 
     def exit(self, code: Exit) -> Exit:
         """Return the exit code of the session, or INCOMPLETE if output was lost. A closed pipe is not an error."""
-        lost = {STEP_SUMMARY: self.lost_summary}
-        if not isinstance(self.lost, BrokenPipeError):
-            lost["to stdout"] = self.lost
-        for target, error in lost.items():
+        errors = {STEP_SUMMARY: self.summary_error}
+        if not isinstance(self.stdout_error, BrokenPipeError):
+            errors["to stdout"] = self.stdout_error
+        for target, error in errors.items():
             if error is not None:
                 print_text(f"simscen: cannot write {target}: {error.strerror}", sys.stderr)
                 code = max(code, Exit.INCOMPLETE)

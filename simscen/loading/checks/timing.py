@@ -15,7 +15,10 @@ from simscen.loading.goals import scenario_goals
 from simscen.model.robot import RobotSpec
 
 MIN_PATH_SHARE = 0.97
-"""Share of the shortest path that a robot drives at least: lengths are exact to 1 %, and its hull may cut corners."""
+"""Factor from the computed shortest path to a length that no drive falls below.
+
+Computed lengths are exact to 1 %, and a robot can cut corners a little more than they assume.
+"""
 MAX_OVERSHOOT = 1.02
 """Factor by which a controller may exceed the top speed."""
 SHORTCUT_ACTIONS = ("kidnap", "push", "new_goal", "cancel_goal")
@@ -24,7 +27,10 @@ SHORTCUT_ACTIONS = ("kidnap", "push", "new_goal", "cancel_goal")
 
 @dataclass(frozen=True)
 class Drive:
-    """A drive to all goals: shortest and least possible length of each leg in m, and the speed bound in m/s."""
+    """A drive of `robot` to all `goals`.
+
+    `lengths` are the lengths in m of the shortest path of each leg, from one goal (or the start) to the next goal.
+    """
 
     goals: tuple[Goal, ...]
     robot: RobotSpec
@@ -43,15 +49,17 @@ class Drive:
         return [length / (MAX_OVERSHOOT * self.robot.top_speed) for length in self.least_lengths]
 
     @property
-    def at_top_speed(self) -> str:
-        """The top speed, in words."""
+    def top_speed_text(self) -> str:
+        """The top speed as part of a message."""
         return f"at the robot's top speed of {self.robot.top_speed:g} m/s"
 
     @property
     def description(self) -> str:
         """Length and time of the whole drive, in words."""
         total = sum(self.lengths)
-        return f"the path of {total:.2f} m to all goals takes {total / self.robot.top_speed:.1f} s {self.at_top_speed}"
+        return (
+            f"the path of {total:.2f} m to all goals takes {total / self.robot.top_speed:.1f} s {self.top_speed_text}"
+        )
 
 
 @TIMING.check("SC303")
@@ -77,7 +85,7 @@ def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[Finding]:
         is_sent = index == 0 or spec.on_goal_failure == "stop"
         if goal.timeout is not None and drive.least_times[index] > goal.timeout and is_sent:
             length = drive.lengths[index]
-            reason = f"the path of {length:.2f} m takes {length / drive.robot.top_speed:.1f} s {drive.at_top_speed}"
+            reason = f"the path of {length:.2f} m takes {length / drive.robot.top_speed:.1f} s {drive.top_speed_text}"
             message = f"goal `{goal.name}` cannot be reached within {goal.timeout:g} s: {reason}"
             yield Finding(("goals", index, "timeout"), message)
     waits = sum(goal.wait for goal in drive.goals)

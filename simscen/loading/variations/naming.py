@@ -1,4 +1,4 @@
-"""Names of variations, derived from the values that differ, and their use in merged problems.
+"""Names of variations, derived from the values that differ, and problems merged over variations.
 
 Names are short, unique, and valid as folder names.
 """
@@ -50,7 +50,8 @@ def short_names(targets: Sequence[Target]) -> dict[str, str]:
 def derive_name(keys: dict[str, str], values: dict[str, Node], numbers: dict[str, int], number: int) -> str:
     """Return the derived name of a variation: `speed=0.5,mass=10`.
 
-    `numbers` count the values of each path; they stand for values that are too long. `number` counts the variations.
+    `keys` has the short name of each path, and `values` its value. A value that is too long is replaced by its number
+    in `numbers`. `number` is that of the variation, and names it if the whole name is too long.
     """
     name = ",".join(f"{keys[path]}={_value(value) or f'no{numbers[path]}'}" for path, value in values.items())
     name = name if name[:1].isalnum() else f"x{name}"
@@ -69,7 +70,10 @@ def number_of(name: str) -> int | None:
 
 
 def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
-    """Return the names; a derived name gets a number if it differs from another name only in case, or not at all."""
+    """Return the names, made unique without regard to case.
+
+    `is_fixed` tells which names the user has set; they stay. To a derived name that is taken, `+2`, `+3`, … is appended.
+    """
     taken = {name.casefold() for name, fixed in zip(names, is_fixed, strict=True) if fixed}
     found = []
     for name, fixed in zip(names, is_fixed, strict=True):
@@ -106,7 +110,10 @@ def _safe(text: str) -> str:
 
 
 class VariationProblems(NamedTuple):
-    """Problems of one variation; `set_by` is the path that set a value, by the position of the value."""
+    """Problems of one variation.
+
+    `set_by` maps the position of each value that the variation sets to the path that sets it.
+    """
 
     name: str
     set_by: Mapping[Position, str]

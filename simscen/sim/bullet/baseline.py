@@ -48,8 +48,8 @@ class PyBulletBaseline:
     def scan(self, directions: Array, min_range: float, max_range: float, height: float) -> None:
         """Cast rays along unit vectors (n, 2) between two ranges in m.
 
-        As is usual, rays start outside of the lidar's own housing: inside of it, PyBullet would test each ray against
-        it, which takes a third of the time of a scan.
+        Rays start at `min_range`, outside the lidar's housing, as is usual. If they started inside, PyBullet would also
+        test each ray against the housing, which takes a third of the time of a scan.
         """
         origin = (self._pose.x, self._pose.y)
         starts, ends = np.full((2, len(directions), 3), height)

@@ -23,8 +23,8 @@ RAY_HEIGHT_M = 1000.0
 MIN_NORMAL_Z_WHEEL, MIN_NORMAL_Z_CASTER = 0.6, 0.1
 """z of the contact normal above which a wheel or caster stands on the ground; below, it has hit an obstacle.
 
-A driven wheel climbs an edge of 0.29 of its radius from standstill, and of 0.4 (this limit) with some speed; a caster
-is pushed over anything lower than its center.
+At an edge of height h, the normal of a wheel of radius r has z = 1 - h / r, so 0.6 is an edge of 0.4 r. A driven wheel
+climbs 0.29 r from standstill, and 0.4 r with some speed; a caster is pushed over anything lower than its center.
 """
 
 
@@ -114,9 +114,9 @@ def is_ground_contact(
 class FloorFriction:
     """Named patches of the floor with a friction of their own; later patches cover earlier ones.
 
-    The engine multiplies the frictions of both bodies. A wheel has friction 1, so that the friction of the floor is
-    that of the contact; on a patch, the wheel gets the friction of the patch instead. On a ramp with a friction of its
-    own, both are multiplied.
+    The engine multiplies the frictions of the two bodies in contact. A wheel normally has friction 1, so that the
+    friction of the floor applies. On a patch, the wheel gets the friction of the patch instead. On a ramp with its own
+    friction, the friction of a patch is multiplied by that of the ramp.
     """
 
     def __init__(self) -> None:

@@ -91,11 +91,11 @@ def _slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]
 
 Pixels = npt.NDArray[np.bool_]
 GROUND_STEP_M = 0.05
-"""Length of ground needed before the slope is measured from the new point."""
+"""Minimum distance in m between two ground points of a column; the slope to the next point starts at the last one."""
 MAX_RISE_RATIO = 1.0
 """Rise per meter above which points belong to an upright face."""
 SLOPE_ROWS_DIVISOR = 8
-"""Fraction of the image rows, as a divisor, over which the slope at the lowest visible point is measured."""
+"""The slope at the lowest visible point is measured over the number of image rows divided by this."""
 
 
 def above_ground(away: Array, heights: Array, slope: float, low: float, known: Pixels) -> tuple[Array, Pixels]:
@@ -104,8 +104,8 @@ def above_ground(away: Array, heights: Array, slope: float, low: float, known: P
     away:     horizontal distances of the points from the camera, top row first
     heights:  above the plane on which the robot stands; nan for pixels without a point
     slope:    maximum angle of the ground in rad
-    low:      height above which the lowest point of a column is on a step that the image does not show, unless its own
-              slope leads there from the robot
+    low:      height in m; a column whose lowest point is higher begins on a step, not on ground, unless the slope at
+              that point leads down to the robot
     known:    points on cells that earlier images showed as ground
     """
     max_rise, upright = math.tan(slope), _upright(away, heights)
@@ -134,7 +134,11 @@ def _upright(away: Array, heights: Array) -> Pixels:
 
 
 def _on_a_step(away: Array, heights: Array, upright: Pixels, low: float) -> Pixels:
-    """Return the columns whose lowest point is on an upright face, or higher than its slope can lead from the robot."""
+    """Return in which columns the lowest point is on a step whose edge the image does not show.
+
+    Such a point is higher than `low`, and is on an upright face, or the slope there, extended down to the robot, ends
+    higher than `low`.
+    """
     rows, columns = heights.shape
     all_columns, lowest = np.arange(columns), _lowest(heights)
     upper = np.maximum(lowest - rows // SLOPE_ROWS_DIVISOR, 0)

@@ -13,27 +13,28 @@ from simscen.core.geometry import Array
 
 BIN_SIZE_M = 0.5
 YAW_BINS = 36
-_HALF = 1 << 21
+_OFFSET = 1 << 21
+"""Number added to the x and y of a bin so that both are positive in its key."""
 Keys = npt.NDArray[np.int64]
 
 
 def bins(poses: Array) -> Keys:
     """Return the keys (n,) of the histogram bins of `poses` (n, 3). Headings a full turn apart share one."""
-    cells = np.clip(np.floor(poses[:, :2] / BIN_SIZE_M), -_HALF + 2, _HALF - 2).astype(np.int64)
+    cells = np.clip(np.floor(poses[:, :2] / BIN_SIZE_M), -_OFFSET + 2, _OFFSET - 2).astype(np.int64)
     yaw = np.floor(poses[:, 2] * (YAW_BINS / (2 * np.pi))).astype(np.int64) % YAW_BINS
     return join(cells[:, 0], cells[:, 1], yaw)
 
 
 def join(x: Keys, y: Keys, yaw: Keys) -> Keys:
     """Return the keys of bins with these integer coordinates."""
-    return ((x + _HALF) * (2 * _HALF) + (y + _HALF)) * YAW_BINS + yaw
+    return ((x + _OFFSET) * (2 * _OFFSET) + (y + _OFFSET)) * YAW_BINS + yaw
 
 
 def split(keys: Keys) -> tuple[Keys, Keys, Keys]:
     """Return the integer coordinates x, y, yaw of bins."""
     cells, yaw = np.divmod(keys, YAW_BINS)
-    x, y = np.divmod(cells, 2 * _HALF)
-    return x - _HALF, y - _HALF, yaw
+    x, y = np.divmod(cells, 2 * _OFFSET)
+    return x - _OFFSET, y - _OFFSET, yaw
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ class KldBound:
     def samples(self, occupied: npt.ArrayLike) -> Keys:
         """Return the samples needed for a number of occupied bins, between `min_samples` and `max_samples`.
 
-        Fox's bound is zero for a single bin. nav2_amcl uses `max_samples` there, although one bin
-        means that the pose is certain.
+        For a single bin, Fox's bound is zero, so this returns `min_samples`: one bin means that the pose is certain.
+        nav2_amcl uses `max_samples` there.
         """
         degrees = np.maximum(np.asarray(occupied, dtype=np.float64) - 1, 1e-9)
         spread = 2 / (9 * degrees)

@@ -1,6 +1,6 @@
 """Upright prisms over convex bases, computed in plain Python without triangulation; and bounds of any solid.
 
-Fast commands use prisms. Their bases equal those of `triangulation.triangulate`, corner for corner.
+Commands that must be fast use prisms. Their bases equal those of `triangulation.triangulate`, corner for corner.
 """
 
 from __future__ import annotations
@@ -89,7 +89,8 @@ def _is_convex_and_counterclockwise(base: Polygon) -> bool:
 
 
 def has_no_drivable_solids(solids: Iterable[Solid], max_height: float) -> bool:
-    """Return True if wheels cannot drive onto any solid: all are prisms, and higher than `max_height` or flat.
+    """Return True if wheels cannot drive onto any solid: all are upright prisms whose top is above
+    `max_height` or not above the floor.
 
     If False, the triangles of the solids must be examined.
     """
