@@ -68,10 +68,10 @@ class ScanMatchingParticleFilter(ParticleFilter):
     def follow(self, step: Step, delta: Pose2) -> None:
         """Move each particle by its own sample of a motion from scan matching.
 
-        `delta` is the motion that odometry measured in the same time, in the base frame. If `step` and `delta` disagree,
-        wheels slip, pedestrians walk next to the robot, or the match is wrong. Some particles then follow the motion
-        model of odometry, and later scans show which particles fit the map. If the map does not show the surroundings,
-        all particles follow scan matching.
+        `delta` is the motion that odometry measured in the same time, in the base frame. If `step` and `delta`
+        disagree, wheels slip, pedestrians walk next to the robot, or the match is wrong. Some particles then follow the motion
+        model of odometry, and later scans show which particles fit the map. If the map does not show the
+        surroundings, all particles follow scan matching.
         """
         self._settle(delta)
         poses = apply_step(self.particles.poses, step, self._rng)

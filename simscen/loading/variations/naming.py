@@ -72,7 +72,7 @@ def number_of(name: str) -> int | None:
 def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
     """Return the names, made unique without regard to case.
 
-    `is_fixed` tells which names the user has set; they stay. To a derived name that is taken, `+2`, `+3`, … is appended.
+    `is_fixed` tells which names the user has set; they stay. A derived name that is taken gets a suffix `+2`, `+3`, …
     """
     taken = {name.casefold() for name, fixed in zip(names, is_fixed, strict=True) if fixed}
     found = []
