@@ -89,8 +89,9 @@ class Push(Spec, Action):
 class NewGoal(Spec, Action):
     """Send another goal; it preempts the current goal, and the remaining goals follow it.
 
-    Criteria judge it like any other goal of the scenario; the preempted goal counts as preempted. Each goal that
-    events send needs its own name; a goal that is sent twice must be reached twice.
+    Criteria judge it like any other goal of the scenario. They neither require the preempted goal nor count it as
+    failed. The name must differ from the names of all other goals. If the event happens twice, the goal is sent twice,
+    and the robot must reach it twice.
 
     Example: `do: {new_goal: {name: detour, pose: {x: 1, y: 4}}}`
     """

@@ -193,8 +193,8 @@ class ClearingBackoff:
         """Prepare for a new goal."""
         self._wait, self._due, self._nearest = INITIAL_WAIT_S, 0.0, float("inf")
 
-    def entirely(self, now: float, goal_distance: float) -> bool:
-        """Return whether to clear all of it `now` (s), with the goal `goal_distance` m away in a straight line."""
+    def clears_entirely(self, now: float, goal_distance: float) -> bool:
+        """Return whether to clear the entire global costmap at `now` in s; `goal_distance` is the straight distance in m."""
         if goal_distance <= self._nearest - PROGRESS_M:
             self._wait, self._due = INITIAL_WAIT_S, now
         if now < self._due:

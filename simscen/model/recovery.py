@@ -84,18 +84,18 @@ class Retrace(BehaviorSpec):
     backup_dist: NonNegativeLength = 0.30
     """Minimum distance to drive back."""
     retrace_dist: NonNegativeLength = 1.0
-    """Maximum distance; beyond `backup_dist` only until there is room to turn in place."""
+    """Maximum distance to drive back. After `backup_dist`, the robot stops as soon as there is room to turn in place."""
     backup_speed: PositiveSpeed = 0.15
     """Speed."""
 
 
 class ClearCostmap(BehaviorSpec):
-    """Remove obstacles that are no longer seen from the costmap."""
+    """Remove obstacles from the costmaps unless current sensor readings contain them."""
 
     component: ClassVar[str] = "simscen.stack.behaviors.motions:ClearCostmap"
     type: Literal["clear_costmap"] = "clear_costmap"
     clear_entirely: bool = True
-    """Whether to clear all of the global costmap, as Nav2 does, or only the area of the local costmap."""
+    """Whether to clear the entire global costmap, as Nav2 does, or only the area of the local costmap."""
 
 
 _Behaviors = Annotated[
@@ -140,8 +140,10 @@ class Recovery(Spec):
     ]
     """Behaviors in the order of their use, by name or with parameters."""
     clear_entirely: bool = True
-    """Whether `clear_costmap` clears all of the global costmap, as in Nav2. Otherwise it clears the area of the local
-    costmap, and ever more rarely after planner errors, so that the robot does not return to a known dead end."""
+    """Whether `clear_costmap`, and each retry after a planner error, clears the entire global costmap, as in Nav2. With
+    false, `clear_costmap` clears only the area of the local costmap. After a planner error, the entire global costmap
+    is then cleared at most after increasing times (10 s, 20 s, 40 s, …), otherwise only the area of the local costmap.
+    Therefore, the robot does not forget a known dead end and return to it."""
     spin_dist: Angle = 1.57
     """Angle of `spin`."""
     wait_duration: Duration = 5.0
@@ -153,7 +155,7 @@ class Recovery(Spec):
     backup_partial: bool = False
     """Whether `backup` drives a shorter distance if there is not enough room. Nav2 fails instead."""
     retrace_dist: NonNegativeLength = 1.0
-    """Maximum distance of `retrace`; beyond `backup_dist` only until there is room to turn in place."""
+    """Maximum distance of `retrace`. After `backup_dist`, it ends as soon as there is room to turn in place."""
     simulate_ahead_time: PositiveDuration = 2.0
     """Time for which the motions of `spin` and `backup` are checked for collisions."""
     max_rotational_vel: PositiveAngularSpeed = 1.0

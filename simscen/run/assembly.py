@@ -80,9 +80,11 @@ def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = Non
 def _directors(
     prepared: PreparedScenario, streams: Streams, agents: Mapping[str, RobotUnderTest]
 ) -> Iterator[Director]:
-    """Yield a director for events in the world, then one for the faults of each robot; a single robot needs only one.
+    """Yield the directors of a run. A director starts events and faults; a stage is its view of the world and a robot.
 
-    Events that concern no robot are the same for all, so the first robot's stage is used.
+    A scenario with one robot has one director. With several robots, the first director is for all events, and one for
+    each robot follows for its faults. The director of the events uses the stage of the first robot, because each event
+    that is for a certain robot names it, and other events have the same effect on every stage.
     """
     spec = prepared.spec
     first, *_ = agents.values()

@@ -89,7 +89,10 @@ class Quantity:
 
 @dataclass(frozen=True)
 class AnyQuantity:
-    """Annotation of a float whose dimension depends on another field, which also parses the unit."""
+    """Annotation of a float whose dimension depends on another field of the same specification.
+
+    It only adds units to the JSON schema. The specification that contains the field must convert text to a number.
+    """
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         units = "|".join(re.escape(unit) for unit in dict.fromkeys(unit for units in UNITS.values() for unit in units))
@@ -177,7 +180,7 @@ def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]
 
 
 def si_number(value: Any) -> Any:
-    """Return a number as it is, and a text such as "50 cm" in SI units; any other value unchanged."""
+    """Convert text such as "50 cm" to a number in SI units; return any other value unchanged."""
     match = NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
     if match is None:
         return value

@@ -2,9 +2,9 @@
 
 Without errors, one step is: check the goal, check the plan, call the controller. When planning fails, the global
 costmap is cleared and planning is tried again; when control fails, the local one is cleared (the contextual recoveries
-of Nav2's tree). When that fails again, the next behavior of the round robin runs. Finding a plan resets the retry of
-planning; control has one retry until the next recovery. After `number_of_retries` behaviors, the goal fails with the
-code of the last failure. A goal outside the map or inside a mapped wall fails after the first retry, because no
+of Nav2's tree). If planning or control fails again after this, the next recovery behavior of the round robin runs.
+Planning has one retry until a plan is found; control has one retry until the next recovery behavior. After
+`number_of_retries` behaviors, the goal fails with the code of the last failure. A goal outside the map or inside a mapped wall fails after the first retry, because no
 recovery can help.
 """
 
@@ -29,8 +29,8 @@ class ClearingPolicy(Protocol):
         """Prepare for a new goal."""
         ...
 
-    def entirely(self, now: float, goal_distance: float) -> bool:
-        """Return whether to clear all of it at the time `now` in s; otherwise only around the robot.
+    def clears_entirely(self, now: float, goal_distance: float) -> bool:
+        """Return whether to clear the entire global costmap at the time `now` in s, or only the area around the robot.
 
         `goal_distance` is the straight distance to the goal in m.
         """
@@ -43,7 +43,7 @@ class ClearEntirely:
     def reset(self) -> None:
         """Prepare for a new goal."""
 
-    def entirely(self, now: float, goal_distance: float) -> bool:
+    def clears_entirely(self, now: float, goal_distance: float) -> bool:
         """Return True."""
         return True
 
@@ -112,7 +112,8 @@ class Navigator:
     def step(self, tick: int, frames: Frames, twist: Twist, is_held: bool = False, periods: int = 1) -> Step:
         """Run one step, `periods` controller periods after the previous one.
 
-        `is_held`: the collision monitor has stopped the robot for its hold timeout.
+        `is_held` means that the collision monitor has kept the robot stopped for its `hold_timeout`; this counts as a
+        control failure.
         """
         goal = self.goal
         if goal is None:
@@ -167,7 +168,7 @@ class Navigator:
             self._failing_since = None
             if planning:
                 goal_distance = frames.pose.distance(goal.pose)
-                self._costmaps.clear_global(entirely=self._clearing.entirely(self._clock, goal_distance))
+                self._costmaps.clear_global(entirely=self._clearing.clears_entirely(self._clock, goal_distance))
             else:
                 self._costmaps.clear_local()
             self.plans.drop("recovery")

@@ -25,7 +25,7 @@ from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import RobotModel, Surroundings
 
 MIN_COMPARED_SHARE = 0.99
-"""Share of beliefs with a reference from which a log counts as compared as a whole."""
+"""Share of the beliefs that must have a reference pose; below it, the output says how many were compared."""
 
 
 def command(
@@ -33,7 +33,7 @@ def command(
     map_: Annotated[Path, typer.Option("--map", help="The ROS map (yaml) of the robot.")],
     robot: Annotated[str, typer.Option(help="A robot file, or the name of a shipped robot.")],
     scenario: Annotated[
-        Path | None, typer.Option(help="Use the `stack:` of this file; otherwise it needs only `pass:`.")
+        Path | None, typer.Option(help="Scenario or criteria file whose `stack:` is used; default: the default stack.")
     ] = None,
     reference: Annotated[
         str | None,
@@ -119,7 +119,7 @@ def _load_inputs(
 
 
 def _missing_localizer_problem(criteria: LoadedCriteria) -> Problem:
-    """Return the problem that the stack of a file is not simscen's own."""
+    """Return the problem for a file whose `stack` is an external stack, which has no simscen localizer."""
     position = value_position(criteria.tree, ("stack",))
     hint = "name a file whose `stack` is simscen's own"
     return criteria.library.with_source([Problem(*position, "SC016", "this stack has no simscen localizer", hint)])[0]

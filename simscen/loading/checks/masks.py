@@ -19,10 +19,10 @@ from simscen.loading.schema.messages import quoted
 Forbids = Callable[[Pose2, float], bool]
 """Predicate: does a zone contain a pose and all positions around it within a distance in m?"""
 
-CELL_M = 0.1
-"""Depth inside a zone at which a goal is forbidden for any rounding of the zone to cells."""
+MIN_DEPTH_M = 0.1
+"""Depth in m inside a zone from which a goal is forbidden, however the costmap rounds the zone to cells."""
 ESTIMATE_ERROR_M = 0.5
-"""Possible error of the initial estimate."""
+"""Possible error of the initial estimate in m. A start is reported only if it is at least this deep inside a zone."""
 NO_LIMIT_REASON = "no cell of the mask limits the speed with this `base` and `multiplier`"
 
 
@@ -49,7 +49,7 @@ def check_stack_zones(scene: Scene) -> Iterator[Finding]:
         zones.append((KEEPOUT_KEYS, "in a cell that the keepout mask forbids", forbidden_test(keepout)))
     for keys, where, forbids in zones:
         hint = "move one of them, or expect the failure with `result: {status: FAILED, error_code: %s}`"
-        for name in [goal.name for _, goal in scene.targets if forbids(goal.pose, CELL_M)]:
+        for name in [goal.name for _, goal in scene.targets if forbids(goal.pose, MIN_DEPTH_M)]:
             message = f"goal `{name}` cannot be reached: it is {where}, which the stack keeps out of"
             yield Finding(keys, message, hint % "GOAL_OCCUPIED")
         if forbids(scene.start, ESTIMATE_ERROR_M) and not expects_start_failure(scene.loaded.spec):
@@ -62,10 +62,10 @@ def _inside_region(corners: Polygon) -> Forbids:
 
 
 def forbidden_test(mask: OccupancyGrid) -> Forbids:
-    """Return the predicate whether a keepout mask forbids a pose and its surroundings."""
+    """Return a predicate: does the keepout mask forbid a pose and all positions around it within a distance in m?"""
 
     def forbids(pose: Pose2, within: float) -> bool:
-        steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, CELL_M))) + 1)
+        steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, MIN_DEPTH_M))) + 1)
         around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         return bool(in_keepout_mask(mask, around + np.array((pose.x, pose.y))).all())
 

@@ -1,4 +1,8 @@
-"""Checks of triggers, criteria and goals by position: positions that cannot be reached, or are reached at the start."""
+"""Checks of triggers, criteria, and goals that compare positions with the geometry of the world.
+
+They find trigger areas that the robot cannot reach, keepout regions that contain the start or a goal, goals that the
+robot has already reached when they are sent, and localization bounds that are larger than the world.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -28,12 +32,15 @@ if TYPE_CHECKING:
 
 
 SILL_M = 0.03
-"""Height of obstacles that a route may cross, although no robot could stop there."""
+"""Height in m up to which an obstacle does not block a route: more than for poses, so that a missing route is certain."""
 
 
 @dataclass(frozen=True)
 class RobotRoutes:
-    """Routes of a disc that fits into the footprint: if the disc has no route, neither has the robot."""
+    """Routes of a disc that fits into the footprint: if the disc has no route, neither has the robot.
+
+    `stops` are the poses between which routes are needed: starts, goals, and the corners of trigger areas.
+    """
 
     scene: Scene
     stops: tuple[Pose2, ...]
@@ -92,7 +99,11 @@ class RobotRoutes:
 
 
 class TriggerArea(NamedTuple):
-    """An area that a trigger waits for the robot to enter; `distance` is how far a pose is from it, in m."""
+    """An area that a trigger waits for the robot to enter.
+
+    `keys` are the position of the condition in the scenario file, and `event` is the name of the event or fault.
+    `distance` returns the distance in m of a pose from the area; it is at most 0 inside.
+    """
 
     keys: Keys
     event: str
@@ -102,7 +113,7 @@ class TriggerArea(NamedTuple):
 
 
 def trigger_areas(scene: Scene) -> list[TriggerArea]:
-    """Return the areas that the robot must enter for events and faults to happen."""
+    """Return the areas that the robot must enter before an event or a fault can start."""
     spec = scene.loaded.spec
     tests: list[tuple[Keys, str, AnyCondition | None]] = [
         ((*step.keys, "when"), step.name, step.when) for step in spec.steps

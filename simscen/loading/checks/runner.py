@@ -1,4 +1,4 @@
-"""Run the checks that need no built world."""
+"""Run the checks of names, settings, and meaning, which do not look at the geometry of the built world."""
 
 from collections.abc import Iterable
 
@@ -17,10 +17,12 @@ MODULES = (actions, criteria, events, faults, names, settings, world_file)
 def check_scenario(
     loaded: LoadedScenario, world: World | None = None, unknown_places: Iterable[Problem] = ()
 ) -> list[Problem]:
-    """Return the problems of a scenario of one robot, or as one of several robots sees it; some are warnings.
+    """Return the errors and warnings of a scenario with one robot.
 
-    `world` is the built world, if the names of an imported world are needed. `unknown_places` are problems with names
-    of places, which are found while the scenario is loaded. The meaning is checked only if all names are known.
+    A scenario with several robots is checked once per robot: `loaded` is then the part that concerns one of them.
+    `world` is the built world; it is needed only for the names in an imported world, e.g. from Gazebo. `unknown_places`
+    are problems with names of places, which were found while the scenario was loaded. The meaning of the scenario is
+    checked only if there are no errors in the names and in the world file.
     """
     problems = [*unknown_places, *NAMES.problems(NameScope(loaded, world)), *check_world_file(loaded.world)]
     if all(problem.severity == "warning" for problem in problems):
@@ -29,10 +31,10 @@ def check_scenario(
 
 
 def check_world_file(world: LoadedWorld) -> list[Problem]:
-    """Return the problems of a world file, without the text of their lines; some are warnings."""
+    """Return the errors and warnings of a world file. They do not contain the text of the source line yet."""
     return [] if world.spec is None else WORLD_FILE.problems(world)
 
 
 def check_robot_names(spec: ScenarioSpec, tree: MappingNode) -> list[Problem]:
-    """Return the problems with the names of robots in a scenario, without the text of their lines."""
+    """Return the problems with the names of robots. They do not contain the text of the source line yet."""
     return ROBOT_NAMES.problems(WrittenScenario(spec, tree))

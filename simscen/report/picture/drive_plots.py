@@ -15,7 +15,7 @@ from simscen.report.picture.map_picture import MAX_MAP_SIZE_PX
 from simscen.report.picture.palette import AMBER, FAINT_INK, GREEN, INK, PAGE, ROBOT, RULE
 
 DriveTrial = tuple[str, Sequence[Pose2], Sequence[Pose2], Sequence[Pose2]]
-"""Name, and the paths as commanded, by odometry, and in truth."""
+"""Name of a test drive, and three paths: as commanded, as estimated by odometry, and the true one."""
 PANEL_SIZE_PX, PANEL_MARGIN_M = 420, 0.25
 GRID_SPACING_M = 0.5
 

@@ -20,11 +20,13 @@ _LINE_HEIGHT_PX = 17
 _ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
 Pen = ImageDraw.ImageDraw
 DrawSymbol = Callable[[Pen, float, float], None]
+"""Function that draws the symbol of a legend entry: pen, x of its left edge and y of its center in px."""
 Row = tuple[Status, Color, list[str]]
+"""Status of a criterion, its color, and lines of text."""
 
 
 def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
-    """Draw the sidebar with at least `height` pixels. The legend explains the `parts` of the map."""
+    """Draw the sidebar with at least `height` pixels. `parts` are the names of the drawn parts, for the legend."""
     reasons, rows = _reasons(scene), _criteria(scene)
     legend = [entry[1:] for entry in _legend(round_time_step(scene.result.simulated)) if _is_drawn(parts, entry[0])]
     text_height = (
@@ -46,7 +48,11 @@ def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
 
 
 def _is_drawn(parts: Sequence[str], word: str) -> bool:
-    """Return whether a part of the map has a name that starts or ends with this word of the legend."""
+    """Return whether the picture has a part that an entry of the legend explains.
+
+    `parts` are the names of the drawn parts. The name of a part starts or ends with the `word` of its legend entry; the
+    word "" belongs to every part.
+    """
     return any(part.startswith(word) or part.endswith(f" {word}") for part in parts)
 
 
@@ -123,7 +129,7 @@ def _cross(draw: Pen, x: float, y: float, color: Color) -> None:
 
 
 def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
-    """Return the entries of the legend: start of the name of a part, text, and function that draws the symbol."""
+    """Return the entries of the legend: word in the names of the parts (see `_is_drawn`), text, and symbol."""
     return [
         ("", f"true path, a dot every {step:g} s", _path),
         ("belief", "believed path", _dashes),

@@ -23,9 +23,13 @@ from simscen.report.replay.timeline import SourceLines
 MAX_BEAMS, MAX_RANGES = 360, 300_000
 """Maximum number of beams per scan, and of ranges per lidar."""
 MAX_PARTICLES, MAX_CLOUDS = 250, 300
+"""Maximum number of particles per cloud, and of clouds per robot."""
 MAX_PLAN_POINTS, MAX_PATH_POINTS = 120, 60_000
+"""Maximum number of points per plan, and of points of all plans together; each plan keeps at least 8 points."""
 MAX_LOCAL_PLANS = 1500
+"""Maximum number of local plans per robot."""
 MAX_GRID_CELLS = 2_000_000
+"""Maximum number of cells of all grids on a costmap topic together."""
 _CENTIMETER = 0.01
 
 
@@ -142,7 +146,10 @@ def _costmap(
 
 
 def map_from_odom(trace: Trace, tick: int) -> Pose2:
-    """Return the transform from map to odom by the newest belief, or the identity without belief or odometry."""
+    """Return the pose of the odom frame in the map frame, from the newest belief at `tick`.
+
+    Without belief or odometry, return the identity.
+    """
     if not len(trace.belief) or not len(trace.odometry):
         return Pose2(0.0, 0.0)
     newest = trace.belief.ticks[max(int(np.searchsorted(trace.belief.ticks, tick, side="right")) - 1, 0)]

@@ -1,8 +1,9 @@
 """Detects objects at rest, so that they can sleep from the first tick, and records where they rest.
 
-Bullet deactivates a body after two seconds at rest; until then a chair costs as much as a robot. The world settles
-before tick 0: an object rests if it is slow at every sample and not faster at each sample than at the one before, as an
-object is that begins to slide or tip over. The remaining speeds are solver jitter of the contacts.
+Bullet deactivates a body after two seconds at rest; until then, a chair takes as much computing time as a robot. The
+world settles before tick 0, and the speed of each object is sampled meanwhile. An object is at rest if it is slow at
+every sample and its speed does not increase from each sample to the next. A speed that increases every time shows that
+the object begins to slide or tip over; other small speeds are jitter of the contact solver.
 """
 
 import itertools
@@ -44,17 +45,20 @@ def _is_at_rest(speeds: list[float]) -> bool:
 
 
 class RestPoses:
-    """Poses in which pushable objects rested at two updates in a row, or at the first one, by name."""
+    """Rest poses of pushable objects, by name.
+
+    A rest pose is a pose that an object had at two consecutive updates. All poses of the first update are rest poses.
+    """
 
     def __init__(self) -> None:
         self.poses: Mapping[str, Pose3] = {}
-        """Replaced by another mapping whenever one of the poses changes."""
+        """Newest rest pose of each object. A change of a pose creates a new mapping."""
         self._last: Mapping[str, Pose3] | None = None
 
     def update(self, poses: Mapping[str, Pose3]) -> None:
-        """Take the current poses of all pushable objects.
+        """Update the rest poses with the current poses of all pushable objects.
 
-        An object that has moved or was removed keeps its rest pose in case it returns to exactly this pose.
+        The last rest pose of an object that moves or is removed stays, in case it returns to exactly this pose.
         """
         before, self._last = poses if self._last is None else self._last, poses
         changed = {name: pose for name, pose in poses.items() if before.get(name) == pose != self.poses.get(name)}

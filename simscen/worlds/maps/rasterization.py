@@ -1,4 +1,8 @@
-"""Rasterization: the cells that solids touch, from their outlines. All segments are processed at once."""
+"""Rasterization: find the grid cells that solids touch or fill, from the outlines of the solids.
+
+All coordinates are in cells: the cell in row r and column c covers c ≤ x < c + 1 and r ≤ y < r + 1. The `owner` of a
+segment is the index of the solid to which it belongs. All segments are processed at once.
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +17,10 @@ INWARD_OFFSET_CELLS = 1e-6
 
 
 def touched_cells(cut: CrossSection, shape: tuple[int, int]) -> Cells:
-    """Return which cells of a grid of `shape` (rows, columns) overlap solids, with outlines in cells."""
+    """Return a mask of `shape` (rows, columns) that is True for the cells that overlap solids.
+
+    `cut` contains the outlines of the solids, in cells.
+    """
     cells = filled_cells(cut, shape)
     rows, columns = _outline_cells(cut.segments)
     inside = (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
@@ -22,7 +29,10 @@ def touched_cells(cut: CrossSection, shape: tuple[int, int]) -> Cells:
 
 
 def _outline_cells(segments: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Return rows and columns of the cells on the segments, which are split at the grid lines."""
+    """Return the rows and columns of the cells that the segments cross.
+
+    The segments are split at the grid lines, so that each piece lies in one cell.
+    """
     start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
     owner = [np.arange(len(segments)), np.arange(len(segments))]
     along = [np.zeros(len(segments)), np.ones(len(segments))]
@@ -65,7 +75,11 @@ def filled_cells(cut: CrossSection, shape: tuple[int, int]) -> Cells:
 def _crossings(
     cut: CrossSection, shape: tuple[int, int]
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Array, npt.NDArray[np.int32]]:
-    """Return the crossings of outlines with the center lines of rows: row, first column beyond, sign, owner."""
+    """Return where outlines cross the horizontal center lines of rows: row, column, sign, and owner of each crossing.
+
+    The column is the first one whose center is at the crossing or at larger x. The sign is 1 if the solid is on the
+    side of larger x, and -1 if it ends there. The owner is the index of the solid.
+    """
     (x0, y0), (x1, y1) = cut.segments[:, 0].T, cut.segments[:, 1].T
     first = np.clip(np.ceil(np.minimum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
     last = np.clip(np.ceil(np.maximum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
@@ -85,7 +99,7 @@ def _is_balanced(keys: npt.NDArray[np.int64], signs: Array) -> Cells:
 
 
 def _is_inside_out(cut: CrossSection) -> Cells:
-    """Return for each owner whether its outline is clockwise."""
+    """Return for each solid, in the order of the owner indices, whether its outline is clockwise."""
     if not len(cut.owners):
         return np.zeros(0, dtype=np.bool_)
     (x0, y0), (x1, y1) = cut.segments[:, 0].T, cut.segments[:, 1].T

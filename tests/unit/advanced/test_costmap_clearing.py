@@ -51,14 +51,14 @@ def test_reopened_door_out_of_sight_is_tried_again() -> None:
 
 def test_whole_costmap_is_cleared_with_growing_intervals() -> None:
     forgetting = ClearingBackoff()
-    assert [t for t in range(100) if forgetting.entirely(float(t), 5.0)] == [0, 10, 30, 70]
+    assert [t for t in range(100) if forgetting.clears_entirely(float(t), 5.0)] == [0, 10, 30, 70]
     forgetting.reset()
-    assert forgetting.entirely(100.0, 5.0)
+    assert forgetting.clears_entirely(100.0, 5.0)
 
 
 @pytest.mark.parametrize(("to_go", "again"), [(4.5, False), (3.9, True)])
 def test_progress_of_a_meter_allows_clearing_at_once(to_go: float, again: bool) -> None:
     forgetting = ClearingBackoff()
-    assert forgetting.entirely(0.0, 5.0)
-    assert forgetting.entirely(1.0, to_go) == again
-    assert not forgetting.entirely(2.0, to_go)
+    assert forgetting.clears_entirely(0.0, 5.0)
+    assert forgetting.clears_entirely(1.0, to_go) == again
+    assert not forgetting.clears_entirely(2.0, to_go)
