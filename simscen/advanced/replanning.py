@@ -194,7 +194,10 @@ class ClearingBackoff:
         self._wait, self._due, self._nearest = INITIAL_WAIT_S, 0.0, float("inf")
 
     def clears_entirely(self, now: float, goal_distance: float) -> bool:
-        """Return whether to clear the entire global costmap at `now` in s; `goal_distance` is the straight distance in m."""
+        """Return whether to clear the entire global costmap at the time `now` in s, or only the area around the robot.
+
+        `goal_distance` is the straight distance to the goal in m.
+        """
         if goal_distance <= self._nearest - PROGRESS_M:
             self._wait, self._due = INITIAL_WAIT_S, now
         if now < self._due:

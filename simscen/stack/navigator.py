@@ -4,8 +4,8 @@ Without errors, one step is: check the goal, check the plan, call the controller
 costmap is cleared and planning is tried again; when control fails, the local one is cleared (the contextual recoveries
 of Nav2's tree). If planning or control fails again after this, the next recovery behavior of the round robin runs.
 Planning has one retry until a plan is found; control has one retry until the next recovery behavior. After
-`number_of_retries` behaviors, the goal fails with the code of the last failure. A goal outside the map or inside a mapped wall fails after the first retry, because no
-recovery can help.
+`number_of_retries` behaviors, the goal fails with the code of the last failure. A goal outside the map or inside a
+mapped wall fails after the first retry, because no recovery can help.
 """
 
 from typing import NamedTuple, Protocol

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 SILL_M = 0.03
-"""Height in m up to which an obstacle does not block a route: more than for poses, so that a missing route is certain."""
+"""Height in m up to which a route may cross an obstacle. For a start or goal, the limit is lower (SILL_M in scene.py)."""
 
 
 @dataclass(frozen=True)
