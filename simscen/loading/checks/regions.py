@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 SILL_M = 0.03
-"""Height in m up to which a route may cross an obstacle. For a start or goal, the limit is lower (SILL_M in scene.py)."""
+"""Height in m up to which a route may cross an obstacle. For a start or goal, SILL_M in scene.py is lower."""
 
 
 @dataclass(frozen=True)
