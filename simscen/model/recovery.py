@@ -84,7 +84,7 @@ class Retrace(BehaviorSpec):
     backup_dist: NonNegativeLength = 0.30
     """Minimum distance to drive back."""
     retrace_dist: NonNegativeLength = 1.0
-    """Maximum distance to drive back. After `backup_dist`, it ends as soon as there is room to turn in place."""
+    """Maximum distance to drive back. After `backup_dist`, the behavior ends once there is room to turn in place."""
     backup_speed: PositiveSpeed = 0.15
     """Speed."""
 
