@@ -69,8 +69,8 @@ class ScanMatchingParticleFilter(ParticleFilter):
         """Move each particle by its own sample of a motion from scan matching.
 
         `delta` is the motion that odometry measured in the same time, in the base frame. If `step` and `delta`
-        disagree, wheels slip, pedestrians walk next to the robot, or the match is wrong. Some particles then follow the motion
-        model of odometry, and later scans show which particles fit the map. If the map does not show the
+        disagree, wheels slip, pedestrians walk next to the robot, or the match is wrong. Some particles then follow the
+        motion model of odometry, and later scans show which particles fit the map. If the map does not show the
         surroundings, all particles follow scan matching.
         """
         self._settle(delta)
