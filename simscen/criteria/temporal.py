@@ -110,12 +110,13 @@ class Until(Release, TemporalCriterion):
 
 
 class Whenever(Windowed):
-    """At every moment at which one condition was true, another one was; it may look ahead: `then: {eventually: …}`.
+    """Whenever one condition (`whenever`) is true, another one (`then`) is true too, or becomes true in time.
 
-    What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the
-        worst response among the moments at which the premise was true.
-    When it fails: the premise was true at some sample, and the response was not.
-    Why this: a robot that is lost, blind or too near must react, each time and in time.
+    What is measured: how far each signal is from its bound at each sample of the truth. The margin is the smallest one
+        of the response (`then`) over all samples at which the premise (`whenever`) was true.
+    When it fails: at some sample, the premise was true and the response was not.
+    Why this: a robot that is lost, blind, or too near must react, each time and in time; for a response within some
+        seconds, write `then: {eventually: {…, within: 2 s}}`.
     Source: the bounded response pattern of Dwyer, Avrunin and Corbett 1999; robust semantics of Donzé and Maler 2010.
 
     Inconclusive if the premise was never known to be true, because then nothing was tested (unless `required: false`),

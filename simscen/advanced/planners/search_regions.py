@@ -22,16 +22,22 @@ CORRIDOR_SLACKS = (0.05, 0.15, 1.0)
 COST_SLACK = 0.15
 """Ratio by which paths in the first search may cost more than the cheapest path over the coarse grid."""
 MAX_SAMPLES = 3000
-"""Maximum number of samples, those on the cheapest paths. BIT* takes about ten iterations for each."""
-REACH_M, FAR_REACH_M = 1.8, 2.3
-"""Distance up to which samples are connected: with the path of the coarse grid among them, and without."""
+"""Maximum number of samples of the first search; those on the cheapest paths are kept. BIT* takes about ten iterations
+for each."""
+REACH_M = 1.8
+"""Distance up to which samples are connected if the points of the coarse path are among them."""
+FAR_REACH_M = 2.3
+"""Distance up to which samples are connected otherwise."""
 AMPLE_CLEARANCE_M = 0.15
 """Clearance beyond the robot's radius that suffices for straight motions between samples."""
 
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """A part of a path to search: with BIT* on `samples` (n, 2), connected up to `reach` m, or on its own samples."""
+    """A part of a path that BIT* searches for.
+
+    It connects the given `samples` (n, 2) up to a distance of `reach` m. If they are None, BIT* draws its own samples.
+    """
 
     problem: Problem
     samples: Array | None = None
@@ -48,7 +54,8 @@ def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iter
     """Yield searches, each as its successive legs.
 
     The first one samples the medial axis, and sparsely the open space, near the cheapest path over the coarse grid. If
-    there were too many samples, searches in corridors follow. The last ones sample everywhere, with increasing density.
+    the medial axis has more than MAX_SAMPLES, searches in corridors follow. The last ones sample everywhere, with
+    increasing density.
     """
     problem, samples = whole_problem(costs, ends), medial_axis_samples(costs.costmap, ends.reachable, seed)
     yield iter((Leg(problem, _cheap_samples(costs, ends, samples), REACH_M),))
@@ -97,7 +104,7 @@ def _motion_within(motion: Motion, informed: InformedSet) -> Motion:
 
 
 CHECKS_BEFORE_FIRST_BATCH = 4
-"""Evaluations of the termination condition by BIT* until after it has drawn its first batch."""
+"""Number of times that BIT* evaluates the termination condition before its first batch is complete."""
 
 
 class _SampledValidity(StateValidity):
@@ -141,7 +148,7 @@ class SampledSearch(OmplSearch):
         planner.setRewireFactor(self._reach / _connection_radius(self.problem.bounds, len(self._samples) + 2))
 
     def _make_termination(self, planner: Any) -> Termination:
-        """Stop when BIT* draws its second batch, which is made small during the first."""
+        """Return a condition that stops BIT* at its second batch, which is reduced to one sample beforehand."""
         batches, remaining = planner.numBatches, self.max_iterations
 
         def should_stop() -> bool:
@@ -155,6 +162,6 @@ class SampledSearch(OmplSearch):
 
 
 def _connection_radius(bounds: tuple[float, float, float, float], states: int) -> float:
-    """Return the distance in m up to which BIT* connects so many states with a rewire factor of 1 (r of RRG)."""
+    """Return the connection radius in m of BIT* for a number of states and a rewire factor of 1 (r of RRG)."""
     area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
     return 2.0 * math.sqrt(1.5 * area / math.pi * math.log(states) / states)

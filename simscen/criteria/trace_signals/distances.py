@@ -133,6 +133,7 @@ def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
 
 
 POINT = ((0.0, 0.0),)
+"""Outline of an object without extent: only its position counts."""
 INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6
 """Gaps in m below which the robot is in the intimate, personal, or social space of a person (Hall 1966, HuNavSim)."""
 
@@ -148,9 +149,9 @@ def pedestrian_radii(trace: Trace) -> dict[str, float]:
 
 
 def pedestrian_gap(trace: Trace, case: Case) -> Array:
-    """Return the distance in m to the nearest pedestrian at each truth sample; infinite without pedestrians.
+    """Return the distance in m to the nearest pedestrian at each truth sample; infinite while none is present.
 
-    The inscribed circle replaces a missing footprint. Raises SignalUnavailable for a run without any pedestrian.
+    The inscribed circle replaces a missing footprint. Raises SignalUnavailable if no pedestrian was ever present.
     """
     radii = pedestrian_radii(trace)
     if not radii:

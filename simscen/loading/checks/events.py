@@ -21,8 +21,8 @@ LATCHING_CONDITIONS = frozenset(
     {"time", "travelled", "goal", "waypoint", "replan", "recovery", "collision", "pedestrian", "event"}
 )
 """Conditions that stay true once they have become true."""
-MAX_OVERSHOOT = 1.1
-"""Factor by which a robot may exceed its top speed."""
+MAX_SPEED_RATIO = 1.1
+"""Largest speed of a robot, relative to its top speed, at any moment."""
 MAX_TRUTH_ERROR_M = 0.5
 """Upper bound on the localization error of a stack that gets the true pose."""
 
@@ -195,13 +195,13 @@ class PossibleRun:
 
     def _travelled(self, travelled: Any) -> str | None:
         top, limit = self._top_speed, self.loaded.spec.time_limit
-        if top is None or travelled.root <= MAX_OVERSHOOT * top * limit:
+        if top is None or travelled.root <= MAX_SPEED_RATIO * top * limit:
             return None
         return f"at its top speed of {top:g} m/s the robot drives {top * limit:g} m within the time limit"
 
     def _speed_above(self, speed: Any) -> str | None:
         top = self._top_speed
-        if top is None or speed.root <= MAX_OVERSHOOT * top or self._may_be_pushed:
+        if top is None or speed.root <= MAX_SPEED_RATIO * top or self._may_be_pushed:
             return None
         return f"the robot's top speed is {top:g} m/s"
 
@@ -209,7 +209,7 @@ class PossibleRun:
         spec = self.loaded.robot.spec
         if spec is None or self._may_be_pushed or self.may_do("push"):
             return None
-        if rate.root <= MAX_OVERSHOOT * spec.limits.angular:
+        if rate.root <= MAX_SPEED_RATIO * spec.limits.angular:
             return None
         return f"the robot's maximum turn rate is {spec.limits.angular:g} rad/s"
 

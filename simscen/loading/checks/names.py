@@ -76,7 +76,7 @@ def unknown_lidars(scope: NameScope) -> Iterator[Finding]:
 
 @NAMES.check("SC033")
 def duplicate_names(scope: NameScope) -> Iterator[Finding]:
-    """Find goals, events or faults that share a name, and events and faults with the same name."""
+    """Find two goals, two events, or two faults with the same name, and an event and a fault with the same name."""
     loaded = scope.loaded
     lists: dict[str, list[tuple[Keys, str | None]]] = {
         "goal": [(("goals", k), goal.name) for k, goal in enumerate(loaded.spec.goals)],
@@ -118,10 +118,10 @@ def duplicate_names_of_actions(scope: NameScope) -> Iterator[Finding]:
 
 @NAMES.check("SC033")
 def reserved_goal_names(scope: NameScope) -> Iterator[Finding]:
-    """Find goals with names such as `shelf#2`, which further loops use."""
+    """Find goals with names such as `shelf#2`, which are reserved for the second and later loops."""
     for index, goal in enumerate(scope.loaded.spec.goals):
         if goal.name is not None and LOOP_NAME.fullmatch(goal.name):
-            message = f"{quoted(goal.name)} is reserved for the goals of further loops"
+            message = f"{quoted(goal.name)} is reserved for the goals of the second and later loops"
             yield Finding(("goals", index, "name"), message, "choose a name that does not end in # and a number")
 
 
@@ -168,7 +168,7 @@ def unknown_robots(scenario: WrittenScenario) -> Iterator[Finding]:
 
 @ROBOT_NAMES.check("SC043")
 def missing_robots(scenario: WrittenScenario) -> Iterator[Finding]:
-    """Find triggers and actions that apply to one robot, but do not name one of several robots."""
+    """Find triggers and actions that must name a robot, because there are several, and do not."""
     spec = scenario.spec
     if not spec.robots:
         return
@@ -176,7 +176,7 @@ def missing_robots(scenario: WrittenScenario) -> Iterator[Finding]:
     faults = {fault.label for robot in spec.robots.values() for fault in robot.faults} - events
     hint = f"add {' or '.join(f'`robot: {name}`' for name in sorted(spec.robots))}"
     for step in spec.steps:
-        unnamed = [] if step.when is None else list(_tests_without_robot(step.when, (*step.keys, "when"), faults))
+        unnamed = [] if step.when is None else list(_conditions_without_robot(step.when, (*step.keys, "when"), faults))
         for keys, action in step.located_actions():
             assert isinstance(action.chosen, Action)
             if action.robot is None and action.chosen.is_robot_specific:
@@ -185,15 +185,15 @@ def missing_robots(scenario: WrittenScenario) -> Iterator[Finding]:
             yield Finding((*keys, kind), f"`{kind}` must name one of the robots", hint, at_key=True)
 
 
-def _tests_without_robot(test: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, str]]:
+def _conditions_without_robot(test: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, str]]:
     """Yield keys and kind of each condition that applies to one robot, or to its fault, but names no robot."""
     if test.robot is not None:
         return
     for key, inner in (("all", test.all), ("any", test.any)):
         for number, part in enumerate(inner or ()):
-            yield from _tests_without_robot(part, (*keys, key, number), faults)
+            yield from _conditions_without_robot(part, (*keys, key, number), faults)
     if test.not_ is not None:
-        yield from _tests_without_robot(test.not_, (*keys, "not"), faults)
+        yield from _conditions_without_robot(test.not_, (*keys, "not"), faults)
     elif not test.inner:
         condition = test.chosen
         assert isinstance(condition, Condition)

@@ -17,7 +17,7 @@ from simscen.core.geometry.polygons import depth_inside_polygon, distance_to_pol
 from simscen.core.geometry.shapes import Solid
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.localization import LocalizationError
-from simscen.loading.checks.events import MAX_OVERSHOOT
+from simscen.loading.checks.events import MAX_SPEED_RATIO
 from simscen.loading.checks.placement import blocked_poses
 from simscen.loading.checks.registry import Finding, Keys
 from simscen.loading.checks.scene import START, WORLD, Scene
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 
-SILL_M = 0.03
-"""Height in m up to which a route may cross an obstacle. For a start or goal, SILL_M in scene.py is lower."""
+MAX_ROUTE_SILL_M = 0.03
+"""Height of obstacles that a route may cross. For a start or goal, it is the lower SILL_M in scene.py."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class RobotRoutes:
     @property
     def z_range(self) -> tuple[float, float]:
         """Heights in m between which an obstacle blocks a route."""
-        return self.scene.heights_above(SILL_M)
+        return self.scene.heights_above(MAX_ROUTE_SILL_M)
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -170,7 +170,7 @@ def unreachable_triggers(scene: Scene) -> Iterator[Finding]:
         center = Pose2(*(sum(values) / len(corners) for values in zip(*corners, strict=True)))
         if not scene.cached(robot_routes).can_enter(starts, center, distance):
             yield Finding(keys, f"`{name}` can never happen: no route leads the robot to {what}")
-        elif robot is not None and min(map(distance, starts)) > MAX_OVERSHOOT * robot.top_speed * limit:
+        elif robot is not None and min(map(distance, starts)) > MAX_SPEED_RATIO * robot.top_speed * limit:
             reason = f"at {robot.top_speed:g} m/s, its top speed, the robot does not reach {what} within the time limit"
             yield Finding(keys, f"`{name}` can never happen: {reason}")
 

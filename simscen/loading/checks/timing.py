@@ -19,8 +19,8 @@ MIN_PATH_SHARE = 0.97
 
 Computed lengths are exact to 1 %, and a robot can cut corners a little more than they assume.
 """
-MAX_OVERSHOOT = 1.02
-"""Factor by which a controller may exceed the top speed."""
+MAX_AVERAGE_SPEED_RATIO = 1.02
+"""Largest average speed of a drive, relative to the top speed of the robot."""
 SHORTCUT_ACTIONS = ("kidnap", "push", "new_goal", "cancel_goal")
 """Actions after which a robot may be somewhere else, faster, or done earlier."""
 
@@ -46,7 +46,7 @@ class Drive:
     @property
     def least_times(self) -> list[float]:
         """Lower bound of the time for each leg in s."""
-        return [length / (MAX_OVERSHOOT * self.robot.top_speed) for length in self.least_lengths]
+        return [length / (MAX_AVERAGE_SPEED_RATIO * self.robot.top_speed) for length in self.least_lengths]
 
     @property
     def top_speed_text(self) -> str:

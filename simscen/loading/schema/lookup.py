@@ -29,14 +29,14 @@ def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel
     return list(dict.fromkeys(kind for kind in found if _is_model(kind) and not issubclass(kind, RootModel)))
 
 
-def types_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
+def type_values_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
     """Return the valid values of `type` in a mapping at `loc`."""
     return [str(value) for kind in models_at(model, loc) for value in _literal_types(kind)]
 
 
-def types_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -> list[str]:
+def type_values_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -> list[str]:
     """Return the other values of `type` with which the mapping at `loc` could have this key."""
-    own = types_at(model, loc)
+    own = type_values_at(model, loc)
     if not loc or loc[-1] not in own:
         return []
     having = [kind for kind in models_at(model, loc[:-1]) if key in keys_of([kind])]
@@ -95,7 +95,7 @@ def _root_type(model: Any) -> Any:
 
 
 def _types_below(kind: Any, part: Key) -> list[Any]:
-    """Return the types of the value at a key or index of a value of this type."""
+    """Return the Python types that an item may have, for a key or index `part` of a container of type `kind`."""
     unwrapped = _unwrapped(kind)
     if _is_model(unwrapped) and isinstance(part, str):
         matches = field_type(unwrapped, part)

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ValidationError
 
 from simscen.core.errors import Problem
 from simscen.loading.schema import common_mistakes, messages
-from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at, types_at, types_with_key
+from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at, type_values_at, type_values_with_key
 from simscen.loading.yaml import textfile
 from simscen.loading.yaml.tree import (
     Key,
@@ -122,7 +122,7 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
         hint = lookalike
     elif key in Trigger.modifiers and models == [AnyCondition]:
         hint = f"`{key}` applies to the whole trigger: write it next to `all`, `any` or `not` under `when`"
-    elif others := types_with_key(model, loc[:-1], key):
+    elif others := type_values_with_key(model, loc[:-1], key):
         hint = f"`{key}` is a parameter of type {' and '.join(f'`{name}`' for name in others)}"
     elif reserved_key_hint := common_mistakes.hint_for_reserved_key(loc[:-1], key):
         hint = reserved_key_hint
@@ -145,7 +145,7 @@ def _missing_key(tree: Node, loc: tuple[Key, ...]) -> Problem:
 
 def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error: dict[str, Any]) -> Problem:
     """Return the problem of a mapping whose `type` is missing or unknown."""
-    node, types = node_at(tree, loc), types_at(model, loc)
+    node, types = node_at(tree, loc), type_values_at(model, loc)
     if not isinstance(node, MappingNode):
         return _problem(value_position(tree, loc), "SC011", f"expected a mapping, got {messages.describe_node(node)}")
     if error["type"] == "union_tag_not_found":

@@ -183,5 +183,5 @@ def test_a_likelihood_ratio_that_equals_its_limit_decides() -> None:
 
 
 def test_a_rate_on_the_boundary_is_not_compatible_with_the_runs() -> None:
-    anytime = claim(min=0.25, confidence=0.5, method="anytime", runs=5)
-    assert decide(anytime, [True, False]) == (1, ClaimStatus.HELD)  # (1 + 1) · 0.25 = 1 - confidence
+    anytime = claim(min=1 / 64, confidence=31 / 32, method="anytime", runs=5)
+    assert decide(anytime, [True, False]) == (1, ClaimStatus.HELD)  # (1 + 1) / 64 = 1 - confidence
