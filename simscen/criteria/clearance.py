@@ -25,7 +25,7 @@ SEARCH_MARGIN_M = 0.5
 
 
 class Clearance(Spec, Criterion):
-    """The robot kept its distance.
+    """The robot kept a minimum distance from everything solid.
 
     What is measured: the smallest true distance between the robot's hull and the surface of anything solid, over the
         whole run. It is searched 2 m around the robot, and further where a bound asks for it.
@@ -69,12 +69,12 @@ DRIVING_SPEED_M_S = 0.1
 
 
 class PersonalSpace(Spec, Criterion):
-    """The robot kept its distance from people.
+    """The robot kept a minimum distance from pedestrians.
 
     What is measured: the smallest true gap between the robot's footprint and the body of a pedestrian, over the whole
         run.
     When it fails: it is below `min`.
-    Why this: people feel a robot that passes close by as a threat long before it touches them; 0.45 m is where Hall's
+    Why this: people feel a robot that passes close by as a threat long before any contact; 0.45 m is where Hall's
         intimate space begins.
     Source: Hall 1966; the space intrusions of HuNavSim and of Francis et al. 2023, by the gap between surfaces.
 

@@ -104,12 +104,12 @@ class TimeToGoal(Spec, Criterion):
 
 
 class PathLength(Spec, Criterion):
-    """The robot drove no further than it should.
+    """The robot drove no further than a maximum length.
 
     What is measured: the length of the true path in the plane, in moves of at least 1 cm, over the whole run; its ratio
         to the shortest path of a disc with the robot's inscribed radius from the start through all goals, except
         those at which the robot is expected to fail.
-    When it fails: it is longer than `max`, or than `max_ratio` times the shortest path.
+    When it fails: the path is longer than `max`, or than `max_ratio` times the shortest path.
     Why this: detours and search patterns cost energy and time although every goal is reached.
     Source: HuNavSim and bench-mr for the length; SEAN's "path efficiency" is this ratio. SPL (Anderson 2018) is its
         inverse over many runs.

@@ -53,12 +53,12 @@ class CountBounds(Spec):
 
 
 class Replans(CountBounds, Criterion):
-    """The robot replanned as often as it should.
+    """The number of times that the robot replanned was within its bounds.
 
     What is measured: the number of plans made for any reason but a new goal.
     When it fails: fewer than `min` or more than `max`.
     Why this: a scenario that drops a pallet on the plan proves nothing unless the robot had to replan; and a robot
-        that replans at every beat has no plan.
+        that replans all the time does not follow any plan.
     Source: Nav2's navigate_to_pose_w_replanning trees.
 
     Example: `replans: {min: 1}`
@@ -87,7 +87,7 @@ class Replans(CountBounds, Criterion):
 
 
 class Recoveries(CountBounds, Criterion):
-    """Recovery behaviors ran as often as they should.
+    """The number of recovery behaviors that ran was within its bounds.
 
     What is measured: the number of recovery behaviors that started.
     When it fails: fewer than `min` or more than `max`.

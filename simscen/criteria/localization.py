@@ -191,7 +191,7 @@ class LocalizationConsistency(Spec, Criterion):
     What is measured: the normalized estimation error squared e' P⁻¹ e of the believed pose (x, y, wrapped heading) with
         its covariance P, sampled every `every` seconds, averaged over the run; 3 for a correct covariance.
     When it fails: the average is above what a consistent belief keeps with this probability (the robot is
-        overconfident), or with `both_sides` below it; or a covariance is singular, like that of a
+        overconfident), or, with `both_sides`, below the lower bound; or a covariance is singular, like that of a
         collapsed particle set.
     Why this: a filter that is wrong but has a small covariance does not recover.
     Source: Bar-Shalom, Li, Kirubarajan 2001, section 5.4; filterpy's stats.NEES.

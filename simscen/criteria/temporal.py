@@ -78,7 +78,7 @@ class Eventually(WindowedCriterion):
 
 
 class Until(Release, TemporalCriterion):
-    """A condition was true from the start until another one became true, and that happened in time.
+    """The condition `hold` was true until the condition `release` became true, which happened within the window.
 
     What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the best
         release: the lesser of the margins of `release` there and of `hold` at every sample before it.
