@@ -11,7 +11,9 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, Goal
 from simscen.core.records.events import Event, EventKind
-from simscen.triggers.base import Trigger
+from simscen.triggers.base import Condition, Trigger
+from simscen.triggers.events import EventStatus, PedestrianStatus
+from simscen.triggers.timing import Time
 
 STILL, CLOCK = Twist(0.0), Clock(240)
 HALL = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
@@ -288,3 +290,9 @@ def test_combinations_have_one_to_fifty_parts(key):
     for parts in ([], [SOON] * 51):
         with pytest.raises(ValidationError):
             Trigger.model_validate({key: parts})
+
+
+@pytest.mark.parametrize("condition", [Time, EventStatus, PedestrianStatus])
+def test_conditions_about_the_world_need_no_robot(condition: type[Condition]) -> None:
+    assert not condition.is_robot_specific
+    assert Condition.is_robot_specific

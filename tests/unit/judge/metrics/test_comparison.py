@@ -284,3 +284,9 @@ def test_differences_are_counted_by_direction_and_written_with_their_interval(pa
     assert (found.lower, found.equal, found.higher) == (0, 0, pairs)
     data = next(one for one in comparison_data(comparison)["against"][0]["differences"] if one["metric"] == "headway")
     assert data["interval"] == ([0.5, 0.5] if has_interval else None)
+
+
+def test_metrics_of_packages_are_in_the_order_of_their_names() -> None:
+    metrics = {f"metric_{letter}": 1.0 for letter in "hgfedcba"}
+    names = [one.metric for one in against(run("ref", **metrics), run("mine", **metrics)).differences]
+    assert [name for name in names if name.startswith("metric_")] == sorted(metrics)
