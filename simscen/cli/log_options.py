@@ -1,5 +1,6 @@
 """Options that `simscen judge` and `simscen replay` share: criteria for a log, and how to read foreign logs."""
 
+from collections.abc import Collection
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -46,7 +47,7 @@ def foreign_log_options(
 ) -> ForeignLogOptions:
     """Return how to read a foreign log according to the command-line options. Raises UsageError."""
     clock: Clock = "log" if time is TimeStamps.LOG else "header"
-    options = ForeignLogOptions(truth, _parse_topics(topics or []), tick_rate, clock, same_frame)
+    options = ForeignLogOptions(truth, parse_topics(topics or [], TOPICS), tick_rate, clock, same_frame)
     _check_truth(options)
     return options
 
@@ -62,13 +63,13 @@ def _check_truth(options: ForeignLogOptions) -> None:
         raise UsageError(f"--truth {escaped(options.truth)} is the belief of the robot; name an independent source")
 
 
-def _parse_topics(arguments: list[str]) -> dict[str, str]:
-    """Return the topics by standard name. Raises UsageError."""
+def parse_topics(arguments: list[str], names: Collection[str]) -> dict[str, str]:
+    """Return the topics by name, from arguments such as "odom=/my/odom". Raises UsageError for other `names`."""
     topics = {}
     for argument in arguments:
         name, equals, topic = argument.partition("=")
-        if not equals or name not in TOPICS or not topic.startswith("/"):
-            known = ", ".join(TOPICS)
+        if not equals or name not in names or not topic.startswith("/"):
+            known = ", ".join(names)
             raise UsageError(f"cannot read --topic {escaped(argument)}: expected NAME=/TOPIC with one of {known}")
         topics[name] = topic
     return topics

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from simscen.cli.diagnostics import escaped, from_here, print_text
+from simscen.cli.log_options import parse_topics
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.loading.files.discovery import default_root
 from simscen.loading.yaml.textfile import os_error_reason
@@ -50,11 +51,12 @@ def write_scenario_from_log(options: FromLogOptions, verify: bool) -> None:
 
 
 def _reconstructed(options: FromLogOptions) -> Reconstruction:
+    from simscen.reconstruction.drive.log_messages import TOPIC_ROLES
     from simscen.reconstruction.drive.reader import DriveOptions
     from simscen.reconstruction.scenario.given_parts import GivenFiles
     from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
 
-    drive = DriveOptions(options.truth, _topics(options.topics))
+    drive = DriveOptions(options.truth, parse_topics(options.topics, TOPIC_ROLES))
     wanted = ReconstructionOptions(drive, GivenFiles(options.world, options.map, options.robot), options.root)
     out = options.out
     try:
@@ -76,17 +78,3 @@ def _reconstructed(options: FromLogOptions) -> Reconstruction:
     except BaseException:
         out.unlink(missing_ok=True)
         raise
-
-
-def _topics(arguments: list[str]) -> dict[str, str]:
-    """Return the topics by role. Raises UsageError."""
-    from simscen.reconstruction.drive.log_messages import TOPIC_ROLES
-
-    topics = {}
-    for argument in arguments:
-        name, equals, topic = argument.partition("=")
-        if not equals or name not in TOPIC_ROLES or not topic.startswith("/"):
-            known = ", ".join(TOPIC_ROLES)
-            raise UsageError(f"cannot read --topic {escaped(argument)}: expected NAME=/TOPIC with one of {known}")
-        topics[name] = topic
-    return topics
