@@ -17,10 +17,9 @@ from simscen.reconstruction.drive.goals import goals_of
 from simscen.reconstruction.drive.log_messages import Logged, LogMessages, collect_messages
 from simscen.reconstruction.drive.recorded_drive import Polygon, RecordedDrive, Scans, TimedValues, no_values
 from simscen.record import topics
-from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log
+from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
 from simscen.record.foreign.transforms import TransformTree, lidar_mount
 from simscen.record.localization_logs.rosbag import planar_pose
-from simscen.record.log_reader.read import LOG_READ_ERRORS, invalid_log
 from simscen.record.messages.decode import ScanMessage
 
 BASE_FRAMES = ("base_link", "base_footprint")
@@ -40,18 +39,12 @@ class DriveOptions:
 
 def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
     """Read an MCAP file or a rosbag2 folder. Raises InvalidInput if it cannot be used for a reconstruction."""
-    try:
+    with unusable_log_as_invalid_input(path):
         truth = options.truth
         if truth is None and not path.is_dir() and is_simscen_log(path):
             truth = topics.TRUTH.name
         messages = collect_messages(path, options.topics, None if truth == NO_TRUTH else truth)
         return from_first_goal(_DriveReader(path, messages).drive())
-    except UnusableLog as error:
-        raise invalid_log(path, "SC804", str(error), error.hint) from error
-    except OSError as error:
-        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror or error}") from error
-    except LOG_READ_ERRORS as error:
-        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
 
 
 class _DriveReader:

@@ -2,12 +2,14 @@
 
 import re
 from collections.abc import Container, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 from mcap import records
 
 from simscen.record.log_file import RecordReader, open_log
+from simscen.record.log_reader.read import LOG_READ_ERRORS, invalid_log
 from simscen.record.mcap_writer import MAGIC
 
 
@@ -17,6 +19,19 @@ class UnusableLog(ValueError):
     def __init__(self, message: str, hint: str = "") -> None:
         self.hint = hint
         super().__init__(message)
+
+
+@contextmanager
+def unusable_log_as_invalid_input(path: Path) -> Iterator[None]:
+    """Raise InvalidInput, with the file and the reason, for a log that cannot be read or used."""
+    try:
+        yield
+    except UnusableLog as error:
+        raise invalid_log(path, "SC804", str(error), error.hint) from error
+    except OSError as error:
+        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror or error}") from error
+    except LOG_READ_ERRORS as error:
+        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
 
 
 class RawMessage(NamedTuple):

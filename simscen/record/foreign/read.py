@@ -15,12 +15,11 @@ from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import LogCoverage
 from simscen.record import topics
 from simscen.record.foreign.options import ForeignLogOptions
-from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
+from simscen.record.foreign.raw_messages import RawMessage, open_messages, unusable_log_as_invalid_input
 from simscen.record.foreign.timebase import Timebase
 from simscen.record.foreign.trace_reader import ForeignTraceReader
 from simscen.record.foreign.tracks import DecodedMessages, decode_messages, topic_roles
 from simscen.record.foreign.transforms import lidar_mount
-from simscen.record.log_reader.read import LOG_READ_ERRORS, invalid_log
 from simscen.record.log_reader.sensor_messages import SensorMessages
 
 
@@ -45,7 +44,7 @@ def read_foreign_log(path: Path, options: ForeignLogOptions, with_sensors: bool 
     criterion can pass. With `with_sensors`, also keep scans, particles, local plans, costmaps and the map. Raises
     InvalidInput if the log cannot be used.
     """
-    try:
+    with unusable_log_as_invalid_input(path):
         roles = topic_roles(options)
         collector = SensorMessageCollector() if with_sensors else None
         messages = open_messages(path, (*roles, *SENSOR_TOPICS) if with_sensors else roles)
@@ -62,12 +61,6 @@ def read_foreign_log(path: Path, options: ForeignLogOptions, with_sensors: bool 
         if collector is None:
             return ForeignLog(trace, coverage, reader.notes)
         return ForeignLog(trace, coverage, reader.notes, collector.sensors(reader.time, decoded), collector.map)
-    except UnusableLog as error:
-        raise invalid_log(path, "SC804", str(error), error.hint) from error
-    except OSError as error:
-        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror or error}") from error
-    except LOG_READ_ERRORS as error:
-        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
 
 
 SENSOR_TOPICS = (
