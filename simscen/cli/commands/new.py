@@ -10,13 +10,13 @@ from simscen.cli import completions
 from simscen.cli.completions import shipped_scenarios
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.from_log import FromLogOptions, write_scenario_from_log
+from simscen.cli.session.new_file import create_file
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
 from simscen.loading.files.discovery import BASE_SUFFIXES, SCENARIO_SUFFIXES, default_root
 from simscen.loading.scenario import is_unusable_name, try_variations
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.library import DEFAULTS_FILE
-from simscen.loading.yaml.textfile import os_error_reason
 
 
 def command(
@@ -103,22 +103,8 @@ def command(
     if is_base and like:
         raise UsageError(f"{name!r} is a base file; --like copies only scenarios")
     file = Path(name if is_base or name.endswith(SCENARIO_SUFFIXES) else f"{name}{SCENARIO_SUFFIXES[0]}")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.open("x").close()
-    except FileExistsError:
-        raise UsageError(f"{file} already exists; choose another name") from None
-    except (OSError, ValueError) as error:
-        reason = os_error_reason(error) if isinstance(error, OSError) else "the name cannot be a path"
-        raise UsageError(f"cannot write {name!r}: {reason}") from None
-    try:
+    with create_file(file, name):
         written = _copy(like, file) if like else _starter(file, "base" if is_base else "scenario")
-    except OSError as error:
-        file.unlink(missing_ok=True)
-        raise UsageError(f"cannot write {name!r}: {os_error_reason(error)}") from None
-    except BaseException:
-        file.unlink(missing_ok=True)
-        raise
     for other in written[1:]:
         print_text(f"wrote {escaped(str(other))}")
     verb = "validate" if is_base else "run"

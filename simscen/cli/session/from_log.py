@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from simscen.cli.diagnostics import escaped, from_here, print_text
 from simscen.cli.log_options import parse_topics
-from simscen.core.errors import InvalidInput, Problem, UsageError
+from simscen.cli.session.new_file import create_file
+from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.discovery import default_root
-from simscen.loading.yaml.textfile import os_error_reason
 
 if TYPE_CHECKING:
     from simscen.reconstruction.scenario_from_log import Reconstruction
@@ -32,7 +32,7 @@ class FromLogOptions:
 
 
 def write_scenario_from_log(options: FromLogOptions, verify: bool) -> None:
-    """Write the scenario, print what it holds, and verify it if wanted. Raises InvalidInput and UsageError."""
+    """Write the scenario, print what it holds, and verify it if `verify`. Raises InvalidInput and UsageError."""
     if not options.log.exists():
         raise InvalidInput([Problem(str(options.log), 0, 0, "SC001", "no such file or directory")])
     made = _reconstructed(options)
@@ -57,24 +57,9 @@ def _reconstructed(options: FromLogOptions) -> Reconstruction:
     from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
 
     drive = DriveOptions(options.truth, parse_topics(options.topics, TOPIC_ROLES))
-    wanted = ReconstructionOptions(drive, GivenFiles(options.world, options.map, options.robot), options.root)
-    out = options.out
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.open("x").close()
-    except FileExistsError:
-        raise UsageError(f"{out} already exists; choose another name") from None
-    except (OSError, ValueError) as error:
-        why = os_error_reason(error) if isinstance(error, OSError) else "the name cannot be a path"
-        raise UsageError(f"cannot write {str(out)!r}: {why}") from None
-    try:
-        return scenario_from_log(options.log, out, wanted)
-    except InvalidInput as error:
-        out.unlink(missing_ok=True)
-        raise InvalidInput(from_here(error.problems, default_root([out]))) from error
-    except OSError as error:
-        out.unlink(missing_ok=True)
-        raise UsageError(f"cannot write {str(out)!r}: {os_error_reason(error)}") from None
-    except BaseException:
-        out.unlink(missing_ok=True)
-        raise
+    reading_options = ReconstructionOptions(drive, GivenFiles(options.world, options.map, options.robot), options.root)
+    with create_file(options.out, str(options.out)):
+        try:
+            return scenario_from_log(options.log, options.out, reading_options)
+        except InvalidInput as error:
+            raise InvalidInput(from_here(error.problems, default_root([options.out]))) from error
