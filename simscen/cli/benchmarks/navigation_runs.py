@@ -11,8 +11,7 @@ from simscen.bench.navigation.experiments import Drive, Experiment
 from simscen.bench.navigation.summary import Row, Trial, mean, summarize
 from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
-from simscen.cli.interrupts import signals_interrupt
-from simscen.cli.session.backends import backend_of
+from simscen.cli.session.backends import backend_of, signals_interrupt
 from simscen.cli.session.pending_runs import plan_session
 from simscen.cli.session.selection import world_problems
 from simscen.core.errors import Exit, InvalidInput

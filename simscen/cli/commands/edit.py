@@ -11,7 +11,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.run_options import LenientOption, RootOption, WorldPathOption
+from simscen.cli.shared_options import LenientOption, RootOption, WorldPathOption
 from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.loading.files.discovery import SCENARIO_SUFFIXES, STUDY_SUFFIXES, default_root
 

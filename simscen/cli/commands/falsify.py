@@ -11,7 +11,8 @@ from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
 from simscen.cli.session.falsification import FalsifyRequest, execute_search, summary_lines
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
-from simscen.cli.session.run_options import (
+from simscen.cli.session.terminal import Format, FormatOption
+from simscen.cli.shared_options import (
     JobsOption,
     JunitOption,
     LenientOption,
@@ -21,7 +22,6 @@ from simscen.cli.session.run_options import (
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.cli.session.terminal import Format, FormatOption
 from simscen.core.errors import UsageError
 from simscen.run.process.jobs import ReplayMode
 from simscen.run.sessions.run_session import SessionOptions

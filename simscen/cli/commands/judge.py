@@ -10,7 +10,10 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.log_options import (
+from simscen.cli.session.judging import LogJudge, runs_without_log
+from simscen.cli.session.logs import find_logs
+from simscen.cli.session.output_files import exit_code
+from simscen.cli.shared_options import (
     RootOption,
     SameFrameOption,
     ScenarioOption,
@@ -22,9 +25,6 @@ from simscen.cli.log_options import (
     WorldPathOption,
     foreign_log_options,
 )
-from simscen.cli.session.judging import LogJudge, runs_without_log
-from simscen.cli.session.logs import find_logs
-from simscen.cli.session.output_files import exit_code
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import result_data
 from simscen.record.foreign.options import ForeignLogOptions

@@ -9,7 +9,10 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.log_options import (
+from simscen.cli.session.judging import LogJudge
+from simscen.cli.session.logs import LOGS, find_logs
+from simscen.cli.session.output_files import save
+from simscen.cli.shared_options import (
     RootOption,
     SameFrameOption,
     ScenarioOption,
@@ -21,9 +24,6 @@ from simscen.cli.log_options import (
     WorldPathOption,
     foreign_log_options,
 )
-from simscen.cli.session.judging import LogJudge
-from simscen.cli.session.logs import LOGS, find_logs
-from simscen.cli.session.output_files import save
 from simscen.core.errors import UsageError
 
 PAGE = "replay.html"

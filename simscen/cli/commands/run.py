@@ -10,7 +10,12 @@ import typer
 from simscen.cli import completions
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
-from simscen.cli.session.run_options import (
+from simscen.cli.session.run_session import SessionRequest, execute_session
+from simscen.cli.session.selection import Selection, scenario_times, shard_of
+from simscen.cli.session.stacks import STACK_HELP
+from simscen.cli.session.terminal import Format, FormatOption
+from simscen.cli.session.watch import watch_session
+from simscen.cli.shared_options import (
     JobsOption,
     JunitOption,
     LenientOption,
@@ -19,12 +24,6 @@ from simscen.cli.session.run_options import (
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.cli.session.run_session import SessionRequest, execute_session
-from simscen.cli.session.selection import Selection
-from simscen.cli.session.shards import scenario_times, shard_of
-from simscen.cli.session.stacks import STACK_HELP
-from simscen.cli.session.terminal import Format, FormatOption
-from simscen.cli.session.watch import watch_session
 from simscen.core.errors import UsageError
 from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.run.process.jobs import KeptLogs, ReplayMode

@@ -9,18 +9,25 @@ import typer
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, backend_of, workers_and_cluster
-from simscen.cli.session.candidates import CandidateRuns, Stopped
 from simscen.cli.session.output_files import save
-from simscen.cli.session.run_options import (
+from simscen.cli.session.selection import Checks
+from simscen.cli.session.shrinking import (
+    CandidateRuns,
+    Failure,
+    Shrinking,
+    Stopped,
+    failure_of,
+    only_failing,
+    with_inline_world,
+)
+from simscen.cli.session.stacks import stacks_of
+from simscen.cli.shared_options import (
     JobsOption,
     LenientOption,
     RootOption,
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.cli.session.selection import Checks
-from simscen.cli.session.shrinking import Failure, Shrinking, failure_of, only_failing, with_inline_world
-from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import RunKey, RunResult
 from simscen.loading.files.discovery import default_root, sibling

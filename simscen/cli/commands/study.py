@@ -9,7 +9,9 @@ import typer
 from simscen.cli import completions
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
-from simscen.cli.session.run_options import (
+from simscen.cli.session.study_session import StudyRequest, execute_study
+from simscen.cli.session.terminal import Format, FormatOption
+from simscen.cli.shared_options import (
     JobsOption,
     JunitOption,
     LenientOption,
@@ -19,8 +21,6 @@ from simscen.cli.session.run_options import (
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.cli.session.study_session import StudyRequest, execute_study
-from simscen.cli.session.terminal import Format, FormatOption
 from simscen.run.process.jobs import KeptLogs, ReplayMode
 from simscen.run.sessions.run_session import SessionOptions
 

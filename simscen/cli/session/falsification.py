@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
 
-from simscen.cli.interrupts import signals_interrupt
-from simscen.cli.session.backends import backend_of
+from simscen.cli.session.backends import backend_of, signals_interrupt
 from simscen.cli.session.output_files import JunitFamily, Reports, require_writable
 from simscen.cli.session.pending_runs import plan_runs
 from simscen.cli.session.run_session import output_folder

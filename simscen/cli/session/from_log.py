@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from simscen.cli.diagnostics import escaped, from_here, print_text
-from simscen.cli.log_options import parse_topics
 from simscen.cli.session.new_file import create_file
+from simscen.cli.shared_options import parse_topics
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.discovery import default_root
 

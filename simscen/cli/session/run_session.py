@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from simscen.cli.diagnostics import as_text, print_text
-from simscen.cli.interrupts import signals_interrupt
-from simscen.cli.session.backends import backend_of
+from simscen.cli.session.backends import backend_of, signals_interrupt
 from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
 from simscen.cli.session.pending_runs import PendingRuns, failed_runs, plan_session
 from simscen.cli.session.selection import Selection, load_all

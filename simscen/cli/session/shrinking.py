@@ -1,14 +1,19 @@
 """`simscen shrink`: the smallest scenario that still fails in the same criterion."""
 
+import hashlib
+import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TypeVar
 
-from simscen.cli.session.candidates import BudgetSpent, CandidateRuns
-from simscen.core.delta_debugging import minimize
-from simscen.core.errors import UsageError
+from simscen.cli.session.backends import signals_interrupt
+from simscen.cli.session.selection import Checks
+from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.verdict import Status, Verdict
+from simscen.loading.loaded import LoadedScenario
 from simscen.loading.reduction import (
     MAX_DIGITS,
     UNNEEDED_KEYS,
@@ -22,12 +27,127 @@ from simscen.loading.reduction import (
     with_values,
     without_parts,
 )
+from simscen.loading.scenario import ChangedScenario
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child
+from simscen.run.process.backend import Backend
+from simscen.run.process.jobs import Job
+from simscen.run.sessions.run_session import SessionOptions, run_session
+
+Part = TypeVar("Part")
+FirstFailing = Callable[[Sequence[Sequence[Part]]], int | None]
+"""Returns the index of the first candidate that still has the property, or None."""
+
+
+def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[Part]:
+    """Return a subset of the parts that still has the property, but loses it if any single part is removed.
+
+    `first_failing` gets candidates, each a subset of the parts in their original order; earlier candidates are
+    preferred. (Zeller and Hildebrandt: Simplifying and Isolating Failure-Inducing Input, 2002; with complements only.)
+    """
+    remaining = list(parts)
+    if not remaining or first_failing([[]]) is not None:
+        return []
+    chunks = 2
+    while len(remaining) > 1:
+        size = -(-len(remaining) // chunks)
+        starts = range(0, len(remaining), size)
+        complements = [[*remaining[:start], *remaining[start + size :]] for start in starts]
+        index = first_failing(complements)
+        if index is not None:
+            remaining, chunks = complements[index], max(2, chunks - 1)
+        elif size == 1:
+            break
+        else:
+            chunks = min(len(remaining), 2 * chunks)
+    return remaining
+
+
+BATCH = 8
+"""Candidates that run at the same time. Fixed, so that the result does not depend on the number of workers."""
+
+
+class Stopped(Exception):
+    """A signal ended the runs; `exit` is the exit code."""
+
+    def __init__(self, code: Exit) -> None:
+        super().__init__(str(code))
+        self.exit = code
+
+
+class BudgetSpent(Exception):
+    """The maximum number of runs is reached."""
+
+
+@dataclass
+class CandidateRuns:
+    """Runs candidates with one seed. Results are cached by content, so that no candidate runs twice.
+
+    `max_runs` limits the number of runs, and `runs` counts them. `report` is called after each batch.
+    """
+
+    scenario: ChangedScenario
+    checks: Checks
+    options: SessionOptions
+    backend: Backend
+    seed: int
+    max_runs: int
+    report: Callable[[], None] = lambda: None
+    runs: int = 0
+    _results: dict[str, RunResult | None] = field(default_factory=dict)
+
+    def first_accepted(self, trees: Sequence[MappingNode], accepts: Callable[[RunResult], bool]) -> int | None:
+        """Return the index of the first candidate whose result `accepts` accepts, or None.
+
+        Invalid candidates are never accepted. Raises BudgetSpent and Stopped.
+        """
+        for start in range(0, len(trees), BATCH):
+            results = self.results(trees[start : start + BATCH])
+            accepted = [result is not None and accepts(result) for result in results]
+            if True in accepted:
+                return start + accepted.index(True)
+        return None
+
+    def results(self, trees: Sequence[MappingNode]) -> list[RunResult | None]:
+        """Return the results of some candidates; None for invalid ones. Raises BudgetSpent and Stopped."""
+        keys = [_content_key(tree) for tree in trees]
+        new = {key: tree for key, tree in zip(keys, trees, strict=True) if key not in self._results}
+        loaded = {key: self.load(tree) for key, tree in new.items()}
+        valid = {key: scenario for key, scenario in loaded.items() if scenario is not None}
+        if self.runs + len(valid) > self.max_runs:
+            raise BudgetSpent
+        self._results |= {key: None for key in loaded if key not in valid}
+        if valid:
+            self._results |= dict(zip(valid, self._run(list(valid.values())), strict=True))
+            self.runs += len(valid)
+            self.report()
+        return [self._results[key] for key in keys]
+
+    def load(self, tree: MappingNode) -> LoadedScenario | None:
+        """Load and check a candidate; None if it is invalid."""
+        found = self.scenario.load(tree)
+        return None if isinstance(found, list) else self.checks.variation(found)[0]
+
+    def _run(self, scenarios: Sequence[LoadedScenario]) -> list[RunResult]:
+        named = [scenario.with_changes(variation=f"candidate-{number}") for number, scenario in enumerate(scenarios)]
+        with TemporaryDirectory(prefix="simscen-") as folder:
+            jobs = [
+                Job(number, scenario, scenario.key(self.seed), Path(folder, str(number)), self.options.wall_limit)
+                for number, scenario in enumerate(named)
+            ]
+            with signals_interrupt():
+                finished_runs, stopped = run_session(jobs, self.options, self.backend, lambda _: None)
+        if stopped is not None:
+            raise Stopped(stopped)
+        results = {finished.key: finished.result for finished in finished_runs}
+        return [results[job.key] for job in jobs]
+
+
+def _content_key(tree: MappingNode) -> str:
+    return hashlib.sha256(json.dumps(tree.plain, sort_keys=True).encode()).hexdigest()
+
 
 MAX_ROUNDS = 3
 """Maximum number of reductions: rounded numbers may make further parts unnecessary."""
-
-Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)

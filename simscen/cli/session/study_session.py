@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from simscen.cli.diagnostics import as_text, escaped, print_text
-from simscen.cli.interrupts import signals_interrupt
-from simscen.cli.session.backends import backend_of
+from simscen.cli.session.backends import backend_of, signals_interrupt
 from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
 from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_reused
 from simscen.cli.session.run_session import output_folder

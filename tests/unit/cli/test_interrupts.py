@@ -5,7 +5,7 @@ import sys
 
 PROGRAM = """
 import os, signal, sys
-from simscen.cli.interrupts import signals_interrupt
+from simscen.cli.session.backends import signals_interrupt
 from simscen.run.process.supervisor import Interrupted
 
 now = iter({times})

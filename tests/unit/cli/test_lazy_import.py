@@ -3,7 +3,7 @@ import sys
 
 LATER = """
 import sys
-from simscen.cli.lazy_import import import_lazily
+from simscen.cli.main import import_lazily
 import_lazily("{name}")
 import {name} as early
 assert "{probe}" not in sys.modules
@@ -32,7 +32,7 @@ def test_imported_library_is_kept() -> None:
         [
             sys.executable,
             "-c",
-            "import json; from simscen.cli.lazy_import import import_lazily as l; l('json'); json.dumps(1)",
+            "import json; from simscen.cli.main import import_lazily as l; l('json'); json.dumps(1)",
         ],
         check=True,
     )
@@ -41,7 +41,7 @@ def test_imported_library_is_kept() -> None:
 def test_lazy_function_imports_the_library_when_called() -> None:
     code = """
 import sys
-from simscen.cli.lazy_import import import_lazily
+from simscen.cli.main import import_lazily
 import_lazily("importlib.metadata", "entry_points")
 from importlib.metadata import entry_points
 import importlib
@@ -55,7 +55,7 @@ from importlib.metadata import distribution
 
 def test_other_attribute_imports_the_library() -> None:
     code = """
-from simscen.cli.lazy_import import import_lazily
+from simscen.cli.main import import_lazily
 import_lazily("importlib.metadata", "entry_points")
 import importlib.metadata
 from importlib.metadata import entry_points

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
-from simscen.cli.session.shards import PARALLEL_JOBS, shard_of, share_of_scenarios
+from simscen.cli.session.selection import PARALLEL_JOBS, shard_of, share_of_scenarios
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 
 SCENARIO = """\

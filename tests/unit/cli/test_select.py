@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.session.selection import Selection, load_all
-from simscen.cli.session.shards import shard_of
+from simscen.cli.session.selection import Selection, load_all, shard_of
 from simscen.core.errors import InvalidInput, UsageError
 
 TEXT = """\

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.core.delta_debugging import minimize
+from simscen.cli.session.shrinking import minimize
 
 
 @given(st.sets(st.integers(0, 30)), st.integers(1, 31))

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from search_plants import PLANTS, failure_threshold
 
-from simscen.cli.session.candidates import CandidateRuns
-from simscen.cli.session.shrinking import Failure, Shrinking
+from simscen.cli.session.shrinking import CandidateRuns, Failure, Shrinking
 from simscen.core.geometry import Array
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict

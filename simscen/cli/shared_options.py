@@ -1,4 +1,4 @@
-"""Options that `simscen judge` and `simscen replay` share: criteria for a log, and how to read foreign logs."""
+"""Options that several commands share: for simulated runs, and for logs, including foreign ones."""
 
 from collections.abc import Collection
 from enum import Enum
@@ -7,9 +7,26 @@ from typing import Annotated
 
 import typer
 
+from simscen.cli import completions
 from simscen.cli.diagnostics import escaped
+from simscen.cli.session.stacks import STACK_HELP
 from simscen.core.errors import UsageError
 from simscen.record.foreign.options import TOPICS, Clock, ForeignLogOptions
+
+OutOption = Annotated[Path | None, typer.Option(help="New or empty output folder; default: simscen-out/<session id>.")]
+JobsOption = Annotated[
+    int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Number of parallel runs; default: one per core.")
+]
+JunitOption = Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")]
+WallLimitOption = Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")]
+StackOption = Annotated[
+    str | None, typer.Option(metavar="NAME=VALUE", autocompletion=completions.stacks, help=STACK_HELP)
+]
+RootOption = Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")]
+WorldPathOption = Annotated[
+    list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
+]
+LenientOption = Annotated[bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")]
 
 
 class TimeStamps(str, Enum):
@@ -35,10 +52,6 @@ TickRateOption = Annotated[int, typer.Option(min=1, max=10_000, help="Ticks per 
 SameFrameOption = Annotated[
     bool,
     typer.Option("--same-frame", help="Treat the frame of the truth as the map frame although its name differs."),
-]
-RootOption = Annotated[Path | None, typer.Option(help="Root folder; the scenario may only refer to files below it.")]
-WorldPathOption = Annotated[
-    list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
 ]
 
 
