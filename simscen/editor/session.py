@@ -22,7 +22,7 @@ from simscen.editor.trial_run import TrialRuns
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.source_nodes import parse_source
 from simscen.loading.yaml.textfile import MAX_FILE_BYTES
-from simscen.run.process.backend import Backend
+from simscen.run.process.jobs import Backend
 
 Data = dict[str, Any]
 WithCommand = Callable[[LoadedScenario], tuple[LoadedScenario, list[Problem]]]

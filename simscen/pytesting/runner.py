@@ -13,8 +13,7 @@ from simscen.core.records.session_events import RunFinished
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.pytesting import OUT_OPTION
-from simscen.run.process.backend import Ended
-from simscen.run.process.jobs import Job, ReplayMode
+from simscen.run.process.jobs import Ended, Job, ReplayMode
 from simscen.run.process.supervisor import Supervisor
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER, run_folder
 from simscen.run.sessions.results import finished_run

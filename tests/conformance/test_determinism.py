@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.run.process import fork_server_process
+from simscen.run.process import supervisor
 
 SIMSCEN = Path(sys.executable).with_name("simscen")
 TELLING = str(Path(__file__).with_name("telling_zygote.py"))
@@ -118,8 +118,8 @@ def test_90_verdicts_are_equal_without_fused_multiply_add(reference, pair: Path,
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F",
         "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX",
     }
-    environment = fork_server_process.clean_environment()
-    monkeypatch.setattr(fork_server_process, "clean_environment", lambda: {**environment, **plain})
+    environment = supervisor.clean_environment()
+    monkeypatch.setattr(supervisor, "clean_environment", lambda: {**environment, **plain})
     assert simscen("run", ".", "--out", "out").code == 0
     assert simscen("run", ".", "--out", "again", "--check-against", "out").code == 0
     assert {"blas", "libm", "numpy", "numpy_dispatch"} == set(

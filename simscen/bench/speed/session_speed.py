@@ -23,8 +23,7 @@ from simscen.record.recorder import MomentSink
 from simscen.run.external.build import with_external_reference
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation import PreparedScenario, prepare
-from simscen.run.process.backend import Ended
-from simscen.run.process.jobs import Job, ProcessEnd
+from simscen.run.process.jobs import Ended, Job, ProcessEnd
 from simscen.run.process.supervisor import Supervisor
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.results import finished_run

@@ -78,7 +78,7 @@ def _line(sign: str, name: str, result: str) -> str:
 
 def cache() -> str:
     """Check the cache of maps and shortest paths, and return its folder and size."""
-    from simscen.run.disk_cache import (
+    from simscen.run.scenario_cache import (
         CACHE_DIR_VARIABLE,
         MAX_CACHE_BYTES,
         cache_folder,

@@ -17,7 +17,7 @@ from simscen.loading.files.discovery import SCENARIO_SUFFIXES, STUDY_SUFFIXES, d
 
 if TYPE_CHECKING:
     from simscen.editor.files import EditedFile
-    from simscen.run.process.backend import Backend
+    from simscen.run.process.jobs import Backend
 
 SUFFIX = SCENARIO_SUFFIXES[0]
 

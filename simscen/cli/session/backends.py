@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from simscen.core.errors import UsageError
-from simscen.run.process.backend import Backend
+from simscen.run.process.jobs import Backend
 from simscen.run.process.supervisor import Interrupted, Supervisor
 from simscen.run.sessions.run_session import SessionOptions
 

@@ -32,8 +32,7 @@ from simscen.loading.variations.expand import Variation
 from simscen.loading.variations.search_space import SearchSpace, search_space
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
-from simscen.run.process.backend import Backend
-from simscen.run.process.jobs import Job
+from simscen.run.process.jobs import Backend, Job
 from simscen.run.sessions.output_folder import run_folder, write_atomically
 from simscen.run.sessions.results import display_path
 from simscen.run.sessions.run_session import SessionOptions, run_session

@@ -29,8 +29,7 @@ from simscen.loading.reduction import (
 )
 from simscen.loading.scenario import ChangedScenario
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child
-from simscen.run.process.backend import Backend
-from simscen.run.process.jobs import Job
+from simscen.run.process.jobs import Backend, Job
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 Part = TypeVar("Part")

@@ -34,8 +34,7 @@ from simscen.loading.variations.naming import number_of
 from simscen.model.acceptance import PassRate
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
-from simscen.run.process.backend import Backend
-from simscen.run.process.jobs import Job
+from simscen.run.process.jobs import Backend, Job
 from simscen.run.reproducibility import plugin_packages
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session

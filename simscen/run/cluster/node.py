@@ -15,8 +15,7 @@ from simscen.core.errors import UsageError
 from simscen.core.version import __version__
 from simscen.loading.plugins import requirement_of
 from simscen.run.cluster.packing import PackedJob, Unpacker
-from simscen.run.process.backend import Ended, Progressed, Started
-from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
+from simscen.run.process.jobs import Ended, ForkServerDeath, Job, ProcessEnd, Progressed, Started
 from simscen.run.process.supervisor import Supervisor
 from simscen.run.reproducibility import source_digest
 from simscen.spec.registry import Entry, find

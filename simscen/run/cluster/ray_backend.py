@@ -20,8 +20,7 @@ from simscen.core.errors import UsageError
 from simscen.core.version import __version__
 from simscen.run.cluster.node import FilePiece, JobEnded, JobProgressed, JobQueue, JobStarted, NodeRunner, NodeUpdate
 from simscen.run.cluster.packing import PACKAGE_FOLDER, SentFile, digest_of, pack
-from simscen.run.process.backend import Ended, JobUpdate, Progressed, Started, always
-from simscen.run.process.jobs import ForkServerDeath, Job
+from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, Progressed, Started, always
 from simscen.run.reproducibility import source_digest
 from simscen.spec.registry import Entry
 

@@ -18,8 +18,7 @@ from simscen.core.errors import RunError
 from simscen.core.external_command import ExternalCommand
 from simscen.peer import wire
 from simscen.run.external import protocol
-from simscen.run.process.captured_output import CappedLog, output_tail
-from simscen.run.process.isolation import clean_environment
+from simscen.run.process.isolation import CappedLog, clean_environment, output_tail
 
 READ_BYTES = 1 << 20
 TAIL_BYTES = 16_384

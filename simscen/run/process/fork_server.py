@@ -17,8 +17,14 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any
 
-from simscen.run.process.captured_output import READ_BYTES, CappedLog
-from simscen.run.process.isolation import adopt_orphans, die_with_parent, kill_children_except, limit_memory
+from simscen.run.process.isolation import (
+    READ_BYTES,
+    CappedLog,
+    adopt_orphans,
+    die_with_parent,
+    kill_children_except,
+    limit_memory,
+)
 from simscen.run.process.jobs import Job, json_line, receive_job
 from simscen.run.process.worker import ExecuteJob, WorkerPipes, run_worker
 

@@ -1,16 +1,18 @@
-"""Jobs and messages between the supervisor and the fork server."""
+"""Jobs of a session, the backends that execute them, and messages between the supervisor and the fork server."""
 
 import json
 import os
 import pickle
 import struct
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.loading.loaded import LoadedScenario
+from simscen.spec.registry import Entry
 
 _LENGTH = struct.Struct("<I")
 
@@ -119,3 +121,52 @@ def _read_exactly(pipe: int, size: int) -> bytes:
 def json_line(message: dict[str, Any]) -> bytes:
     """Return a message as one line of JSON."""
     return json.dumps(message, separators=(",", ":")).encode() + b"\n"
+
+
+@dataclass(frozen=True)
+class Started:
+    """A job has started."""
+
+    job: Job
+
+
+@dataclass(frozen=True)
+class Progressed:
+    """A job has reached a simulated time in seconds."""
+
+    job: Job
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Ended:
+    """The worker process of a job has ended, or the fork server has died."""
+
+    job: Job
+    end: ProcessEnd | ForkServerDeath
+
+
+JobUpdate = Started | Progressed | Ended
+
+
+def always() -> bool:
+    """Return True."""
+    return True
+
+
+class Backend(Protocol):
+    """Executes jobs in processes, which it keeps between two calls of `run`. Leaving its context ends them."""
+
+    def __enter__(self) -> "Backend": ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def run(
+        self, jobs: Iterable[Job], plugins: Sequence[Entry] = (), should_continue: Callable[[], bool] = always
+    ) -> Iterator[JobUpdate]:
+        """Execute jobs, several at a time, and yield their updates: exactly one Ended for each that was started.
+
+        `plugins` are those that the jobs use. `should_continue` is called before each job; no job starts once it
+        returns False. If the consumer stops early or an exception passes through, all running processes are killed.
+        """
+        ...

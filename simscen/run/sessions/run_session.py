@@ -14,8 +14,7 @@ from simscen.core.records.session_events import Listener, RunFinished, RunProgre
 from simscen.judge.result_json import from_json
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
-from simscen.run.process.backend import Backend, Ended, Progressed, Started
-from simscen.run.process.jobs import Job, KeptLogs, ReplayMode
+from simscen.run.process.jobs import Backend, Ended, Job, KeptLogs, Progressed, ReplayMode, Started
 from simscen.run.process.supervisor import Interrupted
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.results import finished_run, skipped_run, unfinished_run

@@ -12,7 +12,7 @@ import pytest
 from simscen.editor.files import EditedFile
 from simscen.editor.server import MAX_REQUEST_BYTES, EditorServer
 from simscen.editor.session import EditorSession
-from simscen.run.process.backend import Backend
+from simscen.run.process.jobs import Backend
 
 TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: {x: 3, y: 1}}]\npass: []\n"
 

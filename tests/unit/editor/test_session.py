@@ -8,7 +8,7 @@ import pytest
 
 from simscen.editor.files import EditedFile
 from simscen.editor.session import EditorSession, RequestRefused
-from simscen.run.process.backend import Backend
+from simscen.run.process.jobs import Backend
 
 TEXT = """\
 simscen: 1

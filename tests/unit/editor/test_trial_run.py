@@ -10,8 +10,7 @@ from simscen.editor.checking import TextChecks
 from simscen.editor.files import EditedFile
 from simscen.editor.trial_run import Trial, TrialRuns
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.process.backend import JobUpdate, Progressed, Started, always
-from simscen.run.process.jobs import Job
+from simscen.run.process.jobs import Job, JobUpdate, Progressed, Started, always
 from simscen.spec.registry import Entry
 
 TEXT = """\

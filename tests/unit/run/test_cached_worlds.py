@@ -10,8 +10,7 @@ from simscen.core.geometry.shapes import Box, Solid
 from simscen.core.messages.navigation import Goal
 from simscen.loading.scenario import load_scenario
 from simscen.run import scenario_cache
-from simscen.run.disk_cache import DiskCache
-from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
+from simscen.run.scenario_cache import CachedWorldBuilder, DiskCache, ScenarioCache
 from simscen.run.simulate import simulate
 
 SCENARIO = """\

@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from simscen.run.process import warm_up
+from simscen.cli.session import warm_process
 from simscen.spec.base import Component
 
 SCENARIO = """\
@@ -52,5 +52,8 @@ def test_components_of_packages_are_left_to_the_process_of_the_run() -> None:
         component = "simscen.sensors.imu:ImuSensor"
         inner: Theirs = Theirs()
 
-    assert [found.component for found in warm_up._components([{"a": (Ours(),)}])] == [Ours.component, Theirs.component]
-    assert list(warm_up.shipped_modules([Ours(), Theirs()])) == ["simscen.sensors.imu"]
+    assert [found.component for found in warm_process._components([{"a": (Ours(),)}])] == [
+        Ours.component,
+        Theirs.component,
+    ]
+    assert list(warm_process.shipped_modules([Ours(), Theirs()])) == ["simscen.sensors.imu"]

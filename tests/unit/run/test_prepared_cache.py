@@ -4,8 +4,7 @@ from pathlib import Path
 
 from simscen.loading.scenario import load_scenario, try_variations
 from simscen.run import scenario_cache
-from simscen.run.disk_cache import DiskCache
-from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
+from simscen.run.scenario_cache import CachedWorldBuilder, DiskCache, ScenarioCache
 
 TEXT = """\
 simscen: 1

@@ -14,8 +14,7 @@ import pytest
 
 from simscen.core.errors import UsageError
 from simscen.loading.scenario import load_scenario
-from simscen.run.process.backend import Ended, Started
-from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
+from simscen.run.process.jobs import Ended, ForkServerDeath, Job, ProcessEnd, Started
 
 pytest.importorskip("ray")
 pytestmark = pytest.mark.slow
