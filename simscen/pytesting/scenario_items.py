@@ -16,8 +16,8 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.loading.files.discovery import default_root
 from simscen.pytesting.runner import runner_of
+from simscen.report.display_text import plain_text
 from simscen.report.session_lines import violation_lines
-from simscen.report.styled_line import plain_text
 from simscen.report.violations import error_summary, reported_violations, scenario_file, short_run_name
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 

@@ -11,8 +11,7 @@ from simscen.core.records.session_events import (
     ScenarioChange,
 )
 from simscen.judge.metrics.significance import PASS_RATE
-from simscen.report.display_text import one_line
-from simscen.report.styled_line import Role, StyledLine, StyledText
+from simscen.report.display_text import Role, StyledLine, StyledText, one_line
 
 MAX_FLIPS = 10
 """Maximum number of runs with different outcomes to list."""

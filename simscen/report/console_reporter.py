@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable, Mapping
 from typing import TextIO
 
-from simscen.report.styled_line import StyledLine, TerminalStyle, detect_style
+from simscen.report.display_text import StyledLine, TerminalStyle, detect_style
 from simscen.report.text_reporters import PlainReporter, Reporter
 
 

@@ -20,8 +20,7 @@ from simscen.core.records.session_events import (
     SessionFinished,
     SessionStarted,
 )
-from simscen.report.display_text import escape_ci_commands, one_line
-from simscen.report.styled_line import StyledLine, TerminalStyle, plain_text
+from simscen.report.display_text import StyledLine, TerminalStyle, escape_ci_commands, one_line, plain_text
 from simscen.report.text_reporters import PlainReporter, SessionFormatter
 
 MIN_FINISHED_RUNS = 2

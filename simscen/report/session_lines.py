@@ -7,8 +7,7 @@ from heapq import nsmallest
 from simscen.core.records.run_result import REPEAT_SUFFIX, Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionFinished, SessionStarted
 from simscen.judge.finding_text import disturbance_line, tightest_margin
-from simscen.report.display_text import one_line, shell_command_text
-from simscen.report.styled_line import Role, StyledLine, StyledText
+from simscen.report.display_text import Role, StyledLine, StyledText, one_line, shell_command_text
 from simscen.report.violations import (
     error_details,
     error_summary,

@@ -16,7 +16,17 @@ from simscen.core.records.session_events import (
     SessionStarted,
 )
 from simscen.report.comparison import comparison_lines
-from simscen.report.display_text import ascii_only, escape_ci_commands, one_line
+from simscen.report.display_text import (
+    StyledLine,
+    StyledText,
+    TerminalStyle,
+    ascii_only,
+    can_encode,
+    escape_ci_commands,
+    one_line,
+    plain_text,
+    wrap_line,
+)
 from simscen.report.session_lines import (
     RunNaming,
     failed_runs,
@@ -28,14 +38,6 @@ from simscen.report.session_lines import (
     slowest_runs,
 )
 from simscen.report.study import study_lines
-from simscen.report.styled_line import (
-    StyledLine,
-    StyledText,
-    TerminalStyle,
-    can_encode,
-    plain_text,
-    wrap_line,
-)
 
 INTERRUPTED, NOT_RUN = "interrupted", "not-run"
 """Kinds of errors of runs that were not finished. They are counted at the end, but not printed."""

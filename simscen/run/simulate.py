@@ -21,8 +21,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.recorder import MOMENT_DELAY_S, MomentBuffer, MomentSink, Recorder
 from simscen.record.trace_builder import TraceBuilder
 from simscen.run.assembly import assemble
-from simscen.run.external.build import robot_file
-from simscen.run.external.stack import ExternalStack
+from simscen.run.external.stack import ExternalStack, robot_file
 from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
 from simscen.run.log_header import log_header

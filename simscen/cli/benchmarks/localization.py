@@ -15,7 +15,7 @@ from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import NothingSelected, UsageError
 from simscen.loading.schema.messages import quoted
-from simscen.report.styled_line import detect_style
+from simscen.report.display_text import detect_style
 
 if TYPE_CHECKING:
     from simscen.bench.localization.campaign import Consistency, Interval, Row, Share, Trial

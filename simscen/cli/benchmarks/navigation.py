@@ -11,7 +11,7 @@ import typer
 from simscen.cli.diagnostics import as_text as problems_as_text
 from simscen.cli.diagnostics import escaped, from_here, print_text
 from simscen.core.errors import Exit, NothingSelected
-from simscen.report.styled_line import detect_style
+from simscen.report.display_text import detect_style
 
 if TYPE_CHECKING:
     from simscen.bench.navigation.experiments import Experiment

@@ -20,10 +20,10 @@ from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.record.log_reader.read import read_log
+from simscen.report.display_text import plain_text
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import UNDECIDED_KINDS
 from simscen.report.session_lines import RunNaming, run_lines
-from simscen.report.styled_line import plain_text
 from simscen.run.process.jobs import Job
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from simscen.bench.navigation.barn import DWA
 from simscen.bench.navigation.summary import Difference, DriveComparison, Row
 from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
-from simscen.report.styled_line import StyledText, plain_text, wrap_line
+from simscen.report.display_text import StyledText, plain_text, wrap_line
 
 TableRow = Sequence[str]
 Adjust = Callable[[str, int], str]

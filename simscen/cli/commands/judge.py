@@ -28,9 +28,9 @@ from simscen.cli.shared_options import (
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import result_data
 from simscen.record.foreign.options import ForeignLogOptions
+from simscen.report.display_text import plain_text
 from simscen.report.judged_logs import full_log_lines, margin_table, short_log_line, summary_line
 from simscen.report.results_json import as_document, in_order
-from simscen.report.styled_line import plain_text
 
 
 def command(

@@ -92,7 +92,7 @@ def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | N
             raise UsageError("--address is for --backend ray")
         return jobs or len(os.sched_getaffinity(0)), ""
     try:
-        from simscen.run.cluster.ray_backend import cluster_cpus
+        from simscen.run.process.ray_backend import cluster_cpus
     except ModuleNotFoundError:
         raise UsageError("--backend ray needs Ray; install it with: pip install ray") from None
     cpus = cluster_cpus(address or OWN_CLUSTER)
@@ -103,6 +103,6 @@ def backend_of(options: SessionOptions) -> Backend:
     """Return the backend that the options select. Its processes start with the first run."""
     if not options.cluster:
         return Supervisor(options.workers, WARM_PROCESS)
-    from simscen.run.cluster.ray_backend import RayBackend
+    from simscen.run.process.ray_backend import RayBackend
 
     return RayBackend(options.cluster, options.workers, WARM_PROCESS)

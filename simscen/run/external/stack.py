@@ -1,11 +1,13 @@
 """External stack: implements the Stack protocol by exchanging frames with another process."""
 
+import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, TypeVar
 
-from simscen.core.clock import SimTime
-from simscen.core.errors import RunError
+from simscen.core.clock import Clock, SimTime
+from simscen.core.errors import InvalidInput, RunError
 from simscen.core.external_command import ExternalCommand
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
@@ -13,6 +15,10 @@ from simscen.core.messages.navigation import Estimate, Goal, Path
 from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Decision
+from simscen.loading.stacks.userconfig import undefined_stack
+from simscen.model.stack import StackSpec
+from simscen.model.stack_base import GoalTolerances, StackBase
+from simscen.model.stack_files import ExternalStackSpec
 from simscen.peer import wire
 from simscen.record import topics
 from simscen.run.external import protocol
@@ -22,6 +28,10 @@ from simscen.run.external.handshake import RunParameters, Welcome, goal_content,
 from simscen.run.external.protocol import KEEPOUT_MASK, SPEED_MASK, ProtocolViolation, TopicTable
 from simscen.run.external.publisher import StepPublisher
 from simscen.run.external.stack_process import StackProcess
+from simscen.run.preparation import PreparedScenario
+from simscen.run.process.isolation import clean_environment
+from simscen.run.robot_interface import sensor_frames, sensor_kinds
+from simscen.sim.urdf.writer import to_urdf
 from simscen.stack.protocols import Surroundings
 
 END_GRACE_S = 2.0
@@ -240,3 +250,56 @@ class ExternalStack:
 
 def _name(kind: int) -> str:
     return wire.KIND_NAMES[kind] if 0 < kind < len(wire.KIND_NAMES) else f"of kind {kind}"
+
+
+def build_external_stack(
+    prepared: PreparedScenario,
+    spec: ExternalStackSpec,
+    surroundings: Surroundings,
+    seed: int,
+    log_file: FilePath | None,
+) -> ExternalStack:
+    """Build the external stack of a scenario. Its output goes to `log_file`, renamed by `robot_file`.
+
+    Raises InvalidInput if the name of the stack is not defined.
+    """
+    command = prepared.loaded.external_command
+    if command is None:
+        raise InvalidInput([problem] if (problem := undefined_stack(prepared.loaded)) else [])
+    parameters = RunParameters(
+        seed=seed,
+        control_period=Clock(surroundings.tick_rate).period(spec.controller_frequency),
+        sensors=sensor_kinds(prepared),
+        mounts=sensor_frames(prepared.robot),
+        rates={name: float(getattr(sensor.chosen, "rate", 0.0)) for name, sensor in prepared.robot.sensors.items()},
+        robot_description=to_urdf(prepared.body),
+        stop_on_failure=prepared.spec.on_goal_failure == "stop",
+        mode=prepared.spec.navigation.mode,
+        robot_name=prepared.loaded.robot_name,
+    )
+    robot_log = log_file and robot_file(log_file, parameters.robot_name)
+    return ExternalStack(spec.external, command, surroundings, parameters, robot_log)
+
+
+def robot_file(file: FilePath, robot: str) -> FilePath:
+    """Return the file name for one of several robots, e.g. `stack.a.log`."""
+    return file.with_stem(f"{file.stem}.{robot}") if robot else file
+
+
+def with_external_reference(prepared: PreparedScenario) -> PreparedScenario:
+    """Return the scenario with the reference stack of each robot as an external process, for tests and benchmarks."""
+    if prepared.robots:
+        parts = {name: with_external_reference(part) for name, part in prepared.robots.items()}
+        loaded = replace(prepared.loaded, robots={name: part.loaded for name, part in parts.items()})
+        return replace(next(iter(parts.values())), loaded=loaded, robots=parts)
+    stack = prepared.stack
+    assert isinstance(stack, StackSpec)
+    stack_json = stack.model_dump_json(by_alias=True, exclude_none=True)
+    argv = (sys.executable, "-I", "-m", "simscen.run.external.reference_stack", stack_json)
+    tolerances = {name: getattr(stack.goal_checker, name) for name in GoalTolerances.model_fields}
+    shared = {name: getattr(stack, name) for name in StackBase.model_fields if name != "goal_checker"}
+    external = ExternalStackSpec(
+        external="reference", ground_truth=stack.gets_ground_truth, goal_checker=GoalTolerances(**tolerances), **shared
+    )
+    command = ExternalCommand(argv, clean_environment(), str(FilePath.cwd()))
+    return replace(prepared, stack=external, loaded=replace(prepared.loaded, external_command=command))

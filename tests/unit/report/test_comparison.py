@@ -17,9 +17,9 @@ from simscen.core.records.session_events import (
 )
 from simscen.report.comparison import comparison_lines, difference_columns, shorten
 from simscen.report.console_reporter import text_reporter
+from simscen.report.display_text import plain_text
 from simscen.report.github import markdown
 from simscen.report.results_json import to_json
-from simscen.report.styled_line import plain_text
 from simscen.report.suite import Session, to_html
 
 FLIP = Flip("navigation/goal", 3, "ref", "mine", "clearance: 0.03 m < 0.05 m, at t = 4.10 s, (2.59, 4.42)")

@@ -4,7 +4,7 @@ import io
 
 import pytest
 
-from simscen.report.styled_line import TerminalStyle, detect_style
+from simscen.report.display_text import TerminalStyle, detect_style
 
 
 class Stream(io.StringIO):

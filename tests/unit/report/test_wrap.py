@@ -7,8 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from simscen.report.display_text import display_width
-from simscen.report.styled_line import StyledText, plain_text, wrap_line
+from simscen.report.display_text import StyledText, display_width, plain_text, wrap_line
 
 RUN = (
     StyledText("  "),

@@ -8,10 +8,19 @@ import pytest
 from PIL import Image
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.cluster.node import FilePiece, JobQueue, NodeRunner
-from simscen.run.cluster.packing import PACKAGE_FOLDER, PackedJob, SentFile, Unpacker, digest_of, pack
 from simscen.run.preparation import prepare
 from simscen.run.process.jobs import Job
+from simscen.run.process.ray_node import (
+    PACKAGE_FOLDER,
+    FilePiece,
+    JobQueue,
+    NodeRunner,
+    PackedJob,
+    SentFile,
+    Unpacker,
+    digest_of,
+    pack,
+)
 from simscen.run.simulate import simulate
 
 SCENARIO = """
@@ -100,13 +109,13 @@ def test_a_queue_gives_each_job_to_one_runner_and_remembers_to_which() -> None:
 
 
 def test_large_files_are_sent_in_pieces(job: Job, tmp_path: Path, monkeypatch) -> None:
-    from simscen.run.cluster import node
+    from simscen.run.process import ray_node
 
-    monkeypatch.setattr(node, "PIECE_BYTES", 4)
+    monkeypatch.setattr(ray_node, "PIECE_BYTES", 4)
     (tmp_path / "out/inner").mkdir(parents=True)
     (tmp_path / "out/inner/file").write_bytes(b"123456789")
     (tmp_path / "out/empty").write_bytes(b"")
-    assert list(node._files(job)) == [
+    assert list(ray_node._files(job)) == [
         FilePiece(3, "empty", b""),
         *(FilePiece(3, "inner/file", data) for data in (b"1234", b"5678", b"9")),
     ]

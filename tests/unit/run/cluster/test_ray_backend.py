@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 from ray.cluster_utils import Cluster  # noqa: E402
 
-from simscen.run.cluster.ray_backend import RayBackend, connect  # noqa: E402
+from simscen.run.process.ray_backend import RayBackend, connect  # noqa: E402
 
 ENTRY = (str(Path(__file__).parents[1] / "process/faulty_zygote.py"),)
 SCENARIO = """

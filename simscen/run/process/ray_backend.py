@@ -18,9 +18,20 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from simscen.core.errors import UsageError
 from simscen.core.version import __version__
-from simscen.run.cluster.node import FilePiece, JobEnded, JobProgressed, JobQueue, JobStarted, NodeRunner, NodeUpdate
-from simscen.run.cluster.packing import PACKAGE_FOLDER, SentFile, digest_of, pack
 from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, Progressed, Started, always
+from simscen.run.process.ray_node import (
+    PACKAGE_FOLDER,
+    FilePiece,
+    JobEnded,
+    JobProgressed,
+    JobQueue,
+    JobStarted,
+    NodeRunner,
+    NodeUpdate,
+    SentFile,
+    digest_of,
+    pack,
+)
 from simscen.run.reproducibility import source_digest
 from simscen.spec.registry import Entry
 

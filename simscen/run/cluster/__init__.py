@@ -1,1 +1,0 @@
-"""Run sessions on a Ray cluster."""
