@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from simscen.pytesting.runner import Simscen
+    from simscen.pytesting.scenario_items import Simscen
 
 SUFFIXES = (".scenario.yaml", ".scenario.yml")
 
@@ -83,7 +83,7 @@ def _is_requested(file: Path, parent: pytest.Collector) -> bool:
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
     """Give all workers of xdist the same output folder."""
-    from simscen.pytesting.runner import runner_of
+    from simscen.pytesting.scenario_items import runner_of
 
     node.workerinput[OUT_OPTION] = str(runner_of(node.config).folder)
 
@@ -91,6 +91,6 @@ def pytest_configure_node(node: Any) -> None:
 @pytest.fixture
 def simscen(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Simscen]:
     """Provide `simscen("goal.scenario.yaml", seed=7)`, which runs a scenario and returns its Run."""
-    from simscen.pytesting.runner import Simscen
+    from simscen.pytesting.scenario_items import Simscen
 
     yield Simscen(request.path.parent, tmp_path)

@@ -1,6 +1,7 @@
-"""Scenarios of the BARN navigation challenge (Perille et al., SSRR 2020; the-barn-challenge, run.py).
+"""Worlds and scenarios of the BARN navigation challenge, and generated fields like those of BARN and DynaBARN.
 
-A robot with the size of a Jackal drives 10 m through a field of cylinders without a map. Any contact ends the run.
+BARN (Perille et al., SSRR 2020; the-barn-challenge, run.py): a robot with the size of a Jackal drives 10 m through a
+field of cylinders without a map. Any contact ends the run.
 """
 
 import csv
@@ -9,8 +10,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
+
 from simscen.core.errors import UsageError
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.core.geometry.shapes import Cylinder, Solid
+from simscen.core.random_streams import Streams
 
 TIME_LIMIT = 100.0
 DWA = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
@@ -106,3 +112,214 @@ def scenario(name: str, world: str, start: Pose2 = START, goal: Pose2 = GOAL, st
 
 def _pose(pose: Pose2) -> str:
     return f"{{x: {pose.x}, y: {pose.y}, yaw: {pose.yaw}}}"
+
+
+CELL_SIZE_M = 0.15
+"""Distance between cylinders, which is twice their radius."""
+COLUMNS, FIELD_ROWS, ROWS = 30, 30, 64
+"""Size of the grid in cells: the lane that the robot drives along has ROWS x COLUMNS.
+
+The field fills the last FIELD_ROWS (largest y). The first and last columns are walls of cylinders.
+"""
+HEIGHT_M = 1.0
+FILL_RANGE = (0.20, 0.35)
+"""Range of the share of cells that are filled at random, before smoothing.
+
+After smoothing, 5 to 22 % of the cells between the walls are filled, as in six worlds of BARN.
+"""
+FILL_NEIGHBORS, CLEAR_NEIGHBORS = 5, 1
+"""Smallest number of filled neighbors, of eight, that fills a cell, and largest number that clears it."""
+START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
+GAP_RADIUS_M = 0.37
+"""Radius of the disc that can cross every field, as it can cross every world of BARN."""
+MAX_ATTEMPTS = 1000
+
+Cells = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class ObstacleField:
+    """Centers (n, 2) of the cylinders, and the length in m of the shortest path of the disc from START to GOAL."""
+
+    number: int
+    centers: Array
+    shortest: float
+
+    @property
+    def density(self) -> float:
+        """Share of filled cells between the walls."""
+        inside = (np.abs(self.centers[:, 0] + COLUMNS * CELL_SIZE_M / 2) < (COLUMNS / 2 - 1) * CELL_SIZE_M) & (
+            self.centers[:, 1] > (ROWS - FIELD_ROWS) * CELL_SIZE_M
+        )
+        return float(np.count_nonzero(inside)) / (FIELD_ROWS * (COLUMNS - 2))
+
+
+def obstacle_field(number: int, gap: float = GAP_RADIUS_M, too_wide: float | None = None) -> ObstacleField:
+    """Generate the field with this number (from 1). The result depends on the arguments only.
+
+    Fields are drawn until a disc of radius `gap` can cross one, and a disc of radius `too_wide`, if given, cannot.
+    Raises RuntimeError after MAX_ATTEMPTS, which never happened so far.
+    """
+    rng = Streams(number).generator("obstacle field" if gap == GAP_RADIUS_M else f"obstacle field {gap:g}")
+    for _ in range(MAX_ATTEMPTS):
+        centers = _cylinder_centers(_smoothed_field(rng))
+        if _is_crossable(centers, gap, too_wide) and np.isfinite(length := _shortest_path_length(centers, gap)):
+            return ObstacleField(number, centers, length)
+    raise RuntimeError(f"none of {MAX_ATTEMPTS} fields with number {number} can be crossed")
+
+
+def _smoothed_field(rng: np.random.Generator) -> Cells:
+    """Return a field of random density that is smoothed two to four times as in BARN, with walls on both sides."""
+    cells: Cells = rng.random((FIELD_ROWS, COLUMNS)) < rng.uniform(*FILL_RANGE)
+    for _ in range(int(rng.integers(2, 5))):
+        cells[:, [0, -1]] = True
+        neighbors = _count_neighbors(cells)
+        cells = (cells | (neighbors >= FILL_NEIGHBORS)) & (neighbors > CLEAR_NEIGHBORS)
+    cells[:, [0, -1]] = True
+    return cells
+
+
+def _count_neighbors(cells: Cells) -> npt.NDArray[np.int64]:
+    """Return the number of filled neighbors of each cell. Cells beyond the edge count as empty."""
+    padded = np.pad(cells.astype(np.int64), 1)
+    rows, columns = cells.shape
+    filled = sum(padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3))
+    return np.asarray(filled - cells)
+
+
+def _cylinder_centers(field: Cells) -> Array:
+    """Return the cylinders (n, 2) of the lane: the walls, which are closed behind the start, and the field."""
+    lane = np.zeros((ROWS, COLUMNS), np.bool_)
+    lane[:, [0, -1]], lane[0] = True, True
+    lane[ROWS - FIELD_ROWS :] = field
+    rows, columns = np.nonzero(lane)
+    return np.column_stack(((columns + 0.5 - COLUMNS) * CELL_SIZE_M, (rows + 0.5) * CELL_SIZE_M))
+
+
+def _is_crossable(centers: Array, gap: float, too_wide: float | None) -> bool:
+    """Return whether the free space of a disc of radius `gap` connects start and goal, and that of `too_wide` does not.
+
+    This is faster than a path search. Most fields cannot be crossed.
+    """
+    from scipy import ndimage, spatial
+
+    step = CELL_SIZE_M / 3
+    x, y = np.meshgrid(np.arange(-COLUMNS * CELL_SIZE_M, 0.0, step), np.arange(0.0, GOAL.y + 1.0, step))
+    distance, _ = spatial.cKDTree(centers).query(np.stack((x, y), axis=-1))
+
+    def is_connected(radius: float) -> bool:
+        pieces, _ = ndimage.label(distance > radius + CELL_SIZE_M / 2)
+        start, goal = (
+            pieces[round(pose.y / step), round((pose.x + COLUMNS * CELL_SIZE_M) / step)] for pose in (START, GOAL)
+        )
+        return bool(start and start == goal)
+
+    return is_connected(gap) and not (too_wide is not None and is_connected(too_wide))
+
+
+def _shortest_path_length(centers: Array, gap: float) -> float:
+    from simscen.worlds.geometry.triangulation import merge_solids
+    from simscen.worlds.routes.shortest_paths import ShortestPaths
+
+    pillar = Cylinder(CELL_SIZE_M / 2, HEIGHT_M)
+    mesh = merge_solids(tuple(Solid(pillar, Pose3(x, y, HEIGHT_M / 2), "") for x, y in centers.tolist()))
+    # The bounds are as wide as the lane, because a path could lead around the walls, which end with the field.
+    bounds = (-COLUMNS * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
+    return ShortestPaths(mesh, bounds, gap).length(START, GOAL)
+
+
+ARENA_HALF_WIDTH_M = 10.0
+"""Half of the side length of the square arena."""
+RADIUS_M, HEIGHT_M = 0.5, 1.0
+COUNT_RANGE = (5, 24)
+"""Smallest and largest number of cylinders."""
+SPEEDS_M_S = (0.74, 1.23, 1.72)
+"""Mean speeds of the easy, medium and hard worlds of DynaBARN."""
+MAX_SPEED_DEVIATION_M_S = 0.25
+"""Largest difference of a cylinder's mean speed from the field's, and of its speeds from its mean speed."""
+SPEED_STD_RANGE_M_S = (0.05, 0.25)
+"""Range of the standard deviation of a cylinder's speeds."""
+DEGREE_RANGE = (1, 5)
+"""Range of the degree of the polynomials."""
+KEYFRAME_DISTANCE_M = 2.0
+"""Distance between two keyframes."""
+MIN_PATH_LENGTH_M = 8.0
+"""Minimum length of a path in the arena. Shorter paths are drawn again."""
+START, GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14159)
+"""Start of the robot in DynaBARN, 1 m outside of the arena, and its goal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mover:
+    """Motion of a cylinder through `points` (n, 2) at `times` (n,) in s, back and forth.
+
+    The run starts `phase` seconds after the start of the motion.
+    """
+
+    times: Array
+    points: Array
+    phase: float
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicField:
+    """Moving cylinders of a field, and their requested mean `speed` in m/s."""
+
+    number: int
+    speed: float
+    movers: tuple[Mover, ...]
+
+
+def dynamic_field(number: int, speed: float) -> DynamicField:
+    """Generate the field with this number (from 1) and mean speed in m/s. The result depends on nothing else."""
+    rng = Streams(number).generator(f"dynamic field {speed:g}")
+    count = int(rng.integers(COUNT_RANGE[0], COUNT_RANGE[1] + 1))
+    return DynamicField(number, speed, tuple(_mover(rng, speed) for _ in range(count)))
+
+
+def _mover(rng: np.random.Generator, speed: float) -> Mover:
+    points = _path(rng)
+    mean = speed + float(rng.uniform(-MAX_SPEED_DEVIATION_M_S, MAX_SPEED_DEVIATION_M_S))
+    deviation = float(rng.uniform(*SPEED_STD_RANGE_M_S))
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    speeds = np.clip(
+        rng.normal(mean, deviation, len(steps)), mean - MAX_SPEED_DEVIATION_M_S, mean + MAX_SPEED_DEVIATION_M_S
+    )
+    times = np.concatenate(([0.0], np.cumsum(steps / speeds)))
+    return Mover(times, points, float(rng.uniform(0.0, 1.99 * times[-1])))
+
+
+def _path(rng: np.random.Generator) -> Array:
+    """Return points (n, 2) about KEYFRAME_DISTANCE_M apart along a polynomial, with random axis and direction.
+
+    Raises RuntimeError after MAX_ATTEMPTS, which never happened so far.
+    """
+    for _ in range(MAX_ATTEMPTS):
+        curve = _polynomial_in_arena(rng)
+        length_at = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))))
+        if length_at[-1] < MIN_PATH_LENGTH_M:
+            continue
+        lengths = np.linspace(0.0, length_at[-1], round(length_at[-1] / KEYFRAME_DISTANCE_M) + 1)
+        points = np.column_stack(
+            (np.interp(lengths, length_at, curve[:, 0]), np.interp(lengths, length_at, curve[:, 1]))
+        )
+        points = points[:, ::-1] if rng.integers(2) else points
+        return points[::-1] if rng.integers(2) else points
+    raise RuntimeError(f"none of {MAX_ATTEMPTS} polynomials stays within the arena for {MIN_PATH_LENGTH_M:g} m")
+
+
+def _polynomial_in_arena(rng: np.random.Generator) -> Array:
+    """Return the longest piece, in the arena, of a polynomial through random points, as points (n, 2)."""
+    order = int(rng.integers(DEGREE_RANGE[0], DEGREE_RANGE[1] + 1))
+    # Spread over the arena, so that the polynomial does not oscillate between points that nearly coincide.
+    edges = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 2)
+    x_points = rng.uniform(edges[:-1], edges[1:])
+    polynomial = np.polynomial.Polynomial.fit(
+        x_points, rng.uniform(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 1), order
+    )
+    x = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, 401)
+    y = polynomial(x)
+    outside = np.flatnonzero(np.abs(y) > ARENA_HALF_WIDTH_M)
+    pieces = np.split(np.column_stack((x, y)), outside)
+    inside = [piece[np.abs(piece[:, 1]) <= ARENA_HALF_WIDTH_M] for piece in pieces]
+    return max(inside, key=len)

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from simscen.bench.navigation import barn
-from simscen.bench.navigation import dynamic_fields as movers
-from simscen.bench.navigation.obstacle_fields import CELL_SIZE_M, HEIGHT_M, ObstacleField, obstacle_field
+from simscen.bench.navigation import barn as movers
+from simscen.bench.navigation.barn import CELL_SIZE_M, HEIGHT_M, ObstacleField, obstacle_field
 from simscen.core.random_streams import Streams
 
 

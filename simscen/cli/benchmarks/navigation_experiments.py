@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.bench.navigation import barn, dynamic_fields, experiments, office_maps, random_goals
+from simscen.bench.navigation import barn, experiments, office_maps, random_goals
 from simscen.bench.navigation.experiments import Experiment
 from simscen.bench.navigation.office_maps import write_building
 
@@ -85,7 +85,7 @@ def _parts(name: str, scenarios: Path) -> list[str]:
         case "narrow fields":
             return [experiments.narrow_name(margin) for margin in experiments.NARROW_MARGINS_M]
         case "dynamic fields":
-            return [experiments.dynamic_name(speed) for speed in dynamic_fields.SPEEDS_M_S]
+            return [experiments.dynamic_name(speed) for speed in barn.SPEEDS_M_S]
         case "random goals":
             return ["random goals, ROS maps"]
         case "degraded sensing":

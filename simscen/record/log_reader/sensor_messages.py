@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from simscen.core.clock import SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
-from simscen.core.messages.level_readings import level_scan
-from simscen.core.messages.sensor_data import Scan
+from simscen.core.messages.sensor_data import Scan, level_scan
 from simscen.record import topics
 from simscen.record.frame_names import RobotFrames
 from simscen.record.messages import decode

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.bench.navigation.dynamic_fields import (
+from simscen.bench.navigation.barn import (
     ARENA_HALF_WIDTH_M,
     COUNT_RANGE,
     MAX_SPEED_DEVIATION_M_S,

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from shapely import MultiPoint, Point, box
 
-from simscen.bench.navigation import obstacle_fields
-from simscen.bench.navigation.obstacle_fields import CELL_SIZE_M, GAP_RADIUS_M, GOAL, START, obstacle_field
+from simscen.bench.navigation import barn
+from simscen.bench.navigation.barn import CELL_SIZE_M, GAP_RADIUS_M, GOAL, START, obstacle_field
 
 
 def test_the_same_number_gives_the_same_field_and_another_one_another() -> None:
@@ -35,7 +35,7 @@ def test_fields_are_as_dense_as_the_worlds_of_barn() -> None:
 def test_cellular_automaton_removes_isolated_cells_and_fills_crowded_ones() -> None:
     alone = np.zeros((3, 3), np.bool_)
     alone[1, 1] = True
-    assert obstacle_fields._count_neighbors(alone).tolist() == [[1, 1, 1], [1, 0, 1], [1, 1, 1]]
+    assert barn._count_neighbors(alone).tolist() == [[1, 1, 1], [1, 0, 1], [1, 1, 1]]
 
 
 def test_narrow_field_width_matches_an_independent_library() -> None:

@@ -7,7 +7,7 @@ import pytest
 from puppet import Nothing, Puppet, SquareRoom, at
 
 from simscen.core.geometry import Pose3
-from simscen.core.messages.level_readings import imu_in_base_frame, level_scan
+from simscen.core.messages.sensor_data import imu_in_base_frame, level_scan
 from simscen.model.robot import InertialUnit, Lidar, Mount
 from simscen.sensors.imu import ImuSensor
 from simscen.sensors.lidar import LidarSensor
