@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.messages.navigation import Belief
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.places import Ring
 from simscen.spec.quantities import Angle, Length
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
 
 Rings = Annotated[list[Ring], Field(max_length=100)]
 
@@ -119,13 +117,3 @@ class _EditedMap(Disturbance):
                 is_inside = points_in_polygon([(x, y) for x, y in ring], centers).reshape(grid.shape)
                 cells[is_inside] = value
         return replace(grid, cells=cells)
-
-
-def points_in_polygon(corners: list[tuple[float, float]], points: Array) -> npt.NDArray[np.bool_]:
-    """Return which of the points (n, 2) lie inside the polygon (even-odd rule)."""
-    is_inside = np.zeros(len(points), dtype=np.bool_)
-    for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        if ay != by:
-            crosses = (ay > points[:, 1]) != (by > points[:, 1])
-            is_inside ^= crosses & (points[:, 0] < ax + (points[:, 1] - ay) / (by - ay) * (bx - ax))
-    return is_inside

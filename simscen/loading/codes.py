@@ -1,5 +1,8 @@
 """Meanings of the problem codes. A code never changes its meaning."""
 
+STACK_CANNOT = "SC062"
+"""The only code of problems that another stack would not have."""
+
 CODES = {
     "SC001": "The file cannot be read: it is missing, not a regular file, too large, or not permitted.",
     "SC002": "The file is not clean text: it must be UTF-8 without control characters.",
@@ -44,6 +47,7 @@ CODES = {
     "SC053": "A number looks like degrees, but radians are expected.",
     "SC054": "An entry, a value, or a shape is listed twice.",
     "SC055": "A setting, an action, or a fault has no effect.",
+    STACK_CANNOT: "The stack cannot do what the scenario requires, for example a fault of its localizer.",
     "SC061": "The command of an external stack in the user configuration cannot be run.",
     "SC060": "An external stack has no command; define it with `--stack NAME='COMMAND'` or in the user configuration.",
     "SC301": "A start or goal is inside an obstacle or off the map.",

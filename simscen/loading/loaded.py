@@ -127,6 +127,10 @@ class LoadedScenario:
         robots = {name: view.with_changes(**changes) for name, view in self.robots.items()}
         return replace(self, **changes, robots=robots)
 
+    def skipped(self, choice: StackChoice, reason: str) -> "LoadedScenario":
+        """Return the scenario marked not to be run with the stack `choice`."""
+        return replace(self, choice=choice, spec=self.spec.model_copy(update={"skip": reason}))
+
     def includes_robot(self, robot: str | None) -> bool:
         """Return whether parts of the scenario that name `robot` (None: that name no robot) apply to this view."""
         return robot is None or not self.robot_name or robot == self.robot_name

@@ -17,6 +17,7 @@ import rclpy
 from rclpy.clock import Clock, ClockType
 
 from simscen.peer.goals import Goal, Goals
+from simscen.ros2.filter_info import FilterInfo
 from simscen.ros2.goal_sender import ACTIONS, ActionSender, Failed, GoalSender, GoalSenders, StackState
 from simscen.ros2.graph import CLOCK, LATCHED, Graph, Received, Topic
 from simscen.ros2.launch import LaunchedCommand
@@ -64,8 +65,9 @@ class Adapter:
         goals: Goals,
         launched: Optional[LaunchedCommand],
         period_s: float,
+        filter_info: FilterInfo,
     ) -> None:
-        """`period_s` is the control period."""
+        """`period_s` is the control period; `filter_info` describes the masks among `topics`."""
         if not rclpy.ok():
             rclpy.init(args=[])
         self._options, self._goals, self._launched, self._period = options, goals, launched, period_s
@@ -82,7 +84,10 @@ class Adapter:
         self._planned_goal: Optional[Goal] = None
         self._initial_pose: Optional[Message] = None
         self._latest: Dict[str, bytes] = {}
-        offered = [Topic(CLOCK, "rosgraph_msgs/msg/Clock"), *topics]
+        self._unused_masks: List[str] = []
+        self._filter_info = filter_info
+        self._pending_infos = filter_info.messages(self._graph.names)
+        offered = [Topic(CLOCK, "rosgraph_msgs/msg/Clock"), *topics, *filter_info.topics]
         offered = [topic for topic in offered if topic.name not in options.without]
         self._unavailable = [topic for topic in offered if not self._graph.advertise(topic.name, topic.type)]
         published = [topic for topic in offered if topic.name in self._graph.publishers]
@@ -120,10 +125,11 @@ class Adapter:
             about["factor"] = self._options.factor
         if self._barrier.not_in_step:
             about["not_in_step"] = self._barrier.not_in_step
-        if self._ready and self._barrier.left_out:
-            about["warnings"] = [
-                f"{node} does not answer, so lockstep does not wait for it" for node in sorted(self._barrier.left_out)
-            ]
+        warnings = [
+            f"{node} does not answer, so lockstep does not wait for it" for node in sorted(self._barrier.left_out)
+        ]
+        if self._ready and (warnings or self._unused_masks):
+            about["warnings"] = [*warnings, *self._unused_masks]
         if self._sender is not None:
             about["goals"] = self._sender.name
         if self._report is not None:
@@ -233,6 +239,7 @@ class Adapter:
         Raises AdapterError when the graph is not ready or no longer usable.
         """
         self._check_launched()
+        messages, self._pending_infos = [*messages, *self._pending_infos], []
         for topic, data in messages:
             self._estimate.take_published(topic, data)
         messages = [(topic, self._with_base_frame(topic, data)) for topic, data in messages]
@@ -247,6 +254,7 @@ class Adapter:
             messages = [message for message in messages if message[0] not in LATCHED]
             self._begin()
         messages = [*messages, *self._due_initial_pose()]
+        self._barrier.step_time.begin(STEP_SHARE * limit_s)
         synchronized: Any = self._lockstep if self._options.sync == "lockstep" and not warming_up else self._paced
         if not warming_up and self._goals.current is None:
             self._send(now)
@@ -281,6 +289,9 @@ class Adapter:
         """Subscribe to the topics of the ready graph."""
         self._ready = True
         self._latest.clear()
+        self._unused_masks = self._filter_info.unused_masks(
+            lambda topic: bool(self._graph.subscribers_of(self._graph.names(topic)))
+        )
         self._barrier.begin()
         self._graph.subscribe(COMMAND, self._readiness.command_type())
         for topic, type_name in SUBSCRIPTIONS.items():

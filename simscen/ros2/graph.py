@@ -18,7 +18,12 @@ NODE = "simscen"
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 """Name of a node whose endpoints are discovered before the node itself."""
 CLOCK = "/clock"
-LATCHED = frozenset({"/map", "/tf_static", "/robot_description", "/keepout_filter_mask", "/speed_filter_mask"})
+LATCHED = frozenset(
+    (
+        *("/map", "/tf_static", "/robot_description", "/keepout_filter_mask", "/speed_filter_mask"),
+        *("/keepout_costmap_filter_info", "/speed_costmap_filter_info"),
+    )
+)
 """Topics with transient local durability: nodes that subscribe later receive the last message."""
 DEPTH = {"/tf": 100, "/imu": 100}
 """Queue lengths for slow subscribers."""

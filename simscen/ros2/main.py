@@ -11,6 +11,7 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tu
 from simscen.peer import messages, wire
 from simscen.peer.goals import Goal, Goals
 from simscen.peer.wire import Connection, Disconnected
+from simscen.ros2.filter_info import MASKS, FilterInfo
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.nav2_report import ROSOUT
 from simscen.ros2.options import AdapterError, Domain, Options, claim_domain, ros_environment
@@ -18,6 +19,7 @@ from simscen.ros2.options import AdapterError, Domain, Options, claim_domain, ro
 EVENTS = "/simscen/events"
 DEFAULT_MODE = "navigate_to_pose"
 MODES = (DEFAULT_MODE, "navigate_through_poses", "follow_waypoints")
+PROTOCOL_TOPICS = {published: topic for topic, published in MASKS.items()}
 READY_MARGIN_S = 15.0
 """Time that the first answer may take beyond `--ready`: for the check in progress and the first period."""
 
@@ -43,12 +45,14 @@ class Hello(NamedTuple):
     """Content of HELLO that the adapter uses."""
 
     topics: Dict[int, Tuple[str, str]]
-    """Name and type of the topics of a robot, by number."""
+    """Name in the graph and type of the topics of a robot, by number."""
     stack_topics: Dict[str, int]
     """Numbers of the topics of the stack."""
     period_s: float
     """Control period."""
     mode: str
+    zone_masks: List[Dict[str, Any]]
+    """What the values of each mask of zones mean."""
 
     @classmethod
     def receive(cls, connection: Connection) -> "Hello":
@@ -60,10 +64,15 @@ class Hello(NamedTuple):
         if wire.PROTOCOL not in hello["protocols"]:
             raise AdapterError(f"simscen ros2 requires version {wire.PROTOCOL} of the stack protocol")
         return cls(
-            {topic["number"]: (topic["topic"], topic["type"]) for topic in hello["says"] if _is_robot_topic(topic)},
+            {
+                topic["number"]: (MASKS.get(topic["topic"], topic["topic"]), topic["type"])
+                for topic in hello["says"]
+                if _is_robot_topic(topic)
+            },
             {topic["topic"]: topic["number"] for topic in hello["hears"]},
             hello["control_period"] / hello["tick_rate"],
             hello.get("mode", DEFAULT_MODE),
+            hello["zone_masks"],
         )
 
 
@@ -95,7 +104,7 @@ class AdapterRun:
             require_packages(options)
         launched = self._start_nodes()
         topics = [Topic(*topic) for topic in hello.topics.values()]
-        adapter = Adapter(options, topics, self.goals, launched, hello.period_s)
+        adapter = Adapter(options, topics, self.goals, launched, hello.period_s, FilterInfo(hello.zone_masks))
         self._cleanup.append(adapter.end)
         adapter.prepare()
         about = adapter.about()
@@ -106,7 +115,7 @@ class AdapterRun:
             "step": "control",
             "modes": [*MODES],
             "first_answer_limit": options.ready + READY_MARGIN_S,
-            "topics": [topic.name for topic in topics if topic.name in adapter.advertised],
+            "topics": [PROTOCOL_TOPICS.get(t.name, t.name) for t in topics if t.name in adapter.advertised],
             "about": about,
         }
         connection.send_json(wire.WELCOME, welcome)
@@ -181,6 +190,8 @@ class AdapterRun:
 def _is_robot_topic(topic: Dict[str, Any]) -> bool:
     """Return whether a robot has this topic; ground truth and topics of the protocol are not published."""
     name: str = topic["topic"]
+    if name in MASKS.values():  # without zones
+        return False
     return not name.startswith(("/simscen", "/ground_truth")) and not topic.get("exact", False) and name != "/clock"
 
 

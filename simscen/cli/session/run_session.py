@@ -128,7 +128,7 @@ def _run(
     written = reports.write_duration(wall) and written and _check_journal(pending.journal)
     code = exit_code(finished_runs)
     if code is Exit.NOTHING_SELECTED:
-        print_text("simscen: nothing was run: all selected scenarios are marked with `skip`", sys.stderr)
+        print_text("simscen: nothing was run: all selected scenarios are skipped", sys.stderr)
     return stopped or (code if written else Exit.INCOMPLETE)
 
 

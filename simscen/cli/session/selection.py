@@ -16,7 +16,9 @@ from simscen.loading.builders import world_from_file
 from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.robot_geometry import robot_problems
 from simscen.loading.checks.scene_runner import check_in_world, world_reader_notes
+from simscen.loading.codes import STACK_CANNOT
 from simscen.loading.files.discovery import default_root, discover
+from simscen.loading.files.paths import is_folder
 from simscen.loading.files.single_files import load_robot_file, load_world_file
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
@@ -138,7 +140,9 @@ def load_all(
 ) -> tuple[list[LoadedScenario], list[Problem]]:
     """Return the selected scenarios, each variation with each of `stacks`, and warnings about them.
 
-    Raises InvalidInput with the problems of all files, whether selected or not, and NothingSelected.
+    A scenario that one of `stacks` cannot run is marked to be skipped if it was found in a folder; if it is one of
+    `paths`, it is invalid. Raises InvalidInput with the problems of all files, whether selected or not, and
+    NothingSelected.
     """
     home = root if root is not None else default_root(paths)
     checks = Checks(home, world_path, lenient, stacks=stacks_of(stacks, home, world_path))
@@ -146,8 +150,12 @@ def load_all(
     loaded: dict[str, list[LoadedScenario]] = {}
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
+    named = {path.absolute() for path in paths if not is_folder(path)}
     for file, choice in product(discover(paths, home), choices):
         variations, found = checks.scenario(file, choice, selection.numbers)
+        if choice is not None and file not in named and (reason := impossible_with(choice, found)):
+            variations, found = checks.scenario(file, None, selection.numbers)
+            variations = [one.skipped(choice, reason) for one in variations]
         for scenario in variations:
             loaded.setdefault(scenario.title, []).append(scenario.with_changes(several_stacks=len(choices) > 1))
             warnings.setdefault(scenario.id, []).extend(found)
@@ -158,6 +166,15 @@ def load_all(
     selected = share_of_scenarios(select(unique, selection.keyword, selection.tags), *selection.shard, selection.times)
     relevant = dict.fromkeys(warning for one in selected for warning in warnings[one.id])
     return [scenario for one in selected for scenario in loaded[one.title]], from_here(relevant, home)
+
+
+def impossible_with(choice: StackChoice, problems: Sequence[Problem]) -> str:
+    """Return why a scenario cannot run with a stack; "" if it can, or if it has an error with any stack."""
+    errors = [problem for problem in problems if problem.severity == "error"]
+    if not errors or any(problem.code != STACK_CANNOT for problem in errors):
+        return ""
+    first = errors[0]
+    return f"--stack {choice.name} cannot run it: {first.place}: {first.message}"
 
 
 def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:

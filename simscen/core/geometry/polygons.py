@@ -28,6 +28,16 @@ def distance_to_polygon(point: Pose2, corners: Sequence[tuple[float, float]]) ->
     return min(distance_to_segment(point.x, point.y, a, b) for a, b in edges)
 
 
+def points_in_polygon(corners: Sequence[Corner], points: Array) -> npt.NDArray[np.bool_]:
+    """Return which of the points (n, 2) lie inside the polygon (even-odd rule)."""
+    is_inside = np.zeros(len(points), dtype=np.bool_)
+    for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if ay != by:
+            crosses = (ay > points[:, 1]) != (by > points[:, 1])
+            is_inside ^= crosses & (points[:, 0] < ax + (points[:, 1] - ay) / (by - ay) * (bx - ax))
+    return is_inside
+
+
 def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
     """Return the distance in m of a position inside a polygon from its border; -1 outside."""
     if not polygon_contains(corners, (pose.x, pose.y)):

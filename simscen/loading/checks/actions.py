@@ -6,7 +6,6 @@ from typing import Any
 from simscen.loading.checks.registry import MEANING, Finding, Keys
 from simscen.loading.known_names import pedestrian_names
 from simscen.loading.loaded import LoadedScenario
-from simscen.model.stack_files import ExternalStackSpec
 
 
 @MEANING.check("SC050")
@@ -33,16 +32,12 @@ def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
 
 @MEANING.check("SC050")
 def impossible_zone_actions(loaded: LoadedScenario) -> Iterator[Finding]:
-    """Find zones that are switched for an external stack, and speed zones without a limit."""
+    """Find speed zones without a limit."""
     actions = _zone_actions(loaded)
     limited = [zone.region for zone in loaded.spec.stack.speed_zones]
     limited += [action.region for _, _, action in actions if getattr(action, "speed_limit", None)]
     for name, keys, action in actions:
-        if isinstance(loaded.spec.stack, ExternalStackSpec):
-            message = f"`{name}` can never happen: an external stack gets its zones once, at the start"
-            hint = "list all zones under `stack`, or remove the event"
-            yield Finding(keys, message, hint, at_key=True)
-        elif _limits_speed(keys, action) and action.region not in limited:
+        if _limits_speed(keys, action) and action.region not in limited:
             message = f"`{name}` can never happen: region `{action.region}` has no speed limit"
             yield Finding((*keys, "region"), message, "add a limit: `speed_limit: 0.3 m/s`")
 
@@ -52,7 +47,7 @@ def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[Finding]:
     """Find speed zones whose limit is not below the top speed of the robot."""
     robot = loaded.robot.spec
     for _, keys, action in _zone_actions(loaded):
-        if isinstance(loaded.spec.stack, ExternalStackSpec) or robot is None or not _limits_speed(keys, action):
+        if robot is None or not _limits_speed(keys, action):
             continue
         if action.speed_limit is not None and action.speed_limit >= robot.top_speed:
             message = f"the limit has no effect: the robot's top speed is {robot.top_speed:g} m/s"

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from simscen.core.records.events import BELIEF, COMMAND, KIND_BY_INSTANCE, MAP, WHEELS
 from simscen.faults.base import Instance
 from simscen.loading.checks.registry import MEANING, NAMES, Finding, NameScope
+from simscen.loading.codes import STACK_CANNOT
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.model.disturbances import FaultEntry
@@ -84,16 +85,10 @@ def unsuitable_faults(scope: NameScope) -> Iterator[Finding]:
 
 
 @NAMES.check("SC032")
-def unsupported_faults(scope: NameScope) -> Iterator[Finding]:
-    """Find faults on the localizer of an external stack, on a map that is not used, or during part of a run."""
+def impossible_map_faults(scope: NameScope) -> Iterator[Finding]:
+    """Find faults on a map that is not used, or during part of a run."""
     loaded = scope.loaded
-    for index, entry, instance in _listed_faults(loaded):
-        if instance is None or instance.kind not in entry.fault.affects or entry.fault.unsuitable_key(instance):
-            continue
-        if instance.kind == BELIEF and not isinstance(loaded.spec.stack, StackSpec):
-            message = "only the localizer of simscen's own stacks can have faults"
-            hint = "disturb the inputs of the localizer instead: odometry, lidar, imu, or the map"
-            yield Finding(("faults", index, "sensor"), message, hint)
+    for index, entry, instance in _suitable_faults(loaded):
         if instance.kind != MAP:
             continue
         if loaded.spec.map == "none":
@@ -103,6 +98,25 @@ def unsupported_faults(scope: NameScope) -> Iterator[Finding]:
             if given is not None:
                 message = f"a fault on the map cannot have `{key}`: the stack gets the map once, before it starts"
                 yield Finding(("faults", index, key), message, at_key=True)
+
+
+@NAMES.check(STACK_CANNOT)
+def faults_of_other_localizers(scope: NameScope) -> Iterator[Finding]:
+    """Find faults on the localizer of a stack that is not one of simscen's own."""
+    if isinstance(scope.loaded.spec.stack, StackSpec):
+        return
+    for index, _, instance in _suitable_faults(scope.loaded):
+        if instance.kind == BELIEF:
+            message = "only the localizer of simscen's own stacks can have faults"
+            hint = "disturb the inputs of the localizer instead: odometry, lidar, imu, or the map"
+            yield Finding(("faults", index, "sensor"), message, hint)
+
+
+def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, Instance]]:
+    """Yield position, fault, and instance of each fault that can affect its instance."""
+    for index, entry, instance in _listed_faults(loaded):
+        if instance is not None and instance.kind in entry.fault.affects and not entry.fault.unsuitable_key(instance):
+            yield index, entry, instance
 
 
 @NAMES.check("SC032")

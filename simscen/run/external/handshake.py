@@ -7,6 +7,7 @@ import json
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from simscen.core.environment.costmap_filters import Zones
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose3
 from simscen.core.messages.navigation import Estimate, Goal, Mode
@@ -29,6 +30,7 @@ class RunParameters:
         robot_description: URDF of the robot.
         stop_on_failure: Whether the stack must stop after a failed goal instead of going on to the next one.
         robot_name: Name of the robot; "" for a single robot.
+        later_zones: Zones that events can switch.
     """
 
     seed: int
@@ -40,6 +42,7 @@ class RunParameters:
     stop_on_failure: bool
     mode: Mode = "navigate_to_pose"
     robot_name: str = ""
+    later_zones: Zones = field(default_factory=Zones)
 
 
 def hello_content(
@@ -47,11 +50,13 @@ def hello_content(
     parameters: RunParameters,
     topic_table: TopicTable,
     sensor_topics: list[tuple[str, Topic]],
+    zone_masks: list[dict[str, Any]],
     answer_limit: float,
 ) -> dict[str, Any]:
     """Return the content of HELLO.
 
     `topic_table` numbers the topics of the run. `sensor_topics` are pairs of a sensor name and a topic of that sensor.
+    `zone_masks` says what the values of each mask of zones mean.
     `answer_limit` is the wall time in s that the stack may take for each answer.
     """
     masks = surroundings.masks
@@ -77,6 +82,7 @@ def hello_content(
             "base": masks.speed.base,
             "multiplier": masks.speed.multiplier,
         },
+        "zone_masks": zone_masks,
         "lidars": list(surroundings.lidars),
         "sensors": {name: _sensor(name, parameters) for name in parameters.sensors},
         "says": [_topic(topic, topic_table.numbers[name], sensor_of) for name, topic in topic_table.sent.items()],

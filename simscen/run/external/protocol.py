@@ -17,6 +17,10 @@ EXACT_SUFFIX = "/exact"
 INITIAL_POSE = Topic("/initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", latched=True)
 KEEPOUT_MASK = Topic("/keepout_filter_mask", topics.MAP.type, latched=True)
 SPEED_MASK = Topic("/speed_filter_mask", topics.MAP.type, latched=True)
+"""The masks of the stack as in their files."""
+KEEPOUT_ZONES = Topic("/keepout_zones", topics.MAP.type, latched=True)
+SPEED_ZONES = Topic("/speed_zones", topics.MAP.type, latched=True)
+"""Masks with the zones that are enabled; sent again when an event switches one."""
 
 STACK_TOPICS = (
     *(topics.COMMAND, topics.PLAN, topics.LOCAL_PLAN, topics.BELIEF, topics.PARTICLES, topics.TF),

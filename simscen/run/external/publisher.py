@@ -48,6 +48,11 @@ class StepPublisher:
         if grid is not None:
             self._latched.append((topic, encode_arrays.occupancy_grid(frame_names.MAP, _START, grid)))
 
+    def publish_grid(self, tick: int, grid: OccupancyGrid, topic: Topic) -> None:
+        """Publish `grid` with the next step."""
+        data = encode_arrays.occupancy_grid(frame_names.MAP, self._time.stamp(tick), grid)
+        self.publish(topic, self._time.nanoseconds(tick), data)
+
     def latch_robot(self, description: str, estimate: Estimate) -> None:
         """Publish robot description and initial pose with the first step."""
         self._latched.append((topics.ROBOT_DESCRIPTION, messages.string(description)))

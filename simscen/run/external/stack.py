@@ -7,6 +7,7 @@ from pathlib import Path as FilePath
 from typing import Any, TypeVar
 
 from simscen.core.clock import Clock, SimTime
+from simscen.core.environment.costmap_filters import Zones
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.external_command import ExternalCommand
 from simscen.core.geometry import Pose2
@@ -25,9 +26,17 @@ from simscen.run.external import protocol
 from simscen.run.external.answer_decoder import Answer, decode_answer, group_by_topic
 from simscen.run.external.goal_tracker import GoalTracker
 from simscen.run.external.handshake import RunParameters, Welcome, goal_content, goal_data, hello_content
-from simscen.run.external.protocol import KEEPOUT_MASK, SPEED_MASK, ProtocolViolation, TopicTable
+from simscen.run.external.protocol import (
+    KEEPOUT_MASK,
+    KEEPOUT_ZONES,
+    SPEED_MASK,
+    SPEED_ZONES,
+    ProtocolViolation,
+    TopicTable,
+)
 from simscen.run.external.publisher import StepPublisher
 from simscen.run.external.stack_process import StackProcess
+from simscen.run.external.zone_masks import ZoneMasks, switched_zones
 from simscen.run.preparation import PreparedScenario
 from simscen.run.process.isolation import clean_environment
 from simscen.run.robot_interface import sensor_frames, sensor_kinds
@@ -69,6 +78,7 @@ class ExternalStack:
         self._time = SimTime(surroundings.tick_rate)
         self._goals = GoalTracker(parameters.stop_on_failure, surroundings.tick_rate, parameters.mode)
         self._publisher = StepPublisher(surroundings.tick_rate, parameters.sensors, parameters.mounts)
+        self._zone_masks = ZoneMasks(surroundings, parameters.later_zones)
         self._process: StackProcess | None = None
         self._topic_table = TopicTable.build(())
         self._welcome = Welcome()
@@ -89,11 +99,20 @@ class ExternalStack:
         publisher.latch(surroundings.masks.keepout, KEEPOUT_MASK)
         speed = surroundings.masks.speed
         publisher.latch(None if speed is None else speed.grid, SPEED_MASK)
+        for topic, mask in self._zone_masks.changed_masks(
+            Zones(surroundings.keepout, surroundings.speed_zones, surroundings.masks)
+        ):
+            publisher.latch(mask, topic)
         publisher.latch_robot(self._parameters.robot_description, estimate)
         self._topic_table = topic_table = publisher.topic_table()
         self._process = StackProcess(self._name, self._command, self._log_file, self._parameters.robot_name)
         hello = hello_content(
-            surroundings, self._parameters, topic_table, publisher.sensor_topics, self._command.answer_limit
+            surroundings,
+            self._parameters,
+            topic_table,
+            publisher.sensor_topics,
+            self._zone_masks.meanings,
+            self._command.answer_limit,
         )
         self._process.send(wire.json_frame(wire.HELLO, hello))
 
@@ -124,6 +143,16 @@ class ExternalStack:
         """Cancel the current goal and all after it."""
         self._canceling = True
         self._interrupt(wire.CANCEL, {"tick": tick, "all": True, "reason": "canceled"})
+
+    @property
+    def can_switch_zones(self) -> bool:
+        """Whether the stack subscribed to the masks of zones."""
+        return not {KEEPOUT_ZONES.name, SPEED_ZONES.name}.isdisjoint(self._welcome.topics)
+
+    def set_zones(self, tick: int, zones: Zones) -> None:
+        """Send the masks that change with the next step."""
+        for topic, mask in self._zone_masks.changed_masks(zones):
+            self._publisher.publish_grid(tick, mask, topic)
 
     @property
     def plan(self) -> Path | None:
@@ -276,6 +305,7 @@ def build_external_stack(
         stop_on_failure=prepared.spec.on_goal_failure == "stop",
         mode=prepared.spec.navigation.mode,
         robot_name=prepared.loaded.robot_name,
+        later_zones=switched_zones(prepared),
     )
     robot_log = log_file and robot_file(log_file, parameters.robot_name)
     return ExternalStack(spec.external, command, surroundings, parameters, robot_log)

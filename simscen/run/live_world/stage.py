@@ -17,6 +17,7 @@ from simscen.core.messages.sensor_data import Readings, Scan
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.core.records.trace import Decision, Truth
+from simscen.run.external.stack import ExternalStack
 from simscen.run.live_world.costmap_filters import CostmapFilters
 from simscen.run.live_world.pedestrians import PedestrianSimulation
 from simscen.sim.body.outline import outlines_in_band
@@ -286,7 +287,7 @@ class LiveStage:
 
     def switch_zone(self, order: ZoneSwitch) -> str:
         """Switch a zone of a costmap filter; return why it is impossible, or ""."""
-        if not isinstance(self._stack, CheckedStack) or not self._stack.can_switch_zones:
+        if not isinstance(self._stack, CheckedStack | ExternalStack) or not self._stack.can_switch_zones:
             return "the stack does not support switching zones"
         if reason := self._filters.rejection_reason(order):
             return reason

@@ -10,6 +10,7 @@ from simscen.core.environment.costmap_filters import in_keepout_mask
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array
+from simscen.core.geometry.polygons import points_in_polygon
 from simscen.stack.costmap.grid_frame import GridFrame
 from simscen.stack.costmap.inflation_layer import Squared, squared_distances
 
@@ -76,14 +77,7 @@ def _keepout_cells(frame: GridFrame, keepout: tuple[Polygon, ...], mask: Occupan
 
 def inside_polygon(frame: GridFrame, polygon: Polygon) -> Mask:
     """Return the cells whose center is inside the polygon (even-odd rule)."""
-    points = _all_centers(frame)
-    inside = np.zeros(len(points), dtype=bool)
-    for (ax, ay), (bx, by) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
-        if ay == by:
-            continue
-        crosses = (ay > points[:, 1]) != (by > points[:, 1])
-        inside ^= crosses & (points[:, 0] < ax + (points[:, 1] - ay) / (by - ay) * (bx - ax))
-    return inside.reshape(frame.shape)
+    return points_in_polygon(polygon, _all_centers(frame)).reshape(frame.shape)
 
 
 def _all_centers(frame: GridFrame) -> Array:

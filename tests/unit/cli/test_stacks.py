@@ -174,6 +174,43 @@ def test_resume_repeats_runs_of_a_changed_stack_file_only(simscen, project: Path
     assert after["dwb"] > before["dwb"]
 
 
+JUMP = "faults: [{sensor: localizer, jump: {y: 0.5 m}, for: 0.2 s}]\n"
+
+
+def test_scenario_of_a_folder_that_the_stack_cannot_run_is_skipped(simscen, project: Path) -> None:
+    scenario = (project / "a.scenario.yaml").read_text()
+    (project / "jump.scenario.yaml").write_text(scenario + JUMP)
+    reason = "--stack mine cannot run it: jump.scenario.yaml:7:19: only the localizer of simscen's own stacks"
+    ended = simscen("run", ".", "--stack", "reference", "--stack", "mine=/bin/true", "--out", "out", "-k", "jump")
+    assert f"jump (mine)      skipped: {reason}" in ended.out
+    assert "1 passed, 1 skipped" in ended.out
+    assert "nothing to compare" in ended.out
+    outcomes = [run["outcome"] for run in json.loads((project / "out/results.json").read_text())["runs"]]
+    assert sorted(outcomes) == ["passed", "skipped"]
+    assert f'<skipped type="simscen.skip" message="{reason}' in (project / "out/junit.xml").read_text()
+    alone = simscen("run", ".", "--stack", "mine=/bin/true", "-k", "jump")
+    assert (alone.code, "0 passed, 1 skipped" in alone.out) == (5, True)
+
+
+def test_named_scenario_that_the_stack_cannot_run_is_invalid(simscen, project: Path) -> None:
+    (project / "jump.scenario.yaml").write_text((project / "a.scenario.yaml").read_text() + JUMP)
+    ended = simscen("run", ".", "jump.scenario.yaml", "--stack", "mine=/bin/true")
+    assert ended.code == 2
+    assert "jump.scenario.yaml:7:19: error[SC062]" in ended.err
+
+
+def test_scenario_with_other_errors_is_not_skipped(simscen, project: Path) -> None:
+    wrong = (
+        (project / "a.scenario.yaml").read_text()
+        + JUMP
+        + "events: [{name: x, when: {time: 1 s}, do: {open: {name: d}}}]\n"
+    )
+    (project / "jump.scenario.yaml").write_text(wrong)
+    ended = simscen("run", ".", "--stack", "mine=/bin/true")
+    assert ended.code == 2
+    assert "error[SC030]" in ended.err
+
+
 @pytest.mark.slow
 def test_keywords_and_shards_keep_pairs_together(simscen, project: Path) -> None:
     assert simscen("run", ".", *BOTH, "--shard", "2/2", "--out", "shard").code == 0

@@ -128,7 +128,7 @@ def test_variation_of_a_replaced_stack_is_reported(simscen, project: Path) -> No
     for path, lost in ((kept, False), (replaced, True)):
         (project / "varied.scenario.yaml").write_text(MIXED + f"variations: {{grid: {{{path}}}}}\n")
         ended = simscen("validate", "varied.scenario.yaml", "--stack", "v2=./nav")
-        assert ("SC055" in ended.out, ended.code) == (lost, 2 if lost else 0), ended.out
+        assert ("SC062" in ended.out, ended.code) == (lost, 2 if lost else 0), ended.out
 
 
 def test_digest_includes_the_stack_of_each_robot(project: Path) -> None:

@@ -116,7 +116,7 @@ def test_geometric_problem_names_its_variation(simscen, project: Path) -> None:
 def test_variation_of_a_replaced_stack_is_rejected(simscen, project: Path) -> None:
     grid = "{grid: {stack.controller.desired_linear_vel: [0.1, 0.2]}}"
     (project / "a.scenario.yaml").write_text(SHORT.replace("{grid: {robot.pose.x: [1, 2, 50 cm]}}", grid))
-    ended = simscen("run", ".", "--stack", "mine=/bin/true")
+    ended = simscen("run", "a.scenario.yaml", "--stack", "mine=/bin/true")
     assert ended.code == 2
     assert "`stack.controller.desired_linear_vel` changes nothing with --stack mine=/bin/true" in ended.err
 

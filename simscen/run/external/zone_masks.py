@@ -1,0 +1,168 @@
+"""Masks of Nav2's costmap filters with the zones of a scenario, for stacks that know no polygons.
+
+The zones and the mask file of a stack are drawn into one mask for each filter. A zone that an event switches changes
+the mask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simscen.core.environment.costmap_filters import SpeedLimits, Zones
+from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
+from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.polygons import points_in_polygon
+from simscen.run.external.protocol import KEEPOUT_ZONES, SPEED_ZONES
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from simscen.core.environment.world_model import Polygon
+    from simscen.record.topics import Topic
+    from simscen.run.preparation import PreparedScenario
+    from simscen.stack.protocols import Surroundings
+
+    Cells = tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]
+
+CELL_M = 0.05
+"""Size of the cells of masks for robots without a map."""
+SPEED_STEP = 0.01
+"""Finest difference in m/s between two speed limits of a mask."""
+
+
+def switched_zones(prepared: PreparedScenario) -> Zones:
+    """Return the zones that events can switch, and their limits."""
+    keepout: list[Polygon] = []
+    speed: list[tuple[Polygon, float]] = []
+    for step in prepared.spec.steps:
+        for _, action in step.located_actions():
+            chosen: Any = action.chosen
+            if not prepared.loaded.includes_robot(action.robot) or getattr(chosen, "region", None) is None:
+                continue
+            if action.kind == "keepout":
+                keepout.append(prepared.built.world.regions[chosen.region])
+            elif action.kind == "speed_zone":
+                speed.append((prepared.built.world.regions[chosen.region], chosen.speed_limit or 0.0))
+    return Zones(tuple(keepout), tuple(speed))
+
+
+class ZoneMasks:
+    """Draws zones into masks, which cover the map of the robot or, without a map, all zones."""
+
+    def __init__(self, surroundings: Surroundings, later: Zones) -> None:
+        """`surroundings` contains the zones at the start of the run, and `later` those that events can switch."""
+        keepout = (*surroundings.keepout, *later.keepout)
+        speed = (*surroundings.speed_zones, *later.speed)
+        masks = surroundings.masks
+        frame = surroundings.map or _frame_around([*keepout, *(polygon for polygon, _ in speed)])
+        self._keepout = frame if keepout else masks.keepout
+        speed_file = masks.speed.grid if masks.speed is not None else None
+        self._speed = _SpeedMask(frame if speed else speed_file, masks.speed, speed, surroundings)
+        self._drawn: dict[Topic, OccupancyGrid] = {}
+
+    def changed_masks(self, zones: Zones) -> Iterator[tuple[Topic, OccupancyGrid]]:
+        """Yield the masks that differ from those of the last call; at the first call, all masks."""
+        for topic, grid in self._masks(zones):
+            before = self._drawn.get(topic)
+            if before is None or not np.array_equal(before.cells, grid.cells):
+                self._drawn[topic] = grid
+                yield topic, grid
+
+    def _masks(self, zones: Zones) -> Iterator[tuple[Topic, OccupancyGrid]]:
+        if self._keepout is not None:
+            cells = _cells_of(zones.masks.keepout, self._keepout)
+            for polygon in zones.keepout:
+                cells[_cells_inside(self._keepout, polygon)] = OCCUPIED
+            yield KEEPOUT_ZONES, _with_cells(self._keepout, cells)
+        if self._speed.frame is not None:
+            yield SPEED_ZONES, self._speed.drawn(self._speed.frame, zones)
+
+    @property
+    def meanings(self) -> list[dict[str, Any]]:
+        """What the values of each mask mean: its topic and filter; for limits also percent, base, and multiplier."""
+        keepout = {"topic": KEEPOUT_ZONES.name, "filter": "keepout"}
+        speed = {"topic": SPEED_ZONES.name, "filter": "speed", **self._speed.scale}
+        return [
+            *([keepout] if self._keepout is not None else []),
+            *([speed] if self._speed.frame is not None else []),
+        ]
+
+
+class _SpeedMask:
+    """Scale and frame of the mask of speed limits; `frame` is None without any limit."""
+
+    def __init__(
+        self,
+        frame: OccupancyGrid | None,
+        file: SpeedLimits | None,
+        zones: tuple[tuple[Polygon, float], ...],
+        surroundings: Surroundings,
+    ) -> None:
+        self.frame, self._file, self._full_speed = frame, file, surroundings.robot.max_linear
+        fastest = max((limit for _, limit in zones), default=0.0)
+        self._percent = file is not None and file.percent
+        self._base = 0.0 if file is None else file.base
+        self._multiplier = max(SPEED_STEP, fastest / OCCUPIED) if file is None else file.multiplier
+
+    @property
+    def scale(self) -> dict[str, Any]:
+        return {"percent": self._percent, "base": self._base, "multiplier": self._multiplier}
+
+    def drawn(self, frame: OccupancyGrid, zones: Zones) -> OccupancyGrid:
+        if not zones.speed and zones.masks.speed is not None and frame is zones.masks.speed.grid:
+            return frame
+        limits: Array = np.full(frame.shape, np.inf)
+        if zones.masks.speed is not None:
+            limits = zones.masks.speed.along(_centers(frame), self._full_speed).reshape(frame.shape)
+        for polygon, limit in zones.speed:
+            inside = _cells_inside(frame, polygon)
+            limits[inside] = np.minimum(limits[inside], limit)
+        limited = np.isfinite(limits)
+        amounts = limits[limited] * (100 / self._full_speed if self._percent else 1.0)
+        values = (amounts - self._base) / self._multiplier
+        # A limit between two values becomes the lower one.
+        rounded = np.floor(values + 1e-9) if self._multiplier > 0 else np.ceil(values - 1e-9)
+        cells = np.full(frame.shape, FREE, dtype=np.int8)
+        cells[limited] = np.clip(rounded, 1, OCCUPIED)
+        return _with_cells(frame, cells)
+
+
+def _frame_around(polygons: list[Polygon]) -> OccupancyGrid:
+    corners = np.array([corner for polygon in polygons for corner in polygon] or [(0.0, 0.0)])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    columns, rows = np.maximum(1, np.ceil((high - low) / CELL_M)).astype(int)
+    origin = Pose2(float(low[0]), float(low[1]), 0.0)
+    return OccupancyGrid(np.full((rows, columns), FREE, dtype=np.int8), CELL_M, origin)
+
+
+def _cells_of(mask: OccupancyGrid | None, frame: OccupancyGrid) -> npt.NDArray[np.int8]:
+    """Return the values of a mask file in the cells of another grid; FREE outside of it, and without it."""
+    if mask is None:
+        return np.full(frame.shape, FREE, dtype=np.int8)
+    if mask is frame:
+        return np.array(mask.cells)
+    cells: npt.NDArray[np.int8] = np.maximum(mask.values_at(_centers(frame)), FREE).reshape(frame.shape)
+    return cells
+
+
+def _cells_inside(grid: OccupancyGrid, polygon: Polygon) -> Cells:
+    """Return rows and columns of the cells whose center is inside a polygon."""
+    corners = grid.cell_of(np.array(polygon))
+    low = np.maximum(corners.min(axis=0), 0)
+    high = np.minimum(corners.max(axis=0) + 1, grid.shape)
+    rows, columns = np.mgrid[low[0] : high[0], low[1] : high[1]]
+    cells = np.column_stack((rows.ravel(), columns.ravel()))
+    cells = cells[points_in_polygon(polygon, grid.center_of(cells))]
+    return cells[:, 0], cells[:, 1]
+
+
+def _centers(grid: OccupancyGrid) -> Array:
+    rows, columns = np.indices(grid.shape)
+    return grid.center_of(np.column_stack((rows.ravel(), columns.ravel())))
+
+
+def _with_cells(grid: OccupancyGrid, cells: npt.NDArray[np.int8]) -> OccupancyGrid:
+    return OccupancyGrid(cells, grid.resolution, grid.origin)
