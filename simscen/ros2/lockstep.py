@@ -67,10 +67,12 @@ class Lockstep:
         return _take_inbox(graph)
 
     def _wait_for_due_command(self, now: int, start: int) -> None:
-        def is_settled() -> bool:
-            return _last_command(self._graph.inbox[start:]) is not None or self._actions.overdue_command(now) is None
+        def late_server() -> List[str]:
+            overdue = self._actions.overdue_command(now)
+            commanded = overdue is None or _last_command(self._graph.inbox[start:]) is not None
+            return [] if commanded or overdue is None else [overdue.node]
 
-        if not self._graph.spin_until(is_settled, self._limit):
+        if not self._barrier.step_time.wait_for(late_server, self._limit):
             overdue = self._actions.overdue_command(now)
             if overdue is not None:
                 reason = (

@@ -9,7 +9,8 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from simscen.ros2.messages import NANOSECONDS, find_type
+from simscen.ros2.messages import NANOSECONDS
+from simscen.ros2.node_parameters import NodeParameters
 
 if TYPE_CHECKING:
     from simscen.ros2.graph import Graph
@@ -42,7 +43,7 @@ class MotionActions:
     """Tracks which actions are being executed, by their status topics."""
 
     def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
-        self._graph, self._barrier = graph, barrier
+        self._graph, self._parameters = graph, NodeParameters(graph, barrier)
         self._servers: dict[str, _Server] = {}
         self._executing: dict[str, bool] = {}
         self._last_command: int | None = None
@@ -51,19 +52,9 @@ class MotionActions:
         """Subscribe to the status of the actions that exist in the graph now."""
         for action, parameter in RATE_PARAMETERS.items():
             node = self._graph.follow_action(action, partial(self._process_status, action))
-            rate = None if node is None else self._rate(node, parameter)
-            if node is not None and rate is not None and rate > 0.0:
+            rate = 0.0 if node is None else self._parameters.values(node, [parameter]).get(parameter) or 0.0
+            if node is not None and rate > 0.0:
                 self._servers[action] = _Server(node, NANOSECONDS / rate)
-
-    def _rate(self, node: str, parameter: str) -> float | None:
-        service_type: Any = find_type("rcl_interfaces/srv/GetParameters")
-        client = self._graph.node.create_client(service_type, f"{node}/get_parameters")
-        try:
-            answer = self._barrier.call(client, service_type.Request(names=[parameter]))
-        finally:
-            self._graph.node.destroy_client(client)
-        values = [] if answer is None else answer.values
-        return float(values[0].double_value) if values else None
 
     def _process_status(self, action: str, message: Any) -> None:
         self._executing[action] = any(goal.status == EXECUTING for goal in message.status_list)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, Callable, NamedTuple
 
 from simscen.ros2.messages import find_type
+from simscen.ros2.node_parameters import NodeParameters
 
 if TYPE_CHECKING:
     from simscen.ros2.graph import Graph
@@ -38,6 +38,7 @@ class Nav2Report:
 
     def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
         self._graph, self._barrier = graph, barrier
+        self._known = NodeParameters(graph, barrier)
         self._lines: list[Line] = []
         self.parameters: dict[str, dict[str, Any]] = {}
         """Values of all parameters by node."""
@@ -72,34 +73,5 @@ class Nav2Report:
 
     def _read_parameters(self, node: str) -> dict[str, Any]:
         """Return the values of a node's parameters; empty if the node does not answer."""
-        listed = self._call(node, "ListParameters")
-        names = [] if listed is None else sorted(n for n in listed.result.names if not n.startswith(OMITTED))
-        answer = self._call(node, "GetParameters", names=names)
-        return {} if answer is None else dict(zip(names, map(plain_value, answer.values)))
-
-    def _call(self, node: str, service: str, **request: Any) -> Any:
-        service_type: Any = find_type(f"rcl_interfaces/srv/{service}")
-        name = "list_parameters" if service == "ListParameters" else "get_parameters"
-        client = self._graph.node.create_client(service_type, f"{node}/{name}")
-        try:
-            return self._barrier.call(client, service_type.Request(**request))
-        finally:
-            self._graph.node.destroy_client(client)
-
-
-FIELDS = ("bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array", "double_array")
-"""Fields of rcl_interfaces/msg/ParameterValue in the order of ParameterType, from PARAMETER_BOOL = 1."""
-STRING_ARRAY = 9
-
-
-def plain_value(value: Any) -> Any:
-    """Return a rcl_interfaces/msg/ParameterValue as a value of JSON; None if it is not set."""
-    if value.type == 0:
-        return None
-    field = "string_array" if value.type == STRING_ARRAY else FIELDS[value.type - 1]
-    found = getattr(value, f"{field}_value")
-    if isinstance(found, (bool, int, str)):
-        return found
-    if isinstance(found, float):
-        return found if math.isfinite(found) else str(found)
-    return [number[0] if isinstance(number, bytes) else number for number in found]
+        names = [name for name in self._known.names(node) if not name.startswith(OMITTED)]
+        return self._known.values(node, names)

@@ -16,6 +16,7 @@ from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Optional, Se
 from simscen.ros2.graph import Graph, Node, full_name
 from simscen.ros2.messages import find_type
 from simscen.ros2.options import AdapterError
+from simscen.ros2.step_time import StepTime
 
 PARAMETER_SERVICE = "rcl_interfaces/srv/GetParameters"
 POLL_S = 0.5
@@ -90,6 +91,7 @@ class NodeBarrier:
         """Nodes that do not serve their parameters, so that the barrier cannot determine when they have finished."""
         self.left_out: List[str] = []
         """Nodes that do not answer, although they serve their parameters."""
+        self.step_time = StepTime(graph.spin_until)
 
     @property
     def nodes(self) -> List[str]:
@@ -150,7 +152,7 @@ class NodeBarrier:
             self._leave_out([node for node in absent if not clients[node].service_is_ready()], "has exited")
         request = find_type(PARAMETER_SERVICE).Request()  # type: ignore[union-attr]
         futures = {node: client.call_async(request) for node, client in clients.items()}
-        if not self._graph.spin_until(lambda: all(f.done() for f in futures.values()), self._limit):
+        if not self.step_time.wait_for(lambda: [full_name(n) for n, f in futures.items() if not f.done()], self._limit):
             late = [node for node in sorted(futures) if not futures[node].done()]
             self._leave_out(late, f"has not answered for {self._limit:g} s: it hangs, or was killed")
         self._graph.take_all()
@@ -165,8 +167,9 @@ class NodeBarrier:
 
     def wait(self, future: Any, otherwise: str) -> None:
         """Wait until `future` is done. Raises AdapterError with `otherwise` when that takes too long."""
-        if not self._graph.spin_until(future.done, self._limit):
-            raise AdapterError(f"{otherwise} for {self._limit:g} s")
+        limit = min(self._limit, self.step_time.remaining)
+        if not self._graph.spin_until(future.done, limit):
+            raise AdapterError(f"{otherwise} for {limit:.3g} s")
 
     def call(self, client: Any, request: Any) -> Any:
         """Return the answer of a service; None if it is missing or does not answer within a second each."""

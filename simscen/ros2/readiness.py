@@ -7,6 +7,7 @@ from simscen.ros2.goal_sender import GOAL_POSE, GoalPoseSender, GoalSenders
 from simscen.ros2.graph import Endpoint, Graph, Topic, full_name, incompatible_policies
 from simscen.ros2.messages import find_type
 from simscen.ros2.node_barrier import POLL_S, NodeBarrier, ServicePoll
+from simscen.ros2.node_parameters import NodeParameters
 from simscen.ros2.options import Options
 
 COMMAND = "/cmd_vel"
@@ -181,7 +182,8 @@ class Nav2Readiness:
     """Checks the nodes of a running Nav2 and their parameters, and the parameter file if there is one."""
 
     def __init__(self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], options: Options) -> None:
-        self._graph, self._barrier, self._options = graph, barrier, options
+        self._graph, self._options = graph, options
+        self._known = NodeParameters(graph, barrier)
         odometry = [graph.names(topic.name) for topic in topics if topic.type == ODOMETRY]
         self._offer = nav2_parameters.Offer(
             [graph.names(topic.name) for topic in topics if topic.type == SCAN],
@@ -211,25 +213,5 @@ class Nav2Readiness:
 
     def _parameters(self, path: str, name: str) -> Dict[str, Any]:
         """Return the parameters of a node that the rules use; none if it does not answer."""
-        list_type: Any = find_type("rcl_interfaces/srv/ListParameters")
-        known = self._call(list_type, f"{path}/list_parameters", list_type.Request())
-        if known is None:
-            return {}
-        names = nav2_parameters.relevant_parameters(name, known.result.names)
-        get_type: Any = find_type("rcl_interfaces/srv/GetParameters")
-        values = self._call(get_type, f"{path}/get_parameters", get_type.Request(names=names))
-        return {} if values is None else {key: _parameter_value(value) for key, value in zip(names, values.values)}
-
-    def _call(self, service_type: Any, name: str, request: Any) -> Any:
-        client = self._graph.node.create_client(service_type, name)
-        try:
-            return self._barrier.call(client, request)
-        finally:
-            self._graph.node.destroy_client(client)
-
-
-def _parameter_value(value: Any) -> Any:
-    """Return the content of a rcl_interfaces/msg/ParameterValue."""
-    fields = ("", "bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array", "double_array")
-    names = (*fields, "string_array")
-    return getattr(value, f"{names[value.type]}_value") if value.type else None
+        names = nav2_parameters.relevant_parameters(name, self._known.names(path))
+        return self._known.values(path, names)

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from simscen.ros2 import motion_actions
+from simscen.ros2 import node_parameters
 from simscen.ros2.motion_actions import MotionActions, OverdueCommand
 
 MS = 1_000_000
@@ -27,7 +27,7 @@ class FakeGraph:
 
     def call(self, client: str, request: Any) -> Any:
         rate = self.rates.get(client.removesuffix("/get_parameters"))
-        return None if rate is None else SimpleNamespace(values=[SimpleNamespace(double_value=rate)])
+        return None if rate is None else SimpleNamespace(values=[SimpleNamespace(type=3, double_value=rate)])
 
     def report(self, action: str, *statuses: int) -> None:
         goals = [SimpleNamespace(status=status) for status in statuses]
@@ -36,7 +36,7 @@ class FakeGraph:
 
 @pytest.fixture
 def types(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(motion_actions, "find_type", lambda name: SimpleNamespace(Request=lambda **_: None))
+    monkeypatch.setattr(node_parameters, "find_type", lambda name: SimpleNamespace(Request=lambda **_: None))
 
 
 @pytest.mark.usefixtures("types")

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from simscen.ros2.nav2_report import Line, Nav2Report, plain_value
+from simscen.ros2.nav2_report import Line, Nav2Report
+from simscen.ros2.node_parameters import plain_value
 
 
 def parameter(number: int, **fields: object) -> SimpleNamespace:
