@@ -7,6 +7,7 @@
 #   libgraphicsmagick++1-dev libsqlite3-dev nlohmann-json3-dev libboost-dev liblttng-ust-dev libpython3.11 pkg-config
 #   libompl-dev libboost-serialization-dev libboost-filesystem-dev libboost-system-dev libboost-program-options-dev (Smac) libxtensor-dev libxsimd-dev (MPPI)
 set -eu
+source "$(dirname "$0")/cmake.sh"
 PREFIX=$(mkdir -p "$1" && cd "$1" && pwd)
 SOURCES=$2
 VENV=$PREFIX/venv INSTALL=$PREFIX/install SRC=$PREFIX/src BUILD=$PREFIX/build
@@ -92,12 +93,7 @@ build() { # PATH [CMAKE OPTION...]
   local source=$SRC/$1 name started=$SECONDS
   name=$(basename "$1"); shift
   [ -e "$BUILD/$name/.done" ] && return
-  mkdir -p "$BUILD/$name"
-  (cd "$BUILD/$name" &&
-    cmake "$source" -DCMAKE_INSTALL_PREFIX="$INSTALL" -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=None \
-      -DCMAKE_CXX_FLAGS="-O1 -w -isystem /usr/include/eigen3" -DCMAKE_EXE_LINKER_FLAGS="-Wl,--unresolved-symbols=ignore-in-shared-libs" \
-      -DPython3_EXECUTABLE="$VENV/bin/python" -DPYTHON_EXECUTABLE="$VENV/bin/python" "$@" > cmake.log 2>&1 &&
-    make -j"${J:-2}" install > make.log 2>&1) || { echo "$name failed, see $BUILD/$name/*.log" >&2; exit 1; }
+  cmake_make "$source" "$INSTALL" "$BUILD/$name" "$@" -- install
   touch "$BUILD/$name/.done"
   echo "$name: $((SECONDS - started)) s"
 }

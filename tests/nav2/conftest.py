@@ -15,7 +15,7 @@ import yaml
 from mcap.reader import make_reader
 
 ROOT = Path(__file__).parents[2]
-BRINGUP = Path(__file__).with_name("bringup.sh")
+BRINGUP, COMPOSE = Path(__file__).with_name("bringup.sh"), Path(__file__).with_name("compose.sh")
 SIMSCEN = str(Path(sys.executable).with_name("simscen"))
 CONTROLLER = {
     "plugin": "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController",
@@ -37,6 +37,11 @@ class Nav2(NamedTuple):
     def launch(self) -> str:
         """The command that starts all servers."""
         return shlex.join(["bash", str(BRINGUP), str(self.script), str(self.params)])
+
+    @property
+    def composed_launch(self) -> str:
+        """The command that starts all servers in one process."""
+        return shlex.join(["bash", str(COMPOSE), str(self.script), str(self.params), str(self.python)])
 
 
 @pytest.fixture(scope="session")

@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 BUILD = Path(__file__).with_name("build.sh")
+RECIPE = (BUILD, BUILD.with_name("cmake.sh"))
 SOURCES = "SIMSCEN_NAV2_SOURCES"
 LAST_PACKAGE = "nav2_bt_navigator"
 
@@ -66,7 +67,7 @@ def prefixes() -> Iterator[Path]:
 def built(folder: Path) -> dict:
     """Build Nav2 from source unless that is done; return its description."""
     env, stamp = folder / "env.sh", folder / "recipe"
-    recipe = hashlib.sha256(BUILD.read_bytes()).hexdigest()[:16]
+    recipe = hashlib.sha256(b"".join(file.read_bytes() for file in RECIPE)).hexdigest()[:16]
     if not (env.is_file() and stamp.is_file() and stamp.read_text() == recipe):
         sources = os.environ.get(SOURCES)
         if not sources:

@@ -4,8 +4,9 @@
 # Nav2's own change is navigation2#6063 (April 2026; Lyrical and main), which does not apply to Jazzy. The result lies in
 # PREFIX/ros_time over what build.sh made, and PREFIX/env_ros_time.sh is to be sourced instead of env.sh.
 set -eu
+source "$(dirname "$0")/cmake.sh"
 PREFIX=$(cd "$1" && pwd)
-OVERLAY=$PREFIX/ros_time
+OVERLAY=$PREFIX/ros_time VENV=$PREFIX/venv
 source "$PREFIX/env.sh"
 export CMAKE_PREFIX_PATH=$PREFIX/install:$PREFIX/venv:$PREFIX/venv/lib/python3.11/site-packages
 
@@ -29,13 +30,7 @@ replace nav2_velocity_smoother/src/velocity_smoother.cpp 'this->create_wall_time
 
 build() { # PACKAGE TARGET...
   local package=$1 started=$SECONDS; shift
-  mkdir -p "$OVERLAY/build/$package"
-  (cd "$OVERLAY/build/$package" &&
-    cmake "$OVERLAY/src/$package" -DCMAKE_INSTALL_PREFIX="$OVERLAY" -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=None \
-      -DCMAKE_CXX_FLAGS="-O1 -w -isystem /usr/include/eigen3" \
-      -DCMAKE_EXE_LINKER_FLAGS="-Wl,--unresolved-symbols=ignore-in-shared-libs" \
-      -DPython3_EXECUTABLE="$PREFIX/venv/bin/python" -DPYTHON_EXECUTABLE="$PREFIX/venv/bin/python" > cmake.log 2>&1 &&
-    make -j"${J:-2}" "$@" > make.log 2>&1) || { echo "$package failed, see $OVERLAY/build/$package/*.log" >&2; exit 1; }
+  cmake_make "$OVERLAY/src/$package" "$OVERLAY" "$OVERLAY/build/$package" -- "$@"
   cp "$OVERLAY/build/$package"/*.so "$OVERLAY/lib/"
   echo "$package with ROS time: $((SECONDS - started)) s"
 }

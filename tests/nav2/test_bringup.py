@@ -1,0 +1,97 @@
+"""A real Nav2 that is started, configured, or broken in the ways that users know."""
+
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+pytestmark = pytest.mark.slow
+GOAL = "navigation/goal.scenario.yaml"
+Nav2 = Any
+"""The fixture `nav2`."""
+
+
+def with_parameters(nav2: Nav2, folder: Path, change: Callable[[dict[str, Any]], Any]) -> Nav2:
+    """Return Nav2 with changed parameters."""
+    nodes = yaml.safe_load(nav2.params.read_text())
+    params = folder / "changed_params.yaml"
+    params.write_text(yaml.safe_dump(change(nodes) or nodes))
+    return nav2._replace(params=params)
+
+
+def with_filters(nodes: dict[str, Any]) -> None:
+    """Add the costmap filters of docs/reference/ros2.md."""
+    keepout = {"plugin": "nav2_costmap_2d::KeepoutFilter", "filter_info_topic": "/keepout_costmap_filter_info"}
+    speed = {"plugin": "nav2_costmap_2d::SpeedFilter", "filter_info_topic": "/speed_costmap_filter_info"}
+    for name in ("global_costmap", "local_costmap"):
+        costmap = nodes[name][name]["ros__parameters"]
+        costmap |= {"filters": ["keepout_filter"], "keepout_filter": {**keepout, "enabled": True}}
+    costmap = nodes["global_costmap"]["global_costmap"]["ros__parameters"]
+    costmap |= {"filters": ["keepout_filter", "speed_filter"], "speed_filter": {**speed, "enabled": True}}
+
+
+@pytest.mark.parametrize("scenario", ["closed_passage", "keepout_under_way", "slow_zone_begins"])
+def test_costmap_filters_receive_the_zones_of_the_scenario(run, nav2: Nav2, tmp_path: Path, scenario: str) -> None:
+    filtered = with_parameters(nav2, tmp_path, with_filters)
+    ended = run(f"zones/{scenario}.scenario.yaml", launch=filtered.launch)
+    assert ended.code == 0, ended.said
+
+
+def test_zones_that_no_node_receives_are_a_warning(run) -> None:
+    ended = run("zones/closed_passage.scenario.yaml")
+    assert "no node subscribes to /keepout_filter_mask, so the stack does not know the keepout zones" in ended.said
+
+
+def test_nav2_in_a_namespace(run, nav2: Nav2, tmp_path: Path) -> None:
+    text = nav2.params.read_text()
+    for topic in ("scan", "odom"):
+        text = text.replace(f": /{topic}\n", f": /robot1/{topic}\n")
+    params = tmp_path / "robot1.yaml"
+    params.write_text(yaml.safe_dump({"robot1": yaml.safe_load(text)}))
+    remaps = ["-r", "__ns:=/robot1", "-r", "/tf:=tf", "-r", "/tf_static:=tf_static"]
+    launch = shlex.join([*shlex.split(nav2._replace(params=params).launch), *remaps])
+    ended = run(GOAL, "--namespace", "robot1", launch=launch)
+    assert ended.code == 0, ended.said
+    assert "/robot1/controller_server" in ended.about["nodes"]
+
+
+def test_nav2_composed_in_one_process(run, nav2: Nav2) -> None:
+    ended = run(GOAL, launch=nav2.composed_launch)
+    assert ended.code == 0, ended.said
+
+
+def test_a_launch_that_takes_half_a_minute(run, nav2: Nav2) -> None:
+    ended = run(GOAL, "--ready", "100", launch=f"sleep 30; {nav2.launch}")
+    assert ended.code == 0, ended.said
+
+
+def test_a_server_that_never_becomes_active_is_named(run, nav2: Nav2) -> None:
+    managed = "MANAGED=controller_server,smoother_server,planner_server,bt_navigator"
+    ended = run(GOAL, "--ready", "30", launch=f"{managed} {nav2.launch}")
+    assert ended.code == 3
+    assert "the lifecycle node /behavior_server is unconfigured, not active" in ended.said
+
+
+def test_a_typo_in_the_name_of_a_plugin_is_reported_with_its_node(run, nav2: Nav2, tmp_path: Path) -> None:
+    def misspell(nodes: dict[str, Any]) -> None:
+        nodes["planner_server"]["ros__parameters"]["GridBased"]["plugin"] = "nav2_navfn_planner::NavfnPlaner"
+
+    ended = run(GOAL, "--ready", "30", launch=with_parameters(nav2, tmp_path, misspell).launch)
+    assert ended.code == 3
+    assert "planner_server" in ended.said
+    assert "NavfnPlaner" in ended.said
+
+
+def test_the_map_of_the_users_map_server(run, nav2: Nav2, tmp_path: Path) -> None:
+    map_file = Path(__file__).parents[2] / "worlds/house_last_year.yaml"
+    server = f"source {shlex.quote(str(nav2.script))}; node nav2_map_server map_server --ros-args"
+    started = f"{server} -p use_sim_time:=true -p yaml_filename:={map_file}"
+    manager = "node nav2_lifecycle_manager lifecycle_manager --ros-args -r __node:=lifecycle_manager_map"
+    managed = f"{manager} -p use_sim_time:=true -p autostart:=true -p bond_timeout:=0.0 -p node_names:='[map_server]'"
+    both = f"({started}) & (source {shlex.quote(str(nav2.script))}; {managed}) & {nav2.launch}"
+    ended = run("navigation/outdated_map.scenario.yaml", "--without", "/map", launch=f"bash -c {shlex.quote(both)}")
+    assert "/map_server" in ended.about["nodes"]
+    assert "goals_reached" not in ended.said or ended.code == 0, ended.said
