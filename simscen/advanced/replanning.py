@@ -1,20 +1,94 @@
-"""Replanning only when it pays: on changes of the costmap, around moving obstacles, and with more clearance."""
+"""Replanning only when it pays: on changes of the costmap, around moving obstacles, and with hysteresis.
+
+Plans pass behind moving obstacles: for each cell, the obstacles are predicted for the time at which the robot would
+arrive there in a straight line at full speed. Of the path of a crossing obstacle, only the part where both would meet
+gets a cost.
+"""
 
 import contextlib
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
-from simscen.advanced.prediction.predicted_costs import add_predicted_costs, meets_moving_obstacle
-from simscen.core.geometry import Pose2
+from simscen.advanced.prediction.avoidance import MIN_DISTANCE_M
+from simscen.advanced.prediction.rollouts import HORIZON_S
+from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Goal, Path
 from simscen.core.records.events import Event
 from simscen.model.planners import PlannerSpec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.followed_plan import WATCH_DISTANCE_M, FollowedPlan
 from simscen.stack.footprint import distances
+from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
 from simscen.stack.plan_manager import PlanManager, PlanResult
+from simscen.stack.planners.traversal_costs import MAX_NON_OBSTACLE
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
+
+DECAY_TIME_S = 2.0
+"""Time in which the cost decays by a factor of e, because no obstacle keeps its velocity forever."""
+BLOCK_SIZE_M = 0.2
+"""Approximate size of the blocks of cells that get the same cost."""
+
+
+def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
+    """Return the costmap with costs of at most MAX_NON_OBSTACLE where the robot would meet moving obstacles.
+
+    The robot starts at `robot`, drives at `speed` m/s, and has a `radius` in m. Without such cells, the same object is
+    returned.
+    """
+    if not len(costmap.moving):
+        return costmap
+    size, (height, width) = costmap.resolution, costmap.costs.shape
+    factor = max(1, round(BLOCK_SIZE_M / size))
+    low, high, centers = [], [], []
+    for center, corner, cells in ((robot.y, costmap.origin[1], height), (robot.x, costmap.origin[0], width)):
+        first = max(0, math.floor((center - speed * HORIZON_S - corner) / size))
+        last = min(cells, math.ceil((center + speed * HORIZON_S - corner) / size))
+        low.append(first)
+        high.append(max(first, last))
+        centers.append(corner + size * (first + factor * (np.arange(-(-max(0, last - first) // factor)) + 0.5)))
+    x, y = np.meshgrid(centers[1], centers[0])
+    predicted = _predicted_costs(costmap.moving, x, y, np.hypot(x - robot.x, y - robot.y) / speed, radius)
+    if not predicted.any():
+        return costmap
+    window = slice(low[0], high[0]), slice(low[1], high[1])
+    cells = predicted.repeat(factor, axis=0).repeat(factor, axis=1)[: high[0] - low[0], : high[1] - low[1]]
+    costs = costmap.costs.copy()
+    np.maximum(costs[window], cells, out=costs[window])
+    return replace(costmap, costs=costs)
+
+
+def _predicted_costs(moving: MovingObstacles, x: Array, y: Array, times: Array, radius: float) -> npt.NDArray[np.uint8]:
+    near, _ = moving.nearness(x, y, times, radius, MIN_DISTANCE_M)
+    cost = MAX_NON_OBSTACLE * np.clip(near, 0.0, 1.0) * np.exp(-times / DECAY_TIME_S)
+    return np.where(times > HORIZON_S, 0.0, cost).astype(np.uint8)
+
+
+def meets_moving_obstacle(
+    moving: MovingObstacles, robot: Pose2, path: Iterable[complex], speed: float, radius: float
+) -> bool:
+    """Return whether a robot at `robot` that drives along `path` (x + iy) at `speed` comes too close to an obstacle.
+
+    The distances are those of `MovingObstacles.nearness`, computed with scalars because there are only few points.
+    """
+    moving = moving.near(robot.x, robot.y, radius + MAX_UNCERTAINTY_M, speed, HORIZON_S)
+    if not moving.obstacles:
+        return False
+    position, driven = complex(robot.x, robot.y), 0.0
+    for point in path:
+        driven += abs(point - position)
+        position, time = point, driven / speed
+        if time >= HORIZON_S:
+            return False
+        for obstacle in moving.obstacles:
+            distance = min(MIN_DISTANCE_M + obstacle.position_std(time, moving.acceleration), MAX_UNCERTAINTY_M)
+            if abs(point - obstacle.position - time * obstacle.velocity) - obstacle.radius < radius + distance:
+                return True
+    return False
+
 
 CLEARANCE_PERIOD_S = 0.5
 """Time between two checks for lost clearance."""

@@ -10,9 +10,9 @@ from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model import recovery as model
-from simscen.stack.behaviors.motions import TIME_ALLOWANCE_S
+from simscen.stack.behaviors import TIME_ALLOWANCE_S
 from simscen.stack.footprint import Mask, distance_at, lethal_near
-from simscen.stack.path_geometry import poses_along
+from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 from simscen.stack.setting import Setting
 

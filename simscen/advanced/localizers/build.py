@@ -2,19 +2,21 @@
 
 from dataclasses import dataclass, replace
 
-from simscen.advanced.localizers import spec as model
+from simscen.advanced import spec as model
 from simscen.advanced.localizers.global_search import GlobalSearch
-from simscen.advanced.localizers.map_residuals import MapResiduals
-from simscen.advanced.localizers.map_trust import FIT_DISTANCE_M, MapTrust
-from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter
+from simscen.advanced.localizers.map_trust import FIT_DISTANCE_M, MapResiduals, MapTrust
+from simscen.advanced.localizers.particle_filter import (
+    ScanMatchingParticleFilter,
+    TemperedLikelihoodField,
+    beyond_the_map,
+)
 from simscen.advanced.localizers.scan_matching_amcl import ScanMatchingAmclLocalizer
-from simscen.advanced.localizers.tempered_likelihood import TemperedLikelihoodField, beyond_the_map
 from simscen.core.decorators import cached_on_instance
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.stack.localizers.build import beam_skipping, motion_model, sensor_model
 from simscen.stack.localizers.dead_reckoning import DeadReckoning
-from simscen.stack.localizers.likelihood_field import SensorModel, obstacle_field
 from simscen.stack.localizers.particles import FreeSpace
+from simscen.stack.localizers.sensor_models import SensorModel, obstacle_field
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
 

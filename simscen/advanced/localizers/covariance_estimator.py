@@ -5,11 +5,11 @@ from collections import deque
 
 import numpy as np
 
-from simscen.advanced.localizers.map_residuals import ScanResiduals
+from simscen.advanced.localizers.map_trust import ScanResiduals
 from simscen.advanced.localizers.scan_matcher import COVARIANCE_FLOOR
 from simscen.advanced.localizers.scan_memory import METERS_PER_RAD
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.stack.localizers.planar_motion import propagate_covariance, rotation_matrix
+from simscen.stack.localizers.dead_reckoning import propagate_covariance, rotation_matrix
 
 WINDOW = 36
 """Number of recent corrections that are compared, about 9 m of driving."""

@@ -16,7 +16,7 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGri
 from simscen.core.geometry import Array, wrap_array
 from simscen.stack.localizers.beams import Plane, evenly_spaced
 from simscen.stack.localizers.distance_field import DistanceField, Float32
-from simscen.stack.localizers.likelihood_field import surfaces
+from simscen.stack.localizers.sensor_models import surfaces
 
 ENDPOINT_STD_M = 0.2
 """Standard deviation of the distance of an endpoint from its obstacle."""

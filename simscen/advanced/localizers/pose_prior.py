@@ -7,8 +7,8 @@ import numpy as np
 
 from simscen.advanced.localizers.scan_matcher import Step
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.clusters import pose_errors
-from simscen.stack.localizers.planar_motion import Noise, propagate_covariance, rotate_covariance, rotation_matrix
+from simscen.stack.localizers.dead_reckoning import Noise, propagate_covariance, rotate_covariance, rotation_matrix
+from simscen.stack.localizers.particles import pose_errors
 
 CERTAIN_STD = (0.1, 0.1, 0.05)
 """Standard deviations (m, m, rad) of a certain pose."""

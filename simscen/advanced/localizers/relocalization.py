@@ -13,7 +13,7 @@ from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import Plane
-from simscen.stack.localizers.clusters import pose_errors
+from simscen.stack.localizers.particles import pose_errors
 
 # All distances driven include rotations (scan_memory.METERS_PER_RAD). A score is that of GlobalSearch.score.
 

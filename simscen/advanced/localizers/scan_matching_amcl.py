@@ -4,19 +4,18 @@ from dataclasses import replace
 
 from simscen.advanced.localizers.covariance_estimator import CovarianceEstimator
 from simscen.advanced.localizers.global_search import GlobalSearch
-from simscen.advanced.localizers.map_residuals import MapResiduals
-from simscen.advanced.localizers.map_trust import MapTrust
+from simscen.advanced.localizers.map_trust import MapResiduals, MapTrust
 from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter
 from simscen.advanced.localizers.pose_prior import ObservedMotion
 from simscen.advanced.localizers.relocalization import NO_MOTION, Relocalizer
 from simscen.advanced.localizers.scan_matcher import ScanMatcher, Step
-from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.amcl import AmclLocalizer, Correction
-from simscen.stack.localizers.clusters import spread
 from simscen.stack.localizers.motion_models import MotionModel
+from simscen.stack.localizers.particles import spread
 
 CERTAIN_AFTER_UPDATES = 8
 """The robot is certain of its pose after this many consecutive updates in which map, scans and wheels agreed."""

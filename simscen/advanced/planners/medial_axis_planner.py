@@ -1,27 +1,126 @@
-"""Planner of the advanced stack: BIT* on samples of the medial axis, followed by an optimization of the path."""
+"""Planner of the advanced stack: BIT* on samples of the medial axis, followed by an optimization of the path.
+
+The optimization places points across the path at several stations along it. Viterbi's algorithm finds the cheapest path
+through one point of each station. The path stays on the same side of each obstacle.
+"""
 
 import math
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.advanced.planners.informed_set import InformedSet
-from simscen.advanced.planners.path_refinement import refined
 from simscen.advanced.planners.search_regions import Leg, searches
-from simscen.advanced.planners.spec import MedialAxisPlanner as PlannerSpec
+from simscen.advanced.spec import MedialAxisPlanner as PlannerSpec
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
+from simscen.grid_graph import resample_polyline
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints
-from simscen.stack.planners.ompl_planner import FINE_CELLS, state_space_for
+from simscen.stack.planners.ompl_planner import (
+    CLEARANCE_M,
+    FINE_CELLS,
+    LESS_CLEARANCE_M,
+    Attempt,
+    PosePlanner,
+    state_space_for,
+)
 from simscen.stack.planners.ompl_search import Point
-from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, spaced, with_headings
+from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, smoothed, spaced, with_headings
 from simscen.stack.planners.planning_window import plan_in_windows, window
-from simscen.stack.planners.pose_planner import CLEARANCE_M, LESS_CLEARANCE_M, Attempt, PosePlanner
 from simscen.stack.planners.pose_search import POSE_SPACING_M
-from simscen.stack.planners.traversal_costs import TraversalCosts
+from simscen.stack.planners.traversal_costs import SAMPLE_SPACING_CELLS, TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
+
+ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
+"""Rounds of refinement: distance between stations in m, maximum offset in m, and number of points per station."""
+MIN_SEGMENTS = 2
+"""Minimum number of segments, so that there is a station to move."""
+Costs = npt.NDArray[np.float32]
+
+
+def refined(costs: TraversalCosts, points: Array) -> Array:
+    """Return the cheapest path near a path (n, 2) with the same ends, smoothed."""
+    points = _with_shortcuts(costs, points)
+    cost = costs.along(points)
+    for spacing, max_offset, count in ROUNDS:
+        for stride in (costs.stride, SAMPLE_SPACING_CELLS * costs.resolution):
+            other = _cheapest_through(
+                costs,
+                resample_polyline(points, spacing, MIN_SEGMENTS),
+                np.linspace(-max_offset, max_offset, count),
+                stride,
+            )
+            if math.isfinite(new_cost := costs.along(other)):
+                break
+        if new_cost < cost:
+            points, cost = other, new_cost
+    return smoothed(costs, points)
+
+
+def _with_shortcuts(costs: TraversalCosts, points: Array) -> Array:
+    """Return the path with shortcuts: straight lines to the farthest point to which they are not more expensive."""
+    resampled = resample_polyline(points, ROUNDS[0][0], MIN_SEGMENTS)
+    rows = resampled.tolist()
+    cost = [0.0]
+    for (ax, ay), (bx, by) in pairwise(rows):
+        cost.append(cost[-1] + costs.between(ax, ay, bx, by))
+    if not math.isfinite(cost[-1]):
+        return points
+    corners, last = [0], len(rows) - 1
+    while corners[-1] < last:
+        current = corners[-1]
+        reachable, step = current + 1, 2
+        while reachable < last:
+            candidate = min(current + step, last)
+            if costs.between(*rows[current], *rows[candidate]) > cost[candidate] - cost[current] + 1e-9:
+                break
+            reachable, step = candidate, 2 * step
+        corners.append(reachable)
+    return resampled[corners]
+
+
+def _cheapest_through(costs: TraversalCosts, stations: Array, offsets: Array, stride: float) -> Array:
+    """Return the cheapest path through points at `offsets` m to the left of each station except the first and last.
+
+    Costs are sampled every `stride` m.
+    """
+    direction = np.empty_like(stations)
+    direction[1:-1] = stations[2:] - stations[:-2]
+    direction[0], direction[-1] = stations[1] - stations[0], stations[-1] - stations[-2]
+    direction /= np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-9)[:, None]
+    left = np.column_stack((-direction[:, 1], direction[:, 0]))
+    segment_costs = _step_costs(costs, stations[:, None] + offsets[:, None] * left[:, None], stride)
+    middle = len(offsets) // 2
+    lowest = np.full(len(offsets), np.inf, dtype=np.float32)
+    lowest[middle] = 0.0
+    predecessors, columns = [], np.arange(len(offsets))
+    for step in segment_costs:
+        total = lowest[:, None] + step
+        predecessors.append(total.argmin(axis=0))
+        lowest = total[predecessors[-1], columns]
+    chosen = [middle]
+    for predecessor in predecessors[::-1]:
+        chosen.append(int(predecessor[chosen[-1]]))
+    return stations + offsets[chosen[::-1], None] * left
+
+
+def _step_costs(costs: TraversalCosts, points: Array, stride: float) -> Costs:
+    """Return the costs (n - 1, k, k) from each point of a station to each of the next; `points` (n, k, 2)."""
+    before = ((points[:-1] - costs.origin) / costs.resolution).astype(np.float32)[:, :, None]
+    step = ((points[1:] - costs.origin) / costs.resolution).astype(np.float32)[:, None] - before
+    samples = math.ceil(float(np.hypot(*(points[1:, 0] - points[:-1, 0]).T).max()) / stride)
+    flat, total = costs.rates.reshape(-1), np.zeros(step.shape[:-1], dtype=np.float32)
+    for sample in range(samples):
+        points_between = before + np.float32((sample + 0.5) / samples) * step
+        columns = np.clip(points_between[..., 0], 0, costs.width - 1).astype(np.int32)
+        total += flat[np.clip(points_between[..., 1], 0, costs.height - 1).astype(np.int32) * costs.width + columns]
+    lengths = np.sqrt(step[..., 0] ** 2 + step[..., 1] ** 2) * np.float32(costs.resolution / samples)
+    segment_costs: Costs = total * lengths
+    return segment_costs
+
 
 MAX_CACHED_CELLS = 500_000
 """Largest costmap for which intermediate results are kept for the next plan, which takes up to 10 MB."""

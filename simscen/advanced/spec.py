@@ -1,4 +1,4 @@
-"""Parameters of the advanced localizers."""
+"""Parameters of the advanced localizers and of the advanced planner."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from simscen.model.localizers import AmclParameters, EkfParameters
+from simscen.model.planners import OmplParameters
 from simscen.spec.quantities import Length, NonNegativeLength, Probability
 
 PARAMETER_SETS: Mapping[str, Mapping[str, object]] = {
@@ -70,3 +71,13 @@ class SlipEkf(EkfParameters):
     match_scans: bool = False
     """Correct the distance by matching each scan with those of the last meters. The covariance stays that of the
     wheels."""
+
+
+class MedialAxisPlanner(OmplParameters):
+    """BIT* on samples of the medial axis near the cheapest path over a coarse grid, then an optimization of the path.
+
+    For cars and long hulls: RRT-Connect over poses, confined to near-shortest paths over a coarse grid.
+    """
+
+    component: ClassVar[str] = "simscen.advanced.planners.medial_axis_planner:medial_axis_planner"
+    type: Literal["medial_axis"]
