@@ -169,10 +169,8 @@ _Localizers = Annotated[
     | Annotated[Ekf, Tag("ekf")]
     | Annotated[GroundTruth, Tag("ground_truth")]
     | Annotated[OdometryOnly, Tag("odometry")]
-    | Annotated[
-        LocalizerSpec, LazySpec("simscen.advanced.localizers.spec", "ScanMatchingAmcl"), Tag("scan_matching_amcl")
-    ]
-    | Annotated[LocalizerSpec, LazySpec("simscen.advanced.localizers.spec", "SlipEkf"), Tag("slip_ekf")],
+    | Annotated[LocalizerSpec, LazySpec("simscen.advanced.spec", "ScanMatchingAmcl"), Tag("scan_matching_amcl")]
+    | Annotated[LocalizerSpec, LazySpec("simscen.advanced.spec", "SlipEkf"), Tag("slip_ekf")],
     Discriminator(type_discriminator(DEFAULT_TYPE)),
 ]
 
@@ -186,6 +184,6 @@ LOCALIZERS = {
     "ekf": _HERE + "Ekf",
     "ground_truth": _HERE + "GroundTruth",
     "odometry": _HERE + "OdometryOnly",
-    "scan_matching_amcl": "simscen.advanced.localizers.spec:ScanMatchingAmcl",
-    "slip_ekf": "simscen.advanced.localizers.spec:SlipEkf",
+    "scan_matching_amcl": "simscen.advanced.spec:ScanMatchingAmcl",
+    "slip_ekf": "simscen.advanced.spec:SlipEkf",
 }

@@ -96,7 +96,7 @@ _Planners = Annotated[
     Annotated[OmplPlanner, Tag("ompl")]
     | Annotated[Navfn, Tag("navfn")]
     | Annotated[Smac2d, Tag("smac_2d")]
-    | Annotated[PlannerSpec, LazySpec("simscen.advanced.planners.spec", "MedialAxisPlanner"), Tag("medial_axis")],
+    | Annotated[PlannerSpec, LazySpec("simscen.advanced.spec", "MedialAxisPlanner"), Tag("medial_axis")],
     Discriminator(_planner),
 ]
 
@@ -109,5 +109,5 @@ PLANNERS = {
     **dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), _HERE + "OmplPlanner"),
     "navfn": _HERE + "Navfn",
     "smac_2d": _HERE + "Smac2d",
-    "medial_axis": "simscen.advanced.planners.spec:MedialAxisPlanner",
+    "medial_axis": "simscen.advanced.spec:MedialAxisPlanner",
 }

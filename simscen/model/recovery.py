@@ -38,7 +38,7 @@ class BehaviorSpec(Typed):
 class Spin(BehaviorSpec):
     """Turn in place to see the surroundings (nav2_behaviors::Spin)."""
 
-    component: ClassVar[str] = "simscen.stack.behaviors.motions:Spin"
+    component: ClassVar[str] = "simscen.stack.behaviors:Spin"
     turns_in_place: ClassVar[bool] = True
     type: Literal["spin"] = "spin"
     spin_dist: Angle = 1.57
@@ -52,7 +52,7 @@ class Spin(BehaviorSpec):
 class Wait(BehaviorSpec):
     """Wait, since the obstacle may move away (nav2_behaviors::Wait)."""
 
-    component: ClassVar[str] = "simscen.stack.behaviors.motions:Wait"
+    component: ClassVar[str] = "simscen.stack.behaviors:Wait"
     type: Literal["wait"] = "wait"
     wait_duration: Duration = 5.0
     """Duration of the wait."""
@@ -61,7 +61,7 @@ class Wait(BehaviorSpec):
 class BackUp(BehaviorSpec):
     """Drive straight back (nav2_behaviors::BackUp)."""
 
-    component: ClassVar[str] = "simscen.stack.behaviors.motions:BackUp"
+    component: ClassVar[str] = "simscen.stack.behaviors:BackUp"
     type: Literal["backup"] = "backup"
     backup_dist: NonNegativeLength = 0.30
     """Distance to back up."""
@@ -92,7 +92,7 @@ class Retrace(BehaviorSpec):
 class ClearCostmap(BehaviorSpec):
     """Remove obstacles from the costmaps unless current sensor readings contain them."""
 
-    component: ClassVar[str] = "simscen.stack.behaviors.motions:ClearCostmap"
+    component: ClassVar[str] = "simscen.stack.behaviors:ClearCostmap"
     type: Literal["clear_costmap"] = "clear_costmap"
     clear_entirely: bool = True
     """Whether to clear the entire global costmap, as Nav2 does, or only the area of the local costmap."""

@@ -11,7 +11,16 @@ from simscen.core.random_streams import Streams
 from simscen.model.latency import Latency
 from simscen.model.recovery import Recovery
 from simscen.model.stack import InProcessStack, StackSpec
-from simscen.stack.behaviors.motions import BehaviorSequence
+from simscen.stack.behaviors import BehaviorSequence
+from simscen.stack.checked_components import (
+    CheckedBehavior,
+    CheckedController,
+    CheckedGoalChecker,
+    CheckedLocalizer,
+    CheckedPlanner,
+    build_component,
+)
+from simscen.stack.checked_stack import CheckedStack
 from simscen.stack.checkers import ProgressChecker
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import CommandPipeline, VelocitySmoother
@@ -19,22 +28,13 @@ from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import TRAIL_S, OdometryHistory
 from simscen.stack.navigator import ClearEntirely, ClearingPolicy, Navigator
 from simscen.stack.plan_manager import PlanManager
-from simscen.stack.plugins.checked_components import (
-    CheckedBehavior,
-    CheckedController,
-    CheckedGoalChecker,
-    CheckedLocalizer,
-    CheckedPlanner,
-)
-from simscen.stack.plugins.checked_plugin import build_component
-from simscen.stack.plugins.checked_stack import CheckedStack
 from simscen.stack.protocols import Behavior, Controller, Localizer, Planner, Surroundings
 from simscen.stack.reference import ReferenceStack
 from simscen.stack.setting import Setting
 from simscen.stack.tasks import Task
 
 if TYPE_CHECKING:
-    from simscen.stack.odometry_filter import OdometryFilter
+    from simscen.stack.localizers.odometry_filter import OdometryFilter
 
 
 def build_stack(
@@ -167,7 +167,7 @@ class StackBuilder:
         """Make the filter of wheel odometry and IMU; None to use the wheel odometry as it is."""
         if not self.spec.filters_odometry(self.surroundings.has_imu):
             return None
-        from simscen.stack.odometry_filter import OdometryFilter
+        from simscen.stack.localizers.odometry_filter import OdometryFilter
 
         return OdometryFilter(self.spec.odometry, self.surroundings.tick_rate)
 

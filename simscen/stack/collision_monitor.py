@@ -13,8 +13,8 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.stack.costmap.obstacle_layer import ScanWithMovingHits
+from simscen.stack.kinematics import poses_along
 from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
-from simscen.stack.path_geometry import poses_along
 from simscen.stack.protocols import RobotModel
 
 SAMPLES = 8

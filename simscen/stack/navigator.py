@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal
 from simscen.core.records.events import Event, EventKind, Value
-from simscen.stack.behaviors.motions import BehaviorSequence
+from simscen.stack.behaviors import BehaviorSequence
 from simscen.stack.checkers import ProgressChecker
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.followed_plan import LocalPath

@@ -14,7 +14,7 @@ from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import CostGrid
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames, transform_poses
-from simscen.stack.path_geometry import LOCAL_PLAN_TIMES_S, arc_poses
+from simscen.stack.kinematics import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.protocols import Controller, CostmapView, Localizer, SupportsArc
 
 BELIEF_RATE, LOCAL_PLAN_RATE = 10.0, 5.0

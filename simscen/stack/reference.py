@@ -13,7 +13,7 @@ from simscen.core.records.trace import Decision
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import CommandPipeline
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.costmap.speed_filter import SpeedFilter
+from simscen.stack.costmap.layers import SpeedFilter
 from simscen.stack.frames import Frames, OdometryHistory, is_plausible
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.localizers.ground_truth import TRUTH
@@ -23,7 +23,7 @@ from simscen.stack.publishing import NO_UPDATES, Publisher, StandstillReporter, 
 from simscen.stack.tasks import Task
 
 if TYPE_CHECKING:
-    from simscen.stack.odometry_filter import OdometryFilter
+    from simscen.stack.localizers.odometry_filter import OdometryFilter
 
 MOTION_READINGS = frozenset((Odometry, Imu, Bump))
 """Readings that only measure the motion of the robot. They can wait for the next scan or controller period."""

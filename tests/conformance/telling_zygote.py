@@ -16,7 +16,7 @@ import numpy as np
 import pybullet
 
 from simscen.cli.session import warm_process
-from simscen.stack.localizers import likelihood_field
+from simscen.stack.localizers import sensor_models
 
 FLOOD = 200  # MiB
 perform = warm_process._execute
@@ -64,11 +64,11 @@ def lose_the_robot():
 
 
 def lose_all_weight():
-    likelihood_field.LikelihoodField.log_likelihood = lambda self, poses, *_: np.full(len(poses), -np.inf)
+    sensor_models.LikelihoodField.log_likelihood = lambda self, poses, *_: np.full(len(poses), -np.inf)
 
 
 def make_weights_nan():
-    likelihood_field.LikelihoodField.log_likelihood = lambda self, poses, *_: np.full(len(poses), np.nan)
+    sensor_models.LikelihoodField.log_likelihood = lambda self, poses, *_: np.full(len(poses), np.nan)
 
 
 def chatter():

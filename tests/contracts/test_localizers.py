@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.spec import ScanMatchingAmcl, SlipEkf
+from simscen.advanced.spec import ScanMatchingAmcl, SlipEkf
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Estimate

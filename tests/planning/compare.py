@@ -9,7 +9,7 @@ from grounds import ROBOT, cheapest, forest, maze, pair, rooms, view_of
 from scipy.spatial import cKDTree
 
 from simscen.advanced.planners.medial_axis_planner import medial_axis_planner
-from simscen.advanced.planners.spec import MedialAxisPlanner
+from simscen.advanced.spec import MedialAxisPlanner
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Path
 from simscen.model.planners import Navfn, OmplPlanner, PlannerSpec, Smac2d

@@ -8,9 +8,8 @@ import pytest
 from grounds import ROBOT, cheapest, forest, large_maze, maze, pair, rooms, view_of
 
 from simscen.advanced.planners import informed_set, medial_axis_planner, search_regions
-from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner, costly_distance
-from simscen.advanced.planners.path_refinement import refined
-from simscen.advanced.planners.spec import MedialAxisPlanner as MedialAxisSpec
+from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner, costly_distance, refined
+from simscen.advanced.spec import MedialAxisPlanner as MedialAxisSpec
 from simscen.core.geometry import Pose2
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as Spec

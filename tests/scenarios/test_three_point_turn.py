@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import simscen
-from simscen.stack.path_geometry import cusps
+from simscen.stack.kinematics import cusps
 
 ROOT = Path(__file__).parents[2]
 TURNING_RADIUS = 0.45 / np.tan(0.51)

@@ -11,7 +11,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.run.lockstep import RobotUnderTest
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
-from simscen.stack.plugins.checked_stack import CheckedStack
+from simscen.stack.checked_stack import CheckedStack
 from simscen.stack.reference import ReferenceStack
 
 WORLDS = Path(__file__).parents[2] / "worlds"

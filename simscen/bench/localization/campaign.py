@@ -8,7 +8,7 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.bench.localization.generated_logs import CIRCUMSTANCES, KIDNAPPED_AT_S, Log, generate_log
 from simscen.bench.localization.recorded_drive import compare_with_reference, localize
 from simscen.core.geometry import Array

@@ -15,7 +15,7 @@ from simscen.core.random_streams import Streams
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.read import LocalizationLog
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
-from simscen.stack.plugins.checked_components import CheckedLocalizer
+from simscen.stack.checked_components import CheckedLocalizer
 from simscen.stack.protocols import Surroundings
 from simscen.stack.setting import Setting
 

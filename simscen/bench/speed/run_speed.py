@@ -21,7 +21,7 @@ from simscen.run.lockstep import RunSetup
 from simscen.run.preparation import PreparedScenario, lidar_height, prepare
 from simscen.run.simulate import GC_THRESHOLD, simulate
 from simscen.sim.bullet.baseline import PyBulletBaseline
-from simscen.stack.plugins.checked_stack import CheckedStack
+from simscen.stack.checked_stack import CheckedStack
 from simscen.stack.reference import ReferenceStack
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene

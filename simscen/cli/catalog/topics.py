@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from simscen.actions.base import AnyAction
-from simscen.advanced.planners.spec import MedialAxisPlanner
+from simscen.advanced.spec import MedialAxisPlanner
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
 from simscen.model import (

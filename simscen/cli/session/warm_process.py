@@ -44,7 +44,7 @@ def import_components(prepared: PreparedScenario) -> None:
         if isinstance(part.stack, StackSpec):
             import_module(part.stack.builder.partition(":")[0])
             if part.stack.filters_odometry(part.robot.has_imu):
-                import_module("simscen.stack.odometry_filter")
+                import_module("simscen.stack.localizers.odometry_filter")
 
 
 def precompute(prepared: PreparedScenario) -> None:

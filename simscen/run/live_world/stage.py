@@ -23,7 +23,7 @@ from simscen.run.live_world.pedestrians import PedestrianSimulation
 from simscen.sim.body.outline import outlines_in_band
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
-from simscen.stack.plugins.checked_stack import CheckedStack
+from simscen.stack.checked_stack import CheckedStack
 from simscen.stack.protocols import Stack
 from simscen.worlds.routes.shortest_paths import Z_RANGE
 

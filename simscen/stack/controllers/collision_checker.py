@@ -9,8 +9,8 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.stack.footprint import Footprint, distance_at, distances, lethal_near
+from simscen.stack.kinematics import MIN_YAW_RATE, poses_along
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M
-from simscen.stack.path_geometry import MIN_YAW_RATE, poses_along
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 MIN_SPEED_M_S = 0.1

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Path
-from simscen.stack.path_geometry import direction_changes, forward_steps
+from simscen.stack.kinematics import direction_changes, forward_steps
 
 SEARCH_AHEAD_M = 1.5
 """Length of path beyond the last position that is searched for the nearest point, so that a path may cross itself."""

@@ -11,7 +11,7 @@ from simscen.stack.controllers.collision_checker import CollisionChecker, Rotati
 from simscen.stack.controllers.path_follower import BRAKING_FACTOR, GoalRotation, PathFollower
 from simscen.stack.controllers.path_handler import CUSP_REACHED_M, PathTracker
 from simscen.stack.footprint import distance_at
-from simscen.stack.path_geometry import LOCAL_PLAN_TIMES_S, arc_poses
+from simscen.stack.kinematics import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 

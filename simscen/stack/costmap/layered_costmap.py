@@ -23,7 +23,18 @@ from simscen.stack.costmap.grid_frame import (
     should_roll,
     window_around,
 )
-from simscen.stack.costmap.inflation_layer import Costs, Inflation, inflation, squared_distances
+from simscen.stack.costmap.layers import (
+    Costs,
+    Inflation,
+    Mask,
+    StaticLayer,
+    empty_layer,
+    free_layer,
+    inflation,
+    squared_distances,
+    static_distances,
+    static_layer,
+)
 from simscen.stack.costmap.obstacle_layer import (
     NO_CELLS,
     WHOLE_GRID,
@@ -31,14 +42,6 @@ from simscen.stack.costmap.obstacle_layer import (
     Window,
     crossed_cells,
     remove_small_groups,
-)
-from simscen.stack.costmap.static_layer import (
-    Mask,
-    StaticLayer,
-    empty_layer,
-    free_layer,
-    static_distances,
-    static_layer,
 )
 from simscen.stack.localizers.beams import Plane
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES

@@ -18,8 +18,7 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.costmaps import DenoiseLayer
 from simscen.stack.costmap.depth_layer import Heights, project_depth_image, seen_through
 from simscen.stack.costmap.grid_frame import Cell, CellIndices, Cells, GridFrame, shift_layer
-from simscen.stack.costmap.inflation_layer import Squared
-from simscen.stack.costmap.static_layer import Mask
+from simscen.stack.costmap.layers import Mask, Squared
 from simscen.stack.localizers.beams import Plane, directions
 
 RANGE_TOLERANCE_M = 1e-9

@@ -6,20 +6,21 @@ from simscen.core.decorators import cached_on_instance
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.model import localizers as model
 from simscen.stack.localizers.amcl import AmclLocalizer
-from simscen.stack.localizers.beam_model import BeamModel, opaque_field
 from simscen.stack.localizers.dead_reckoning import DeadReckoning
 from simscen.stack.localizers.distance_field import DistanceField
 from simscen.stack.localizers.ground_truth import GroundTruthLocalizer
-from simscen.stack.localizers.likelihood_field import (
+from simscen.stack.localizers.motion_models import DifferentialMotionModel, MotionModel, OmniMotionModel
+from simscen.stack.localizers.particle_filter import ParticleFilter
+from simscen.stack.localizers.particles import FreeSpace
+from simscen.stack.localizers.sensor_models import (
+    BeamModel,
     BeamSkipping,
     LikelihoodField,
     LikelihoodFieldProb,
     SensorModel,
     obstacle_field,
+    opaque_field,
 )
-from simscen.stack.localizers.motion_models import DifferentialMotionModel, MotionModel, OmniMotionModel
-from simscen.stack.localizers.particle_filter import ParticleFilter
-from simscen.stack.localizers.particles import FreeSpace
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
 

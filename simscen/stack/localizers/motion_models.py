@@ -12,8 +12,8 @@ from typing import Protocol
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
+from simscen.stack.localizers.dead_reckoning import propagate_covariance
 from simscen.stack.localizers.particles import columns, wrapped
-from simscen.stack.localizers.planar_motion import propagate_covariance
 
 MIN_BEARING_DISTANCE_M = 0.01
 """Shortest translation whose direction is used."""

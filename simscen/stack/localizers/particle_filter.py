@@ -13,13 +13,17 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.localizers import AmclParameters
 from simscen.stack.localizers.beams import Beams, select_beams
-from simscen.stack.localizers.clusters import MAX_COMPACT_BINS, are_compact, summarize
-from simscen.stack.localizers.kld import KldBound
-from simscen.stack.localizers.likelihood_field import SensorModel
 from simscen.stack.localizers.motion_models import MotionModel
-from simscen.stack.localizers.particles import FreeSpace, Particles, equal_weights
-from simscen.stack.localizers.recovery import PROBE_COUNT, Recovery
-from simscen.stack.localizers.resampling import adaptive, systematic
+from simscen.stack.localizers.particles import (
+    MAX_COMPACT_BINS,
+    FreeSpace,
+    Particles,
+    are_compact,
+    equal_weights,
+    summarize,
+)
+from simscen.stack.localizers.resampling import PROBE_COUNT, KldBound, Recovery, adaptive, systematic
+from simscen.stack.localizers.sensor_models import SensorModel
 
 CONVERGED_WITHIN_M = 0.5
 """All particles are this near to their mean when the filter has converged (nav2_amcl's pf.dist_threshold)."""

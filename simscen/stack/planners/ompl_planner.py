@@ -1,22 +1,190 @@
-"""The planner of the reference stack: a search by OMPL over the costs of the costmap."""
+"""The planner of the reference stack: a search by OMPL over the costs of the costmap, in the plane or over poses."""
 
-from dataclasses import replace
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
+from simscen.model.planners import OmplParameters, StateSpace
 from simscen.model.planners import OmplPlanner as PlannerSpec
-from simscen.model.planners import StateSpace
-from simscen.stack.planners.endpoints import Endpoints, find_endpoints, reachable_bounds, reachable_cells
+from simscen.stack.footprint import Footprint
+from simscen.stack.kinematics import cusps
+from simscen.stack.planners.endpoints import Endpoints, find_endpoints, near, reachable_bounds, reachable_cells
 from simscen.stack.planners.ompl_search import OmplSearch, Problem
 from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, spaced, with_headings
 from simscen.stack.planners.planning_window import plan_in_windows
-from simscen.stack.planners.pose_planner import PosePlanner
-from simscen.stack.planners.traversal_costs import TraversalCosts
+from simscen.stack.planners.pose_search import POSE_SPACING_M, DistanceLookup, Space, Valid, escape_arcs, search_poses
+from simscen.stack.planners.traversal_costs import NO_INFORMATION, TraversalCosts
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
+
+PLANE_ONLY = ("bit_star", "aorrtc", "medial_axis")
+"""Planners that are replaced by RRT-Connect over poses, where e.g. OMPL's AORRTC (2.0.1) returns only the goal."""
+MIN_RADIUS_M = 0.2
+"""Radius of the arcs of a long robot that could turn in place, but should not have to."""
+RADIUS_RATIO = 1.15
+"""Ratio of the planned turning radius of a car to its minimum, so that the controller can correct to both sides."""
+CLEARANCE_M, LESS_CLEARANCE_M = 0.10, 0.05
+"""Preferred clearances beyond the hull, because pose estimate and map can have such errors."""
+MAX_POSE_SEARCHES = 6
+"""Maximum number of searches, of which the cheapest path is taken, because tree planners over poses make detours."""
+FINAL_CHECKS = 50
+"""Number of poses per step of the path at which the hull is finally checked."""
+MAX_DEEPER_M = 0.01
+"""Distance by which a hull may penetrate an obstacle deeper while it escapes from it."""
+CUSP_M = 1.0
+"""Length that a change of direction costs: a car could drive this far while it stops and steers."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One attempt to find a path in a region.
+
+    bounds:     of the region: (min x, min y, max x, max y) in m
+    contains:   returns whether a point is in the region
+    clearance:  in m beyond the hull
+    share:      of the iterations
+    spacing:    between the collision checks, in m
+    """
+
+    bounds: tuple[float, float, float, float]
+    contains: Callable[[float, float], bool]
+    clearance: float
+    share: float
+    spacing: float
+
+
+class PosePlanner:
+    """Plans with the whole hull, which is checked at each pose as a row of discs."""
+
+    def __init__(self, spec: OmplParameters, robot: RobotModel, footprint: Footprint, space: Space) -> None:
+        self._spec, self._robot, self._footprint, self._space = spec, robot, footprint, space
+        self._inscribed = robot.inscribed_radius
+        self._type = "rrt_connect" if spec.type in PLANE_ONLY else spec.type
+        self._turning_radius = max(RADIUS_RATIO * robot.turning_radius, MIN_RADIUS_M)
+
+    def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        """Return a path of poses in the map frame, 5 cm apart: the cheapest of a few searches."""
+        costs = TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
+        field = DistanceLookup(costmap if self._spec.allow_unknown else self._block_unknown(costmap))
+        ends = find_endpoints(costs, start, goal, self._spec.tolerance)
+        goal = self._move_goal_to_fit(costmap, goal, near(costs, ends.reachable, goal, self._spec.tolerance))
+        escape = self._escape_path(costs, start)
+        free_start = Pose2(*escape[-1].tolist())
+        for attempt in self._attempts(costs, ends, free_start, goal):
+            valid = self._validity_check(field, attempt, (free_start, goal))
+            iterations = max(1, round(attempt.share * self._spec.max_iterations))
+            found: list[Array] = []
+            for _ in range(MAX_POSE_SEARCHES):
+                seed += 1
+                poses = search_poses(
+                    self._type, self._space, self._turning_radius, attempt.bounds, free_start, goal, valid, seed,
+                    iterations, attempt.spacing,
+                )  # fmt: skip
+                if poses is None:
+                    break
+                found.append(np.array(poses))
+            for cheapest in sorted(found, key=lambda poses: _cost(costs, poses)):
+                if self._is_collision_free(costs, cheapest):
+                    return Path(np.concatenate((escape[:-1], cheapest)))
+        message = f"{self._type}: no path in {self._spec.max_iterations} iterations"
+        raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
+
+    def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
+        """Yield the attempts: with decreasing clearance, finally with finer checks."""
+        bounds, reachable, size, (x0, y0) = (
+            reachable_bounds(costs, ends),
+            ends.reachable,
+            costs.resolution,
+            costs.origin,
+        )
+        rows, columns = reachable.shape
+
+        def contains(x: float, y: float) -> bool:
+            row, column = int((y - y0) / size), int((x - x0) / size)
+            return 0 <= row < rows and 0 <= column < columns and bool(reachable[row, column])
+
+        for clearance, share, spacing in (
+            (CLEARANCE_M, 0.2, POSE_SPACING_M),
+            (LESS_CLEARANCE_M, 0.2, POSE_SPACING_M),
+            (0.0, 0.3, POSE_SPACING_M),
+            (0.0, 0.3, POSE_SPACING_M / 10),
+        ):
+            yield Attempt(bounds, contains, clearance, share, spacing)
+
+    def _is_collision_free(self, costs: TraversalCosts, poses: Array) -> bool:
+        """Return whether the whole hull is free of collisions along the path, also between the checks of the search."""
+        fractions = np.arange(FINAL_CHECKS) / FINAL_CHECKS
+        yaw = np.unwrap(poses[:, 2])
+        unwrapped = np.column_stack((poses[:, :2], yaw))
+        between = unwrapped[:-1, None] + fractions[:, None] * np.diff(unwrapped, axis=0)[:, None]
+        checked = np.vstack((between.reshape(-1, 3), unwrapped[-1:]))
+        return bool(self._footprint.free(costs.costmap, checked).all() and np.isfinite(costs.at(checked[:, :2])).all())
+
+    def _block_unknown(self, costmap: CostmapView) -> CostmapView:
+        """Return the costmap with distances so small in unknown cells that the robot does not fit there."""
+        limited = np.minimum(costmap.distance, np.float32(self._inscribed))
+        return replace(costmap, distance=np.where(costmap.costs == NO_INFORMATION, limited, costmap.distance))
+
+    def _move_goal_to_fit(self, costmap: CostmapView, goal: Pose2, points: Iterable[tuple[float, float]]) -> Pose2:
+        """Return the goal moved to the first of the points where the whole hull fits, with the same heading."""
+        poses = np.array([(*point, goal.yaw) for point in points])
+        free = self._footprint.free(costmap, poses)
+        if not free.any():
+            within = f"within {self._spec.tolerance} m of the goal ({goal.x:.2f}, {goal.y:.2f})"
+            raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, f"the robot does not fit {within}")
+        return Pose2(*poses[free.argmax()].tolist())
+
+    def _escape_path(self, costs: TraversalCosts, start: Pose2) -> Array:
+        """Return poses (n, 3) from the start to the nearest one where the whole hull fits.
+
+        A start in collision is left on the shortest arc that does not lead deeper into the obstacle.
+        """
+        costmap, best = costs.costmap, None
+        for arc in escape_arcs(self._space, self._turning_radius, start):
+            free = self._footprint.free(costmap, arc) & np.isfinite(costs.at(arc[:, :2]))
+            clear = int(free.argmax())
+            if not free[clear] or (best is not None and clear + 1 >= len(best)):
+                continue
+            clearances = self._footprint.clearance(costmap, arc[: clear + 1])
+            if (clearances >= clearances[0] - MAX_DEEPER_M).all():
+                best = arc[: clear + 1]
+        if best is None:
+            message = f"the robot does not fit at the start ({start.x:.2f}, {start.y:.2f}) and cannot get away from it"
+            raise NavigationFailure(ErrorCode.START_OCCUPIED, message)
+        return best
+
+    def _validity_check(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> Valid:
+        """Return a check of poses: in the region and free of collisions, with the clearance except near the ends."""
+        offsets = self._footprint.discs.offsets.tolist()
+        required = self._footprint.discs.radius + attempt.clearance
+        # The distances are those between cell centers, which are wrong by up to a cell diagonal.
+        certain = self._footprint.discs.radius + math.sqrt(2.0) * field.resolution
+        inner = self._inscribed
+        distance_of, contains, free, costmap = field.distance, attempt.contains, self._footprint.free, field.costmap
+
+        def valid(x: float, y: float, yaw: float) -> bool:
+            if not contains(x, y) or distance_of(x, y) <= inner:
+                return False
+            cosine, sine = math.cos(yaw), math.sin(yaw)
+            distance = min(distance_of(x + offset * cosine, y + offset * sine) for offset in offsets)
+            if distance <= required and min(math.hypot(x - end.x, y - end.y) for end in ends) > 2 * required:
+                return False
+            return distance > certain or bool(free(costmap, np.array([(x, y, yaw)]))[0])
+
+        return valid
+
+
+def _cost(costs: TraversalCosts, poses: Array) -> float:
+    """Return the cost of a path, including that of changes of direction."""
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    midpoints = 0.5 * (poses[1:, :2] + poses[:-1, :2])
+    return float((steps * costs.at(midpoints)).sum()) + CUSP_M * int(cusps(poses).size)
+
 
 FINE_CELLS = 0.125
 """Spacing of the collision checks of the next search, if the path of the first one is blocked between its checks."""

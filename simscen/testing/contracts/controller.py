@@ -10,7 +10,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.stack.footprint import Footprint
-from simscen.stack.path_geometry import poses_along
+from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import Controller, CostmapView, GoalChecker, NavigationFailure, RobotModel
 from simscen.testing.contracts.base import (
     ComponentContract,

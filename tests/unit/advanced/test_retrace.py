@@ -15,10 +15,10 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.model import recovery as model
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.guards import CollisionMonitor as MonitorSpec
-from simscen.stack.behaviors.motions import BackUp, Spin
+from simscen.stack.behaviors import BackUp, Spin
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
-from simscen.stack.path_geometry import poses_along
+from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 

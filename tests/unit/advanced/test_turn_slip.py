@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.spec import SlipEkf
+from simscen.advanced.spec import SlipEkf
 from simscen.advanced.stack import MAX_CURVATURE_PER_M, TurnSlipObserver
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.bench.localization.buildings import box_distances, generate_building, wall_boxes
 from simscen.bench.localization.campaign import MOMENTS_S, PARAMETER_SETS, ROBOT, Share, Trial, summarize
 from simscen.bench.localization.generated_logs import Log, generate_log

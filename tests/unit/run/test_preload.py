@@ -23,14 +23,14 @@ from pathlib import Path
 from simscen.cli.session import warm_process
 from simscen.loading.scenario import load_scenario
 from simscen.run.process.jobs import Job
-from simscen.stack.costmap import inflation_layer, static_layer
+from simscen.stack.costmap import layers
 
 folder = Path(sys.argv[1])
 loaded = load_scenario(folder / "a.scenario.yaml", folder)
 job = Job(0, loaded, loaded.key(1), folder, 60.0)
 warm_process._warm_up(job)
 before = set(sys.modules)
-inflation_layer.squared_distances = static_layer.squared_distances = None  # what a fork need not work out any more
+layers.squared_distances = None  # what a fork need not work out any more
 assert warm_process._execute(job, lambda seconds: None)["outcome"] == "passed"
 print("late:", *sorted(name for name in set(sys.modules) - before if name.split(".")[0] in ("simscen", "ompl", "PIL")))
 """

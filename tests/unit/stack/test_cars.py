@@ -10,7 +10,7 @@ from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.stack.commands import VelocitySmoother
 from simscen.stack.costmap.layered_costmap import CostmapView
 from simscen.stack.followed_plan import FollowedPlan
-from simscen.stack.path_geometry import cusps
+from simscen.stack.kinematics import cusps
 from simscen.stack.protocols import RobotModel
 from simscen.testing.flatland import box_robot
 

@@ -21,17 +21,17 @@ from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.model.recovery import Recovery
 from simscen.model.recovery import Wait as WaitSpec
 from simscen.model.stack import StackSpec
-from simscen.stack.behaviors.motions import BehaviorSequence, Wait
+from simscen.stack.behaviors import BehaviorSequence, Wait
 from simscen.stack.checkers import STANDSTILL_CHECKS, ProgressChecker, SimpleGoalChecker
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import VelocitySmoother
 from simscen.stack.controllers.collision_checker import time_to_collision
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
-from simscen.stack.costmap.speed_filter import SpeedFilter
+from simscen.stack.costmap.layers import SpeedFilter
 from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.footprint import Footprint
+from simscen.stack.kinematics import poses_along
 from simscen.stack.moving_obstacles import MovingObstacles
-from simscen.stack.path_geometry import poses_along
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.tasks import Task
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting

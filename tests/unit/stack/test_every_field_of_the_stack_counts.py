@@ -17,8 +17,7 @@ import scenes
 from pydantic import BaseModel, ValidationError
 from scenes import Scene
 
-from simscen.advanced.localizers.spec import ScanMatchingAmcl, SlipEkf
-from simscen.advanced.planners.spec import MedialAxisPlanner
+from simscen.advanced.spec import MedialAxisPlanner, ScanMatchingAmcl, SlipEkf
 from simscen.model import checkers, costmaps, guards, localizers, planners
 from simscen.model import recovery as behaviors
 from simscen.model.latency import Latency

@@ -390,7 +390,7 @@ def driven_setting():
 
 def test_a_failure_without_a_code_of_nav2_is_a_broken_promise(odd) -> None:
     from simscen.model.planners import OmplPlanner
-    from simscen.stack.plugins.checked_components import CheckedPlanner
+    from simscen.stack.checked_components import CheckedPlanner
     from simscen.testing.flatland import setting
 
     class Own(OmplPlanner):

@@ -22,7 +22,7 @@ from simscen.sensors.imu import ImuSensor
 from simscen.sensors.odometry import WheelOdometrySensor, integrate_arc
 from simscen.sensors.sensor import SensorSetting
 from simscen.stack.build import build_stack
-from simscen.stack.odometry_filter import OdometryFilter
+from simscen.stack.localizers.odometry_filter import OdometryFilter
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import round_robot
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
-from simscen.stack.controllers.kinematics import VelocityLimits, accumulate_rows, velocity_limits
+from simscen.stack.kinematics import VelocityLimits, accumulate_rows, velocity_limits
 from simscen.stack.protocols import RobotModel
 
 SAME_VELOCITY_M_S = 1e-5

@@ -5,7 +5,7 @@ by exp(-cost / temperature).
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -15,14 +15,6 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.model.mppi import Mppi as MppiSpec
 from simscen.stack.controllers.collision_checker import CollisionChecker
-from simscen.stack.controllers.kinematics import VelocityLimits
-from simscen.stack.controllers.mppi.control_sequence import (
-    PAST_COMMANDS,
-    apply_limits,
-    sample_weights,
-    shift_sequence,
-    smooth_sequence,
-)
 from simscen.stack.controllers.mppi.critic_data import CriticData
 from simscen.stack.controllers.mppi.critics import CriticManager
 from simscen.stack.controllers.mppi.rollouts import (
@@ -38,10 +30,93 @@ from simscen.stack.controllers.mppi.rollouts import (
 )
 from simscen.stack.controllers.path_follower import GoalRotation, PathFollower
 from simscen.stack.controllers.path_handler import LocalPlan, local_plan
+from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 Floats = npt.NDArray[np.float32]
+SMOOTHING_KERNELS = {
+    1: np.full(9, 1.0 / 9.0, np.float32),
+    2: np.array([-21, 14, 39, 54, 59, 54, 39, 14, -21], np.float32) / np.float32(231.0),
+}
+"""Savitzky-Golay filters of nine points, by their order (Savitzky and Golay 1964)."""
+MIN_SMOOTHED_STEPS = 21
+"""Shortest sequence that is smoothed."""
+PAST_COMMANDS = 4
+"""Number of previous commands that the filter includes."""
+
+
+def sample_weights(
+    costs: Array, sequence: Floats, noise: Floats, deviations: Sequence[float], gamma: float, temperature: float
+) -> Floats:
+    """Return the weights (n,) of the samples, which are proportional to exp(-cost / temperature).
+
+    `gamma` weights the control cost: the product of the sequence and the `noise` (axes, steps, n) that was added to it,
+    divided by the variance of the noise.
+    """
+    total = costs.copy()
+    for axis, deviation in enumerate(deviations):
+        if deviation > 0.0:
+            total += gamma / deviation**2 * (sequence[axis] @ noise[axis])
+    weights = np.exp((total.min() - total) / temperature)
+    return np.asarray(weights / weights.sum(), np.float32)
+
+
+def smooth_sequence(sequence: Floats, past: Floats, order: int) -> Floats:
+    """Return the sequence with all steps but the last one filtered; `past` (axes, 4) are the commands before it."""
+    if sequence.shape[1] < MIN_SMOOTHED_STEPS:
+        return sequence
+    padded = np.concatenate((past, sequence, np.repeat(sequence[:, -1:], PAST_COMMANDS, axis=1)), axis=1)
+    result: Floats = sequence.copy()
+    for axis, row in enumerate(padded):
+        result[axis, :-1] = np.convolve(row, SMOOTHING_KERNELS[order], mode="valid")[:-1]
+    return result
+
+
+def apply_limits(sequence: Floats, now: Floats, limits: VelocityLimits, dt: float) -> Floats:
+    """Return the sequence limited to what the base can drive. Its first step is the current velocity `now` (axes,)."""
+    low, high = axis_order(limits.low).tolist(), axis_order(limits.high).tolist()
+    increase, decrease = (
+        (axis_order(limits.acceleration) * dt).tolist(),
+        (axis_order(limits.deceleration) * dt).tolist(),
+    )
+    _limit_curvature(sequence, limits)
+    result = np.empty_like(sequence)
+    for axis in range(len(sequence)):
+        result[axis] = _limit_axis(
+            sequence[axis].tolist(), float(now[axis]), (low[axis], high[axis]), (increase[axis], decrease[axis])
+        )
+    _limit_curvature(result, limits)
+    return result
+
+
+def _limit_axis(
+    requested: list[float], now: float, bounds: tuple[float, float], changes: tuple[float, float]
+) -> list[float]:
+    """Return the velocities of one axis, limited to `bounds` and by the `changes` per step (up, down)."""
+    (low, high), (up, down) = bounds, changes
+    limited, last = [now], now
+    for velocity in requested[1:]:
+        target = low if velocity < low else min(velocity, high)
+        lowest, highest = (last + down, last + up) if last >= 0.0 else (last - up, last - down)
+        last = lowest if target < lowest else highest if target > highest else target
+        limited.append(last)
+    return limited
+
+
+def _limit_curvature(sequence: Floats, limits: VelocityLimits) -> None:
+    """Limit the turn rates of a car to its turning radius, in place."""
+    if limits.turning_radius > 0.0:
+        max_turn_rate = np.abs(sequence[VX]) / np.float32(limits.turning_radius)
+        np.clip(sequence[WZ], -max_turn_rate, max_turn_rate, out=sequence[WZ])
+
+
+def shift_sequence(sequence: Floats, steps: float) -> Floats:
+    """Return the sequence shifted forward by a number of steps, with its last value repeated."""
+    index = np.arange(sequence.shape[1], dtype=np.float64)
+    return np.stack([np.interp(index + steps, index, row) for row in sequence]).astype(np.float32)
+
+
 COMMAND_FREE_TIME_S = 0.5
 """Time for which the command itself must be free of collisions."""
 MIN_PLAN_LENGTH_M, PLAN_MARGIN_M = 2.0, 1.0

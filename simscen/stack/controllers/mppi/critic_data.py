@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.controllers.kinematics import VelocityLimits
 from simscen.stack.controllers.mppi.rollouts import Rollouts
 from simscen.stack.controllers.path_handler import LocalPlan
 from simscen.stack.footprint import CoveringDiscs, Footprint
+from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
 from simscen.stack.protocols import CostmapView
 

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.model import mppi as model
-from simscen.stack.controllers.kinematics import accumulate_rows
 from simscen.stack.controllers.mppi.critic_data import CriticData, Mask, hypot_in_place
 from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ
+from simscen.stack.kinematics import accumulate_rows
 
 Floats = npt.NDArray[np.float32]
 MIN_TURN_RATE_RAD_S = np.float32(1e-6)

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.model.mppi import Mppi as MppiSpec
-from simscen.stack.controllers.kinematics import Axes, VelocityLimits, accumulate_rows, velocity_limits
 from simscen.stack.controllers.path_follower import DEFAULT_SPEED_M_S
+from simscen.stack.kinematics import Axes, VelocityLimits, accumulate_rows, velocity_limits
 from simscen.stack.protocols import RobotModel
 
 Floats = npt.NDArray[np.float32]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simscen.advanced.localizers.covariance_estimator import WINDOW, CovarianceEstimator
-from simscen.advanced.localizers.map_residuals import ScanResiduals
+from simscen.advanced.localizers.map_trust import ScanResiduals
 from simscen.core.geometry import Array, Pose2
 
 STEP = Pose2(0.25, 0.0, 0.05)

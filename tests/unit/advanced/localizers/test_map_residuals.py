@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.map_residuals import MapResiduals, ScanResiduals
+from simscen.advanced.localizers.map_trust import MapResiduals, ScanResiduals
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.stack.localizers.beams import Beams
-from simscen.stack.localizers.likelihood_field import obstacle_field
+from simscen.stack.localizers.sensor_models import obstacle_field
 
 WALL = 4.05
 """m: the x of the middles of a wall's cells."""

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from simscen.advanced.localizers.map_trust import MapTrust
-from simscen.advanced.localizers.tempered_likelihood import beyond_the_map
+from simscen.advanced.localizers.particle_filter import beyond_the_map
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.beams import Beams, Plane
-from simscen.stack.localizers.likelihood_field import obstacle_field
 from simscen.stack.localizers.particles import Particles
+from simscen.stack.localizers.sensor_models import obstacle_field
 
 NEAR = np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
 """A narrow group in the middle of the map."""

@@ -6,7 +6,7 @@ import pytest
 from simscen.advanced.localizers.build import map_models
 from simscen.advanced.localizers.particle_filter import ODOMETRY_SHARE, ScanMatchingParticleFilter
 from simscen.advanced.localizers.scan_matcher import Step
-from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.stack.localizers.motion_models import DifferentialMotionModel

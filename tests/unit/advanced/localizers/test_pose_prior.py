@@ -12,7 +12,7 @@ from simscen.advanced.localizers.pose_prior import (
 )
 from simscen.advanced.localizers.scan_matcher import Step, apply_step
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.clusters import pose_errors
+from simscen.stack.localizers.particles import pose_errors
 
 THEN = Pose2(1.0, 2.0, np.pi / 2)
 SURE = PosePrior.at(np.array([5.0, 5.0, 0.0]), THEN)

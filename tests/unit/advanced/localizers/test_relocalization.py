@@ -5,14 +5,14 @@ import pytest
 
 from simscen.advanced.localizers.global_search import GlobalSearch
 from simscen.advanced.localizers.map_trust import MapTrust
+from simscen.advanced.localizers.particle_filter import beyond_the_map
 from simscen.advanced.localizers.pose_prior import ObservedMotion
 from simscen.advanced.localizers.relocalization import Relocalizer
 from simscen.advanced.localizers.scan_matcher import Step
-from simscen.advanced.localizers.tempered_likelihood import beyond_the_map
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
-from simscen.stack.localizers.likelihood_field import obstacle_field
+from simscen.stack.localizers.sensor_models import obstacle_field
 from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 
 START = Pose2(-2.5, -1.8, 0.6)

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.advanced.localizers.build import scan_matching_amcl
 from simscen.advanced.localizers.scan_matching_amcl import CERTAIN_AFTER_UPDATES
-from simscen.advanced.localizers.spec import ScanMatchingAmcl
+from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.environment.occupancy_grid import UNKNOWN
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist

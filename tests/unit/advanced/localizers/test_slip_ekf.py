@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from simscen.advanced.localizers.spec import SlipEkf
+from simscen.advanced.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Estimate

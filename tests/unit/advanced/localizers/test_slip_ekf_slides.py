@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 from test_slip_ekf_slip import RATE, replayed
 
-from simscen.advanced.localizers.slip_detector import SlipDetector
-from simscen.advanced.localizers.spec import SlipEkf
+from simscen.advanced.localizers.slip_model import SlipDetector
+from simscen.advanced.spec import SlipEkf
 from simscen.core.geometry import Array
 from simscen.testing.synthetic_room import nees
 

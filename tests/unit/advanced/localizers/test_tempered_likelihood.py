@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from simscen.advanced.localizers.tempered_likelihood import (
+from simscen.advanced.localizers.particle_filter import (
     MAX_WALL_THICKNESS_M,
     UNINFORMATIVE_SHARE_OF_HIT,
     TemperedLikelihoodField,
@@ -13,7 +13,7 @@ from simscen.advanced.localizers.tempered_likelihood import (
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.stack.localizers.beams import select_beams
-from simscen.stack.localizers.likelihood_field import LikelihoodFieldProb, obstacle_field
+from simscen.stack.localizers.sensor_models import LikelihoodFieldProb, obstacle_field
 from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 
 Z_HIT, Z_RAND, SIGMA = 0.5, 0.5, 0.2

@@ -9,9 +9,9 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model import recovery as model
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.behaviors.motions import BackUp, ClearCostmap, Spin, Wait
+from simscen.stack.behaviors import BackUp, ClearCostmap, Spin, Wait
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
-from simscen.stack.path_geometry import poses_along
+from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 

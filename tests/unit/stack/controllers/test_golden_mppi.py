@@ -10,13 +10,13 @@ import yaml
 
 from simscen.core.geometry import Pose2
 from simscen.model.mppi import Mppi
-from simscen.stack.controllers.kinematics import VelocityLimits
-from simscen.stack.controllers.mppi.control_sequence import apply_limits, sample_weights, smooth_sequence
+from simscen.stack.controllers.mppi.controller import apply_limits, sample_weights, smooth_sequence
 from simscen.stack.controllers.mppi.critic_data import CriticData
 from simscen.stack.controllers.mppi.critics import CriticManager
 from simscen.stack.controllers.mppi.rollouts import integrate_velocities, predict_velocities
 from simscen.stack.controllers.path_handler import LocalPlan
 from simscen.stack.footprint import Footprint
+from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.protocols import CostmapView
 from simscen.testing.flatland import round_robot
 

@@ -14,7 +14,6 @@ from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
 from simscen.model.mppi import Mppi
 from simscen.stack.controllers.collision_checker import CollisionChecker
 from simscen.stack.controllers.dwb.controller import DynamicWindowController
-from simscen.stack.controllers.kinematics import VelocityLimits
 from simscen.stack.controllers.mppi import critics
 from simscen.stack.controllers.mppi.controller import MppiController
 from simscen.stack.controllers.mppi.critic_data import COLLISION_DECAY_S, MOVING_CLEARANCE_M, CriticData
@@ -22,6 +21,7 @@ from simscen.stack.controllers.mppi.rollouts import Rollouts
 from simscen.stack.controllers.path_handler import LocalPlan
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit as Rpp
 from simscen.stack.footprint import Footprint
+from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import Controller, CostmapView
 from simscen.testing.flatland import box_robot, round_robot, setting

@@ -12,10 +12,8 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Goal, Path
 from simscen.model import mppi as model
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.controllers.kinematics import VelocityLimits
 from simscen.stack.controllers.mppi import critics
-from simscen.stack.controllers.mppi.control_sequence import apply_limits, shift_sequence, smooth_sequence
-from simscen.stack.controllers.mppi.controller import MppiController
+from simscen.stack.controllers.mppi.controller import MppiController, apply_limits, shift_sequence, smooth_sequence
 from simscen.stack.controllers.mppi.critic_data import CriticData
 from simscen.stack.controllers.mppi.rollouts import (
     Rollouts,
@@ -26,7 +24,7 @@ from simscen.stack.controllers.mppi.rollouts import (
 from simscen.stack.controllers.path_handler import LocalPlan
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
-from simscen.stack.path_geometry import poses_along
+from simscen.stack.kinematics import VelocityLimits, poses_along
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 

@@ -19,7 +19,7 @@ from simscen.loading.builders import world_from_file
 from simscen.loading.files.single_files import load_world_file
 from simscen.model.localizers import Amcl
 from simscen.model.world import WorldSpec
-from simscen.stack.plugins.checked_components import CheckedLocalizer
+from simscen.stack.checked_components import CheckedLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
 from simscen.testing.synthetic_room import ROBOT, TICK_RATE

@@ -15,9 +15,8 @@ from estimate_drives import CIRCUMSTANCES, Case, case
 
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers import particle_filter
-from simscen.stack.localizers.clusters import cluster_labels, pose_errors, summarize
-from simscen.stack.localizers.kld import bins
-from simscen.stack.localizers.particles import Particles
+from simscen.stack.localizers.particles import Particles, cluster_labels, pose_errors, summarize
+from simscen.stack.localizers.resampling import bins
 
 CHOSEN_ON = ("house", "corridor", "pillars", "symmetric")
 HELD_OUT = ("office", "warehouse", "clutter", "house coarse")

@@ -7,8 +7,8 @@ import pytest
 
 from simscen.core.environment.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.stack.localizers.beam_model import BeamModel, cast_rays, opaque_field
 from simscen.stack.localizers.beams import select_beams
+from simscen.stack.localizers.sensor_models import BeamModel, cast_rays, opaque_field
 from simscen.testing.synthetic_room import BEAMS, cast, drive, grid, scan
 
 MOUNT = Pose2(0.15, -0.1, 0.5)

@@ -6,9 +6,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.localizers.clusters import cluster_labels, spread, summarize
-from simscen.stack.localizers.kld import bins, split
-from simscen.stack.localizers.particles import Particles
+from simscen.stack.localizers.particles import Particles, cluster_labels, spread, summarize
+from simscen.stack.localizers.resampling import bins, split
 
 
 @pytest.mark.parametrize(("seed", "count", "width"), [(0, 40, 2.0), (1, 200, 4.0), (2, 600, 5.0), (3, 1, 1.0)])

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from simscen.stack.localizers.kld import BIN_SIZE_M, KldBound, bins, join, split
+from simscen.stack.localizers.resampling import BIN_SIZE_M, KldBound, bins, join, split
 
 coordinates = st.integers(-2_000_000, 2_000_000)
 

@@ -8,7 +8,7 @@ import pytest
 from simscen.core.environment.occupancy_grid import OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.stack.localizers.beams import Beams, select_beams
-from simscen.stack.localizers.likelihood_field import (
+from simscen.stack.localizers.sensor_models import (
     BeamSkipping,
     LikelihoodField,
     LikelihoodFieldProb,

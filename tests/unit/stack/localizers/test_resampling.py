@@ -6,8 +6,7 @@ from filterpy.monte_carlo import resampling as filterpy_resampling
 from scipy import stats
 
 from simscen.core.geometry import Array
-from simscen.stack.localizers.kld import KldBound, bins
-from simscen.stack.localizers.resampling import adaptive, systematic
+from simscen.stack.localizers.resampling import KldBound, adaptive, bins, systematic
 
 
 def weights(seed: int, count: int = 300) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner
-from simscen.advanced.planners.spec import MedialAxisPlanner as PlannerSpec
+from simscen.advanced.spec import MedialAxisPlanner as PlannerSpec
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.stack.planners.planning_window import MAX_FULL_SEARCH_CELLS, plan_in_windows

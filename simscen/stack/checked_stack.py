@@ -10,8 +10,7 @@ from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import CostGrid, Decision
 from simscen.model.stack import InProcessStack
-from simscen.stack.plugins.checked_components import checked_belief
-from simscen.stack.plugins.checked_plugin import CheckedPlugin
+from simscen.stack.checked_components import CheckedPlugin, checked_belief
 from simscen.stack.protocols import Stack
 from simscen.stack.setting import Setting
 

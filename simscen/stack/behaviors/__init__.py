@@ -1,1 +1,0 @@
-"""Recovery behaviors (nav2_behaviors)."""

@@ -1,0 +1,178 @@
+"""Layers and filters of a costmap: static map with keepout zones, inflation, and speed limits by position.
+
+Distances are squared numbers of cells (uint16), so that one table lookup gives the distance in m or the cost.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.decorators import cached_on_instance
+from simscen.core.environment.costmap_filters import Zones, in_keepout_mask
+from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
+from simscen.core.environment.world_model import Polygon
+from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.polygons import distance_to_polygon, points_in_polygon
+from simscen.stack.costmap.distance_transform import (
+    MAX_REACH_CELLS,
+    OUT_OF_REACH,
+    squared_distance_blocks,
+    squared_distances_within,
+)
+from simscen.stack.costmap.grid_frame import GridFrame
+from simscen.stack.protocols import Surroundings
+
+FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
+MAX_SQUARED_CELLS = OUT_OF_REACH
+"""The largest squared distance: that of 256 cells, 12.8 m at 5 cm."""
+
+Squared = npt.NDArray[np.uint16]
+Costs = npt.NDArray[np.uint8]
+
+
+def squared_distances(lethal: npt.NDArray[np.bool_], reach: int) -> Squared:
+    """Return the squared distance of each cell to the nearest lethal cell in cells, exact up to `reach`."""
+    if not lethal.any():
+        return np.full(lethal.shape, MAX_SQUARED_CELLS, dtype=np.uint16)
+    if reach <= MAX_REACH_CELLS:
+        return squared_distances_within(lethal, reach)
+    squared = np.empty(lethal.shape, dtype=np.uint16)
+    for rows, distances in squared_distance_blocks(lethal):
+        squared[rows] = np.where(
+            distances <= reach * reach, np.minimum(distances, MAX_SQUARED_CELLS), MAX_SQUARED_CELLS
+        )
+    return squared
+
+
+@lru_cache(maxsize=8)
+def inflation(resolution: float, inscribed: float, radius: float, scaling: float, reach: float) -> "Inflation":
+    """Return the lookup tables, which both costmaps of a robot and all its runs share."""
+    return Inflation(resolution, inscribed, radius, scaling, reach)
+
+
+class Inflation:
+    """Tables over squared cell distances: `meters` and nav2's exponential `cost`.
+
+    cost = 252 · exp(-cost_scaling_factor · (distance - inscribed_radius)) between the inscribed and the inflation
+    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost). Meters end at `reach`.
+    """
+
+    def __init__(
+        self, resolution: float, inscribed: float, inflation_radius: float, scaling: float, reach: float
+    ) -> None:
+        distance = np.sqrt(np.arange(MAX_SQUARED_CELLS + 1)) * resolution
+        self.meters: npt.NDArray[np.float32] = np.minimum(distance, reach).astype(np.float32)
+        decay = MAX_NON_OBSTACLE * np.exp(-scaling * np.maximum(distance - inscribed, 0.0))
+        cost = np.where(distance <= inscribed, INSCRIBED, decay)
+        cost = np.where(distance > inflation_radius, FREE, cost)
+        cost[0] = LETHAL
+        self.cost: npt.NDArray[np.uint8] = cost.astype(np.uint8)
+
+    def costs(self, squared: npt.NDArray[np.integer], unknown: npt.NDArray[np.bool_] | None) -> Costs:
+        """Return the costs of cells. `unknown` ones stay unknown unless an obstacle is within the inscribed radius."""
+        cost = self.cost.take(squared)
+        if unknown is not None:
+            cost[unknown & (cost < INSCRIBED)] = NO_INFORMATION
+        return cost
+
+
+Mask = npt.NDArray[np.bool_]
+OCCUPIED_THRESHOLD = 65
+"""nav2's lethal_cost_threshold is 100 on a trinary map; 65 also reads maps that were loaded in scale mode."""
+
+
+@dataclass(frozen=True, eq=False)
+class StaticLayer:
+    """Static part of a costmap: `lethal` and `unknown` cells (rows, columns) of `frame`."""
+
+    frame: GridFrame
+    lethal: Mask
+    unknown: Mask
+
+
+def static_layer(
+    grid: OccupancyGrid, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = True
+) -> StaticLayer:
+    """Return the layer of a map; a rotated map is sampled into an unrotated frame of the same resolution.
+
+    Without tracking of `unknown` space, unknown cells are free, as in Nav2.
+    """
+    if abs(grid.origin.yaw) < 1e-9:
+        frame = GridFrame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
+        cells = grid.cells
+    else:
+        frame = _bounding_frame(grid)
+        cells = grid.values_at(_all_centers(frame)).reshape(frame.shape)
+    lethal = np.ascontiguousarray(cells >= OCCUPIED_THRESHOLD) | _keepout_cells(frame, keepout, mask)
+    return StaticLayer(frame, lethal, (cells == UNKNOWN) & ~lethal & unknown)
+
+
+@cached_on_instance
+def free_layer(grid: OccupancyGrid, unknown: bool) -> StaticLayer:
+    """Return the layer of a map without zones, computed once for all runs, which write into copies."""
+    return static_layer(grid, (), unknown=unknown)
+
+
+@cached_on_instance
+def static_distances(grid: OccupancyGrid, reach: int) -> Squared:
+    """Return the squared distances in a layer without zones, computed once for all runs."""
+    return squared_distances(free_layer(grid, True).lethal, reach)
+
+
+def empty_layer(
+    frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = False
+) -> StaticLayer:
+    """Return the layer of a robot without a map: only keepout zones and masks; the rest is `unknown` or free."""
+    return StaticLayer(frame, _keepout_cells(frame, keepout, mask), np.full(frame.shape, unknown))
+
+
+def _keepout_cells(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
+    lethal = np.zeros(frame.shape, dtype=bool)
+    for polygon in keepout:
+        lethal |= inside_polygon(frame, polygon)
+    if mask is not None:
+        columns = np.arange(frame.shape[1])
+        for row in range(frame.shape[0]):
+            lethal[row] |= in_keepout_mask(mask, frame.centers(np.column_stack((np.full_like(columns, row), columns))))
+    return lethal
+
+
+def inside_polygon(frame: GridFrame, polygon: Polygon) -> Mask:
+    """Return the cells whose center is inside the polygon (even-odd rule)."""
+    return points_in_polygon(polygon, _all_centers(frame)).reshape(frame.shape)
+
+
+def _all_centers(frame: GridFrame) -> Array:
+    rows, columns = np.indices(frame.shape)
+    return frame.centers(np.column_stack((rows.ravel(), columns.ravel())))
+
+
+def _bounding_frame(grid: OccupancyGrid) -> GridFrame:
+    height, width = grid.shape
+    corners = np.array([[0, 0], [width, 0], [0, height], [width, height]]) * grid.resolution
+    corners = grid.origin.apply(corners)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    columns, rows = np.ceil((high - low) / grid.resolution).astype(int)
+    return GridFrame((float(low[0]), float(low[1])), grid.resolution, (int(rows), int(columns)))
+
+
+class SpeedFilter:
+    """The current speed zones and speed mask."""
+
+    def __init__(self, surroundings: Surroundings) -> None:
+        """Start with the zones and the mask that the stack was configured with."""
+        self._zones, self._mask = surroundings.speed_zones, surroundings.masks.speed
+        self.used = bool(self._zones) or self._mask is not None
+        """Whether there is or was a speed limit."""
+
+    def set_zones(self, zones: Zones) -> None:
+        """Replace all zones and masks."""
+        self._zones, self._mask, self.used = zones.speed, zones.masks.speed, True
+
+    def limit(self, pose: Pose2, full_speed: float) -> float | None:
+        """Return the lowest limit in m/s at a pose, or None. `full_speed` is the controller's speed without limits."""
+        limits = [limit for polygon, limit in self._zones if distance_to_polygon(pose, polygon) == 0.0]
+        masked = self._mask.at(pose, full_speed) if self._mask is not None else None
+        return min(limits if masked is None else [*limits, masked], default=None)

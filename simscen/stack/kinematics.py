@@ -1,0 +1,129 @@
+"""Kinematics of a base: arcs at constant velocity in closed form, velocity limits, and cumulative sums."""
+
+import cmath
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose2, wrap
+from simscen.core.geometry.kinematics import Twist
+from simscen.stack.protocols import RobotModel
+
+MIN_YAW_RATE = 1e-6
+"""rad/s below which an arc is a straight line."""
+LOCAL_PLAN_TIMES_S = tuple(0.25 * step for step in range(7))
+"""Times of the poses in a logged local plan. At 0.5 m/s and 1 rad/s, the chords are at most 4 mm off the arc."""
+
+
+def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
+    """Return the poses (n, 3) of a base that starts at `pose` with constant `twist`, after `times` (n,) in s."""
+    vx, vy, wz = twist
+    turned = wz * times
+    if abs(wz) < MIN_YAW_RATE:
+        x, y = vx * times, vy * times
+    else:
+        forward, left = np.sin(turned) / wz, (1.0 - np.cos(turned)) / wz
+        x, y = (vx * forward, vx * left) if vy == 0.0 else (vx * forward - vy * left, vx * left + vy * forward)
+    cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
+    poses = np.empty((len(times), 3))
+    poses[:, 0], poses[:, 1], poses[:, 2] = pose.x + cosine * x - sine * y, pose.y + sine * x + cosine * y, turned
+    poses[:, 2] += pose.yaw
+    return poses
+
+
+def arc_poses(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
+    """Return the same poses (n, 3), computed with scalars: faster than with arrays for about a dozen times."""
+    (x, y, yaw), (vx, vy, wz) = pose, twist
+    start, velocity = complex(x, y), cmath.rect(1.0, yaw) * complex(vx, vy)
+    poses: list[tuple[float, float, float]] = []
+    for time in times:
+        turned = wz * time
+        effective_time = time if abs(wz) < MIN_YAW_RATE else (cmath.rect(1.0, turned) - 1.0) / complex(0.0, wz)
+        position = start + velocity * effective_time
+        poses.append((position.real, position.imag, wrap(yaw + turned)))
+    return np.array(poses)
+
+
+def forward_steps(poses: Array) -> npt.NDArray[np.bool_]:
+    """Return for each step (n - 1,) between poses (n, 3) whether it points forward in the robot's heading."""
+    steps = np.diff(poses[:, :2], axis=0)
+    forward: npt.NDArray[np.bool_] = steps[:, 0] * np.cos(poses[:-1, 2]) + steps[:, 1] * np.sin(poses[:-1, 2]) >= -1e-9
+    return forward
+
+
+def direction_changes(forward: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """Return the indices of the poses between a forward and a backward step."""
+    return np.flatnonzero(forward[1:] != forward[:-1]) + 1
+
+
+def cusps(poses: Array) -> npt.NDArray[np.int64]:
+    """Return the indices of the cusps among the poses (n, 3)."""
+    return direction_changes(forward_steps(poses))
+
+
+Axes = tuple[float, float, float]
+"""Values for vx, vy, and turn rate."""
+OptionalAxes = tuple[float | None, float | None, float | None]
+Limits = TypeVar("Limits", bound="VelocityLimits")
+Real = TypeVar("Real", np.float32, np.float64)
+
+
+@dataclass(frozen=True)
+class VelocityLimits:
+    """Limits of vx and vy in m/s and of the turn rate in rad/s, and their acceleration and (negative) deceleration.
+
+    `turning_radius` is the minimum turning radius in m; 0 for a base that turns in place.
+    """
+
+    low: Axes
+    high: Axes
+    acceleration: Axes
+    deceleration: Axes
+    turning_radius: float
+
+    def scaled(self: Limits, ratio: float) -> Limits:
+        """Return the limits with all velocities scaled by a speed limit; the same object if `ratio` is at least 1."""
+        if ratio >= 1.0:
+            return self
+        (a, b, c), (d, e, f) = self.low, self.high
+        return replace(self, low=(a * ratio, b * ratio, c * ratio), high=(d * ratio, e * ratio, f * ratio))
+
+
+def velocity_limits(
+    robot: RobotModel,
+    low: Axes,
+    high: Axes,
+    acceleration: OptionalAxes,
+    deceleration: OptionalAxes,
+    turning_radius: float | None = None,
+) -> VelocityLimits:
+    """Return the requested limits, bounded by those of the robot; None means the limit of the robot."""
+    linear, lateral, angular = robot.max_linear, robot.max_lateral, robot.max_angular
+    increase, decrease = robot.linear_acceleration, -robot.linear_deceleration
+    angular_change = robot.angular_acceleration
+    return VelocityLimits(
+        low=_bounded(max, low, (-robot.max_reverse, -lateral, -angular)),
+        high=_bounded(min, high, (linear, lateral, angular)),
+        acceleration=_bounded(min, acceleration, (increase, increase, angular_change)),
+        deceleration=_bounded(max, deceleration, (decrease, decrease, -angular_change)),
+        turning_radius=max(turning_radius or 0.0, robot.turning_radius),
+    )
+
+
+def _bounded(bound: Callable[[float, float], float], requested: OptionalAxes, limits: Axes) -> Axes:
+    x, y, turn = (
+        limit if value is None else bound(value, limit) for value, limit in zip(requested, limits, strict=True)
+    )
+    return x, y, turn
+
+
+def accumulate_rows(rows: npt.NDArray[Real]) -> npt.NDArray[Real]:
+    """Replace the rows (m, n) by their cumulative sums, in place, several times as fast as np.cumsum."""
+    for previous, row in pairwise(rows):
+        np.add(previous, row, out=row)
+    return rows

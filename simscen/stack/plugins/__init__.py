@@ -1,1 +1,0 @@
-"""Checks of what stacks and components from other packages return."""
