@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from simscen.model.robot import Drive, Mecanum, SkidSteer
 from simscen.run.trial_drive import RestingState, Trial, run_trials
-from simscen.sim.body.climb import ClimbLimits, compute_climb_limits
-from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.body.robot_body import ClimbLimits, RobotBody, compute_climb_limits
 
 MAX_REST_TILT_RAD, MAX_REST_HEIGHT_M, MAX_REST_DRIFT_M = math.radians(1.0), 0.002, 0.001
 """At rest: tilt, height of the wheels above or below the ground, and drift in a second."""

@@ -61,7 +61,7 @@ def check_reachability(scene: Scene) -> Iterator[Finding]:
 def _ramp_hint(scene: Scene) -> str:
     """Return when a goal may be reachable after all: a solid that is not upright may be a ramp."""
     from simscen.loading.builders import load_robot
-    from simscen.sim.body.climb import compute_climb_limits
+    from simscen.sim.body.robot_body import compute_climb_limits
 
     slope = math.degrees(compute_climb_limits(load_robot(scene.loaded)[1]).slope)
     climbs = f"climbs slopes up to {slope:.1f}°" if slope else "cannot climb slopes"

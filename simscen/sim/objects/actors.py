@@ -24,9 +24,8 @@ from simscen.sim.bullet import engine
 from simscen.sim.bullet.divergence import divergence_reason
 from simscen.sim.contact.static_distance import encloses
 from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ScheduledPoses
-from simscen.sim.objects.broad_phase import BroadPhase
+from simscen.sim.objects.idle_objects import BroadPhase, RestDetector, RestPoses
 from simscen.sim.objects.proximity import DeferredActors, NearbyActors, ProximityQuery, find_nearby
-from simscen.sim.objects.rest import RestDetector, RestPoses
 
 FRICTION = 0.6
 """Friction of pushable objects on the ground: about that of wood or cardboard on concrete."""

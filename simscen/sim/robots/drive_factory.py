@@ -7,10 +7,9 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.model.robot import Ackermann, Differential, Mecanum, Omnidirectional, SkidSteer
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.robots.ackermann import AckermannDrive
-from simscen.sim.robots.differential import DifferentialDrive
 from simscen.sim.robots.planar_base import MecanumDrive, OmnidirectionalDrive, PlanarBase
 from simscen.sim.robots.robot_state import RobotState
+from simscen.sim.robots.wheel_drives import AckermannDrive, DifferentialDrive
 from simscen.sim.robots.wheeled_base import WheeledBase
 from simscen.sim.scene.terrain import Terrain
 

@@ -13,7 +13,7 @@ from simscen.sim.body.inertia import GRAVITY, MassProperties, combine
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import engine
 from simscen.sim.robots.robot_state import RobotState
-from simscen.sim.robots.velocity_ramp import VelocityRamp
+from simscen.sim.robots.wheel_drives import VelocityRamp
 
 MAX_FORCE_PER_WEIGHT = 0.7
 """Largest motor force relative to the weight of the robot."""

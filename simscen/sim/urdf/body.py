@@ -15,8 +15,7 @@ from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import MIN_GROUND_CLEARANCE_M, RobotBody, assemble
 from simscen.sim.body.undercarriage import Wheel, wheel_inertia
-from simscen.sim.urdf.elements import MeshReader, MeshSource
-from simscen.sim.urdf.tree import Tree, build_tree
+from simscen.sim.urdf.elements import MeshReader, MeshSource, Tree, build_tree
 from simscen.sim.urdf.wheels import WheelJoint, select_wheels
 from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
 from simscen.sim.urdf.xml_source import CODE, RobotFiles, read_xml

@@ -23,8 +23,7 @@ from simscen.model.robot import (
 )
 from simscen.sim.body.outline import hull_points
 from simscen.sim.urdf.body import body_from_tree, check_front_steering, read_tree
-from simscen.sim.urdf.elements import MeshReader
-from simscen.sim.urdf.tree import Tree
+from simscen.sim.urdf.elements import MeshReader, Tree
 from simscen.sim.urdf.wheels import WheelJoint, infer_wheels
 
 AXLE_TOLERANCE_M = 0.02

@@ -10,8 +10,7 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Cylinder, Mesh, Solid, Sphere
 from simscen.model.robot import Ackermann, Differential, Drive, Omnidirectional
 from simscen.sim.body.outline import hull_points
-from simscen.sim.urdf.elements import Joint
-from simscen.sim.urdf.tree import Tree
+from simscen.sim.urdf.elements import Joint, Tree
 
 MIN_AXIS_COSINE = 0.99
 """Cosine of the largest angle (8 degrees) between a joint axis and the direction that it is compared with."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.sim.objects.broad_phase import HORIZON_S, NEAR_CONTACT_S, BoundingDiscs, find_candidates
+from simscen.sim.objects.idle_objects import HORIZON_S, NEAR_CONTACT_S, BoundingDiscs, find_candidates
 
 
 def test_bodies_do_not_meet_within_the_guaranteed_time():

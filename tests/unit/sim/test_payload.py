@@ -7,9 +7,8 @@ from playground import shipped
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
-from simscen.sim.body.climb import compute_climb_limits
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.body.robot_body import add_payload, center_of_mass, is_stable, scale_motor_torque
+from simscen.sim.body.robot_body import add_payload, center_of_mass, compute_climb_limits, is_stable, scale_motor_torque
 from simscen.worlds.world_file import ramp_solid
 
 TICKS, GRAVITY = 240, 9.81

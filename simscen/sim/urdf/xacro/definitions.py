@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from simscen.sim.urdf.xacro.limits import ExpansionError, parse_bool, parse_literal
-from simscen.sim.urdf.xacro.scope import Block, Lazy, Scope, ScopeValue
-from simscen.sim.urdf.xacro.text import TextEvaluator, required_attribute
+from simscen.sim.urdf.xacro.text import Block, Lazy, Scope, ScopeValue, TextEvaluator, required_attribute
 from simscen.sim.urdf.xml_source import Element
 
 PARAMETER = re.compile(

@@ -18,8 +18,7 @@ from simscen.sim.urdf.xacro.definitions import (
     resolve_macro,
 )
 from simscen.sim.urdf.xacro.limits import Budget, ExpansionError, MissingFile, parse_bool
-from simscen.sim.urdf.xacro.scope import Block, Scope
-from simscen.sim.urdf.xacro.text import TextEvaluator, required_attribute
+from simscen.sim.urdf.xacro.text import Block, Scope, TextEvaluator, required_attribute
 from simscen.sim.urdf.xml_source import MAX_URDF_BYTES, Element
 
 MAX_FILES = 200

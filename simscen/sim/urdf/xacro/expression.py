@@ -1,12 +1,88 @@
-"""Evaluates `${…}` expressions with Python's grammar; raises an error for anything but arithmetic on plain data."""
+"""Evaluates `${…}` expressions with Python's grammar: arithmetic and harmless functions; anything else is an error."""
 
 import ast
+import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from simscen.sim.urdf.xacro.functions import GLOBALS, METHODS, NAMESPACES, TYPES, Function
 from simscen.sim.urdf.xacro.limits import MAX_BITS, MAX_LENGTH, Budget, ExpansionError, Value, check_bounds, size
+
+Function = Callable[..., object]
+
+TYPES: Mapping[str, type] = {"int": int, "float": float, "str": str, "bool": bool, "list": list, "dict": dict}
+
+
+def _round(number: float, digits: int | None = None) -> float:
+    if digits is not None and abs(digits) > 100:  # Python would compute 10**digits
+        raise ExpansionError("round() takes up to 100 digits")
+    return round(number, digits)
+
+
+def _range(*bounds: int) -> list[int]:
+    numbers = range(*bounds)
+    if len(numbers) > MAX_LENGTH:
+        raise ExpansionError(f"range() gives more than {MAX_LENGTH} numbers")
+    return list(numbers)
+
+
+def _tokenize(text: str, separators: str = ",; ", skip_empty: bool = True) -> list[str]:
+    for separator in separators[1:]:
+        text = text.replace(separator, separators[0])
+    return [word for word in text.split(separators[0]) if word or not skip_empty]
+
+
+def _ignore_message(*_: object) -> str:
+    return ""  # messages of a file are meant for its authors
+
+
+def _fatal(*messages: object) -> str:
+    raise ExpansionError(f"error in the file: {' '.join(map(str, messages))[:200]}")
+
+
+MATH: Mapping[str, Function | float] = {
+    name: getattr(math, name)
+    for name in (
+        "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos", "cosh", "degrees", "exp",
+        "expm1", "fabs", "floor", "fmod", "hypot", "isfinite", "isinf", "isnan", "log", "log10", "log1p", "log2", "pow",
+        "radians", "sin", "sinh", "sqrt", "tan", "tanh", "trunc", "pi", "e", "tau", "inf", "nan",
+    )
+}  # fmt: skip
+PYTHON: Mapping[str, Function] = {
+    **TYPES, "abs": abs, "all": all, "any": any, "len": len, "max": max, "min": min, "range": _range, "round": _round,
+    "sorted": sorted, "sum": sum,
+}  # fmt: skip
+XACRO: Mapping[str, Function] = {
+    "message": _ignore_message, "warning": _ignore_message, "error": _fatal, "fatal": _fatal, "tokenize": _tokenize
+}  # fmt: skip
+NAMESPACES: Mapping[str, Mapping[str, Function | float]] = {"math": MATH, "python": PYTHON, "xacro": XACRO}
+GLOBALS: Mapping[str, Function | float] = {**MATH, **PYTHON}
+
+
+def _replace(text: str, old: str, new: str) -> str:
+    if text.count(old) * len(new) > MAX_LENGTH:
+        raise ExpansionError(f"replace() gives more than {MAX_LENGTH} characters")
+    return text.replace(old, new)
+
+
+def _join(separator: str, words: list[Any]) -> str:
+    if len(words) * len(separator) > MAX_LENGTH:
+        raise ExpansionError(f"join() gives more than {MAX_LENGTH} characters")
+    return separator.join(words)
+
+
+METHODS: Mapping[tuple[type, str], Function] = {
+    **{(str, name): getattr(str, name) for name in (
+        "count", "endswith", "find", "lower", "lstrip", "rstrip", "split", "startswith", "strip", "upper",
+    )},
+    (str, "replace"): _replace,
+    (str, "join"): _join,
+    **{(list, name): getattr(list, name) for name in ("count", "index", "pop")},
+    (dict, "get"): dict.get,
+    (dict, "keys"): list,
+    (dict, "values"): lambda mapping: list(mapping.values()),
+}  # fmt: skip
+
 
 MAX_CHARACTERS = 1000
 
