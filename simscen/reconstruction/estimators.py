@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,11 +28,14 @@ from simscen.reconstruction.faults.transparent_walls import glass_fault
 from simscen.reconstruction.objects.clusters import usable_scans
 from simscen.reconstruction.objects.find_objects import find_objects
 from simscen.reconstruction.objects.found_object import FoundObject
+from simscen.reconstruction.objects.pedestrians import with_walks
+from simscen.reconstruction.objects.walk_trial import WalkTrial
 from simscen.reconstruction.scans.scan_model import scan_model
 from simscen.reconstruction.scans.surroundings import Surroundings
 from simscen.reconstruction.scenario.contents import Findings
 from simscen.reconstruction.scenario.incidents import incidents_of
 from simscen.reconstruction.scenario.robot_properties import UNKNOWN_ROBOT, KnownRobot
+from simscen.run.live_world.pedestrian_map import PedestrianMap
 
 MAX_SCANS = 3000
 """Maximum number of scans that are compared with the world; of longer drives, every second, third, … scan is used."""
@@ -55,8 +58,7 @@ def find_all(drive: RecordedDrive, world: Surroundings, robot: KnownRobot = UNKN
             faults += gyroscope_faults(drive)
     else:
         unknowns.append("errors of odometry, gyroscope, and mount of the lidar, which need a ground truth (--truth)")
-    if any(thing.is_moving for thing in objects):
-        unknowns.append("whether moving objects react to the robot; they follow their recorded tracks")
+    unknowns += _unknown_reactions(objects)
     faults += command_faults(drive, 0.0 if robot.skids else robot.separation)
     faults += localizer_faults(drive)
     faults = _on_own_sensors(faults, robot, unknowns)
@@ -108,7 +110,17 @@ def _from_scans(
         faults += range_error_faults(model)
     glass = glass_fault(model, world, usable_scans(model))
     faults += [] if glass is None else [glass]
-    return faults, find_objects(model, world, drive.has_independent_poses)
+    objects = find_objects(model, world, drive.has_independent_poses)
+    return faults, with_walks(objects, WalkTrial(drive, PedestrianMap(world.built), robot.radius))
+
+
+def _unknown_reactions(objects: Sequence[FoundObject]) -> Iterator[str]:
+    """Yield what the log does not show about reactions to the robot."""
+    if any(thing.is_moving and thing.walk is None for thing in objects):
+        yield "whether moving objects react to the robot; those that are no pedestrians follow their recorded tracks"
+    apart = [thing.name for thing in objects if thing.walk is not None and not thing.walk.meets_robot]
+    if apart:
+        yield f"whether {', '.join(apart)} would evade the robot, which was never near; pedestrians do"
 
 
 def _kidnaps(drive: RecordedDrive) -> Iterator[tuple[float, Pose2, Evidence]]:

@@ -49,10 +49,12 @@ class Reconstruction:
 
     def summary(self) -> Iterator[str]:
         """Yield lines that say what was found."""
-        moving = sum(thing.is_moving for thing in self.findings.objects)
-        standing = len(self.findings.objects) - moving
+        people = sum(thing.walk is not None for thing in self.findings.objects)
+        moving = sum(thing.is_moving for thing in self.findings.objects) - people
+        standing = len(self.findings.objects) - moving - people
         counts = (
             (len(self.contents.goals), "goal"),
+            (people, "pedestrian"),
             (moving, "moving object"),
             (standing, "standing object"),
             (len(self.findings.faults), "fault"),
@@ -79,9 +81,17 @@ def _write_valid(
         refused = {thing.name for thing in findings.objects if any(f"`{thing.name}`" in message for message in wrong)}
         if not refused:
             break
-        objects = [thing for thing in findings.objects if thing.name not in refused]
-        unknowns = [f"how {name} fits, which was left out because it makes the scenario invalid" for name in refused]
-        findings = replace(findings, objects=objects, unknowns=[*findings.unknowns, *sorted(unknowns)])
+        walking = {thing.name for thing in findings.objects if thing.walk is not None}
+        objects = [
+            replace(thing, walk=None) if thing.name in refused else thing
+            for thing in findings.objects
+            if thing.name not in refused - walking
+        ]
+        unknowns = [
+            f"how {name} fits, which was left out because it makes the scenario invalid"
+            for name in sorted(refused - walking)
+        ]
+        findings = replace(findings, objects=objects, unknowns=[*findings.unknowns, *unknowns])
     if wrong:
         unknowns = [f"what to correct, so that the scenario can run: {message}" for message in wrong]
         findings = replace(findings, unknowns=[*findings.unknowns, *sorted(unknowns)])

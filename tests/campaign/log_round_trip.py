@@ -38,7 +38,10 @@ SAME_KINDS = {
 
 @dataclass
 class Row:
-    """What came of one scenario; `objects` are RMSE in m, error of the time in s, and share of the time covered."""
+    """What came of one scenario; `objects` are RMSE in m, error of the time in s, and share of the time covered.
+
+    `pedestrians` are the objects that are written as pedestrians.
+    """
 
     name: str
     start: float = 0.0
@@ -47,6 +50,7 @@ class Row:
     ordered: set[tuple[str, str]] = field(default_factory=set)
     found: set[tuple[str, str]] = field(default_factory=set)
     spurious: int = 0
+    pedestrians: int = 0
     problem: str = ""
 
     @property
@@ -114,6 +118,7 @@ def _compare_objects(row: Row, log: Log, made: Reconstruction) -> None:
         if len(seen) * 0.1 >= MIN_SEEN_S and _moved_while(track, log, seen):
             fits = [_fit(thing, track, log, seen) for thing in moving]
             row.objects[name] = min(fits, key=_rank, default=(float("inf"), float("inf"), 0.0))
+    row.pedestrians = sum(thing.walk is not None for thing in moving)
     row.spurious = max(0, len(moving) - len(moved))
 
 
@@ -148,8 +153,13 @@ def _times_seen(track: Samples, log: Log, made: Reconstruction) -> np.ndarray:
 
 
 def _fit(thing: FoundObject, track: Samples, log: Log, seen: np.ndarray) -> tuple[float, float, float]:
-    """Return the RMSE in m of the best time shift, the shift in s, and the covered share of the times seen."""
-    frames = np.array(thing.keyframes)
+    """Return the RMSE in m, the best time shift in s, and the covered share of the times seen.
+
+    Of a pedestrian, the simulated motion counts, and not the track.
+    """
+    frames = np.array([frame[:3] for frame in thing.keyframes])
+    if thing.walk is not None:
+        frames = np.column_stack((thing.walk.times, thing.walk.positions))
     inside = seen[(seen >= frames[0, 0]) & (seen <= frames[-1, 0])]
     if len(inside) < 5:
         return float("inf"), float("inf"), 0.0
@@ -205,6 +215,7 @@ def _line(row: Row) -> str:
     ]
     parts += [f"missing {sensor}.{kind}" for sensor, kind in sorted(row.missing)]
     parts += [f"extra {sensor}.{kind}" for sensor, kind in sorted(row.extra)]
+    parts += [f"{row.pedestrians} as pedestrians"] if row.pedestrians else []
     parts += [f"{row.spurious} spurious moving objects"] if row.spurious else []
     return f"{signs} {row.name:45} {', '.join(parts)}"
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from simscen.core.environment.occupancy_grid import OCCUPIED, OccupancyGrid
-from simscen.core.environment.world_model import World
+from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Array, Pose2
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans
 from simscen.worlds.geometry.triangulation import merge_solids
@@ -30,6 +30,7 @@ class Surroundings:
         mesh = merge_solids((*world.solids, *bodies))
         self._scene = RayScene(mesh)
         self.grid: OccupancyGrid = draw_map(replace(world, solids=(*world.solids, *bodies)), mesh, height)
+        self.built = BuiltWorld(world, mesh, self.grid)
         distances = distance_transform_edt(self.grid.cells != OCCUPIED)
         self._distances: Array = np.asarray(distances) * self.grid.resolution
 

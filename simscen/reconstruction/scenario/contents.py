@@ -28,6 +28,8 @@ MIN_WAIT_S = 0.3
 MIN_TIMEOUT_S, TIMEOUT_FACTOR = 30.0, 2.0
 UNFINISHED_TIMEOUT_FACTOR = 1.1
 MAX_TIME_LIMIT_S = 8000.0
+RADIUS_STEP_M = 0.05
+"""Step to which the distance at which goals count as passed is rounded up."""
 NEAR_TRUTH_M, NEAR_TRUTH_RAD = 0.15, math.radians(6)
 """Errors of the first belief within which the default initial estimate is kept."""
 UNKNOWN_START_STD_M = 1.5
@@ -70,6 +72,10 @@ def contents_of(
     evidence["start"] = Evidence(f"first pose of the drive, from {drive.pose_source}", 0.0)
     if estimate_evidence is not None:
         evidence["estimate"] = estimate_evidence
+    passing = passing_radius(drive)
+    if passing is not None:
+        text = f"goals were passed without a stop, at a distance of at most {passing:g} m"
+        evidence["navigation"] = Evidence(text, None, None, "medium")
     slowest = max((goal.timeout for goal in goals), default=MIN_TIMEOUT_S)
     time_limit = min(MAX_TIME_LIMIT_S, max(60.0, 2 * drive.duration, drive.duration + slowest))
     return ScenarioContents(
@@ -83,7 +89,7 @@ def contents_of(
         start=start,
         estimate=estimate,
         stack=given.stack,
-        navigation="navigate_through_poses" if any(goal.status == "passed" for goal in drive.goals) else "",
+        passing_radius=passing,
         goals=goals,
         stops_at_failure=not any(goal.status == "failed" for goal in drive.goals[:-1]),
         time_limit=time_limit,
@@ -99,6 +105,26 @@ def contents_of(
 def start_pose(drive: RecordedDrive) -> Pose2:
     """Return the pose at the start of the drive."""
     return Pose2(*drive.poses.poses_at(np.zeros(1))[0].tolist())
+
+
+def passing_radius(drive: RecordedDrive) -> float | None:
+    """Return the distance in m at which goals counted as passed; None if the robot passed none.
+
+    A robot counts a goal as passed at the first control step within this distance, by its own belief. The largest
+    distance seen is therefore a little too small, and is rounded up.
+    """
+    passed = [goal for goal in drive.goals if goal.status == "passed" and goal.ended is not None]
+    distances = [_believed_pose(drive, goal.ended or 0.0).distance(goal.pose) for goal in passed]
+    return round(math.ceil(max(distances) / RADIUS_STEP_M) * RADIUS_STEP_M, 2) if distances else None
+
+
+def _believed_pose(drive: RecordedDrive, time: float) -> Pose2:
+    """Return the pose that the robot believed: its odometry with the latest correction, if the log has both."""
+    at = np.array([time])
+    if not len(drive.corrections) or not len(drive.odometry):
+        return Pose2(*drive.poses.poses_at(at)[0].tolist())
+    correction, odometry = drive.corrections.values_at(at)[0], drive.odometry.poses_at(at)[0]
+    return Pose2(*correction.tolist()).compose(Pose2(*odometry.tolist()))
 
 
 def _estimate(

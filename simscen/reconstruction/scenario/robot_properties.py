@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,7 @@ class KnownRobot:
 
     Attributes:
         lidar_noise: Standard deviation of the ranges of the lidar in m.
+        radius: Radius of the circle around its footprint in m.
         separation: Distance of the left and right wheels in m.
         skids: Whether the wheels skid in turns.
         sensors: Names of its sensors by the usual name: "lidar", "odom", "imu". Empty if they are unknown.
@@ -24,6 +26,7 @@ class KnownRobot:
     """
 
     lidar_noise: float = 0.01
+    radius: float = 0.25
     separation: float = 0.287
     skids: bool = False
     sensors: Mapping[str, str] = field(default_factory=dict)
@@ -50,4 +53,6 @@ def known_robot(written: str, folder: Path, is_known: bool) -> KnownRobot:
     for name, sensor in spec.sensors.items():
         kinds = ("lidar", sensor.lidar), ("odom", sensor.odometry), ("imu", sensor.imu)
         names |= {usual: name for usual, given in kinds if given and usual not in names}
-    return KnownRobot(noise, separation, spec.drive.type == "skid_steer", names, is_known)
+    corners = (math.hypot(x, y) for x, y in spec.footprint or ())
+    radius = spec.radius or max(corners, default=UNKNOWN_ROBOT.radius)
+    return KnownRobot(noise, radius, separation, spec.drive.type == "skid_steer", names, is_known)

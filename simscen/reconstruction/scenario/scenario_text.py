@@ -14,13 +14,15 @@ from simscen.core.geometry import Pose2
 from simscen.loading.files.single_files import CompactDumper
 from simscen.loading.yaml.scalars import to_yaml
 from simscen.reconstruction.evidence import Evidence, FoundFault
-from simscen.reconstruction.objects.found_object import FoundObject
+from simscen.reconstruction.objects.found_object import FoundObject, FoundWalk
+from simscen.reconstruction.objects.pedestrians import is_person
 from simscen.reconstruction.scenario.criteria import ProposedCriterion
 
 MAX_COLUMNS = 118
 OBJECT_HEIGHT_M = 1.0
 PERSON_HEIGHT_M = 1.7
-MIN_PERSON_RADIUS_M, MAX_PERSON_RADIUS_M = 0.15, 0.4
+GLUE = "\x00"
+"""Stands for a space at which no line is broken."""
 _PLAIN = re.compile(r"[\w./ %-]+")
 """Scalars that need no quotes in flow style."""
 
@@ -52,7 +54,7 @@ class ScenarioContents:
         start: True start pose.
         estimate: Initial estimate with standard deviations x, y, yaw; None for the default, "unknown" for anywhere.
         stack: Configuration of the stack.
-        navigation: Navigation action; "" for the default.
+        passing_radius: Distance in m at which a pose counts as passed; None if the robot stops at each goal.
         time_limit: Time limit in s.
         evidence: Evidence by key of the scenario.
         unknowns: What the log does not show.
@@ -68,7 +70,7 @@ class ScenarioContents:
     start: Pose2
     estimate: tuple[Pose2, tuple[float, float, float]] | str | None
     stack: Mapping[str, Any]
-    navigation: str
+    passing_radius: float | None
     goals: Sequence[ScenarioGoal]
     stops_at_failure: bool
     time_limit: float
@@ -108,8 +110,9 @@ def _lines(contents: ScenarioContents) -> Iterator[str]:
     if contents.stack:
         yield from _evidence(contents, "stack")
         yield from _entry("stack", dict(contents.stack))
-    if contents.navigation:
-        yield f"navigation: {{mode: {contents.navigation}}}"
+    if contents.passing_radius is not None:
+        yield from _evidence(contents, "navigation")
+        yield f"navigation: {{mode: navigate_through_poses, radius: {contents.passing_radius:g} m}}"
     if not contents.stops_at_failure:
         yield "on_goal_failure: continue"
     yield from _goals(contents)
@@ -181,7 +184,7 @@ def _events(contents: ScenarioContents) -> Iterator[str]:
     yield ""
     yield "events:"
     for thing in contents.objects:
-        yield from _comment(thing.evidence.comment, "  ")
+        yield from _comment(thing.comment, "  ")
         yield from _object(thing)
     for time, pose, evidence in contents.kidnaps:
         yield from _comment(evidence.comment, "  ")
@@ -191,10 +194,40 @@ def _events(contents: ScenarioContents) -> Iterator[str]:
 
 
 def _object(thing: FoundObject) -> Iterator[str]:
+    yield from _scripted_object(thing) if thing.walk is None else _pedestrian(thing.walk)
+    if thing.disappears is not None:
+        yield f"  - name: {_text(f'{thing.name} disappears')}"
+        yield f"    when: {{time: {thing.disappears:.2f} s}}"
+        yield f"    do: {{remove: {{name: {_text(thing.name)}}}}}"
+
+
+def _pedestrian(walk: FoundWalk) -> Iterator[str]:
+    walker = walk.walker
+    goals = ", ".join(f"[{x:.2f}, {y:.2f}]" for x, y in walker.goals)
+    keys = [
+        f"name: {_text(walker.name)}",
+        f"pose: {_pose(walker.pose)}",
+        f"goals: [{goals}]",
+        f"speed: {walker.speed:.2f} m/s",
+        f"radius: {walker.radius:.2f} m",
+    ]
+    if walker.behavior != "regular":
+        keys += [f"behavior: {walker.behavior}", f"reacts_for: {walker.reacts_for:.1f} s"]
+    if walker.blind_to:
+        keys.append(f"blind_to: [{', '.join(sorted(walker.blind_to))}]")
+    yield f"  - name: {_text(f'{walker.name} appears')}"
+    yield f"    when: {{time: {walk.begin:.2f} s}}"
+    yield "    do:"
+    yield "      pedestrian:"
+    glued = ", ".join(key.replace(" ", GLUE) for key in keys)
+    lines = textwrap.wrap(f"{{{glued}}}", MAX_COLUMNS, initial_indent=" " * 8, subsequent_indent=" " * 9)
+    yield from (line.replace(GLUE, " ") for line in lines)
+
+
+def _scripted_object(thing: FoundObject) -> Iterator[str]:
     begin = thing.appears or 0.0
     _, x, y, yaw = thing.keyframes[0]
-    is_person = thing.is_moving and thing.is_cylinder and MIN_PERSON_RADIUS_M <= thing.size[0] <= MAX_PERSON_RADIUS_M
-    height = PERSON_HEIGHT_M if is_person else OBJECT_HEIGHT_M
+    height = PERSON_HEIGHT_M if is_person(thing) else OBJECT_HEIGHT_M
     size = ", ".join(f"{value:.2f}" for value in (*thing.size, height))
     shape = f"{'cylinder' if thing.is_cylinder else 'box'}: [{size}]"
     spawn = f"spawn: {{name: {_text(thing.name)}, {shape}, pose: {_pose(Pose2(x, y, yaw))}}}"
@@ -209,10 +242,6 @@ def _object(thing: FoundObject) -> Iterator[str]:
         yield "        ]}"
     else:
         yield f"    do: {{{spawn}}}"
-    if thing.disappears is not None:
-        yield f"  - name: {_text(f'{thing.name} disappears')}"
-        yield f"    when: {{time: {thing.disappears:.2f} s}}"
-        yield f"    do: {{remove: {{name: {_text(thing.name)}}}}}"
 
 
 def _fault_entry(fault: FoundFault) -> dict[str, Any]:

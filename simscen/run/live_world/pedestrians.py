@@ -12,23 +12,14 @@ from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.pedestrians.crowd import Crowd, Point
-from simscen.pedestrians.surroundings import ObservedObject, ObservedRobot, Surroundings, WallMap
+from simscen.pedestrians.surroundings import ObservedObject, ObservedRobot, Surroundings
+from simscen.run.live_world.pedestrian_map import BODY_HEIGHT_RANGE_M, PedestrianMap
 from simscen.sim.body.outline import footprint, outlines_in_band
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
-from simscen.worlds.geometry.cross_section import cross_section
-from simscen.worlds.routes.shortest_paths import ShortestPaths, shortest_paths_in
 
 MAX_STEP_S = 0.05
 """Longest step of the pedestrian model."""
-OBSTACLE_HEIGHTS_M = (0.15, 0.5, 0.95)
-"""Heights at which walls block pedestrians; walls at the last height also block their view."""
-BODY_HEIGHT_RANGE_M = (0.05, 1.7)
-"""Range of heights above the ground in which an object blocks a pedestrian."""
-PATH_CELL_M = 0.1
-"""Cell size of the grid for path planning."""
-PREFERRED_CLEARANCE_M = 0.2
-"""Clearance that planned paths keep where there is enough space."""
 EVENT_KINDS = {
     "reached": EventKind.PEDESTRIAN_REACHED,
     "reacted": EventKind.PEDESTRIAN_REACTED,
@@ -40,25 +31,17 @@ class PedestrianSimulation:
     """Steps all pedestrians of a run and passes their events to `listeners`. Set up when the first one appears."""
 
     def __init__(self, built: BuiltWorld, simulation: Simulation, clock: Clock) -> None:
-        self._built, self._simulation = built, simulation
+        self._map, self._simulation = PedestrianMap(built), simulation
         self._period = max(1, int(MAX_STEP_S * clock.rate + 1e-9))
         self._step_s = self._period / clock.rate
         self._behaviors: dict[str, str] = {}
         self._hulls: dict[str, Array] = {}
         self._outlines: dict[str, tuple[tuple[Solid, ...], tuple[Array, ...]]] = {}
-        self._planners: dict[float, ShortestPaths] = {}
         self.listeners: list[Callable[[Event], None]] = []
 
     @cached_property
-    def _walls(self) -> WallMap:
-        cuts = [cross_section(self._built.mesh, height) for height in OBSTACLE_HEIGHTS_M]
-        opaque = np.concatenate([np.full(len(cut.owners), cut is cuts[-1]) for cut in cuts])
-        owners = np.concatenate([cut.owners for cut in cuts]).astype(np.int64)
-        return WallMap(np.concatenate([cut.segments for cut in cuts]), owners, opaque)
-
-    @cached_property
     def _crowd(self) -> Crowd:
-        return Crowd(self._walls, self._plan_path)
+        return Crowd(self._map.walls, self._map.plan_path)
 
     def add(self, walker: WalkingPedestrian) -> Body:
         """Add a pedestrian and return its body."""
@@ -83,8 +66,8 @@ class PedestrianSimulation:
 
     def has_room(self, place: Point, radius: float, walls_only: bool) -> bool:
         """Return whether a pedestrian with this radius in m fits at a place; `walls_only` ignores all but walls."""
-        if walls_only or self._walls.distance(place) < radius:
-            return self._walls.distance(place) >= radius
+        if walls_only or self._map.walls.distance(place) < radius:
+            return self._map.walls.distance(place) >= radius
         surroundings = self._surroundings()
         outlines = [outline for observed in surroundings.objects for outline in observed.outlines]
         outlines += [robot.pose.apply(robot.outline) for robot in surroundings.robots]
@@ -140,15 +123,3 @@ class PedestrianSimulation:
         (vx, vy, _), _ = robot.base_velocity()
         radius = float(np.hypot(outline[:, 0], outline[:, 1]).max())
         return ObservedRobot(robot.name, robot.base_pose().plane, (vx, vy), radius, outline)
-
-    def _plan_path(self, start: Point, goal: Point, radius: float) -> list[Point]:
-        """Return a path around walls, with extra clearance if possible; a straight line if there is no path."""
-        for clearance in (radius + PREFERRED_CLEARANCE_M, radius):
-            if clearance not in self._planners:
-                self._planners[clearance] = shortest_paths_in(
-                    self._built, (), clearance, BODY_HEIGHT_RANGE_M, PATH_CELL_M
-                )
-            corners = self._planners[clearance].path(Pose2(*start, 0.0), Pose2(*goal, 0.0))
-            if corners is not None:
-                return [(x, y) for x, y in corners[1:].tolist()]
-        return [goal]

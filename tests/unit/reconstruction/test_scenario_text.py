@@ -25,7 +25,7 @@ def contents(**changes):
         "start": Pose2(1.0, 3.0, 0.5),
         "estimate": None,
         "stack": {},
-        "navigation": "",
+        "passing_radius": None,
         "goals": [ScenarioGoal("a, b: {c}", Pose2(7.0, 3.0), 60.0, Evidence("/goal_pose", 0.0, 20.0))],
         "stops_at_failure": True,
         "time_limit": 100.0,
@@ -86,3 +86,10 @@ def test_a_carried_robot_is_kidnapped(tmp_path):
     scenario, _ = loaded(tmp_path, kidnaps=[(4.0, Pose2(2.0, 5.0, 0.0), SEEN)])
     (event,) = scenario.spec.events
     assert event.do is not None
+
+
+def test_goals_that_were_passed_without_a_stop_have_the_radius_of_the_log(tmp_path):
+    scenario, text = loaded(tmp_path, passing_radius=0.5, evidence={"navigation": SEEN})
+    assert scenario.spec.navigation.mode == "navigate_through_poses"
+    assert scenario.spec.navigation.radius == 0.5
+    assert "# seen in 40 scans" in text

@@ -1,0 +1,260 @@
+"""Pedestrians of the scenario language that reproduce tracked people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from simscen.core.environment.world_model import Unseen, WalkingPedestrian
+from simscen.core.geometry import Array, Pose2
+from simscen.pedestrians.forces import RELAXATION_TIME_S
+from simscen.reconstruction.evidence import windows
+from simscen.reconstruction.objects.found_object import FoundObject, FoundWalk
+from simscen.reconstruction.objects.walk_trial import WalkTrial
+
+MIN_CYLINDER_RADIUS_M, MAX_CYLINDER_RADIUS_M = 0.15, 0.4
+MAX_LEGS_SIDE_M = 0.7
+"""Longest side of a box around two legs."""
+MIN_BODY_RADIUS_M, MAX_BODY_RADIUS_M, LEGS_BODY_RADIUS_M = 0.2, 0.35, 0.25
+MIN_WALK_M = 1.0
+MIN_WALKING_SPEED_M_S, MAX_WALKING_SPEED_M_S = 0.3, 2.2
+MAX_RMSE_M, MAX_TIME_SHIFT_S = 0.3, 0.5
+"""Largest difference between a track and the pedestrian that replaces it."""
+TRIED_SHIFTS_S = np.round(np.arange(-1.0, 1.01, 0.05), 2)
+STEP_S, SMOOTHING_STEPS = 0.1, 5
+MOVING_SPEED_M_S, MIN_STOP_S = 0.2, 1.5
+PATH_TOLERANCES_M = (math.inf, 0.6, 0.3)
+"""Distances that the straight lines between goals may have from the track: first only the end is a goal."""
+MEETING_DISTANCE_M, SURPRISE_DISTANCE_M = 3.0, 4.0
+"""Distance from the robot within which a person would evade it, or stop and look at it."""
+BETTER_M = 0.05
+"""Amount by which the RMSE of a more complex explanation must be smaller."""
+GOOD_RMSE_M, HOPELESS_RMSE_M = 0.1, 0.9
+"""RMSE below which no other path is tried, and above which no other speed is."""
+SPEED_FACTORS = (0.93, 1.07)
+
+
+@dataclass(frozen=True)
+class _Reaction:
+    """How a person may react to the robot."""
+
+    behavior: str = "regular"
+    duration: float = 0.0
+    blind_to: frozenset[Unseen] = frozenset()
+
+
+def with_walks(objects: Sequence[FoundObject], trial: WalkTrial) -> list[FoundObject]:
+    """Return the objects; those that a pedestrian reproduces have a walk, and their names begin with "person"."""
+    people = [thing for thing in objects if is_person(thing)]
+    others = [thing for thing in objects if thing not in people]
+    walks = {
+        thing.name: _fitted_walk(thing, [one for one in people if one is not thing], others, trial) for thing in people
+    }
+    found = [replace(thing, walk=walks.get(thing.name)) for thing in objects]
+    while any(thing.walk for thing in found):
+        found = _walked_together(found, trial)
+        worst = max(found, key=_error)
+        if _error(worst) <= 1.0:
+            break
+        found = [replace(thing, walk=None) if thing is worst else thing for thing in found]
+    return [*_named(found)]
+
+
+def _named(found: Sequence[FoundObject]) -> Iterator[FoundObject]:
+    count = 0
+    for thing in found:
+        if thing.walk is None:
+            yield thing
+        else:
+            count += 1
+            walker = replace(thing.walk.walker, name=f"person {count}")
+            yield replace(thing, name=walker.name, walk=replace(thing.walk, walker=walker))
+
+
+def _error(thing: FoundObject) -> float:
+    """Return how far the walk of an object is from its track, in multiples of what is allowed; 0 without a walk."""
+    walk = thing.walk
+    return 0.0 if walk is None else max(walk.rmse / MAX_RMSE_M, walk.time_shift / MAX_TIME_SHIFT_S)
+
+
+def is_person(thing: FoundObject) -> bool:
+    """Return whether the size and the speed of an object are those of a person who walks."""
+    if not thing.is_moving:
+        return False
+    if thing.is_cylinder:
+        is_body = MIN_CYLINDER_RADIUS_M <= thing.size[0] <= MAX_CYLINDER_RADIUS_M
+    else:
+        is_body = max(thing.size) <= MAX_LEGS_SIDE_M
+    track = _Track(thing)
+    return is_body and track.length >= MIN_WALK_M and MIN_WALKING_SPEED_M_S <= track.speed <= MAX_WALKING_SPEED_M_S
+
+
+class _Track:
+    """Positions of an object every STEP_S."""
+
+    def __init__(self, thing: FoundObject) -> None:
+        begin, end = thing.keyframes[0][0], thing.keyframes[-1][0]
+        self.times: Array = np.append(np.arange(begin, end, STEP_S), end)
+        self.positions: Array = thing.poses_at(self.times)[:, :2]
+        span = np.arange(len(self.times))
+        after = np.minimum(span + SMOOTHING_STEPS, len(span) - 1)
+        before = np.maximum(span - SMOOTHING_STEPS, 0)
+        moved = np.hypot(*(self.positions[after] - self.positions[before]).T)
+        self.speeds: Array = moved / np.maximum(self.times[after] - self.times[before], 1e-6)
+
+    @property
+    def length(self) -> float:
+        return float(np.hypot(*np.diff(self.positions, axis=0).T).sum())
+
+    @property
+    def speed(self) -> float:
+        """Usual speed in m/s while it walks."""
+        walking = self.speeds[self.speeds > MOVING_SPEED_M_S]
+        return float(np.median(walking)) if len(walking) else 0.0
+
+    def at(self, time: float) -> tuple[float, float]:
+        x, y = (float(np.interp(time, self.times, self.positions[:, axis])) for axis in (0, 1))
+        return x, y
+
+
+def _fitted_walk(
+    thing: FoundObject, people: Sequence[FoundObject], objects: Sequence[FoundObject], trial: WalkTrial
+) -> FoundWalk | None:
+    """Return the simplest walk that reproduces a person while all others move as recorded; None without one."""
+    track = _Track(thing)
+    distances = trial.robot_distances(track.times, track.positions)
+    meets = bool(distances.min() < MEETING_DISTANCE_M)
+
+    def tried(begin: float, walker: WalkingPedestrian) -> FoundWalk:
+        walked = trial.positions([(begin, walker)], people, objects, float(track.times[-1]))
+        return _compared(track, begin, walker, *walked[walker.name])
+
+    best: FoundWalk | None = None
+    for reaction in _reactions(track, distances, meets):
+        for begin, walker in _walkers(thing, track, reaction, trial):
+            best = _better(best, tried(begin, walker), BETTER_M)
+            if best.rmse < GOOD_RMSE_M:
+                break
+    if best is None or best.rmse > HOPELESS_RMSE_M:
+        return None
+    for factor in SPEED_FACTORS:
+        faster = replace(best.walker, speed=round(factor * track.speed, 2))
+        best = _better(best, tried(best.begin, faster), BETTER_M / 2)
+    return replace(best, meets_robot=meets)
+
+
+def _better(one: FoundWalk | None, other: FoundWalk, margin: float) -> FoundWalk:
+    return other if one is None or other.rmse < one.rmse - margin else one
+
+
+def _reactions(track: _Track, distances: Array, meets: bool) -> Iterator[_Reaction]:
+    """Yield how the person may react to the robot, the simplest first."""
+    yield _Reaction()
+    if meets:
+        yield _Reaction(blind_to=frozenset({"robots"}))
+    for stop in windows(track.speeds < MOVING_SPEED_M_S, track.times, MIN_STOP_S):
+        walks_before_and_after = stop.first > 0 and stop.last < len(track.times) - 1
+        if walks_before_and_after and distances[stop.first] < SURPRISE_DISTANCE_M:
+            yield _Reaction("surprised", round(stop.length, 1))
+            return
+
+
+def _walkers(
+    thing: FoundObject, track: _Track, reaction: _Reaction, trial: WalkTrial
+) -> Iterator[tuple[float, WalkingPedestrian]]:
+    """Yield times of appearance and pedestrians that walk along a track, those with the fewest goals first.
+
+    A pedestrian starts at rest. One whose track begins in motion appears earlier by its relaxation time.
+    """
+    radius, walls = body_radius(thing), trial.world.walls
+    seen: set[tuple[float, tuple[tuple[float, float], ...]]] = set()
+    for tolerance in PATH_TOLERANCES_M:
+        goals = [*_corners(track.positions, tolerance)[1:-1], _last_goal(track, radius, trial)]
+        rounded = tuple((round(float(x), 2), round(float(y), 2)) for x, y in goals)
+        if any(walls.distance(goal) < radius + 0.01 for goal in rounded):
+            continue
+        for lead in (RELAXATION_TIME_S, 0.0):
+            begin = round(max(0.0, float(track.times[0]) - lead), 2)
+            x, y = track.at(begin + lead)
+            if (begin, rounded) in seen or walls.distance((x, y)) < radius + 0.01:
+                continue
+            seen.add((begin, rounded))
+            yaw = math.atan2(rounded[0][1] - y, rounded[0][0] - x)
+            yield (
+                begin,
+                WalkingPedestrian(
+                    name=thing.name,
+                    pose=Pose2(round(x, 3), round(y, 3), round(yaw, 2)),
+                    goals=rounded,
+                    speed=round(track.speed, 2),
+                    radius=radius,
+                    behavior=reaction.behavior,  # type: ignore[arg-type]
+                    blind_to=reaction.blind_to,
+                    reacts_within=SURPRISE_DISTANCE_M if reaction.behavior == "surprised" else 0.0,
+                    reacts_for=reaction.duration,
+                ),
+            )
+
+
+def body_radius(thing: FoundObject) -> float:
+    """Return the radius in m of the pedestrian that has the size of an object."""
+    if not thing.is_cylinder:
+        return LEGS_BODY_RADIUS_M
+    return min(max(thing.size[0], MIN_BODY_RADIUS_M), MAX_BODY_RADIUS_M)
+
+
+def _last_goal(track: _Track, radius: float, trial: WalkTrial) -> Array:
+    """Return the end (2,) of a track; if it ends in motion, a place farther on, because a pedestrian brakes."""
+    end: Array = track.positions[-1]
+    motion = end - track.at(float(track.times[-1]) - SMOOTHING_STEPS * STEP_S)
+    distance = float(np.hypot(*motion))
+    if distance < MOVING_SPEED_M_S * SMOOTHING_STEPS * STEP_S:
+        return end
+    farther: Array = end + motion / distance * track.speed * RELAXATION_TIME_S
+    walls = trial.world.walls
+    has_room = walls.distance((float(farther[0]), float(farther[1]))) >= radius + 0.01
+    return farther if has_room and walls.visible(end[None], farther[None])[0] else end
+
+
+def _corners(path: Array, tolerance: float) -> list[Array]:
+    """Return the points of a path (n, 2) between which straight lines are at most `tolerance` m away from it.
+
+    Source: Douglas and Peucker, Algorithms for the reduction of the number of points (1973).
+    """
+    along = path[-1] - path[0]
+    length = float(np.hypot(*along))
+    offsets = path - path[0]
+    share = np.clip(offsets @ along / max(length**2, 1e-9), 0.0, 1.0)
+    away = np.hypot(*(offsets - share[:, None] * along).T)
+    worst = int(np.argmax(away))
+    if len(path) < 3 or float(away[worst]) <= tolerance:
+        return [path[0], path[-1]]
+    return [*_corners(path[: worst + 1], tolerance), *_corners(path[worst:], tolerance)[1:]]
+
+
+def _walked_together(found: Sequence[FoundObject], trial: WalkTrial) -> list[FoundObject]:
+    """Return the objects with their walks in a simulation in which all pedestrians walk at the same time."""
+    walkers = [(thing.walk.begin, thing.walk.walker) for thing in found if thing.walk]
+    objects = [thing for thing in found if not thing.walk]
+    end = max(thing.keyframes[-1][0] for thing in found if thing.walk)
+    paths = trial.positions(walkers, [], objects, end)
+    together = []
+    for thing in found:
+        walk = thing.walk
+        if walk is not None:
+            again = _compared(_Track(thing), walk.begin, walk.walker, *paths[thing.name])
+            walk = replace(again, meets_robot=walk.meets_robot)
+        together.append(replace(thing, walk=walk))
+    return together
+
+
+def _compared(track: _Track, begin: float, walker: WalkingPedestrian, times: Array, positions: Array) -> FoundWalk:
+    def rmse(shift: float) -> float:
+        at = np.column_stack([np.interp(track.times + shift, times, positions[:, axis]) for axis in (0, 1)])
+        return float(np.sqrt(np.mean(np.sum((at - track.positions) ** 2, axis=1))))
+
+    errors = [(rmse(shift), abs(shift)) for shift in TRIED_SHIFTS_S.tolist()]
+    return FoundWalk(begin, walker, times, positions, rmse(0.0), min(errors)[1])
