@@ -11,6 +11,7 @@ from simscen.loading.checks.scene_runner import check_in_world, world_reader_not
 from simscen.loading.files.single_files import load_world_file
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_variations
+from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.variations.naming import VariationProblems, merge_problems
 from simscen.loading.world_cache import WorldCache
 
@@ -23,17 +24,21 @@ MAX_WORLDS = 8
 
 @dataclass
 class TextChecks:
-    """Checks of one file; worlds and shortest paths are kept between two checks."""
+    """Checks of one file; worlds and shortest paths are kept between two checks.
+
+    `stack` replaces the stack of the scenario.
+    """
 
     file: EditedFile
     lenient: bool = False
+    stack: StackChoice | None = None
     cache: WorldCache = field(default_factory=lambda: WorldCache(MAX_WORLDS))
 
     def load(self, text: str) -> tuple[LoadedScenario, ...] | list[Problem]:
         """Return the first variations of a scenario, or its problems."""
         file = self.file
         numbers = CHECKED_VARIATIONS
-        loaded = try_variations(file.path, file.root, file.world_path, None, numbers, {file.path: text})
+        loaded = try_variations(file.path, file.root, file.world_path, self.stack, numbers, {file.path: text})
         if isinstance(loaded, list):
             return loaded
         return tuple(one.with_changes(lenient=self.lenient) for one in loaded)

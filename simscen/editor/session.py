@@ -20,6 +20,7 @@ from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import apply_edits
 from simscen.editor.trial_run import TrialRuns
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.yaml.source_nodes import parse_source
 from simscen.loading.yaml.textfile import MAX_FILE_BYTES
 from simscen.run.process.jobs import Backend
@@ -49,21 +50,24 @@ class EditorSession:
         backend_factory: Callable[[], Backend],
         new_text: str = "",
         lenient: bool = False,
+        stack: StackChoice | None = None,
         with_command: WithCommand = _as_it_is,
     ) -> None:
         """Open a file; `new_text` is the text of one that does not exist yet. Raises InvalidInput.
 
-        `with_command` returns a scenario with the commands of its external stacks, and problems if they are unknown.
+        Runs use `stack` instead of the stack of the scenario. `with_command` returns a scenario with the commands of
+        its external stacks, and problems if they are unknown.
         """
         self.file = file
         self.runs = TrialRuns(backend_factory)
         self.world_page: Callable[[Path], str] = lambda _: ""
         """Returns the address of the page that edits a world file, relative to that of this session."""
         self._backend_factory, self._lenient, self._with_command = backend_factory, lenient, with_command
+        self._stack = stack
         self._document = Document(file.path, file.display_name)
         self._opened = Content(new_text, NEW) if new_text else self._document.read()
         self._backgrounds = Backgrounds(file.root, file.world_path)
-        self._checks, self._preview_checks = TextChecks(file, lenient), TextChecks(file, lenient)
+        self._checks, self._preview_checks = (TextChecks(file, lenient, stack) for _ in range(2))
         self._scene_lock, self._check_lock, self._preview_lock = threading.Lock(), threading.Lock(), threading.Lock()
         self.requests: Mapping[str, Callable[[Data], Data]] = {
             "open": self.open,
@@ -198,6 +202,7 @@ class EditorSession:
             "text": content.text,
             "version": content.version,
             "is_new": content.version == NEW,
+            "stack": "" if self._stack is None else self._stack.name,
         }
 
     def _problem_data(self, problem: Problem, objects: list[Any], own: Any, text: str) -> Data:

@@ -33,6 +33,14 @@ def command(
     ] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address without opening it.")] = False,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the local server; 0: any free port.")] = 0,
+    stack: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            autocompletion=completions.stacks,
+            help="Run the scenario with this stack instead of its own, as in `simscen run`.",
+        ),
+    ] = None,
     root: RootOption = None,
     world_path: WorldPathOption = None,
     lenient: LenientOption = False,
@@ -48,11 +56,15 @@ def command(
     Exit code 0: ended with Ctrl-C; 2: the file or an option is unusable.
     """
     edited, text = _edited_file(file, new, map_, root, tuple(world_path or ()), lenient)
-    from simscen.cli.session.stacks import Stacks
+    if stack is not None and edited.kind != "scenario":
+        raise UsageError("--stack has no effect on a world, which does not run; edit a scenario")
+    from simscen.cli.session.stacks import stacks_of
     from simscen.editor.server import EditorServer
     from simscen.editor.session import EditorSession
 
-    session = EditorSession(edited, _backend, text, lenient, Stacks().with_command)
+    stacks = stacks_of([] if stack is None else [stack], edited.root, edited.world_path)
+    chosen = next(iter(stacks.chosen), None)
+    session = EditorSession(edited, _backend, text, lenient, chosen, stacks.with_command)
     try:
         server = EditorServer(session, port)
     except OSError as error:

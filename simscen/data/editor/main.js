@@ -32,6 +32,8 @@ class Page {
     this.form = new Form($("details"), (edits, what) => this.edit(edits, what));
     this.textPane = new TextPane($("text"), $("gutter"), $("problems"), $("count"), (text) => this.changed(text, "typing"), (line) => this.selectLine(line));
     this.runs = new RunPanel($("runpanel"), (text) => this.say(text), (line) => { this.showTab("text"); this.textPane.goTo(line, 1); });
+    this.runs.stack = opened.stack;
+    if (opened.stack) $("runstack").textContent = `Runs use the stack ${opened.stack}, not the one in the text.`;
     $("name").textContent = opened.name;
     document.title = `${opened.name} – simscen edit`;
     if (this.kind !== "scenario") $("run").hidden = $("runtab").hidden = true;

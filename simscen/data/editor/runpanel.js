@@ -10,6 +10,7 @@ export class RunPanel {
   constructor(element, say, goToLine) {
     Object.assign(this, { element, say, goToLine });
     this.number = 0;
+    this.stack = "";
   }
 
   async start(text) {
@@ -42,7 +43,8 @@ export class RunPanel {
     const good = run.state === "passed" || run.state === "failed-as-expected", page = `runs/${run.run}/replay.html`;
     const rows = run.verdicts.map((one) => el("tr", {}, el("td", { class: one.status === "pass" ? "good" : "bad" }, `${SIGNS[one.status] ?? "?"} ${one.status}`),
       el("td", {}, one.line ? el("button", { onclick: () => this.goToLine(one.line) }, one.id) : one.id), el("td", {}, one.text)));
-    const head = `The run ${run.state === "error" ? "could not be completed" : run.state === "canceled" ? "was stopped" : run.state} after ${run.seconds.toFixed(1)} s simulated${run.message ? `: ${run.message}` : ""}`;
+    const what = this.stack ? `The run with the stack ${this.stack}` : "The run";
+    const head = `${what} ${run.state === "error" ? "could not be completed" : run.state === "canceled" ? "was stopped" : run.state} after ${run.seconds.toFixed(1)} s simulated${run.message ? `: ${run.message}` : ""}`;
     fill(this.element, el("p", { id: "outcome", class: good ? "good" : "bad" }, head), rows.length ? el("table", { "aria-label": "Verdicts" }, el("tbody", {}, ...rows)) : null,
       run.replay ? el("p", {}, el("a", { href: page, target: "_blank", rel: "noreferrer" }, "Open the replay in a tab of its own")) : null,
       run.replay ? el("iframe", { src: page, title: "Replay of the run" }) : null);

@@ -110,6 +110,8 @@ def test_a_new_scenario_on_a_map_is_valid_and_has_a_goal_that_can_be_reached(tmp
         (("--new", "--map", "w.sdf", "a.scenario.yaml"), "already exists"),
         (("--new", "--map", "w.sdf", "nowhere/a"), "nowhere is not a folder"),
         (("--root", "folder", "a.scenario.yaml"), "outside the scenario root"),
+        (("a.scenario.yaml", "--stack", "unheard_of"), "cannot read --stack unheard_of"),
+        (("w.world.yaml", "--stack", "reference"), "--stack has no effect on a world"),
     ],
 )
 def test_what_cannot_be_edited_is_an_error_with_exit_code_2(
@@ -118,6 +120,7 @@ def test_what_cannot_be_edited_is_an_error_with_exit_code_2(
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     (tmp_path / "r.robot.yaml").write_text("simscen: 1\ndrive: {}\n")
     (tmp_path / "w.sdf").write_text(SDF)
+    (tmp_path / "w.world.yaml").write_text("simscen: 1\n")
     (tmp_path / "folder").mkdir()
     ended = simscen("edit", *arguments, "--no-browser")
     assert ended.code == 2

@@ -6,8 +6,13 @@ from typing import Any
 
 import pytest
 
+from simscen.cli.session.stacks import Stacks
+from simscen.core.external_command import ExternalCommand
 from simscen.editor.files import EditedFile
 from simscen.editor.session import EditorSession, RequestRefused
+from simscen.editor.trial_run import Trial
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.stacks.choice import StackChoice
 from simscen.run.process.jobs import Backend
 
 TEXT = """\
@@ -29,6 +34,14 @@ events:
       - do: {kidnap: {pose: {x: 3, y: 3}}}
 faults:
   - {sensor: lidar, off: {}, when: {robot_within: {object: cart, distance: 2 m}}, for: 1 s}
+pass: [goals_reached: {}]
+"""
+RUNNABLE = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [9, 0], [9, 5], [0, 5], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 3, y: 1}}]
+stack: {profile: advanced}
 pass: [goals_reached: {}]
 """
 MakeSession = Any
@@ -188,3 +201,23 @@ def test_what_a_base_file_says_is_shown_and_overridden_here(session: MakeSession
 def test_a_scenario_with_problems_does_not_run(session: MakeSession) -> None:
     with pytest.raises(RequestRefused, match="inside obstacle"):
         session().run({"text": TEXT.replace("x: 7, y: 2", "x: 4, y: 4")})
+
+
+def test_a_run_uses_the_stack_of_the_option_instead_of_that_of_the_text(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(RUNNABLE)
+    program = ExternalCommand(("drive",), {}, str(tmp_path))
+    stacks = Stacks((StackChoice("mine", "drive", external_command=program),))
+    file = EditedFile(tmp_path / "a.scenario.yaml", "scenario", tmp_path)
+    session = EditorSession(file, _no_backend, stack=stacks.chosen[0], with_command=stacks.with_command)
+    started: list[LoadedScenario] = []
+
+    def start(loaded: LoadedScenario) -> Trial:
+        started.append(loaded)
+        return Trial(1, tmp_path, 60.0)
+
+    monkeypatch.setattr(session.runs, "start", start)
+    assert session.open({})["stack"] == "mine"
+    session.run({"text": RUNNABLE})
+    assert [(one.stack, one.external_command) for one in started] == [("mine=drive", program)]
