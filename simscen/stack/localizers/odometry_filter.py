@@ -30,6 +30,7 @@ MAX_YAW_RATE_RADPS = 100.0
 _WHEELS = np.eye(3, 4)
 _WHEELS_AND_GYRO = np.vstack((_WHEELS, (0.0, 0.0, 1.0, 1.0)))
 _FORWARD_AND_GYRO = _WHEELS_AND_GYRO[[VX, VY, 3]]
+_IDENTITIES = {size: np.eye(size) for size in (3, 4)}
 
 
 class OdometryFilter:
@@ -52,6 +53,8 @@ class OdometryFilter:
         self._filter.x = np.zeros(4)
         self._filter.P = np.diag([0.0, 0.0, 0.0, spec.gyro_bias**2])
         self._covariance = np.zeros((7, 7))  # of the pose and the state together
+        self._pose_covariance, self._cross_covariance = self._covariance[:3, :3], self._covariance[:3, 3:]  # views
+        self._jacobian = np.eye(3, 7)  # of the pose after a step by the pose before it and the state
         self._pose = Pose2(0.0, 0.0)
         self._last: Odometry | None = None  # reading of the last update
         self._last_tick: int | None = None  # of the last reading
@@ -86,7 +89,7 @@ class OdometryFilter:
         self._move(seconds)
         vx, vy, wz, _ = self._filter.x.tolist()
         variances = self._filter.P.diagonal().tolist()
-        covariance = tuple(self._covariance[:3, :3].ravel().tolist())
+        covariance = tuple(self._pose_covariance.ravel().tolist())
         return Odometry(
             odometry.sensor, odometry.tick, self._pose, Twist(vx, vy, wz),
             (variances[VX], variances[VY], variances[VYAW]), covariance,
@@ -105,27 +108,29 @@ class OdometryFilter:
         """Predict and update the mean velocity during the last `seconds`; `turned` is the gyroscope's measurement."""
         self._filter.Q = self._process_noise * seconds
         self._filter.predict()
-        variances = [max(variance / seconds**2, MIN_VARIANCE) for variance in self._step_variances]
+        squared = seconds**2
+        variances = [max(variance / squared, MIN_VARIANCE) for variance in self._step_variances]
         if turned is None:
             measurement, matrix = list(wheels), _WHEELS
         else:
-            rate, variance = turned[0] / seconds, max(turned[1] / seconds**2, MIN_VARIANCE)
+            rate, variance = turned[0] / seconds, max(turned[1] / squared, MIN_VARIANCE)
             if self._slips(wheels.wz - rate, variances[VYAW] + variance):
                 measurement, matrix = [wheels.vx, wheels.vy, rate], _FORWARD_AND_GYRO
                 variances[VYAW] = variance
             else:
                 measurement, matrix = [*wheels, rate], _WHEELS_AND_GYRO
                 variances.append(variance)
-        self._filter.update(np.array(measurement), R=np.diag(variances), H=matrix)
+        noise = _IDENTITIES[len(variances)] * variances  # a diagonal matrix, in half of the time of np.diag
+        self._filter.update(np.array(measurement), R=noise, H=matrix)
         # The update corrects the state, but not the pose: only the covariance between both changes.
-        correction = np.dot(self._filter.K, matrix)
-        self._covariance[:3, 3:] -= np.dot(self._covariance[:3, 3:], correction.T)
-        self._covariance[3:, :3] = self._covariance[:3, 3:].T
+        cross = self._cross_covariance
+        cross -= cross.dot(self._filter.K.dot(matrix).T)
+        self._covariance[3:, :3] = cross.T
 
     def _slips(self, difference: float, variance: float) -> bool:
         """Return whether wheels and gyroscope disagree about the yaw rate by more than their errors explain."""
-        difference += float(self._filter.x[BIAS])
-        limit = self._rejection_threshold**2 * (variance + float(self._filter.P[BIAS, BIAS]))
+        difference += self._filter.x.item(BIAS)
+        limit = self._rejection_threshold**2 * (variance + self._filter.P.item(BIAS, BIAS))
         return difference**2 > limit
 
     def _move(self, seconds: float) -> None:
@@ -136,16 +141,12 @@ class OdometryFilter:
         c, s = math.cos(heading) * seconds, math.sin(heading) * seconds
         dx, dy, half = c * vx - s * vy, s * vx + c * vy, seconds / 2
         self._pose = Pose2(x + dx, y + dy, wrap(yaw + wz * seconds))
-        jacobian = np.array((
-            (1.0, 0.0, -dy, c, -s, -dy * half, 0.0),
-            (0.0, 1.0, dx, s, c, dx * half, 0.0),
-            (0.0, 0.0, 1.0, 0.0, 0.0, seconds, 0.0),
-        ))  # fmt: skip
-        covariance = self._covariance
+        jacobian, covariance = self._jacobian, self._covariance
+        jacobian[:, 2:6] = (-dy, c, -s, -dy * half), (dx, s, c, dx * half), (1.0, 0.0, 0.0, seconds)
         covariance[3:, 3:] = self._filter.P
-        moved = np.dot(jacobian, covariance)
-        covariance[:3, :3] = np.dot(moved, jacobian.T)
-        covariance[:3, 3:] = moved[:, 3:]
+        moved = jacobian.dot(covariance)
+        self._pose_covariance[:] = moved.dot(jacobian.T)
+        self._cross_covariance[:] = moved[:, 3:]
         covariance[3:, :3] = moved[:, 3:].T
 
 
