@@ -1,7 +1,7 @@
 """Rigid-body model of a robot, independent of the physics engine: hull, wheels, masses, and what it can climb.
 
-The analysis of climbing is quasi-static, without a run-up; `friction` is that between wheels and surface. Sources: Bekker,
-Introduction to Terrain-Vehicle Systems, 1969; Wong, Theory of Ground Vehicles, chapters 2 and 4.
+The analysis of climbing is quasi-static, without a run-up; `friction` is that between wheels and surface. Sources:
+Bekker, Introduction to Terrain-Vehicle Systems, 1969; Wong, Theory of Ground Vehicles, chapters 2 and 4.
 """
 
 import math

@@ -131,7 +131,7 @@ class OdometryFilter:
         """Return whether wheels and gyroscope disagree about the yaw rate by more than their errors explain."""
         difference += self._filter.x.item(BIAS)
         limit = self._rejection_threshold**2 * (variance + self._filter.P.item(BIAS, BIAS))
-        return difference**2 > limit
+        return bool(difference**2 > limit)
 
     def _move(self, seconds: float) -> None:
         """Move the pose by the velocity, at the mean heading of the step, and propagate its covariance."""
