@@ -1,17 +1,160 @@
 """ROS maps, read and written as by Nav2's map_server (nav2_map_server/src/map_io.cpp)."""
 
+import io
 import json
+import re
+import stat
+import struct
+import warnings
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.errors import InvalidInput, Problem
-from simscen.core.files import require_regular_file
+from simscen.core.files import record_read_file, require_regular_file
 from simscen.core.geometry import Pose2
 from simscen.model.ros_map import RosMapSpec
-from simscen.worlds.maps.map_image import CODE, read_image
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+Bytes8 = npt.NDArray[np.uint8]
+Quanta = npt.NDArray[np.uint16]
+
+MAX_PIXELS = 16 * 2**20
+MAX_BYTES = 64 * 2**20
+CODE = "SC320"
+
+_GAP = rb"(?:\s|#[^\r\n]*[\r\n])+"
+_PNM_HEADER = re.compile(rb"(P[25])" + _GAP + rb"(\d{1,10})" + _GAP + rb"(\d{1,10})" + _GAP + rb"(\d{1,10})\s")
+
+
+@dataclass(frozen=True, eq=False)
+class MapImage:
+    """Pixels as nav2_map_server reads them with GraphicsMagick: `gray` (h, w), top row first; `alpha` if it has one."""
+
+    gray: Bytes8
+    alpha: Bytes8 | None = None
+
+
+class UnreadableImage(Exception):
+    """An image cannot be read; the message is the reason."""
+
+
+def read_image(path: Path) -> MapImage:
+    """Read a pgm (P2 or P5, 8 or 16 bit), png or bmp; raises InvalidInput for other or too large files."""
+    try:
+        data = _read_bytes(path)
+        if data[:2] in (b"P2", b"P5"):
+            return MapImage(_eight_bits(_decode_pgm(data)))
+        return _decode_png_or_bmp(data)
+    except UnreadableImage as error:
+        raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from None
+
+
+def _read_bytes(path: Path) -> bytes:
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise UnreadableImage("not a regular file")
+        if status.st_size > MAX_BYTES:
+            raise UnreadableImage(f"map too large: {status.st_size} bytes, more than {MAX_BYTES}")
+        record_read_file(path.resolve())
+        return path.read_bytes()
+    except OSError as error:
+        reason = (error.strerror or "cannot be read").lower()
+        raise UnreadableImage(f"cannot read the map's image: {reason}") from None
+
+
+def _check_size(width: int, height: int) -> None:
+    if width < 1 or height < 1:
+        raise UnreadableImage(f"the image has no pixels: {width} x {height}")
+    if width * height > MAX_PIXELS:
+        raise UnreadableImage(f"map too large: {width} x {height} pixels, more than {MAX_PIXELS}")
+
+
+def _decode_pgm(data: bytes) -> Quanta:
+    """Return a PGM as 16-bit grays (h, w). Source: netpbm's pgm(5); samples of two bytes are big-endian."""
+    match = _PNM_HEADER.match(data)
+    if match is None:
+        raise UnreadableImage("the PGM header is damaged; expected width, height and maxval")
+    width, height, maximum = (int(text) for text in match.groups()[1:])
+    _check_size(width, height)
+    if not 1 <= maximum <= 65535:
+        raise UnreadableImage(f"maxval must be between 1 and 65535, not {maximum}")
+    raster = data[match.end() :]
+    values = _ascii_samples(raster) if match[1] == b"P2" else _binary_samples(raster, width * height, maximum)
+    if len(values) < width * height:
+        raise UnreadableImage(f"the PGM is truncated: {len(values)} of {width * height} pixels")
+    values = values[: width * height].reshape(height, width)
+    if values.max() > maximum:
+        raise UnreadableImage(f"a pixel is {values.max()}, above the maxval of {maximum}")
+    scale = np.round(np.arange(maximum + 1) * (65535 / maximum)).astype(np.uint16)
+    quanta: Quanta = scale[values]
+    return quanta
+
+
+def _binary_samples(raster: bytes, count: int, maximum: int) -> npt.NDArray[np.generic]:
+    sample = np.dtype(">u2" if maximum > 255 else "u1")
+    return np.frombuffer(raster, dtype=sample, count=min(count, len(raster) // sample.itemsize))
+
+
+def _ascii_samples(raster: bytes) -> npt.NDArray[np.generic]:
+    text = re.sub(rb"#[^\r\n]*", b"", raster)
+    if re.search(rb"[^\d\s]", text):
+        raise UnreadableImage("the PGM contains something that is not a number")
+    if len(text) > 0 and text.isspace():
+        return np.empty(0, dtype=np.int64)
+    return np.fromstring(text, dtype=np.int64, sep=" ")
+
+
+def _decode_png_or_bmp(data: bytes) -> MapImage:
+    from PIL import Image, UnidentifiedImageError
+
+    if data[:8] == b"\x89PNG\r\n\x1a\n" and len(data) >= 24:
+        kind, (width, height) = "PNG", struct.unpack(">II", data[16:24])
+    elif data[:2] == b"BM" and len(data) >= 26:
+        kind, (width, height) = "BMP", _bmp_size(data)
+    else:
+        raise UnreadableImage("not a PGM (P2, P5), PNG or BMP image")
+    _check_size(width, height)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            image = Image.open(io.BytesIO(data), formats=[kind])
+            _check_size(*image.size)
+            image.load()
+    except UnidentifiedImageError:  # its message contains the address of an object
+        raise UnreadableImage(f"the {kind} cannot be decoded") from None
+    except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError) as error:
+        raise UnreadableImage(f"the {kind} cannot be decoded: {error}") from None
+    return _gray_and_alpha(image)
+
+
+def _bmp_size(data: bytes) -> tuple[int, int]:
+    (header,) = struct.unpack("<I", data[14:18])
+    width, height = struct.unpack("<HH" if header == 12 else "<ii", data[18 : 22 if header == 12 else 26])
+    return width, abs(height)
+
+
+def _gray_and_alpha(image: "Image.Image") -> MapImage:
+    """Return 8-bit grays, computed as by GraphicsMagick: 0.299 R + 0.587 G + 0.114 B (Rec. 601), in integers."""
+    if image.mode.startswith("I"):
+        return MapImage(_eight_bits(np.clip(np.asarray(image), 0, 65535).astype(np.uint16)))
+    transparent = image.mode in ("LA", "PA", "RGBA") or "transparency" in image.info
+    red, green, blue, *alpha = np.moveaxis(np.asarray(image.convert("RGBA" if transparent else "RGB")), 2, 0)
+    quanta = [color.astype(np.uint32) * 257 for color in (red, green, blue)]
+    luma = (306 * quanta[0] + 601 * quanta[1] + 117 * quanta[2]) >> 10
+    return MapImage(_eight_bits(luma.astype(np.uint16)), alpha[0] if transparent else None)
+
+
+def _eight_bits(quanta: Quanta) -> Bytes8:
+    return (quanta // 257).astype(np.uint8)
+
 
 UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 205, 254, 0
 """Gray values of trinary maps written by map_saver."""

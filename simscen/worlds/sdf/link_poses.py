@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 
 from simscen.core.geometry import Pose3
 from simscen.worlds.sdf.elements import MAX_COORDINATE_M, Element, read_numbers, read_pose
-from simscen.worlds.sdf.frames import Frame
-from simscen.worlds.sdf.model_tree import ModelNode
+from simscen.worlds.sdf.model_tree import Frame, ModelNode
 from simscen.worlds.sdf.report import ImportReport
 
 Scale = tuple[float, float, float]

@@ -14,11 +14,10 @@ from simscen.worlds.geometry.prisms import mesh_bounds_2d
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.map_size import Bounds, map_size_error
 from simscen.worlds.sdf.actors import read_actor
-from simscen.worlds.sdf.bodies import split_model, with_unique_names
+from simscen.worlds.sdf.bodies import read_link, split_model, with_unique_names
 from simscen.worlds.sdf.elements import Element
 from simscen.worlds.sdf.files import IncludedFiles, WorldFiles
 from simscen.worlds.sdf.link_poses import ModelState, WorldState, place_links, read_state
-from simscen.worlds.sdf.links import read_link
 from simscen.worlds.sdf.model_tree import ModelNode, TreeReader
 from simscen.worlds.sdf.report import ImportReport, UnusableElement
 from simscen.worlds.sdf.shapes import MIN_LEVEL_NORMAL_Z, ShapeReader
