@@ -10,7 +10,7 @@ from typing import Any
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.study import ParameterEffect, RateRow, Study
 from simscen.core.statistics import CONFIDENCE, holm, wilson_interval
-from simscen.judge.acceptance import anytime_limits, evaluate_claim, is_counted
+from simscen.judge.statistical_tests import anytime_limits, evaluate_claim, is_counted
 from simscen.model.acceptance import PassRate
 from simscen.spec.quantities import NUMBER_AND_UNIT, si_number
 
@@ -226,3 +226,66 @@ def _pair_coverage(plan: StudyPlan, results: Sequence[RunResult]) -> float | Non
     possible = sum(counts[a] * counts[b] for a, b in combinations(range(len(paths)), 2))
     covered = {(a, row[a], b, row[b]) for row in rows for a, b in combinations(range(len(paths)), 2)}
     return len(covered) / possible
+
+
+def study_data(study: Study) -> dict[str, Any]:
+    """Return the result of a study as in results.json. Limits are [lower, upper]."""
+    claim = study.claim
+    return {
+        "scenario": study.scenario,
+        "sampling": "random" if study.is_random else "designed",
+        "passed": study.passed,
+        "failed": study.failed,
+        "errors": study.errors,
+        "interval": _pair(study.limits),
+        "claim": None
+        if claim is None
+        else {
+            "status": claim.status.value,
+            "min": claim.min_rate,
+            "confidence": claim.confidence,
+            "method": claim.method,
+            "target": claim.target,
+            "power": claim.power,
+            "passed": claim.passed,
+            "runs": claim.runs,
+            "max_runs": claim.max_runs,
+            "errors": claim.errors,
+            "limits": _pair(claim.limits),
+        },
+        "rates": [
+            {
+                "path": row.path,
+                "value": row.value,
+                "passed": row.passed,
+                "runs": row.runs,
+                "interval": _pair(row.limits),
+            }
+            for row in study.rates
+        ],
+        "effects": [
+            {
+                "path": one.path,
+                "criterion": one.criterion,
+                "measure": "spearman" if one.is_ordered else "epsilon_squared",
+                "effect": one.effect,
+                "p": one.p,
+                "runs": one.runs,
+            }
+            for one in study.effects
+        ],
+        "worst": {
+            criterion: {"variation": key.variation, "seed": key.seed, "margin": margin, "unit": unit}
+            for criterion, (key, margin, unit) in study.worst.items()
+        },
+        "pair_coverage": study.coverage,
+        "accepted": study.accepted,
+        "values": [
+            {"variation": key.variation, "seed": key.seed, "stack_name": key.stack_name, "values": dict(values)}
+            for key, values in sorted(study.values.items())
+        ],
+    }
+
+
+def _pair(limits: tuple[float, float] | None) -> list[float] | None:
+    return None if limits is None else list(limits)

@@ -86,18 +86,17 @@ TESTS_OF_MODULE = {
             for of in ("required_evidence", "required_evidence_of_signals", "evaluation", "expected_failure")
         ]
     ],
-    **{
-        f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]]
-        for of in ("acceptance", "disturbances", "finding_text", "study")
-    },
-    "judge/study_json": [["tests/unit/judge/test_study.py"]],
+    **{f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]] for of in ("disturbances", "finding_text", "study")},
+    "judge/statistical_tests": [
+        ["tests/unit/judge/test_statistical_tests.py", "tests/unit/judge/test_significant_changes.py"]
+    ],
     "judge/metrics/trajectory": [
         [f"{_METRICS}/test_path.py", f"{_METRICS}/test_pose_error.py"],
         [f"{_METRICS}/test_compute.py"],
     ],
     "judge/metrics/compute": [[_METRICS], ["tests/unit/judge"]],
     **{f"judge/metrics/{of}": [[f"{_METRICS}/test_{of}.py"]] for of in ("session_summary", "comparison")},
-    **{f"judge/diagnosis/{of}": [DIAGNOSIS] for of in ("causes", "objects", "goal_failure")},
+    **{f"judge/{of}": [DIAGNOSIS] for of in ("failure_causes", "goal_failure_causes")},
 }
 """Tests of single modules, in stages. The stage with all tests of the package follows."""
 IGNORED_FILES = {"__init__.py"}

@@ -19,7 +19,7 @@ from simscen.core.statistics import bootstrap_mean_interval, sign_test
 from simscen.judge.evaluation import EXPECTED
 from simscen.judge.finding_text import sentence, violations
 from simscen.judge.metrics.catalog import METRICS
-from simscen.judge.metrics.significance import (
+from simscen.judge.statistical_tests import (
     PASS_RATE,
     PairedSample,
     Significance,

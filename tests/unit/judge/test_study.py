@@ -10,9 +10,8 @@ from scipy import stats
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult, error_result
 from simscen.core.records.study import ClaimStatus, RateRow, Study
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.judge.acceptance import anytime_limits, clopper_pearson_limits
-from simscen.judge.study import StudyPlan, evaluate_study, in_seed_order, value_text
-from simscen.judge.study_json import study_data
+from simscen.judge.statistical_tests import anytime_limits, clopper_pearson_limits
+from simscen.judge.study import StudyPlan, evaluate_study, in_seed_order, study_data, value_text
 from simscen.model.acceptance import PassRate
 
 

@@ -1,6 +1,6 @@
 """Sketched failures: a robot that does not reach the study, and what happened on the way."""
 
-from simscen.judge.diagnosis.causes import causes
+from simscen.judge.failure_causes import causes
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 GOAL = {"name": "study", "pose": [8, 0, 0]}

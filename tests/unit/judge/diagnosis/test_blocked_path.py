@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import CASE, DOOR, STANDS, box, by, why
 
-from simscen.judge.diagnosis.goal_failure import diagnose_blocked_path
-from simscen.judge.diagnosis.objects import MovableObject, movable_objects
+from simscen.judge.goal_failure_causes import MovableObject, diagnose_blocked_path, movable_objects
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 CLOSES = (

@@ -3,7 +3,7 @@
 from diagnosis_cases import STANDS, by, why
 
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.judge.diagnosis.causes import explain_failures
+from simscen.judge.failure_causes import explain_failures
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 

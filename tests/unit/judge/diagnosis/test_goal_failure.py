@@ -3,7 +3,7 @@
 import pytest
 from diagnosis_cases import CASE, STANDS, box, why
 
-from simscen.judge.diagnosis.causes import causes
+from simscen.judge.failure_causes import causes
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.criteria.goal_outcomes import goal_outcomes
-from simscen.judge.diagnosis.goal_failure import _failed_recoveries, _gave_up, _stopped
+from simscen.judge.goal_failure_causes import _failed_recoveries, _gave_up, _stopped
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 SECOND = 240

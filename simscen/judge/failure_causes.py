@@ -15,8 +15,7 @@ from simscen.core.records.case import Case
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.judge.diagnosis.goal_failure import diagnose_goal_failure
-from simscen.judge.diagnosis.objects import MovableObject, movable_objects
+from simscen.judge.goal_failure_causes import MovableObject, diagnose_goal_failure, movable_objects
 
 GOAL_CRITERIA = frozenset({"goals_reached", "result", "error_code", "time_to_goal", "stuck"})
 """Criteria that fail if something blocks the robot."""

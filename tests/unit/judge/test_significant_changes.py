@@ -3,7 +3,7 @@
 import pytest
 from scipy.stats import binomtest, wilcoxon
 
-from simscen.judge.metrics.significance import (
+from simscen.judge.statistical_tests import (
     PASS_RATE,
     PairedSample,
     Significance,

@@ -1,1 +1,0 @@
-"""Probable causes of failed criteria, from the trace and the scenario."""
