@@ -116,7 +116,7 @@ def _unknown_argument(robot: LoadedRobot, argument: str, declared: Sequence[str]
 
 
 def _infer_spec(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:
-    from simscen.sim.urdf.infer_spec import infer_robot_spec
+    from simscen.sim.urdf.body import infer_robot_spec
 
     return infer_robot_spec(urdf, roots, read_mesh)
 

@@ -13,7 +13,7 @@ from simscen.core.records.study import Study
 from simscen.judge.metrics.comparison import comparison_data
 from simscen.judge.metrics.session_summary import SessionFigures, SessionSummary, session_summary_data
 from simscen.judge.result_json import result_data
-from simscen.judge.study_json import study_data
+from simscen.judge.study import study_data
 from simscen.report.display_text import escape_ci_markers_in_json
 from simscen.report.text_reporters import Reporter
 

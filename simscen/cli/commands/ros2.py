@@ -15,7 +15,7 @@ import typer
 
 from simscen.cli.diagnostics import as_text, from_here, print_text
 from simscen.core.errors import InvalidInput, UsageError
-from simscen.loading.nav2.parameterfile import Nav2Parameters, read_nav2_parameters
+from simscen.loading.nav2.parameter_file import Nav2Parameters, read_nav2_parameters
 from simscen.ros2.nav2_parameters import Offer
 
 SOCKET = "SIMSCEN_STACK_FD"

@@ -19,13 +19,12 @@ from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
 from simscen.core.records.verdict import Status
 from simscen.core.version import __version__
-from simscen.judge.acceptance import clopper_pearson_limits, is_counted
 from simscen.judge.finding_text import run_margin
+from simscen.judge.statistical_tests import clopper_pearson_limits, is_counted
 from simscen.judge.study import StudyPlan, evaluate_study, value_text
 from simscen.loading.files.discovery import default_root, sibling
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.reduced_text import changed_text
-from simscen.loading.reduction import with_seed
+from simscen.loading.reduction import changed_text, with_seed
 from simscen.loading.scenario import ChangedScenario
 from simscen.loading.variations.conditions import ConditionError
 from simscen.loading.variations.expand import Variation

@@ -11,7 +11,7 @@ from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem, UsageError
 from simscen.core.files import require_regular_file
 from simscen.loading.builders import load_robot
-from simscen.loading.checks import masks, placement, reachability, regions, timing
+from simscen.loading.checks import masks, placement, regions, routes
 from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.checks.scene import TIMING, WORLD, Scene
@@ -21,7 +21,7 @@ from simscen.loading.world_cache import WorldCache
 from simscen.worlds.geometry.overlaps import place_polygon
 from simscen.worlds.maps.map_size import map_size_error
 
-MODULES = (masks, placement, reachability, regions, timing)
+MODULES = (masks, placement, routes, regions)
 """Modules that register checks when they are imported."""
 
 
@@ -63,7 +63,7 @@ def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
         problems += TIMING.problems(scene)
     problems = [scene.loaded.with_source_line(problem) for problem in sorted(problems)]
     if problems and pictures is not None:
-        gaps = [gap.position for _, gap in scene.cached(reachability.closed_gaps)]
+        gaps = [gap.position for _, gap in scene.cached(routes.closed_gaps)]
         file = draw_picture(scene, gaps, pictures)
         problems = [replace(problem, hint=f"{problem.hint}; picture: {file}".lstrip("; ")) for problem in problems]
     return problems

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.paths import PathSandbox
-from simscen.loading.nav2.parameterfile import is_nav2_parameter_file
-from simscen.loading.nav2.stack import NAV2_PARAMS, with_nav2_parameters
+from simscen.loading.nav2.parameter_file import NAV2_PARAMS, is_nav2_parameter_file, with_nav2_parameters
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import SCENARIO_KEYS, StackChoice
 from simscen.loading.yaml.library import Library

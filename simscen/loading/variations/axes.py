@@ -7,11 +7,18 @@ from typing import TYPE_CHECKING
 
 from simscen.core.errors import Problem
 from simscen.loading.schema.messages import quoted
-from simscen.loading.variations.conditions import GRAMMAR, Condition, ConditionError, parse_condition
+from simscen.loading.variations.conditions import (
+    GRAMMAR,
+    Condition,
+    ConditionError,
+    all_hold,
+    parse_condition,
+    plain_values,
+    written_value,
+)
 from simscen.loading.variations.naming import NAME_HINT, name_error
 from simscen.loading.variations.options import Change, Option, RandomOptions, typical_options, value_node
 from simscen.loading.variations.paths import PathError, Target, resolve_path
-from simscen.loading.variations.requirements import all_hold, plain_values, written_value
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, child, node_at
 
 if TYPE_CHECKING:  # most scenarios have no variations

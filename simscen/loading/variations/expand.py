@@ -8,11 +8,10 @@ from typing import Any
 from simscen.core.errors import Problem
 from simscen.loading.schema.validate import check
 from simscen.loading.variations.axes import AxisBuilder
-from simscen.loading.variations.conditions import Condition, ConditionError
+from simscen.loading.variations.conditions import Condition, ConditionError, all_hold, plain_values
 from simscen.loading.variations.naming import derive_name, make_unique, name_error, numbered_name, short_names
 from simscen.loading.variations.options import Change, Option, typical_options
 from simscen.loading.variations.paths import Target, set_value
-from simscen.loading.variations.requirements import all_hold, plain_values
 from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode
 
 VARIATIONS, ACCEPTANCE = "variations", "acceptance"

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from simscen.core.errors import Problem
 from simscen.loading.schema.validate import check
 from simscen.loading.variations.axes import AxisBuilder
-from simscen.loading.variations.conditions import Condition
+from simscen.loading.variations.conditions import Condition, all_hold, plain_values
 from simscen.loading.variations.expand import VARIATIONS, Variation
 from simscen.loading.variations.options import Change, value_node
 from simscen.loading.variations.paths import Target, set_value
-from simscen.loading.variations.requirements import all_hold, plain_values
 from simscen.loading.variations.sampling import value_at
 from simscen.loading.yaml.tree import MappingNode, SequenceNode, node_at
 from simscen.model.variations import OneOf, Sampled, VariationsSection

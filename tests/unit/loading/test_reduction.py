@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from simscen.loading.reduced_text import changed_text
 from simscen.loading.reduction import (
+    changed_text,
     changed_values,
     removable_parts,
     removed_parts,
