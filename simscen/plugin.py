@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from simscen.criteria.findings import at_least, at_most, counted, held, missed, undecided
     from simscen.criteria.trace_signals.ground_truth import clearance, drive, pose_error, speed, truth, turn_rate
     from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance, Sight, Wheels
-    from simscen.model.checkers import GoalCheckerSpec
+    from simscen.model.controllers import GoalCheckerSpec
     from simscen.model.localizers import LocalizerSpec
     from simscen.model.planners import PlannerSpec
     from simscen.model.recovery import BehaviorSpec
@@ -254,7 +254,7 @@ _NAMES_BY_MODULE = {
     # Base classes of specifications.
     "simscen.model.stack": ("InProcessStack",),
     "simscen.model.recovery": ("BehaviorSpec",),
-    "simscen.model.checkers": ("GoalCheckerSpec",),
+    "simscen.model.controllers": ("GoalCheckerSpec",),
     "simscen.model.localizers": ("LocalizerSpec",),
     "simscen.model.planners": ("PlannerSpec",),
     "simscen.model.stack_base": ("ControllerSpec",),

@@ -8,8 +8,8 @@ from pydantic import BaseModel, RootModel
 from pydantic.fields import FieldInfo
 
 from simscen.cli.catalog.json_schema import MODELS
-from simscen.model.criteria_file import CriteriaSpec
-from simscen.model.ros_map import RosMapSpec
+from simscen.model.scenario import CriteriaSpec
+from simscen.model.world import RosMapSpec
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.lazy_spec import LazySpec
 

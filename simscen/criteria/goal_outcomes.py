@@ -14,10 +14,12 @@ from pydantic_core import CoreSchema, PydanticCustomError
 from simscen.core.messages.navigation import FAILED, ErrorCode, Goal, error_code
 from simscen.core.records.events import Event, EventKind
 from simscen.criteria.trace_signals.ground_truth import truth
+from simscen.spec.base import Spec
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Trace
+
 
 _ARRIVED = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
 _GOAL_ENDS = (*_ARRIVED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
@@ -196,3 +198,13 @@ def code_of(event: Event) -> str:
     if isinstance(code, ErrorCode):
         return code.name
     return ErrorCode.NONE.name if number is None else str(number)
+
+
+class ExpectedError(Spec):
+    """Error code with which a goal is expected to fail.
+
+    Example: `expect: {error_code: GOAL_OCCUPIED}`
+    """
+
+    error_code: Code
+    """Error code of Nav2, by name or number."""

@@ -13,9 +13,8 @@ from simscen.criteria.findings import at_most, undecided
 from simscen.criteria.timeline import NEVER_SWITCHED, enabled_spans
 from simscen.criteria.trace_signals import ground_truth
 from simscen.spec.base import Spec
-from simscen.spec.places import RegionName
+from simscen.spec.places import RegionName, SpeedMask
 from simscen.spec.quantities import Duration, NonNegativeSpeed, PositiveAngularSpeed, PositiveSpeed
-from simscen.spec.speed_mask import SpeedMask
 
 if TYPE_CHECKING:
     from simscen.core.geometry import Array

@@ -12,9 +12,8 @@ from simscen.core.records.verdict import ExpectedFailure
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.yaml.tree import Key, MappingNode, Position, key_position, value_position
 from simscen.model.robot import RobotSpec
-from simscen.model.ros_map import RosMapSpec
 from simscen.model.scenario import ScenarioSpec
-from simscen.model.world import WorldSpec
+from simscen.model.world import RosMapSpec, WorldSpec
 
 
 @dataclass(frozen=True)

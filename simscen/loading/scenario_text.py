@@ -17,8 +17,7 @@ from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.scalars import to_yaml
 from simscen.loading.yaml.tree import Key, MappingNode, Node, node_at
-from simscen.model.criteria_file import CriteriaSpec
-from simscen.model.scenario import ScenarioSpec
+from simscen.model.scenario import CriteriaSpec, ScenarioSpec
 
 JUDGING_PLUGINS = frozenset({"criterion", "metric"})
 """Kinds of plugins that are needed to judge a log."""

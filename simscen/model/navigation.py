@@ -34,7 +34,7 @@ def _text_or_mapping(value: Any) -> str:
 
 Expectation = Annotated[
     Annotated[Literal["succeeded", "failed"], Tag("text")]
-    | Annotated[Spec, LazySpec("simscen.model.expected_error", "ExpectedError"), Tag("mapping")],
+    | Annotated[Spec, LazySpec("simscen.criteria.goal_outcomes", "ExpectedError"), Tag("mapping")],
     Discriminator(_text_or_mapping),
 ]
 

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import MAX_SEED
+from simscen.core.records.verdict import ExpectedFailure as DeclaredFailure
 from simscen.criteria.registry import AnyCriterion
 from simscen.model.navigation import Expectation, Navigation, OnReached
 from simscen.model.stack_files import AnyStack
@@ -315,3 +316,19 @@ def initial_estimate(entry: RobotEntry, truth: Pose2) -> Estimate:
         case InitialEstimate() as estimate:
             return Estimate(Pose2(estimate.x, estimate.y, estimate.yaw), estimate.std)
     raise AssertionError(entry.initial_estimate)
+
+
+def expected_failure(spec: ScenarioSpec) -> DeclaredFailure | None:
+    """Return the known failure that a scenario declares, or None."""
+    return None if spec.expected is None else DeclaredFailure(spec.expected.fail, tuple(spec.expected.criteria))
+
+
+class CriteriaSpec(ScenarioSpec):
+    """Scenario in which only `pass` is required: enough to evaluate an existing log."""
+
+    simscen: LanguageVersion = 1
+    """Version of the scenario language."""
+    world: WorldOrFile | None = None  # type: ignore[assignment]
+    """World with the places and regions of the criteria; needed only for foreign logs."""
+    robot: RobotEntry | None = None
+    """Robot with the footprint for the criteria; needed only for foreign logs."""

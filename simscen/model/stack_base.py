@@ -5,9 +5,8 @@ from typing import Annotated
 from pydantic import Field
 
 from simscen.spec.base import Spec, Typed, by_default
-from simscen.spec.places import MaskFile, RegionName
-from simscen.spec.quantities import Frequency, PositiveAngle, PositiveLength, PositiveSpeed
-from simscen.spec.speed_mask import SpeedMask
+from simscen.spec.places import MaskFile, Name, RegionName, SpeedMask
+from simscen.spec.quantities import Duration, Frequency, PositiveAngle, PositiveLength, PositiveSpeed
 
 
 class GoalTolerances(Spec):
@@ -62,3 +61,32 @@ class ControllerSpec(Typed):
     def lookahead_s(self) -> float:
         """Time horizon of the commands in seconds; the local costmap is large enough for it."""
         return 2.0
+
+
+class Latency(Spec):
+    """Computing times of the parts of a stack, rounded to physics ticks.
+
+    A part uses the data at the start of its computation; its result is available after this time. Parts run in
+    parallel, as Nav2's servers do; a part that is still busy is not started again.
+    """
+
+    localizer: Duration = 0.0
+    """Time from a scan to the pose correction; odometry updates the pose in the meantime."""
+    costmap: Duration = 0.0
+    """Time from sensor data to the updated costmaps."""
+    planner: Duration = 0.0
+    """Time from a request to the plan; the controller follows the previous plan in the meantime."""
+    controller: Duration = 0.0
+    """Time from pose and costmap to the command."""
+    collision_monitor: Duration = 0.0
+    """Time from the command of the controller to the command that is sent to the base."""
+
+
+class RobotLatency(Latency):
+    """Computing times on the robot's usual computer, and usual delays of its sensors.
+
+    Used by scenarios with `stack: {latency: robot}`.
+    """
+
+    sensors: Annotated[dict[Name, Duration], Field(max_length=100)] = {}
+    """Delays by sensor name, instead of the `latency` of the sensor."""

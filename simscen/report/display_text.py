@@ -5,7 +5,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from shutil import get_terminal_size
 from typing import Literal, TextIO
 
@@ -14,6 +14,12 @@ _MARKER = re.compile(r"##(\w*)\[")
 _ASCII = str.maketrans(
     {"✓": "+", "✗": "x", "·": "-", "≤": "<=", "≥": ">=", "°": " deg", "×": "x", "…": "...", "—": "-", "→": "->"}
 )
+
+
+def relative(path: str, folder: str) -> str:
+    """Return the path of a file relative to `folder` if the file is in there, otherwise the path itself."""
+    is_inside = folder and PurePath(path).is_relative_to(folder)
+    return PurePath(path).relative_to(folder).as_posix() if is_inside else PurePath(path).as_posix()
 
 
 def escape_control(text: str) -> str:

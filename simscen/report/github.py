@@ -12,8 +12,7 @@ from simscen.core.records.session_events import RunFinished, SessionEvent, Sessi
 from simscen.judge.finding_text import tightest_margin
 from simscen.report.comparison_markup import as_markdown, markdown_cell
 from simscen.report.console_reporter import text_reporter
-from simscen.report.display_text import relative_to_checkout
-from simscen.report.results_json import relative
+from simscen.report.display_text import relative, relative_to_checkout
 from simscen.report.text_reporters import Reporter
 from simscen.report.violations import error_summary, excuse_text, reported_violations, scenario_file, short_run_name
 

@@ -15,8 +15,7 @@ from simscen.core.records.session_events import Artifacts, RunFinished, SessionS
 from simscen.judge.result_json import from_data, read_key, result_data
 from simscen.judge.study import StudyPlan
 from simscen.model.acceptance import PassRate
-from simscen.report.display_text import relative_to_cwd
-from simscen.report.results_json import relative
+from simscen.report.display_text import relative, relative_to_cwd
 
 JOURNAL_FILE = "events.jsonl"
 JOURNAL_FORMAT = 2

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from pathlib import PurePath
 from types import TracebackType
 from typing import Any, TextIO
 
@@ -14,7 +13,7 @@ from simscen.judge.metrics.comparison import comparison_data
 from simscen.judge.metrics.session_summary import SessionFigures, SessionSummary, session_summary_data
 from simscen.judge.result_json import result_data
 from simscen.judge.study import study_data
-from simscen.report.display_text import escape_ci_markers_in_json
+from simscen.report.display_text import escape_ci_markers_in_json, relative
 from simscen.report.text_reporters import Reporter
 
 FORMAT = 1
@@ -110,12 +109,6 @@ def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
     names = "mcap", "picture", "replay", "result"
     files = {name: getattr(artifacts, name) for name in names}
     return {name: relative(path, folder) for name, path in files.items() if path}
-
-
-def relative(path: str, folder: str) -> str:
-    """Return the path of a file relative to `folder` if the file is in there, otherwise the path itself."""
-    is_inside = folder and PurePath(path).is_relative_to(folder)
-    return PurePath(path).relative_to(folder).as_posix() if is_inside else PurePath(path).as_posix()
 
 
 def json_reporter(out: TextIO) -> Reporter:

@@ -4,8 +4,10 @@ A field of type `PlaceOrPose` or `PlaceOrPoint` also accepts the name of a place
 pose of the place (`loading/known_names.py`), so code that uses a specification only sees poses and points.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, GetCoreSchemaHandler, PrivateAttr, StringConstraints
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -14,6 +16,10 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import polygon_defect
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Length
+
+if TYPE_CHECKING:
+    from simscen.core.environment.costmap_filters import SpeedLimits
+    from simscen.core.environment.occupancy_grid import OccupancyGrid
 
 
 def _reject_path(name: str) -> str:
@@ -63,7 +69,7 @@ class PoseSpec(Spec):
         """Name of the place that this pose was written as; "" if the file contains the pose itself."""
         return self._place
 
-    def with_place(self, place: str) -> "PoseSpec":
+    def with_place(self, place: str) -> PoseSpec:
         """Return a copy of the pose with the name of the place that it comes from."""
         copy = self.model_copy()
         copy._place = place
@@ -156,3 +162,26 @@ PlaceOrPose = Annotated[PoseSpec, PlaceAllowed()]
 """A pose in the world frame, or the name of a place in the world."""
 PlaceOrPoint = Annotated[Point, PlaceAllowedForPoint()]
 """A point [x, y] in the world frame, or the name of a place in the world."""
+
+
+class SpeedMask(Spec):
+    """Filter mask of speed limits, as for nav2_costmap_2d's SpeedFilter and its CostmapFilterInfo.
+
+    The limit of a cell is `base + multiplier · value` with a value of 0 … 100 as map_server reads the mask (`mode:
+    scale` keeps shades of gray). Cells with value 0, unknown cells, and limits of 0 or less have no effect.
+    """
+
+    file: MaskFile
+    """Map YAML file of the mask, relative to this file. Its resolution and origin may differ from those of the map."""
+    type: Literal["percent", "absolute"] = "percent"
+    """Unit of the limits: percent of the controller's full speed (CostmapFilterInfo type 1), or m/s (type 2)."""
+    base: Annotated[float, Field(ge=-1000, le=1000)] = 0.0
+    """Limit at value 0 (base of CostmapFilterInfo): percent or m/s."""
+    multiplier: Annotated[float, Field(ge=-1000, le=1000)] = 1.0
+    """Increase of the limit per unit of value (multiplier of CostmapFilterInfo): percent or m/s."""
+
+    def over(self, grid: OccupancyGrid) -> SpeedLimits:
+        """Return the speed limits for the cells of the mask."""
+        from simscen.core.environment.costmap_filters import SpeedLimits
+
+        return SpeedLimits(grid, self.type == "percent", self.base, self.multiplier)

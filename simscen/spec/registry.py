@@ -53,7 +53,7 @@ GROUPS: dict[str, Group] = {
     "planner": Group("simscen.model.planners:PlannerSpec", "simscen.model.planners:PLANNERS"),
     "controller": Group("simscen.model.controllers:ControllerSpec", "simscen.model.controllers:CONTROLLERS"),
     "behavior": Group("simscen.model.recovery:BehaviorSpec", "simscen.model.recovery:BEHAVIORS"),
-    "goal_checker": Group("simscen.model.checkers:GoalCheckerSpec", "simscen.model.checkers:GOAL_CHECKERS"),
+    "goal_checker": Group("simscen.model.controllers:GoalCheckerSpec", "simscen.model.controllers:GOAL_CHECKERS"),
     "criterion": Group(
         "simscen.criteria.base:Criterion", "simscen.criteria.registry:AnyCriterion", ("id", "severity", "then")
     ),

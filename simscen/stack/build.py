@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from simscen.core.clock import Clock
 from simscen.core.messages.navigation import Mode
 from simscen.core.random_streams import Streams
-from simscen.model.latency import Latency
 from simscen.model.recovery import Recovery
 from simscen.model.stack import InProcessStack, StackSpec
+from simscen.model.stack_base import Latency
 from simscen.stack.behaviors import BehaviorSequence
 from simscen.stack.checked_components import (
     CheckedBehavior,

@@ -13,7 +13,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Goal, Path
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
-from simscen.model.checkers import GoalCheckerSpec
+from simscen.model.controllers import GoalCheckerSpec
 from simscen.model.localizers import LocalizerSpec
 from simscen.model.planners import PlannerSpec
 from simscen.model.recovery import BehaviorSpec

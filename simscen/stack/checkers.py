@@ -5,8 +5,8 @@ import math
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Goal
-from simscen.model.checkers import ProgressChecker as ProgressSpec
-from simscen.model.checkers import SimpleGoalChecker as GoalSpec
+from simscen.model.controllers import ProgressChecker as ProgressSpec
+from simscen.model.controllers import SimpleGoalChecker as GoalSpec
 from simscen.stack.setting import Setting
 
 STANDSTILL_SPEED, STANDSTILL_YAW_RATE = 0.02, 0.1

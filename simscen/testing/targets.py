@@ -13,7 +13,7 @@ from pydantic import RootModel, ValidationError
 from simscen.actions.base import Action
 from simscen.criteria.base import Criterion, Measure
 from simscen.faults.base import Fault
-from simscen.model.checkers import GoalCheckerSpec
+from simscen.model.controllers import GoalCheckerSpec
 from simscen.model.localizers import LocalizerSpec
 from simscen.model.planners import PlannerSpec
 from simscen.model.recovery import BehaviorSpec

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.model.checkers import SimpleGoalChecker
+from simscen.model.controllers import SimpleGoalChecker
 from simscen.model.recovery import BackUp, ClearCostmap, Retrace, Spin, Wait
 from simscen.testing import Promise, promises_of
 

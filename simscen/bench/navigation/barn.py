@@ -129,7 +129,6 @@ After smoothing, 5 to 22 % of the cells between the walls are filled, as in six 
 """
 FILL_NEIGHBORS, CLEAR_NEIGHBORS = 5, 1
 """Smallest number of filled neighbors, of eight, that fills a cell, and largest number that clears it."""
-START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
 GAP_RADIUS_M = 0.37
 """Radius of the disc that can cross every field, as it can cross every world of BARN."""
 MAX_ATTEMPTS = 1000
@@ -230,7 +229,7 @@ def _shortest_path_length(centers: Array, gap: float) -> float:
 
 ARENA_HALF_WIDTH_M = 10.0
 """Half of the side length of the square arena."""
-RADIUS_M, HEIGHT_M = 0.5, 1.0
+RADIUS_M = 0.5
 COUNT_RANGE = (5, 24)
 """Smallest and largest number of cylinders."""
 SPEEDS_M_S = (0.74, 1.23, 1.72)
@@ -245,7 +244,7 @@ KEYFRAME_DISTANCE_M = 2.0
 """Distance between two keyframes."""
 MIN_PATH_LENGTH_M = 8.0
 """Minimum length of a path in the arena. Shorter paths are drawn again."""
-START, GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14159)
+DYNABARN_START, DYNABARN_GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14159)
 """Start of the robot in DynaBARN, 1 m outside of the arena, and its goal."""
 
 

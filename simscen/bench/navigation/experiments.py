@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from simscen.bench.navigation import barn
-from simscen.bench.navigation import barn as movers
 from simscen.bench.navigation.barn import CELL_SIZE_M, HEIGHT_M, ObstacleField, obstacle_field
 from simscen.core.random_streams import Streams
 
@@ -104,17 +103,19 @@ def _field_drive(folder: Path, field: ObstacleField) -> Drive:
 def dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
     """Return one experiment for each mean speed, with fields of moving cylinders and one seed each."""
     experiments = []
-    for speed in movers.SPEEDS_M_S:
+    for speed in barn.SPEEDS_M_S:
         drives = []
         for number in numbers:
             stem = f"dynamic/field_{number}_at_{speed:.2f}"
-            world = write_scenario(
-                folder / f"{stem}.world.yaml", _moving_world_text(movers.dynamic_field(number, speed))
-            )
+            world = write_scenario(folder / f"{stem}.world.yaml", _moving_world_text(barn.dynamic_field(number, speed)))
             text = barn.scenario(
-                f"dynamic field {number}", world.name, movers.START, movers.GOAL, barn.TUNED_FOR_MOVING_WORLDS
+                f"dynamic field {number}",
+                world.name,
+                barn.DYNABARN_START,
+                barn.DYNABARN_GOAL,
+                barn.TUNED_FOR_MOVING_WORLDS,
             )
-            length = movers.START.distance(movers.GOAL)
+            length = barn.DYNABARN_START.distance(barn.DYNABARN_GOAL)
             drives.append(Drive(write_scenario(folder / f"{stem}.scenario.yaml", text), [number], length))
         experiments.append(Experiment(dynamic_name(speed), tuple(drives), folder, mapless=True))
     return experiments
@@ -192,7 +193,7 @@ def _world_text(field: ObstacleField) -> str:
     return f"simscen: 1\nname: field {field.number}\nobstacles:\n{pillars}\n"
 
 
-def _moving_world_text(field: movers.DynamicField) -> str:
+def _moving_world_text(field: barn.DynamicField) -> str:
     lines = []
     for number, mover in enumerate(field.movers, start=1):
         keyframes = ", ".join(
@@ -201,7 +202,7 @@ def _moving_world_text(field: movers.DynamicField) -> str:
         )
         x, y = mover.points[0].tolist()
         lines.append(
-            f"  - name: cylinder {number}\n    cylinder: [{movers.RADIUS_M:g}, {movers.HEIGHT_M:g}]\n"
+            f"  - name: cylinder {number}\n    cylinder: [{barn.RADIUS_M:g}, {barn.HEIGHT_M:g}]\n"
             f"    pose: {{x: {x:.3f}, y: {y:.3f}}}\n    move:\n      keyframes: [{keyframes}]\n"
             f"      repeat: back_and_forth\n      ease: spline\n      phase: {mover.phase:.3f} s\n"
         )

@@ -13,38 +13,35 @@ from pydantic_core import PydanticUndefined
 
 from simscen.actions.base import AnyAction
 from simscen.advanced.spec import MedialAxisPlanner
+from simscen.criteria import goal_outcomes
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
 from simscen.model import (
-    checkers,
     controllers,
     costmaps,
-    expected_error,
     guards,
-    latency,
     localizers,
     navigation,
-    odometry,
     planners,
     recovery,
     robot,
     scenario,
     stack,
+    stack_base,
     stack_files,
     variations,
     world,
 )
 from simscen.model.disturbances import EventEntry, FaultEntry, StepEntry
-from simscen.model.ros_map import RosMapSpec
 from simscen.model.stack_base import SpeedZone
+from simscen.model.world import RosMapSpec
 from simscen.spec import extensible_union, registry
 from simscen.spec.base import field_docs
 from simscen.spec.choice import Choice, installed_choices
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.lazy_spec import LazySpec, annotation_of
-from simscen.spec.places import PlaceAllowed, PlaceShorthand, PoseSpec
+from simscen.spec.places import PlaceAllowed, PlaceShorthand, PoseSpec, SpeedMask
 from simscen.spec.quantities import UNITS, Quantity
-from simscen.spec.speed_mask import SpeedMask
 from simscen.triggers.base import AnyCondition, Trigger
 
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
@@ -133,7 +130,7 @@ _SCENARIO: dict[str, type[BaseModel]] = {
     "payload": scenario.Payload,
     "goals": scenario.GoalEntry,
     "navigation": navigation.Navigation,
-    "expect": expected_error.ExpectedError,
+    "expect": goal_outcomes.ExpectedError,
     "on_reached": navigation.OnReached,
     "events": EventEntry,
     "then": StepEntry,
@@ -147,18 +144,18 @@ _STACK: dict[str, type[BaseModel]] = {
     "external": stack_files.ExternalStackSpec,
     "speed_zones": SpeedZone,
     "speed_mask": SpeedMask,
-    "odometry_filter": odometry.OdometryFilter,
+    "odometry_filter": localizers.OdometryFilter,
     "costmap": costmaps.Costmap,
     "local_costmap": costmaps.LocalCostmap,
     "planner": planners.OmplPlanner,
-    "goal_checker": checkers.SimpleGoalChecker,
-    "progress_checker": checkers.ProgressChecker,
+    "goal_checker": controllers.SimpleGoalChecker,
+    "progress_checker": controllers.ProgressChecker,
     "recovery": recovery.Recovery,
     "velocity_smoother": guards.VelocitySmoother,
     "collision_monitor": guards.CollisionMonitor,
     "prediction": guards.Prediction,
     "denoise_layer": costmaps.DenoiseLayer,
-    "latency": latency.Latency,
+    "latency": stack_base.Latency,
     "navfn": planners.Navfn,
     "smac_2d": planners.Smac2d,
     "medial_axis": MedialAxisPlanner,

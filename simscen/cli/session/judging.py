@@ -19,7 +19,7 @@ from simscen.judge.run_result import combine_robots, judge_run
 from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
 from simscen.loading.scenario_text import criteria_of_text
-from simscen.model.criteria_file import expected_failure
+from simscen.model.scenario import expected_failure
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import is_simscen_log
 from simscen.record.foreign.read import ForeignLog, read_foreign_log

@@ -20,8 +20,7 @@ from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.textfile import read_text
 from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, key_position, node_at, value_position
 from simscen.model.robot import RobotSpec
-from simscen.model.ros_map import RosMapSpec
-from simscen.model.world import WorldSpec
+from simscen.model.world import RosMapSpec, WorldSpec
 
 Model = TypeVar("Model", bound=BaseModel)
 Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)

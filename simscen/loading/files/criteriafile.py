@@ -14,7 +14,7 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.schema.validate import check
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.tree import MappingNode, ScalarNode, key_position, node_at, value_position
-from simscen.model.criteria_file import CriteriaSpec
+from simscen.model.scenario import CriteriaSpec
 from simscen.model.world import WorldSpec
 
 

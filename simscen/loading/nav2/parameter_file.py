@@ -213,12 +213,12 @@ def _note(position: Position, message: str) -> Problem:
 
 def _known_parameters() -> Known:
     """Return the parameters of the reference stack, by section or by type; `a.b` is `b` in the mapping `a`."""
-    from simscen.model import checkers, controllers, costmaps, localizers, mppi, planners, recovery
+    from simscen.model import controllers, costmaps, localizers, mppi, planners, recovery
 
     models: dict[str, type[BaseModel]] = {
         "amcl": localizers.Amcl,
-        "progress_checker": checkers.ProgressChecker,
-        "simple": checkers.SimpleGoalChecker,
+        "progress_checker": controllers.ProgressChecker,
+        "simple": controllers.SimpleGoalChecker,
         "regulated_pure_pursuit": controllers.RegulatedPurePursuit,
         "dwb": controllers.DynamicWindow,
         "mppi": mppi.Mppi,

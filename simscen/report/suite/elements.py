@@ -9,8 +9,7 @@ from urllib.parse import quote
 
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
-from simscen.report.display_text import one_line
-from simscen.report.results_json import relative
+from simscen.report.display_text import one_line, relative
 
 SIGNS = {
     Outcome.PASSED: "✓",

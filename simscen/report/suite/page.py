@@ -15,7 +15,7 @@ from simscen.core.records.session_events import Comparison, RunFinished
 from simscen.core.records.study import Study
 from simscen.report.comparison_markup import as_html
 from simscen.report.picture.palette import css_variables
-from simscen.report.study import study_html
+from simscen.report.study_markup import study_html
 from simscen.report.suite import elements
 from simscen.report.suite.elements import SIGNS, anchor, count, html_text, outcome_marks, sparkline
 from simscen.report.suite.history import PastSession, outcome_change, past_outcomes

@@ -15,7 +15,7 @@ from filterpy.kalman import KalmanFilter
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Imu, Odometry
-from simscen.model import odometry as model
+from simscen.model import localizers as model
 from simscen.stack.frames import is_plausible
 
 VX, VY, VYAW, BIAS = range(4)

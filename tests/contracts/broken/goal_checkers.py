@@ -2,7 +2,7 @@
 
 import random
 
-from simscen.model.checkers import SimpleGoalChecker
+from simscen.model.controllers import SimpleGoalChecker
 from tests.contracts.broken.cases import Wrapper, breaks
 
 CHECKER = SimpleGoalChecker()

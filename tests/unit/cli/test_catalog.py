@@ -10,14 +10,13 @@ from simscen.actions.base import AnyAction
 from simscen.cli.catalog.topics import Topic, fields_of, kind_of, topics
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.model.checkers import GoalCheckerSpec
+from simscen.model.controllers import GoalCheckerSpec
 from simscen.model.costmaps import Costmap
 from simscen.model.disturbances import FaultEntry
-from simscen.model.latency import Latency
 from simscen.model.localizers import Amcl, LocalizerSpec
 from simscen.model.planners import PlannerSpec
 from simscen.model.stack import StackSpec
-from simscen.model.stack_base import ControllerSpec, GoalTolerances
+from simscen.model.stack_base import ControllerSpec, GoalTolerances, Latency
 from simscen.spec import registry
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Probability

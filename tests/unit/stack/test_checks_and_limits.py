@@ -13,8 +13,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
 from simscen.core.messages.sensor_data import Scan
-from simscen.model.checkers import ProgressChecker as ProgressSpec
-from simscen.model.checkers import SimpleGoalChecker as CheckerSpec
+from simscen.model.controllers import ProgressChecker as ProgressSpec
+from simscen.model.controllers import SimpleGoalChecker as CheckerSpec
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.model.guards import VelocitySmoother as SmootherSpec

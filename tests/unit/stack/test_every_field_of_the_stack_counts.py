@@ -18,13 +18,12 @@ from pydantic import BaseModel, ValidationError
 from scenes import Scene
 
 from simscen.advanced.spec import MedialAxisPlanner, ScanMatchingAmcl, SlipEkf
-from simscen.model import checkers, costmaps, guards, localizers, planners
+from simscen.model import controllers, costmaps, guards, localizers, planners
 from simscen.model import recovery as behaviors
-from simscen.model.latency import Latency
-from simscen.model.odometry import OdometryFilter
+from simscen.model.localizers import OdometryFilter
 from simscen.model.stack import StackSpec
-from simscen.model.stack_base import ControllerSpec, SpeedZone
-from simscen.spec.speed_mask import SpeedMask
+from simscen.model.stack_base import ControllerSpec, Latency, SpeedZone
+from simscen.spec.places import SpeedMask
 
 Said = dict[str, Any]
 TRUTH: Said = {"localizer": {"type": "ground_truth"}, "planner": {"type": "navfn"}}
@@ -136,9 +135,9 @@ PARTS = [
         "denoise_layer": [{"enabled": True, "minimal_group_size": 20}], "obstacle_min_range": [1.0],
         "raytrace_min_range": [2.0],
     }),
-    Part(("goal_checker",), checkers.SimpleGoalChecker, (
+    Part(("goal_checker",), controllers.SimpleGoalChecker, (
         (STRICT, scenes.arriving), (STRICT, scenes.drifting_past))),
-    Part(("progress_checker",), checkers.ProgressChecker, (
+    Part(("progress_checker",), controllers.ProgressChecker, (
         ({**TRUTH, "progress_checker": {"movement_time_allowance": 0.5}}, scenes.stuck),
         ({**TRUTH, "progress_checker": {"movement_time_allowance": 1.0}}, scenes.stuck),
     )),
@@ -216,7 +215,7 @@ def left_out(kind: type[BaseModel], name: str) -> bool:
     return f"{kind.__name__}.{name}" in ELSEWHERE or (name == "type" and kind is not planners.OmplPlanner)
 
 
-OTHERS_CARE = {planners.PlannerSpec, ControllerSpec, checkers.GoalCheckerSpec, SpeedZone, SpeedMask}
+OTHERS_CARE = {planners.PlannerSpec, ControllerSpec, controllers.GoalCheckerSpec, SpeedZone, SpeedMask}
 """What all planners and goal checkers have is tried with each; controllers and zones have tests of their own."""
 
 
@@ -333,7 +332,7 @@ def test_every_field_is_tried(part: Part) -> None:
 
 def test_every_model_is_tried() -> None:
     """Those that a stack holds, and those of the shipped components."""
-    registries = (localizers.LOCALIZERS, planners.PLANNERS, behaviors.BEHAVIORS, checkers.GOAL_CHECKERS)
+    registries = (localizers.LOCALIZERS, planners.PLANNERS, behaviors.BEHAVIORS, controllers.GOAL_CHECKERS)
     shipped = [where.split(":") for each in registries for where in each.values()]
     roots = [StackSpec, *(getattr(import_module(module), name) for module, name in shipped)]
     holding = {

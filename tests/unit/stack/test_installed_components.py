@@ -33,7 +33,7 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Path
 from simscen.core.records.trace import Decision
 from simscen.model.controllers import ControllerSpec, RegulatedPurePursuit
-from simscen.model.checkers import GoalCheckerSpec
+from simscen.model.controllers import GoalCheckerSpec
 from simscen.model.localizers import LocalizerSpec
 from simscen.model.planners import OmplPlanner, PlannerSpec
 from simscen.model.recovery import BehaviorSpec

@@ -10,9 +10,9 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
 from simscen.core.messages.navigation import Goal
 from simscen.core.messages.sensor_data import Readings, Scan
-from simscen.model.latency import Latency
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
+from simscen.model.stack_base import Latency
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames, OdometryHistory
 from simscen.stack.latency_queue import LatencyQueue

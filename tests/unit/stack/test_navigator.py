@@ -7,7 +7,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
-from simscen.model.checkers import ProgressChecker
+from simscen.model.controllers import ProgressChecker
 from simscen.model.costmaps import Costmap
 from simscen.model.localizers import GroundTruth
 from simscen.model.planners import OmplPlanner

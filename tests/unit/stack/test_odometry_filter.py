@@ -16,7 +16,7 @@ from simscen.core.messages.navigation import Estimate, Goal
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.core.random_streams import Streams
 from simscen.model import robot as robots
-from simscen.model.odometry import OdometryFilter as Spec
+from simscen.model.localizers import OdometryFilter as Spec
 from simscen.model.stack import StackSpec
 from simscen.sensors.imu import ImuSensor
 from simscen.sensors.odometry import WheelOdometrySensor, integrate_arc

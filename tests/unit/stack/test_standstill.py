@@ -5,8 +5,8 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal
 from simscen.core.records.events import Event
-from simscen.model.latency import Latency
 from simscen.model.stack import StackSpec
+from simscen.model.stack_base import Latency
 from simscen.stack.publishing import StandstillReporter
 from simscen.testing.flatland import Flatland, drive
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 OWN = """
-from simscen.model.checkers import GoalCheckerSpec
+from simscen.model.controllers import GoalCheckerSpec
 from simscen.stack.setting import Setting
 
 

@@ -10,7 +10,7 @@ import yaml
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal
-from simscen.model.ros_map import RosMapSpec
+from simscen.model.world import RosMapSpec
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.ros_map import load_map

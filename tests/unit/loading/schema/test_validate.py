@@ -6,9 +6,8 @@ from simscen.core.errors import Problem
 from simscen.loading.schema.validate import check
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.robot import RobotSpec
-from simscen.model.ros_map import RosMapSpec
 from simscen.model.scenario import ScenarioSpec
-from simscen.model.world import WorldSpec
+from simscen.model.world import RosMapSpec, WorldSpec
 
 LIMITS = "limits: {linear: 1, angular: 1, linear_acceleration: 1, angular_acceleration: 1}\n"
 SCENARIO = "simscen: 1\nworld: w\nrobot: {pose: p}\npass: [{goals_reached: {}}]\n"

@@ -8,7 +8,7 @@ from PIL import Image
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
-from simscen.model.ros_map import RosMapSpec
+from simscen.model.world import RosMapSpec
 from simscen.worlds.maps.ros_map import cell_values, load_map, save_map
 
 GOLD = Path(__file__).parents[5] / "shared" / "data" / "nav2_map_loader_gold"

@@ -1,0 +1,131 @@
+"""Section of the HTML report about a study: claim, pass rates, effects, and plots that link to replays."""
+
+from collections.abc import Sequence
+
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished
+from simscen.core.records.study import Study
+from simscen.report.display_text import relative
+from simscen.report.study import (
+    claim_text,
+    effect_text,
+    notes,
+    pass_rate_text,
+    significant_effects,
+)
+from simscen.report.suite.elements import html_text
+from simscen.spec.quantities import si_number
+
+MAX_PLOTS = 8
+"""Maximum number of parameters with a plot, those with the strongest effects first."""
+MAX_POINTS = 2000
+"""Maximum number of runs in a plot; failures come first."""
+WIDTH, HEIGHT, MARGIN = 420, 220, 44
+
+
+def study_html(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
+    """Return the section. Points of the plots are links to replay or log in `folder`."""
+    remarks = "".join(f'<p class="quiet">{html_text(text)}</p>' for text in notes(study))
+    claim = ""
+    if study.claim is not None:
+        claim = f'<p class="claim {study.claim.status.value}">{html_text(claim_text(study.claim))}</p>'
+    return (
+        f'<section id="study" aria-label="study"><h2>Study</h2><p>{html_text(pass_rate_text(study))}</p>'
+        f"{remarks}{claim}{_rates(study)}{_effects(study)}{_plots(study, runs, folder)}</section>"
+    )
+
+
+def _rates(study: Study) -> str:
+    if not study.rates:
+        return ""
+    has_limits = any(row.limits is not None for row in study.rates)
+    rows = "".join(
+        f"<tr><td>{html_text(row.path)}</td><td>{html_text(row.value)}</td><td>{row.passed} of {row.runs}</td>"
+        f"{'' if row.limits is None else f'<td>{100 * row.limits[0]:.0f} … {100 * row.limits[1]:.0f} %</td>'}</tr>"
+        for row in study.rates
+    )
+    return (
+        "<h3>Pass rate by parameter</h3><table><thead><tr><th>parameter</th><th>value</th><th>passed</th>"
+        f"{'<th>95 % interval</th>' if has_limits else ''}</tr></thead><tbody>{rows}</tbody></table>"
+    )
+
+
+def _effects(study: Study) -> str:
+    effects = significant_effects(study)
+    if not study.effects:
+        return ""
+    if not effects:
+        return '<p class="quiet">No parameter has a significant effect on a margin.</p>'
+    rows = "".join(
+        f"<tr><td>{html_text(one.path)}</td><td>{html_text(one.criterion)}</td><td>{one.effect:+.2f}</td>"
+        f"<td>{one.p:.1g}</td><td>{effect_text(one)}</td></tr>"
+        for one in effects
+    )
+    return (
+        "<h3>Effects on margins</h3><table><thead><tr><th>parameter</th><th>margin of</th>"
+        "<th>rank correlation</th><th>p, corrected</th><th>meaning</th></tr></thead><tbody>"
+        f"{rows}</tbody></table>"
+    )
+
+
+def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
+    """Return a plot of margin against parameter for the strongest effects, one for each parameter."""
+    criterion_of = {one.path: one.criterion for one in reversed(study.effects) if one.is_ordered}
+    order = [path for path in dict.fromkeys(one.path for one in study.effects) if path in criterion_of]
+    plots = "".join(_plot(path, criterion_of[path], study, runs, folder) for path in order[:MAX_PLOTS])
+    return f'<h3>Margins</h3><div class="plots">{plots}</div>' if plots else ""
+
+
+def _plot(path: str, criterion: str, study: Study, runs: Sequence[RunFinished], folder: str) -> str:
+    points = []
+    for run in sorted(runs, key=lambda run: (run.outcome.good, run.key))[:MAX_POINTS]:
+        value = si_number(study.values.get(run.key, {}).get(path))
+        margins = [
+            finding.margin
+            for verdict in run.result.verdicts
+            if verdict.id == criterion
+            for finding in verdict.findings
+            if finding.margin is not None
+        ]
+        if isinstance(value, int | float) and margins:
+            points.append((float(value), min(margins), run))
+    if not points:
+        return ""
+    x_range, y_range = _range([x for x, _, _ in points]), _range([0.0, *(y for _, y, _ in points)])
+    zero = _scale(0.0, y_range, HEIGHT - MARGIN, 12)
+    dots = "".join(
+        _dot(_scale(x, x_range, MARGIN, WIDTH - 12), _scale(y, y_range, HEIGHT - MARGIN, 12), run, folder)
+        for x, y, run in reversed(points)
+    )
+    labels = (
+        f'<text x="{MARGIN}" y="{HEIGHT - 26}">{x_range[0]:.4g}</text>'
+        f'<text x="{WIDTH - 12}" y="{HEIGHT - 26}" text-anchor="end">{x_range[1]:.4g}</text>'
+        f'<text x="{MARGIN}" y="{HEIGHT - 8}">{html_text(path)} (SI units)</text>'
+        f'<text x="{MARGIN - 4}" y="16" text-anchor="end">{y_range[1]:.3g}</text>'
+        f'<text x="{MARGIN - 4}" y="{HEIGHT - MARGIN}" text-anchor="end">{y_range[0]:.3g}</text>'
+    )
+    title = f"margin of {criterion} against {path}"
+    return (
+        f'<figure><figcaption>{html_text(title)}</figcaption><svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" '
+        f'aria-label="{html_text(title)}"><line class="zero" x1="{MARGIN}" x2="{WIDTH - 12}" y1="{zero:.1f}" '
+        f'y2="{zero:.1f}"/>{labels}{dots}</svg></figure>'
+    )
+
+
+def _dot(x: float, y: float, run: RunFinished, folder: str) -> str:
+    name = f"{run.key.variation or run.key.scenario}, seed {run.key.seed}: {run.outcome.value}"
+    mark = (
+        f'<circle class="{"good" if run.outcome is Outcome.PASSED else "bad"}" cx="{x:.1f}" cy="{y:.1f}" r="3.5">'
+        f"<title>{html_text(name)}</title></circle>"
+    )
+    target = run.artifacts.replay or run.artifacts.mcap
+    return f'<a href="{html_text(relative(target, folder))}">{mark}</a>' if target else mark
+
+
+def _range(values: Sequence[float]) -> tuple[float, float]:
+    low, high = min(values), max(values)
+    return (low, high) if low < high else (low - 0.5, high + 0.5)
+
+
+def _scale(value: float, limits: tuple[float, float], start: float, end: float) -> float:
+    return start + (value - limits[0]) / (limits[1] - limits[0]) * (end - start)
