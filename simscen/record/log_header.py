@@ -10,7 +10,7 @@ from pydantic_core import to_json
 
 from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.environment.world_model import Scenery
+from simscen.core.environment.scenery import Scenery
 from simscen.core.geometry import Pose3
 from simscen.core.records.case import Case
 from simscen.core.records.run_result import RunKey

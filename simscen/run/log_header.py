@@ -7,15 +7,15 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from simscen.core.environment.costmap_filters import mask_blocks
-from simscen.core.environment.world_model import (
+from simscen.core.environment.scenery import (
     CompressedGrid,
     DrivableSurface,
     FilterZone,
     FrictionRegion,
     MovableObject,
     Scenery,
-    World,
 )
+from simscen.core.environment.world_model import World
 from simscen.core.geometry.meshes import drivable_solids, face_normals, upward_faces
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.loading.plugins import fact_of, requirement_of

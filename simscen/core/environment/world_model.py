@@ -1,17 +1,12 @@
-"""A world as plain data: solids, bodies, named places, map, floor friction; and what a log stores for pictures."""
+"""A world as plain data: solids, bodies, named places, map, floor friction, and pedestrians."""
 
 from __future__ import annotations
 
-import base64
 import math
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-
-from simscen.core.environment.costmap_filters import Filter, MaskBlocks
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Body, Solid, TriangleMesh
@@ -116,95 +111,3 @@ class PedestrianAction:
     name: str
     what: Literal["reached", "reacted", "calmed"]
     about: str
-
-
-@dataclass(frozen=True)
-class MovableObject:
-    """Movable object with its start pose and its outlines from above.
-
-    `outlines` are in the frame of the object. `closed` and `opened` are the poses of a door panel, whose frame is at
-    the hinge. `mass` is in kg; 0 for an object that cannot be pushed.
-    """
-
-    name: str
-    pose: Pose2
-    outlines: tuple[Polygon, ...]
-    closed: Pose2 | None = None
-    opened: Pose2 | None = None
-    mass: float = 0.0
-
-
-@dataclass(frozen=True)
-class DrivableSurface:
-    """Surface on which wheels can roll: a ramp, a sill, or a platform.
-
-    `height` of the highest point is in m. `uphill` is the rise per meter along x and y; zeros for a level surface.
-    """
-
-    name: str
-    outline: Polygon
-    height: float
-    uphill: tuple[float, float] = (0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class FrictionRegion:
-    """Region whose floor friction differs from 1, the value of dry concrete, from the start."""
-
-    region: str
-    outline: Polygon
-    friction: float
-
-
-@dataclass(frozen=True)
-class FilterZone:
-    """Zone of a costmap filter of `robot` at the start of the run. `speed_limit` is in m/s; 0 for none.
-
-    The zone of a filter mask has `cells` instead of a region and an outline.
-    """
-
-    filter: Filter
-    region: str = ""
-    outline: Polygon = ()
-    speed_limit: float = 0.0
-    cells: MaskBlocks | None = None
-    robot: str = ""
-
-
-@dataclass(frozen=True)
-class CompressedGrid:
-    """Occupancy grid as plain data; `data` is its int8 cells in row order, compressed by zlib, in base64."""
-
-    width: int
-    height: int
-    resolution: float
-    origin: Pose2
-    data: str
-
-    @classmethod
-    def of(cls, grid: OccupancyGrid) -> CompressedGrid:
-        """Return the compressed grid."""
-        packed = zlib.compress(np.ascontiguousarray(grid.cells).tobytes(), 9)
-        height, width = grid.shape
-        return cls(width, height, grid.resolution, grid.origin, base64.b64encode(packed).decode("ascii"))
-
-    @property
-    def grid(self) -> OccupancyGrid:
-        """The uncompressed grid. Raises ValueError if it is damaged."""
-        try:
-            cells = np.frombuffer(zlib.decompress(base64.b64decode(self.data)), dtype=np.int8)
-        except zlib.error as error:
-            raise ValueError(f"the cells of the map are damaged: {error}") from None
-        return OccupancyGrid(cells.reshape(self.height, self.width), self.resolution, self.origin)
-
-
-@dataclass(frozen=True)
-class Scenery:
-    """Visible parts of the world at the start of a run. `map` is set if it differs from the map of the robot."""
-
-    places: Mapping[str, Pose2] = field(default_factory=dict)
-    things: tuple[MovableObject, ...] = ()
-    ground: tuple[DrivableSurface, ...] = ()
-    floors: tuple[FrictionRegion, ...] = ()
-    zones: tuple[FilterZone, ...] = ()
-    map: CompressedGrid | None = None

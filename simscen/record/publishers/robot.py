@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from simscen.core.clock import SimTime
-from simscen.core.environment.world_model import Scenery
+from simscen.core.environment.scenery import Scenery
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
 from simscen.core.messages.navigation import Belief

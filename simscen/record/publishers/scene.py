@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from simscen.core.environment.costmap_filters import Filter
-from simscen.core.environment.world_model import FilterZone, Scenery
+from simscen.core.environment.scenery import FilterZone, Scenery
 from simscen.core.geometry import Array, Pose3
 from simscen.core.records.case import Case
 from simscen.core.records.events import Event, EventKind, Value

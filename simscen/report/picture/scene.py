@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.environment.world_model import MovableObject, Scenery
+from simscen.core.environment.scenery import MovableObject, Scenery
 from simscen.core.geometry import Array, Pose2
 from simscen.core.records.case import Case
 from simscen.core.records.events import Event, EventKind

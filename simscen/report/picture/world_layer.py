@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from simscen.core.environment.costmap_filters import MaskBlocks
-from simscen.core.environment.world_model import DrivableSurface, FilterZone, MovableObject
+from simscen.core.environment.scenery import DrivableSurface, FilterZone, MovableObject
 from simscen.core.geometry import Array, Pose2
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Samples

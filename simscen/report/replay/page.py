@@ -16,7 +16,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from simscen.core.environment.world_model import Scenery
+from simscen.core.environment.scenery import Scenery
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.run_result import RunResult
 from simscen.core.version import PACKAGE

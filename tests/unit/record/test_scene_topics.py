@@ -11,7 +11,7 @@ from mcap_ros2.decoder import DecoderFactory
 from moments import CLOCK, about, moments
 
 from simscen.core.environment.costmap_filters import MaskBlocks
-from simscen.core.environment.world_model import DrivableSurface, FilterZone, MovableObject, Scenery
+from simscen.core.environment.scenery import DrivableSurface, FilterZone, MovableObject, Scenery
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
 from simscen.core.records.events import Event, EventKind

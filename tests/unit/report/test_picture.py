@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.environment.world_model import MovableObject, Scenery
+from simscen.core.environment.scenery import MovableObject, Scenery
 from simscen.core.geometry import Pose2
 from simscen.core.records.run_result import RunKey
 from simscen.criteria.registry import AnyCriterion

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.environment.world_model import DrivableSurface, FilterZone, FrictionRegion, MovableObject, Scenery
+from simscen.core.environment.scenery import DrivableSurface, FilterZone, FrictionRegion, MovableObject, Scenery
 from simscen.core.geometry import Pose2
 from simscen.core.records.run_result import RunKey
 from simscen.criteria.registry import AnyCriterion
