@@ -17,8 +17,7 @@ from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import RobotFile, load_robot_file
 
 if TYPE_CHECKING:
-    from simscen.run.robot_check import DriveCheck, RobotCheckResult
-    from simscen.run.trial_drive import Motion, Trial
+    from simscen.run.robot_check import DriveCheck, Motion, RobotCheckResult, Trial
     from simscen.sim.body.robot_body import RobotBody
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
