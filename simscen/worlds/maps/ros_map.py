@@ -18,7 +18,6 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.core.files import record_read_file, require_regular_file
 from simscen.core.geometry import Pose2
 from simscen.model.world import RosMapSpec
-from simscen.worlds.maps.map_image import CODE, read_image
 
 if TYPE_CHECKING:
     from PIL import Image
