@@ -69,7 +69,7 @@ class Reconstruction:
 def _write_valid(
     drive: RecordedDrive, given: GivenParts, findings: Findings, name: str, log: Path, out: Path
 ) -> tuple[ScenarioContents, Findings]:
-    """Write the scenario without the objects that `simscen validate` refuses, such as one inside the robot.
+    """Write the scenario without the objects and faults that `simscen validate` refuses, such as one inside the robot.
 
     Return what was written. What else is refused is listed among what the log does not show. Raises InvalidInput if
     the scenario cannot be loaded.
@@ -77,7 +77,11 @@ def _write_valid(
     while True:
         contents = contents_of(drive, given, findings, name, log.name)
         out.write_text(scenario_text(contents), encoding="utf-8")
-        wrong = {problem.message for problem in _errors(out)}
+        loaded = try_variations(out, default_root([out]))
+        if isinstance(loaded, list):
+            findings = _without_refused_faults(findings, loaded)
+            continue
+        wrong = {problem.message for problem in check_in_world(loaded[0], WorldCache()) if problem.severity == "error"}
         refused = {thing.name for thing in findings.objects if any(f"`{thing.name}`" in message for message in wrong)}
         if not refused:
             break
@@ -100,12 +104,15 @@ def _write_valid(
     return contents, findings
 
 
-def _errors(scenario: Path) -> list[Problem]:
-    """Return what `simscen validate` refuses in the scenario's world. Raises InvalidInput if it cannot be loaded."""
-    loaded = try_variations(scenario, default_root([scenario]))
-    if isinstance(loaded, list):
-        raise InvalidInput(loaded)
-    return [problem for problem in check_in_world(loaded[0], WorldCache()) if problem.severity == "error"]
+def _without_refused_faults(findings: Findings, problems: list[Problem]) -> Findings:
+    """Return the findings without the faults that do not fit their sensors. Raises InvalidInput if there are none."""
+    refusals = "\n".join(problem.message for problem in problems)
+    refused = [fault for fault in findings.faults if f"fault `{fault.kind}` does not fit `{fault.target}`" in refusals]
+    if not refused:
+        raise InvalidInput(problems)
+    unknowns = [f"how to write the fault that {fault.target} has: {fault.evidence.comment}" for fault in refused]
+    faults = [fault for fault in findings.faults if fault not in refused]
+    return replace(findings, faults=faults, unknowns=[*findings.unknowns, *unknowns])
 
 
 def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> Reconstruction:

@@ -157,18 +157,21 @@ def odometry(seconds: float) -> Any:
     )
 
 
-def write_bag(folder: Path, times: Sequence[float]) -> Path:
-    """Write a rosbag2 with the true odometry at these times in s."""
+def write_bag(folder: Path, times: Sequence[float], logged_from: float = 0.0) -> Path:
+    """Write a rosbag2 with the true odometry at these times in s, of which none is logged before `logged_from`."""
     kind = "nav_msgs/msg/Odometry"
     with BagWriter(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         connection = writer.add_connection("/truth", kind, typestore=STORE)
         for seconds, latest in zip(times, np.maximum.accumulate(times), strict=True):
             data = bytes(STORE.serialize_cdr(odometry(seconds), kind))
-            writer.write(connection, round((1000.01 + latest) * 1e9), data)
+            writer.write(connection, round((1000.01 + max(latest, logged_from)) * 1e9), data)
     return folder
 
 
+BUSY_START_S = 1.1
+"""Time until which a recorder of a public log is busy; it loses messages and logs the others at once."""
 RNG = np.random.default_rng(5)
+BUSY = np.arange(0.0, 10.0, 0.011)
 GRID = np.arange(0.0, 10.0, 0.05)
 TIMES: dict[str, tuple[Sequence[float], int]] = {
     "3 ms of jitter": (GRID + RNG.uniform(-0.003, 0.003, len(GRID)), 0),
@@ -178,6 +181,11 @@ TIMES: dict[str, tuple[Sequence[float], int]] = {
     "a repeated message": (np.insert(GRID, 77, GRID[77]), 0),
     "a late message": ([*GRID[:77], GRID[78], GRID[77], *GRID[79:]], 0),
     "a gap of 3 s": (GRID[(GRID < 3.0) | (GRID > 6.0)], 1),
+    # Measured in public logs: a robot polled over Wi-Fi, motion capture in pairs, a busy recorder, and gaps of 12 s.
+    "periods of 0.156 to 0.268 s": (np.cumsum(RNG.uniform(0.156, 0.268, 45)), 0),
+    "pairs every 20 ms": (np.repeat(np.arange(0.0, 10.0, 0.02), 2) + np.tile([0.0, 2e-5], 500), 0),
+    "a recorder with a busy start": (BUSY[((BUSY < 0.25) | (BUSY > 0.38)) & ((BUSY < 0.6) | (BUSY > 0.73))], 0),
+    "a gap of 12 s": ([*GRID, *(GRID + 22.0)], 1),
 }
 
 
@@ -186,7 +194,7 @@ def test_108_logs_of_real_robots_are_judged(simscen, folder: Path, name: str) ->
     times, code = TIMES[name]
     (folder / "limits.yaml").write_text("pass:\n  - speed: {max: 0.6 m/s}\n")
     (folder / "tight.yaml").write_text("pass:\n  - speed: {max: 0.4 m/s}\n")
-    bag = write_bag(folder / "bag", times)
+    bag = write_bag(folder / "bag", times, BUSY_START_S if "busy" in name else 0.0)
     ended = simscen("judge", bag, "--truth", "/truth", "--scenario", "limits.yaml")
     assert ended.code == code, ended
     assert simscen("judge", bag, "--truth", "/truth", "--scenario", "tight.yaml").code == 1

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.records.events import Event, EventKind
 from simscen.reconstruction.drive.log_messages import LogMessages
 from simscen.reconstruction.drive.recorded_drive import RecordedGoal, TimedValues
@@ -24,6 +24,9 @@ MIN_STOP_S = 2.0
 """Minimum duration of a stop that counts as a goal."""
 MIN_LEG_M = 0.5
 """Minimum distance between two stops that count as goals."""
+MIN_BEND_M = 0.5
+"""Distance of the path from the straight line between two goals from which on it bends at a goal of its own."""
+STOP_SOURCE, BEND_SOURCE = "the robot stopped there", "its path bends there"
 _ENDINGS = {
     EventKind.GOAL_REACHED: "reached",
     EventKind.GOAL_PASSED: "passed",
@@ -109,7 +112,7 @@ def _ends_of_plans(messages: LogMessages, seconds: Seconds) -> Iterator[Recorded
 
 
 def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
-    """Yield a goal of status "reached" where the robot stopped for MIN_STOP_S, and where the drive ends."""
+    """Yield goals where the robot stopped for MIN_STOP_S, where its path bends in between, and where the drive ends."""
     if len(poses) < 2:
         return
     steps = np.maximum(np.diff(poses.times), 1e-6)
@@ -120,14 +123,34 @@ def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
     still = (np.convolve(speeds, kernel, "same") < STOPPED_SPEED_M_S) & (
         np.convolve(turns, kernel, "same") < STOPPED_TURN_RAD_S
     )
-    last, sent = Pose2(*poses.values[0].tolist()), float(poses.times[0])
+    last, sent, since = Pose2(*poses.values[0].tolist()), float(poses.times[0]), 0
     stops = windows(still, poses.times[1:], min_length=MIN_STOP_S, max_gap=0.5)
     ends = [(stop.begin, stop.end, stop.first + 1) for stop in stops if stop.begin > float(poses.times[0]) + 1e-3]
     if not ends or ends[-1][2] < len(poses) - 1:
         ends.append((float(poses.times[-1]), float(poses.times[-1]), len(poses) - 1))
     for begin, end, index in ends:
         pose = Pose2(*poses.values[index].tolist())
-        if pose.distance(last) < MIN_LEG_M:
+        bends = _bends(poses.values[:, :2], since, index)
+        if pose.distance(last) < MIN_LEG_M and not bends:
             continue
-        yield RecordedGoal("", pose, sent, begin, "reached", source="the robot stopped there")
-        last, sent = pose, end
+        for bend in bends:
+            passed = float(poses.times[bend])
+            yield RecordedGoal("", Pose2(*poses.values[bend].tolist()), sent, passed, "reached", source=BEND_SOURCE)
+            sent = passed
+        yield RecordedGoal("", pose, sent, begin, "reached", source=STOP_SOURCE)
+        last, sent, since = pose, end, index
+
+
+def _bends(path: Array, first: int, last: int) -> list[int]:
+    """Return the indices between `first` and `last` at which a path (n, 2) is farthest from straight lines.
+
+    This is the line simplification of Ramer, Douglas, and Peucker with the tolerance MIN_BEND_M.
+    """
+    line = path[last] - path[first]
+    offsets = path[first : last + 1] - path[first]
+    along = np.clip(offsets @ line / max(float(line @ line), 1e-9), 0.0, 1.0)
+    away = np.hypot(*(offsets - along[:, None] * line).T)
+    bend = first + int(np.argmax(away))
+    if away.max() <= MIN_BEND_M or bend in (first, last):
+        return []
+    return [*_bends(path, first, bend), bend, *_bends(path, bend, last)]

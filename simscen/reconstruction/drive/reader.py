@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from simscen.record import topics
 from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
 from simscen.record.foreign.transforms import TransformTree, lidar_mount
 from simscen.record.localization_logs.rosbag import planar_pose
-from simscen.record.messages.decode import ScanMessage
+from simscen.record.messages.decode import ScanMessage, StampedPose
 
 BASE_FRAMES = ("base_link", "base_footprint")
 NO_TRUTH = "none"
@@ -161,13 +162,10 @@ class _DriveReader:
         raise UnusableLog("it has no poses of the robot", f"name a topic with --topic odom=/TOPIC{listed}")
 
     def _poses_of_tf(self, outer: str, inner: str) -> TimedValues | None:
-        tree = TransformTree()
-        for role in ("tf_static", "tf"):
-            for one in self._messages.of(role):
-                tree.add(one.logged, one.message, static=role == "tf_static")
         try:
-            found = tree.between(outer, inner)
-        except UnusableLog:
+            found = self._transforms.between(outer, inner)
+        except UnusableLog as error:
+            self._notes.append(f"tf {outer}:{inner} is not used: {error}")
             return None
         if isinstance(found, str) or len(found[1]) < MIN_POSES:
             return None
@@ -176,6 +174,14 @@ class _DriveReader:
         order = np.argsort(times, kind="stable")
         planar = np.array([planar_pose(tuple(pose)) for pose in poses[order].tolist()])
         return TimedValues(times[order], planar, (stamped.logged[order] - self._start) / NS_PER_SECOND)
+
+    @cached_property
+    def _transforms(self) -> TransformTree:
+        tree = TransformTree()
+        for role in ("tf_static", "tf"):
+            for one in self._messages.of(role):
+                tree.add(one.logged, one.message, static=role == "tf_static")
+        return tree
 
     def _scans(self) -> Scans | None:
         messages = self._messages.of("scan")
@@ -201,8 +207,11 @@ class _DriveReader:
         return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, malformed, frame)
 
     def _mount(self, frame: str) -> tuple[Pose2, float]:
-        """Return the pose of the lidar on the base and its height, from static transforms."""
-        links = {link.child: link for one in self._messages.of("tf_static") for link in one.message}
+        """Return the pose of the lidar on the base and its height, from static transforms, or else the first ones."""
+        links: dict[str, StampedPose] = {}
+        for one in (*self._messages.of("tf_static"), *self._messages.of("tf")):
+            for link in one.message:
+                links.setdefault(link.child, link)
         base = next((one.message.child for one in self._messages.of("odom") if one.message.child), BASE_FRAMES[0])
         mount = lidar_mount(frame, base, links)
         if mount is None:

@@ -42,6 +42,15 @@ class TimedValues:
         return self.values[np.maximum(np.searchsorted(self.times, times, side="right") - 1, 0)]
 
 
+USUAL_PERIOD_PERCENTILE = 20
+"""Percentile of the times between messages that is their period, even if most messages are lost."""
+
+
+def usual_period(times: Array) -> float:
+    """Return the period in s with which a sensor measures, from the `times` (n,) of its messages; nan if unknown."""
+    return float(np.percentile(np.diff(times), USUAL_PERIOD_PERCENTILE)) if len(times) > 1 else float("nan")
+
+
 def no_values(columns: int) -> TimedValues:
     """Return a signal without samples."""
     return TimedValues(np.empty(0), np.empty((0, columns)), np.empty(0))

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy.ndimage import median_filter
 
+from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.evidence import Evidence, FoundFault, Window, windows
 from simscen.reconstruction.scans.scan_model import ScanModel
@@ -86,17 +87,25 @@ def missing_beam_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
         ):
             for first, last in runs:
                 blind[first : last + 1] = True
-                angles = np.degrees(model.scans.angles)
-                values = {"from": f"{angles[first]:.0f} deg", "to": f"{angles[last]:.0f} deg"}
+                begin, stop = blind_sector(model.scans.angles, first, last)
+                values = {"from": f"{begin} deg", "to": f"{stop} deg"}
                 if last >= len(blind):  # across the seam of a full circle
                     continue
-                text = f"the beams from {angles[first]:.0f} to {angles[last]:.0f} deg return nothing"
+                text = f"the beams from {begin} to {stop} deg return nothing"
                 yield fault_in_window("sector", values, window, model, end, text)
         others = chosen[:, ~blind]
         share = float(others.mean()) if others.size else 0.0
         if share > MIN_NAN_SHARE:
             text = f"{100 * share:.0f} % of the beams return nothing"
             yield fault_in_window("beam_dropout", {"probability": f"{100 * share:.0f} %"}, window, model, end, text)
+
+
+def blind_sector(angles: Array, first: int, last: int) -> tuple[str, str]:
+    """Return the directions of two beams in degrees, with as many decimals as tell neighboring beams apart."""
+    spacing = float(np.degrees(abs(angles[1] - angles[0])))
+    decimals = max(0, math.ceil(-math.log10(spacing)))
+    begin, end = (f"{math.degrees(angles[index]):.{decimals}f}" for index in (first, last))
+    return begin, end
 
 
 def mask_runs(mask: Mask) -> list[tuple[int, int]]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.reconstruction.drive.recorded_drive import Mask, Scans
+from simscen.reconstruction.drive.recorded_drive import Mask, Scans, usual_period
 from simscen.reconstruction.evidence import Evidence, FoundFault, windows
 
 MIN_OUTAGE_PERIODS = 4.5
@@ -15,6 +15,9 @@ MIN_OUTAGE_PERIODS = 4.5
 LOST_PERIODS = 1.5
 MIN_LOST_SHARE = 0.03
 MIN_LOST = 4
+MAX_OFF_MULTIPLE, MIN_MULTIPLE_SHARE = 0.2, 0.7
+"""Where messages are lost, most steps are within a fifth of a period of two, three, … periods. Otherwise the sensor
+measures irregularly."""
 MIN_DELAY_PERIODS, MIN_DELAY_S = 0.3, 0.03
 """Delays below both are those of normal drivers and networks."""
 MIN_OUTAGES_INTERMITTENT = 3
@@ -33,8 +36,7 @@ def stream_faults(
     """
     if len(times) < 3:
         return
-    steps = np.diff(times)
-    period = nominal_period or float(np.percentile(steps, 20))
+    period = nominal_period or usual_period(times)
     if period <= 0.0:
         return
     late = list(_delay(target, times, arrivals, period, end))
@@ -71,7 +73,9 @@ def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[Foun
     short = (steps > LOST_PERIODS * period) & (steps <= MIN_OUTAGE_PERIODS * period)
     lost = int(np.round(steps[short] / period - 1.0).sum())
     expected = len(times) + lost
-    if lost >= MIN_LOST and lost / expected > MIN_LOST_SHARE:
+    periods = steps[short] / period
+    is_multiple = np.abs(periods - np.round(periods)) < MAX_OFF_MULTIPLE
+    if lost >= MIN_LOST and lost / expected > MIN_LOST_SHARE and is_multiple.mean() > MIN_MULTIPLE_SHARE:
         at = np.flatnonzero(short)
         begin, last = float(edges[at[0]]), float(edges[at[-1] + 1])
         inside = (times >= begin) & (times <= last)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.reconstruction.drive.recorded_drive import Indices, RecordedDrive
+from simscen.reconstruction.drive.recorded_drive import Indices, Mask, RecordedDrive
 from simscen.reconstruction.scans.surroundings import beam_ends, lidar_poses
 
 RESOLUTION_M = 0.05
@@ -14,6 +15,8 @@ MARGIN_M = 1.0
 """Free margin around everything that was measured."""
 MAX_SCANS = 1500
 """Maximum number of scans that are used; they are evenly spread over the drive."""
+BODY_RADIUS_M = 0.15
+"""Radius of every robot, as far as the map is concerned: where one drove, no wall stands, however its poses drift."""
 MAX_RANGE_M = 15.0
 """Range beyond which errors of the heading blur the map."""
 HIT_LOG_ODDS, PASS_LOG_ODDS, MAX_LOG_ODDS = 0.85, -0.4, 20.0
@@ -38,8 +41,17 @@ def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
     for row in range(len(scans)):
         if hits[row].any():
             _add_scan(odds, poses[row, :2] - low, ends[row][hits[row]] - low)
+    odds[_driven_over(odds.shape, path - low)] = -MAX_LOG_ODDS
     cells = np.where(odds > MIN_OCCUPIED_LOG_ODDS, OCCUPIED, np.where(odds < MAX_FREE_LOG_ODDS, FREE, UNKNOWN))
     return OccupancyGrid(cells.astype(np.int8), RESOLUTION_M, Pose2(float(low[0]), float(low[1]), 0.0))
+
+
+def _driven_over(shape: tuple[int, ...], path: Array) -> Mask:
+    """Return which cells are within BODY_RADIUS_M of a `path` (n, 2) relative to the corner of the map."""
+    is_path = np.zeros(shape, dtype=bool)
+    is_path.reshape(-1)[_index(path, shape)] = True
+    driven: Mask = distance_transform_edt(~is_path) * RESOLUTION_M <= BODY_RADIUS_M
+    return driven
 
 
 def _shape(low: Array, high: Array) -> tuple[int, int]:
@@ -48,18 +60,20 @@ def _shape(low: Array, high: Array) -> tuple[int, int]:
 
 
 def _add_scan(odds: Array, origin: Array, ends: Array) -> None:
-    """Add the beams of one scan from `origin` (2,) to `ends` (n, 2), relative to the corner of the map."""
+    """Add the beams of one scan from `origin` (2,) to `ends` (n, 2), relative to the corner of the map.
+
+    A cell changes once per scan, because several beams through it write the same value.
+    """
     reach = np.hypot(*(ends - origin).T)
     steps = np.arange(0.0, float(reach.max()), RESOLUTION_M)
     share = steps[None, :] / np.maximum(reach, 1e-9)[:, None]
     passes = share < 1.0 - RESOLUTION_M / np.maximum(reach, RESOLUTION_M)[:, None]
     points = origin + share[..., None] * (ends - origin)[:, None, :]
-    through = np.unique(_index(points[passes], odds.shape))
-    hit = np.unique(_index(ends, odds.shape))
-    through = np.setdiff1d(through, hit, assume_unique=True)
+    through, hit = _index(points[passes], odds.shape), _index(ends, odds.shape)
     flat = odds.reshape(-1)
+    with_hits = np.minimum(flat[hit] + HIT_LOG_ODDS, MAX_LOG_ODDS)
     flat[through] = np.maximum(flat[through] + PASS_LOG_ODDS, -MAX_LOG_ODDS)
-    flat[hit] = np.minimum(flat[hit] + HIT_LOG_ODDS, MAX_LOG_ODDS)
+    flat[hit] = with_hits
 
 
 def _index(points: Array, shape: tuple[int, ...]) -> Indices:

@@ -31,6 +31,8 @@ from simscen.worlds.maps.ros_map import save_map
 from simscen.worlds.world_file import world_from_spec
 
 DEFAULT_LIDAR_HEIGHT_M = 0.2
+WALL_MARGIN_M = 0.05
+"""Distance that a wall can be nearer than the center of its cell."""
 MAX_NOISE_SCANS = 100
 """Number of scans, evenly spread over the drive, from which the noise of a lidar is computed."""
 MAX_EQUAL_MAP_DIFFERENCE = 0.002
@@ -154,7 +156,9 @@ def given_parts(
         robot = relative(described.robot, out) if isinstance(described.robot, Path) else described.robot
         evidence["robot"] = Evidence("robot in the header of the log")
     else:
-        written = write_robot_file(drive, out.with_name(f"{_stem(out)}.robot.yaml"), _lidar_noise(drive, surroundings))
+        clearance = float(surroundings.distance_to_walls(drive.poses.values[:, :2]).min()) - WALL_MARGIN_M
+        file = out.with_name(f"{_stem(out)}.robot.yaml")
+        written = write_robot_file(drive, file, _lidar_noise(drive, surroundings), clearance)
         choice.files.append(written.file)
         robot, unknowns = written.file.name, [*unknowns, *written.unknowns]
         evidence["robot"] = Evidence(written.evidence, None, None, "medium")

@@ -8,11 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValues
 from simscen.reconstruction.evidence import windows
 
 STUCK_RADIUS_M, STUCK_S = 0.5, 10.0
 """A robot with a goal is stuck if it stays within this radius for this time, as in Nav2's progress checker."""
+MAX_COMMAND_HOLD_S = 0.5
+"""Maximum time for which a command counts; bases stop without a new one."""
 LOST_ERROR_M = 0.5
 """Localization error above which the robot is lost."""
 MAX_STD_M = 1.0
@@ -63,9 +66,20 @@ def _standstills(drive: RecordedDrive) -> Iterator[Incident]:
         chosen = (drive.poses.times >= goal.sent) & (drive.poses.times <= end)
         times, places = drive.poses.times[chosen], drive.poses.values[chosen, :2]
         begin, length = longest_stay(times, places, STUCK_RADIUS_M)
-        if length > STUCK_S:
+        is_estimated = goal.source in (STOP_SOURCE, BEND_SOURCE)
+        if length > STUCK_S and (not is_estimated or _is_told_to_leave(drive.commands, begin, begin + length)):
             detail = f"the robot stayed within {STUCK_RADIUS_M} m for {length:.1f} s"
             yield Incident("stuck", begin, _place(drive, begin), detail, "stuck")
+
+
+def _is_told_to_leave(commands: TimedValues, begin: float, end: float) -> bool:
+    """Return whether the commands are to drive, in sum, farther than the circle in which the robot stayed.
+
+    Where a goal is only known from where the robot stopped, one that stands may wait or be parked.
+    """
+    inside = (commands.times >= begin) & (commands.times <= end)
+    held = np.minimum(np.diff(commands.times[inside], append=end), MAX_COMMAND_HOLD_S)
+    return float(np.hypot(*(commands.values[inside, :2].T @ held))) > 2 * STUCK_RADIUS_M
 
 
 def longest_stay(times: Array, places: Array, radius: float) -> tuple[float, float]:

@@ -12,14 +12,15 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.loading.files.single_files import CompactDumper
 from simscen.loading.yaml.scalars import to_yaml
-from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans, TimedValues
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans, TimedValues, usual_period
 
 TICK_RATE_HZ = 240
 """Default tick rate of scenarios, which the rates of sensors must divide."""
-DEFAULT_RADIUS_M = 0.22
+DEFAULT_RADIUS_M, MIN_RADIUS_M = 0.22, 0.1
 DEFAULT_MASS_KG, DEFAULT_ACCELERATION, DEFAULT_TURN_ACCELERATION = 5.0, 1.0, 3.2
 BODY_TOP_M, BODY_BOTTOM_M, MIN_LIDAR_HEIGHT_M = 0.12, 0.03, 0.15
 WHEEL_RADIUS_M, SEPARATION_PER_RADIUS = 0.033, 1.3
+VELOCITY_STEP_S = 0.25
 SPEED_PERCENTILE, SPEED_MARGIN = 99.0, 1.05
 MIN_SPEED_M_S, MIN_TURN_RATE_RAD_S = 0.1, 0.5
 MAX_BEAMS = 4096
@@ -34,11 +35,15 @@ class WrittenRobot:
     unknowns: list[str]
 
 
-def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float) -> WrittenRobot:
-    """Write a robot file with what a drive shows of its robot. `lidar_noise` is that of the ranges in m."""
+def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clearance: float) -> WrittenRobot:
+    """Write a robot file with what a drive shows of its robot.
+
+    `lidar_noise` is that of the ranges in m, and `clearance` the smallest distance in m of the base to a wall.
+    """
     speed, turn_rate = observed_limits(drive)
     unknowns = ["mass, wheels, and accelerations of the robot; usual values are assumed"]
-    radius = max((math.hypot(*corner) for corner in drive.footprint), default=DEFAULT_RADIUS_M)
+    assumed = max(MIN_RADIUS_M, min(DEFAULT_RADIUS_M, math.floor(100 * clearance) / 100))
+    radius = max((math.hypot(*corner) for corner in drive.footprint), default=assumed)
     outline: dict[str, Any] = {"radius": radius}
     body: dict[str, Any] = {"cylinder": [round(radius, 3), round(BODY_TOP_M - BODY_BOTTOM_M, 3)], "z": BODY_BOTTOM_M}
     if drive.footprint:
@@ -46,7 +51,8 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float) -> Wr
         outline = {"footprint": corners}
         body = {"polygon": corners, "height": round(BODY_TOP_M - BODY_BOTTOM_M, 3), "z": BODY_BOTTOM_M}
     else:
-        unknowns.append(f"footprint of the robot; a radius of {DEFAULT_RADIUS_M} m is assumed")
+        reason = " because it drove that close to walls" if radius < DEFAULT_RADIUS_M else ""
+        unknowns.append(f"footprint of the robot; a radius of {radius} m is assumed{reason}")
     data = {
         "simscen": 1,
         "name": f"robot of {drive.name}",
@@ -72,9 +78,15 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float) -> Wr
 
 
 def observed_limits(drive: RecordedDrive) -> tuple[float, float]:
-    """Return the largest forward speed in m/s and turn rate in rad/s of a drive, from its odometry and commands."""
+    """Return the largest speed in m/s and turn rate in rad/s of a drive.
+
+    They are those of its odometry and commands, or else of its poses.
+    """
     speeds = _largest(drive.odometry, 3), _largest(drive.commands, 0)
     turns = _largest(drive.odometry, 5), _largest(drive.commands, 2)
+    if not len(drive.odometry) and not len(drive.commands):
+        of_poses = _velocities(drive.poses)
+        speeds, turns = (_largest(of_poses, 0), 0.0), (_largest(of_poses, 1), 0.0)
     speed = math.ceil(100 * SPEED_MARGIN * max(speeds)) / 100
     turn_rate = math.ceil(100 * SPEED_MARGIN * max(turns)) / 100
     return max(speed, MIN_SPEED_M_S), max(turn_rate, MIN_TURN_RATE_RAD_S)
@@ -82,6 +94,14 @@ def observed_limits(drive: RecordedDrive) -> tuple[float, float]:
 
 def _largest(signal: TimedValues, column: int) -> float:
     return float(np.percentile(np.abs(signal.values[:, column]), SPEED_PERCENTILE)) if len(signal) else 0.0
+
+
+def _velocities(poses: TimedValues) -> TimedValues:
+    """Return the speed and the turn rate (n, 2) between poses, averaged over VELOCITY_STEP_S."""
+    times = np.arange(poses.times[0], poses.times[-1], VELOCITY_STEP_S)
+    steps = np.diff(poses.poses_at(times), axis=0) / VELOCITY_STEP_S
+    turns = np.diff(np.unwrap(poses.poses_at(times)[:, 2])) / VELOCITY_STEP_S
+    return TimedValues(times[1:], np.column_stack((np.hypot(steps[:, 0], steps[:, 1]), turns)), times[1:])
 
 
 def _inner_radius(drive: RecordedDrive, radius: float) -> float:
@@ -121,6 +141,6 @@ def _lidar(scans: Scans, noise: float) -> dict[str, Any]:
 
 def _rate(times: Array, usual: float) -> float:
     """Return the rate in Hz nearest to that of a signal that divides the tick rate."""
-    measured = 1.0 / max(float(np.median(np.diff(times))), 1e-3) if len(times) > 1 else usual
+    measured = 1.0 / max(usual_period(times), 1e-3) if len(times) > 1 else usual
     divisors = [rate for rate in range(1, TICK_RATE_HZ + 1) if TICK_RATE_HZ % rate == 0]
     return float(min(divisors, key=lambda rate: abs(math.log(rate / measured))))

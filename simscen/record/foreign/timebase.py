@@ -17,6 +17,9 @@ MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
 """Minimum change of a clock that is reported. Smaller changes are within the delays of logging."""
 MIN_MESSAGES_AROUND_STEP = 20
 """Minimum number of messages before and after a change of a clock, to distinguish it from delayed messages."""
+MAX_CLOCK_STEP_SHARE = 1.5
+"""Maximum lasting change of the clock, as a share of the change at one message. A recorder that catches up after a busy
+start, and lost messages meanwhile, changes far more in the end than at any message."""
 MAX_LOGGING_DELAY_NS = 10 * NS_PER_SECOND
 """Maximum difference between the stamps of two topics at the same time. A larger one means different clocks."""
 
@@ -72,7 +75,8 @@ def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
     offsets, stamp_gaps, logged_gaps = stamps - logged, np.diff(stamps), np.diff(logged)
     changes = np.diff(offsets)
     lasting = np.maximum.accumulate(offsets[::-1])[::-1][1:] - np.maximum.accumulate(offsets)[:-1]
-    is_step = (np.abs(changes) > MIN_CLOCK_STEP_NS) & (2 * lasting * np.sign(changes) > np.abs(changes))
+    share = lasting / np.where(changes == 0, 1, changes)
+    is_step = (np.abs(changes) > MIN_CLOCK_STEP_NS) & (share > 0.5) & (share < MAX_CLOCK_STEP_SHARE)
     is_step &= np.abs(stamp_gaps - np.median(stamp_gaps)) > np.abs(logged_gaps - np.median(logged_gaps))
     found = np.flatnonzero(is_step[count - 1 : -count + 1])
     if not len(found):
@@ -115,10 +119,13 @@ class Timebase:
     anchor: StampedMessages | None = None
 
     @classmethod
-    def from_logged(cls, logged: Iterable[Ticks], rate: int, anchor: StampedMessages | None) -> Timebase:
-        """Return the timebase of messages that were logged at these times (at least one)."""
+    def from_logged(
+        cls, logged: Iterable[Ticks], rate: int, anchor: StampedMessages | None, begin: int | None = None
+    ) -> Timebase:
+        """Return the timebase of messages that were logged at these times (at least one), from `begin` on."""
         times = np.concatenate(list(logged))
-        start, stop = _header_times(np.array([times.min(), times.max()]), anchor).tolist()
+        begin = int(times.min()) if begin is None else begin
+        start, stop = _header_times(np.array([begin, times.max()]), anchor).tolist()
         return cls(start, stop, rate, anchor)
 
     @property

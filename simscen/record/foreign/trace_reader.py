@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from simscen.core.clock import NS_PER_SECOND
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Ticks
 from simscen.core.records.verdict import Evidence
@@ -71,6 +72,8 @@ def _count(number: int) -> str:
 
 MAX_TRUTH_GAP_S = 1.0
 """Maximum time without ground truth. Something may have happened in a longer gap."""
+MIN_LATE_SUBSCRIPTION_S, MAX_LATE_SUBSCRIPTION_S = 0.05, 2.0
+"""Time after its start in which a recorder still subscribes to topics. What it holds before the last is left out."""
 MAX_DISTANCE_BEFORE_BELIEF_M = 0.3
 """Distance that a robot may drive before the first pose of AMCL: a little more than Nav2's update_min_d, 0.25 m."""
 MAX_LISTED_TOPICS = 12
@@ -163,7 +166,23 @@ class ForeignTraceReader:
         anchor = next((messages for messages in stamped if messages is not None), None)
         if anchor is None and self._options.clock == "header":
             self.notes.append("no relevant message has a stamp, so the times of logging are used")
-        return Timebase.from_logged(logged, self._options.tick_rate, anchor)
+        return Timebase.from_logged(logged, self._options.tick_rate, anchor, self._recorded_since(logged, tracks[0]))
+
+    def _recorded_since(self, logged: Sequence[Ticks], truth: Track | None) -> int:
+        """Return the time of logging in ns since which the ground truth and the scans are recorded.
+
+        A recorder subscribes to the topics one after another; what it recorded before the last one is left out.
+        """
+        start = int(min(times.min() for times in logged))
+        firsts = {} if truth is None else {truth.source: int(truth.logged.min())}
+        if scans := self._decoded.by_role["scan"]:
+            firsts[self._options.topic("scan")] = min(time for time, _ in scans)
+        source, first = max(firsts.items(), key=lambda item: item[1], default=("", start))
+        late = (first - start) / NS_PER_SECOND
+        if not MIN_LATE_SUBSCRIPTION_S < late <= MAX_LATE_SUBSCRIPTION_S:
+            return start
+        self.notes.append(f"{source} is recorded {late:.1f} s after the first message; the log is judged from then on")
+        return first
 
     def _stamped(self, role: str) -> StampedMessages | None:
         messages = self._decoded.by_role[role]

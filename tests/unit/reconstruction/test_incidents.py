@@ -5,6 +5,7 @@ import pytest
 import synthetic_drives as drives
 
 from simscen.core.geometry import Pose2
+from simscen.reconstruction.drive.goals import STOP_SOURCE
 from simscen.reconstruction.drive.recorded_drive import RecordedGoal
 from simscen.reconstruction.scenario.criteria import criteria_of
 from simscen.reconstruction.scenario.incidents import incidents_of, longest_stay
@@ -56,6 +57,16 @@ def test_a_robot_that_stays_in_place_with_a_goal_is_stuck():
     goal = replace(REACHED, ended=None, status="unknown")
     one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,))
     assert "stuck" in kinds(one) and "unfinished goal" in kinds(one)
+
+
+@pytest.mark.parametrize(("speed", "expected"), [(0.0, []), (0.3, ["stuck"])])
+def test_a_parked_robot_whose_goal_is_where_it_stopped_is_not_stuck(speed, expected):
+    times = np.arange(0.0, 30.0, 0.1)
+    stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))
+    told = drives.signal(times, np.column_stack((np.full(len(times), speed), np.zeros((len(times), 2)))))
+    goal = replace(REACHED, ended=30.0, source=STOP_SOURCE)
+    one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,), commands=told)
+    assert [kind for kind in kinds(one) if kind == "stuck"] == expected
 
 
 def test_a_failed_goal_is_an_incident_with_its_code():

@@ -9,6 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.reconstruction.drive.recorded_drive import no_values
 from simscen.reconstruction.estimators import find_all
 from simscen.reconstruction.faults.lidar_calibration import range_error_faults
+from simscen.reconstruction.faults.lidar_readings import blind_sector
 from simscen.reconstruction.faults.transparent_walls import glass_fault
 from simscen.reconstruction.objects.clusters import usable_scans
 from simscen.reconstruction.scans.surroundings import Surroundings
@@ -46,6 +47,13 @@ def test_blind_directions_are_a_sector():
     assert fault.kind == "sector"
     ends = [number(fault, "from"), number(fault, "to")]
     assert ends == pytest.approx(np.degrees(drives.ANGLES[[40, 80]]), abs=1.0)
+
+
+def test_a_blind_sector_of_a_fine_lidar_has_two_ends():
+    angles = np.radians(np.linspace(-29.4, 29.4, 377))
+    begin, end = blind_sector(angles, 0, 2)
+    assert float(begin) < float(end)
+    assert [float(begin), float(end)] == pytest.approx(np.degrees(angles[[0, 2]]), abs=0.06)
 
 
 def test_beams_lost_for_a_while_are_a_beam_dropout_in_that_time():

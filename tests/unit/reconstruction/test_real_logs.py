@@ -1,7 +1,9 @@
 """Scenarios from logs of robots that simscen never met, written with rosbags from its own message definitions."""
 
 import math
+import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,14 @@ from rosbags.rosbag2 import StoragePlugin
 from simscen.cli.main import app
 from simscen.core.errors import InvalidInput
 from simscen.loading.scenario import load_scenario
+from simscen.reconstruction import scenario_from_log as scenario_module
+from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE, ends_of_motion
 from simscen.reconstruction.drive.reader import DriveOptions, read_drive
+from simscen.reconstruction.drive.recorded_drive import no_values
+from simscen.reconstruction.evidence import Evidence, FoundFault
+from simscen.reconstruction.scans.grid_mapping import map_from_scans
+from simscen.reconstruction.scans.surroundings import Surroundings, world_from_map
+from simscen.reconstruction.scenario.robot_file import observed_limits, write_robot_file
 from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
 from simscen.worlds.maps.ros_map import save_map
 
@@ -134,6 +143,58 @@ def test_without_goals_the_end_of_the_motion_is_the_goal(tmp_path):
     drive = read_drive(bag, DriveOptions())
     (only,) = drive.goals
     assert only.pose.distance(drives.Pose2(*drives.poses(np.array([drives.DURATION_S - 0.05]))[0].tolist())) < 0.1
+
+
+def test_a_drive_without_stops_has_goals_where_its_path_bends():
+    times = np.arange(0.0, 20.0, 0.1)
+    corners = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0), (0.0, 0.1)]
+    path = np.column_stack([np.interp(times, [0, 5, 10, 15, 19.9], column) for column in zip(*corners, strict=True)])
+    goals = list(ends_of_motion(drives.signal(times, np.column_stack((path, np.zeros(len(times)))))))
+    np.testing.assert_allclose([goal.pose[:2] for goal in goals], corners[1:], atol=0.05)
+    assert [goal.ended for goal in goals] == pytest.approx([5, 10, 15, 19.9], abs=0.1)
+    assert [goal.source for goal in goals] == [BEND_SOURCE] * 3 + [STOP_SOURCE]
+
+
+def test_the_mount_of_the_lidar_can_be_on_tf(tmp_path):
+    moved = [replace(said, topic="/tf") if said.topic == "/tf_static" else said for said in messages()]
+    drive = read_drive(logs.write_bag(tmp_path / "bag", moved), DriveOptions())
+    assert not any("mount" in note for note in drive.notes)
+
+
+def test_a_fault_that_does_not_fit_the_sensor_is_only_mentioned(tmp_path, monkeypatch):
+    slow = FoundFault("odom", "slow", {"rate": "400 Hz"}, evidence=Evidence("too slow", 1.0, 2.0))
+    real = scenario_module.find_all
+    monkeypatch.setattr(
+        scenario_module, "find_all", lambda *given: replace(found := real(*given), faults=[*found.faults, slow])
+    )
+    bag = logs.write_bag(tmp_path / "bag", messages())
+    made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    load_scenario(made.file, tmp_path)
+    assert [fault.kind for fault in made.findings.faults] == ["off"]
+    assert any("too slow" in unknown for unknown in made.contents.unknowns)
+
+
+def test_the_assumed_robot_fits_where_it_drove(tmp_path):
+    """The wall stands 0.3 m beside the path; where the robot drove, the map is free although its poses drift."""
+    times = np.arange(0.0, 8.0, 0.1)
+    at = np.column_stack((1.0 + 0.5 * times, np.full(len(times), 0.35), np.zeros(len(times))))
+    ranges = drives.room().ranges_from(at, drives.ANGLES, 12.0)
+    ranges[70:] -= 0.28
+    scans = replace(drives.scans(), times=times, arrivals=times, ranges=ranges, malformed=np.zeros(len(times), bool))
+    drive = drives.drive(scans, poses=drives.signal(times, at))
+    walls = Surroundings(world_from_map(map_from_scans(drive), "map"), drives.HEIGHT)
+    nearest = float(walls.distance_to_walls(at[:, :2]).min())
+    assert nearest >= 0.15
+    written = write_robot_file(drive, tmp_path / "a.robot.yaml", 0.01, nearest - 0.05)
+    radius = float(re.search(r"radius: ([\d.]+)", written.file.read_text()).group(1))
+    assert 0.1 <= radius < nearest
+    assert any(f"a radius of {radius} m" in unknown for unknown in written.unknowns)
+
+
+def test_the_speed_limits_of_a_log_of_transforms_are_those_of_its_poses():
+    speed, turn_rate = observed_limits(drives.drive(odometry=no_values(6), commands=no_values(3)))
+    assert speed == pytest.approx(1.05 * drives.SPEED_M_S, abs=0.02)
+    assert turn_rate == 0.5
 
 
 def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path):

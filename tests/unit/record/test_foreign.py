@@ -35,6 +35,7 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import Evidence
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.read import ForeignLog, read_foreign_log
+from simscen.record.foreign.timebase import find_clock_step
 
 MOCAP = ForeignLogOptions(truth="/mocap")
 WRITERS: dict[str, Callable[[Path, list[Said]], Path]] = {
@@ -194,6 +195,37 @@ def test_clock_that_is_set_while_recording_is_refused(
     assert refused(with_clock_step(seconds)).startswith(text)
     by_log = read(with_clock_step(seconds), ForeignLogOptions(truth="/mocap", clock="log"))
     assert by_log.trace.velocity.values[:, 0] == pytest.approx(SPEED, abs=1e-6)
+
+
+def with_busy_start(step: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Times of logging and stamps in ns of a public log: 90 Hz, logged from 1.1 s on, with losses of 0.1 s before.
+
+    The clock of the stamps is set by `step` ns at 5 s.
+    """
+    stamps = np.arange(0, 10 * SECOND, 11_000_000)
+    is_lost = np.zeros(len(stamps), dtype=bool)
+    for begin in (6, 30, 50):
+        is_lost[begin : begin + 12] = True
+    stamps = stamps[~is_lost]
+    logged = np.maximum(stamps, round(1.1 * SECOND)) + LATENCY
+    return logged, stamps + np.where(stamps >= 5 * SECOND, step, 0)
+
+
+def test_a_recorder_that_catches_up_after_a_busy_start_is_no_clock_that_was_set() -> None:
+    assert find_clock_step(*with_busy_start()) is None
+    found = find_clock_step(*with_busy_start(round(0.3 * SECOND)))
+    assert found is not None
+    assert found[1] == pytest.approx(0.3 * SECOND, abs=0.02 * SECOND)
+
+
+def test_a_log_is_judged_from_when_the_recorder_has_subscribed_to_scans(read: Callable[..., ForeignLog]) -> None:
+    late = [one for one in drive() if one.topic != "/scan" or one.time > BEGIN + SECOND]
+    log = read(late)
+    assert log.notes == ["/scan is recorded 1.0 s after the first message; the log is judged from then on"]
+    assert (log.trace.scans[0], log.trace.seconds(log.trace.end)) == (0, pytest.approx(9.1, abs=0.1))
+    assert log.trace.truth.values[0, 0] == pytest.approx(SPEED * 1.0, abs=0.03)
+    silent = read([one for one in drive() if one.topic != "/scan" or one.time > BEGIN + 3 * SECOND])
+    assert (silent.notes, silent.trace.scans[0]) == ([], pytest.approx(3000, abs=50))
 
 
 def test_clock_of_the_recorder_that_is_set_back_is_refused(refused: Callable[..., str]) -> None:
