@@ -41,14 +41,21 @@ MAX_SCANS = 3000
 """Maximum number of scans that are compared with the world; of longer drives, every second, third, … scan is used."""
 SENSORS = ("lidar", "odom", "imu")
 """Usual names of the sensors that faults are found for."""
+NEVER_KNOWN = "doors that open or close, pushes, slippery floor, and changes of the payload; add them by hand"
+"""What no estimator looks for."""
 MIN_KIDNAP_M = 0.5
 MAX_KIDNAP_S = 0.3
 
 
-def find_all(drive: RecordedDrive, world: Surroundings, robot: KnownRobot = UNKNOWN_ROBOT) -> Findings:
-    """Return everything that the estimators find in a drive."""
-    unknowns: list[str] = []
-    faults, objects = _from_scans(drive, world, robot, unknowns)
+def find_all(
+    drive: RecordedDrive,
+    world: Surroundings,
+    robot: KnownRobot = UNKNOWN_ROBOT,
+    other_robots: Sequence[FoundObject] = (),
+) -> Findings:
+    """Return everything that the estimators find in a drive. `other_robots` are known to be there."""
+    unknowns = [NEVER_KNOWN]
+    faults, objects = _from_scans(drive, world, robot, other_robots, unknowns)
     kidnaps = list(_kidnaps(drive))
     faults += stream_faults("odom", drive.odometry.times, drive.odometry.arrivals, drive.duration)
     faults += stream_faults("imu", drive.turn_rates.times, drive.turn_rates.arrivals, drive.duration)
@@ -79,12 +86,16 @@ def _on_own_sensors(faults: list[FoundFault], robot: KnownRobot, unknowns: list[
 
 
 def _from_scans(
-    drive: RecordedDrive, world: Surroundings, robot: KnownRobot, unknowns: list[str]
+    drive: RecordedDrive,
+    world: Surroundings,
+    robot: KnownRobot,
+    other_robots: Sequence[FoundObject],
+    unknowns: list[str],
 ) -> tuple[list[FoundFault], list[FoundObject]]:
     scans = drive.scans
     if scans is None or len(scans) < 3:
         unknowns.append("objects that are not on the map, and faults of the lidar, because the log has no scans")
-        return [], []
+        return [], [*other_robots]
     faults = [*stream_faults("lidar", scans.times, scans.arrivals, drive.duration)]
     faults += stuck_scans("lidar", scans, drive.duration)
     if len(scans) > MAX_SCANS:
@@ -110,7 +121,7 @@ def _from_scans(
         faults += range_error_faults(model)
     glass = glass_fault(model, world, usable_scans(model))
     faults += [] if glass is None else [glass]
-    objects = find_objects(model, world, drive.has_independent_poses)
+    objects = find_objects(model, world, drive.has_independent_poses, other_robots)
     return faults, with_walks(objects, WalkTrial(drive, PedestrianMap(world.built), robot.radius))
 
 

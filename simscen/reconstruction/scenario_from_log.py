@@ -13,8 +13,9 @@ from simscen.loading.scenario import try_variations
 from simscen.loading.world_cache import WorldCache
 from simscen.reconstruction.drive.reader import DriveOptions, read_drive
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
-from simscen.reconstruction.drive.run_description import read_description
+from simscen.reconstruction.drive.run_description import choose_robot, read_description
 from simscen.reconstruction.estimators import find_all
+from simscen.reconstruction.objects.find_objects import object_along
 from simscen.reconstruction.scans.surroundings import Surroundings
 from simscen.reconstruction.scenario.contents import Findings, GivenParts, contents_of
 from simscen.reconstruction.scenario.given_parts import DEFAULT_LIDAR_HEIGHT_M, GivenFiles, choose_world, given_parts
@@ -116,16 +117,25 @@ def _without_refused_faults(findings: Findings, problems: list[Problem]) -> Find
 
 
 def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> Reconstruction:
-    """Write a scenario from a log, and its map beside it if it needs one. Raises InvalidInput and OSError."""
-    drive = read_drive(log, options.drive)
-    described = read_description(log, options.root or Path.cwd())
-    choice = choose_world(drive, described, options.files, out)
+    """Write a scenario from a log, and its map beside it if it needs one. Raises InvalidInput and OSError.
+
+    Of a log with several robots, `options.files.robot` names the robot that the scenario has.
+    """
+    robot_of_log = choose_robot(log, options.files.robot)
+    files = replace(options.files, robot="") if robot_of_log else options.files
+    drive = read_drive(log, replace(options.drive, robot=robot_of_log))
+    described = read_description(log, options.root or Path.cwd(), robot_of_log)
+    choice = choose_world(drive, described, files, out)
     height = DEFAULT_LIDAR_HEIGHT_M if drive.scans is None else drive.scans.height
     surroundings = Surroundings(choice.world, height)
-    given = given_parts(drive, described, choice, options.files, out, surroundings)
-    is_known = bool(options.files.robot) or described.robot is not None
+    given = given_parts(drive, described, choice, files, out, surroundings)
+    is_known = bool(files.robot) or described.robot is not None
     robot = known_robot(given.robot, out.parent, is_known)
-    findings = find_all(drive, surroundings, robot)
+    others = [
+        object_along(name, outline, times[times >= drive.begin] - drive.begin, poses[times >= drive.begin])
+        for name, outline, times, poses in described.others
+    ]
+    findings = find_all(drive, surroundings, robot, others)
     name = out.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario").replace("_", " ")
     contents, findings = _write_valid(drive, given, findings, name, log, out)
     return Reconstruction(log, (out, *choice.files), drive, findings, contents, surroundings)

@@ -48,7 +48,13 @@ def command(
     world: Annotated[
         Path | None, typer.Option(help="With --from-log: world file to use instead of walls from the map.")
     ] = None,
-    robot: Annotated[str, typer.Option(help="With --from-log: robot file, or the name of a shipped robot.")] = "",
+    robot: Annotated[
+        str,
+        typer.Option(
+            help="With --from-log: robot file, or the name of a shipped robot; with several robots in a log of "
+            "simscen, the name of one of them: the others become moving objects."
+        ),
+    ] = "",
     truth: Annotated[
         str | None,
         typer.Option(help="With --from-log: topic of the true pose, or `none`; default: that of simscen's own logs."),

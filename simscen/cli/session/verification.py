@@ -44,7 +44,7 @@ def verify_reconstruction(made: Reconstruction) -> None:
     failed = ", ".join(verified.failed)
     print_text(escaped(f"criteria that fail in the run: {failed}" if failed else "all criteria hold in the run"))
     page = made.file.with_name(f"{name}{PAGE_SUFFIX}")
-    text = verification_page(made.contents.name, made.surroundings.grid, made.findings.objects, verified)
+    text = verification_page(made.contents.name, made.surroundings, made.findings.objects, verified)
     save(page, lambda path: _write(path, text), [made.file, made.log])
     recorded, run = (escaped(shlex.quote(str(file))) for file in (made.log, log))
     print_text(f"log of the run: {run}; to play both: simscen replay {run} --against {recorded}")

@@ -42,6 +42,7 @@ def from_first_goal(drive: RecordedDrive) -> RecordedDrive:
         scans=None if drive.scans is None else _scans_after(drive.scans, begin),
         goals=goals,
         notes=(*drive.notes, note),
+        begin=begin,
     )
 
 

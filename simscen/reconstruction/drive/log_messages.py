@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from simscen.record import topics
 from simscen.record.foreign.options import TOPICS
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
+from simscen.record.frame_names import RobotFrames
 from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader, decode_checked
 
@@ -102,28 +103,32 @@ class LogMessages:
         return self.by_role.get(role, [])
 
 
-def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None) -> LogMessages:
+def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, robot: str = "") -> LogMessages:
     """Read the messages of an MCAP file or a rosbag2 folder.
 
     `renamed` are topics that differ from the defaults, by role, and `truth` is the topic of the ground truth. Scans are
-    found on any topic if the default topic has none. Raises UnusableLog.
+    found on any topic if the default topic has none. In a log of simscen with several robots, `robot` is the one whose
+    messages are read; its name is removed from topics and frames. Raises UnusableLog.
     """
+    prefix = f"/{robot}" if robot else ""
     names = {**TOPICS, **EXTRA_TOPICS, **renamed}
-    roles = {names[role]: role for role in sorted(names)}
+    roles = {prefix + names[role].removeprefix(prefix): role for role in sorted(names)}
     if truth:
-        roles[truth] = "truth"
+        roles[prefix + truth.removeprefix(prefix)] = "truth"
     stream = open_messages(path, _AnyTopic(roles) if path.is_dir() else roles)
     messages = LogMessages()
     other_scans: dict[str, list[Logged]] = {}
     for raw in stream:
         role = roles.get(raw.topic)
         if role is not None and raw.type in _DECODERS[role]:
-            messages.by_role.setdefault(role, []).append(_decoded(raw, role))
+            messages.by_role.setdefault(role, []).append(_without_robot(_decoded(raw, role), robot))
         elif role is None and raw.type == topics.SCAN_TYPE:
             other_scans.setdefault(raw.topic, []).append(_decoded(raw, "scan"))
     if not messages.of("scan") and other_scans:
         messages.by_role["scan"] = other_scans[min(other_scans)]
-    messages.topics, messages.is_complete = stream.topics, stream.complete
+    own = {name: kind for name, kind in stream.topics.items() if not robot or name.startswith(f"{prefix}/")}
+    messages.topics = {name.removeprefix(prefix): kind for name, kind in own.items()}
+    messages.is_complete = stream.complete
     for logged in messages.by_role.values():
         logged.sort(key=lambda one: one.logged)
     return messages
@@ -147,6 +152,22 @@ def _decoded(raw: RawMessage, role: str) -> Logged:
     except (struct.error, ValueError, UnicodeDecodeError, OverflowError) as error:
         raise UnusableLog(f"a message of {raw.topic} cannot be read as {raw.type}: {error}") from error
     return Logged(raw.time, _stamp(message), message)
+
+
+def _without_robot(logged: Logged, robot: str) -> Logged:
+    """Return a message without the name of the robot in its frames."""
+    if not robot:
+        return logged
+    frames = RobotFrames(robot)
+
+    def stripped(message: Any) -> Any:
+        names = [name for name in ("frame", "child") if name in getattr(message, "_fields", ())]
+        return message._replace(**{name: frames.stack_frame(getattr(message, name)) for name in names})
+
+    message = logged.message
+    if isinstance(message, list) and message and hasattr(message[0], "_fields"):
+        return logged._replace(message=[stripped(one) for one in message])
+    return logged._replace(message=stripped(message)) if hasattr(message, "_fields") else logged
 
 
 def _stamp(message: Any) -> int:

@@ -32,10 +32,14 @@ MIN_POSES = 2
 
 @dataclass(frozen=True)
 class DriveOptions:
-    """How to read a log: the topic of the ground truth, "none" to ignore it, and topics that differ, by role."""
+    """How to read a log: the topic of the ground truth, "none" to ignore it, and topics that differ, by role.
+
+    `robot` is the robot to read in a log of simscen with several robots.
+    """
 
     truth: str | None = None
     topics: Mapping[str, str] = field(default_factory=dict)
+    robot: str = ""
 
 
 def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
@@ -44,7 +48,7 @@ def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
         truth = options.truth
         if truth is None and not path.is_dir() and is_simscen_log(path):
             truth = topics.TRUTH.name
-        messages = collect_messages(path, options.topics, None if truth == NO_TRUTH else truth)
+        messages = collect_messages(path, options.topics, None if truth == NO_TRUTH else truth, options.robot)
         return from_first_goal(_DriveReader(path, messages).drive())
 
 

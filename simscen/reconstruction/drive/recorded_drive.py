@@ -155,6 +155,7 @@ class RecordedDrive:
         result: Final result of the navigation, such as "SUCCEEDED", or "".
         footprint: Corners of the robot's footprint in the base frame, () if unknown.
         notes: Remarks for the user.
+        begin: Time in s, since the start of the log, at which the drive starts.
     """
 
     name: str
@@ -174,3 +175,4 @@ class RecordedDrive:
     result: str = ""
     footprint: Polygon = ()
     notes: tuple[str, ...] = ()
+    begin: float = 0.0

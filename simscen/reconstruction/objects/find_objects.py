@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.reconstruction.drive.recorded_drive import Indices
+from simscen.reconstruction.drive.recorded_drive import Indices, Polygon
 from simscen.reconstruction.evidence import Evidence
 from simscen.reconstruction.objects.clusters import scan_clusters, share_seen_free, usable_scans
 from simscen.reconstruction.objects.found_object import FoundObject, Keyframe
@@ -35,14 +36,16 @@ MAX_OBJECT_SPEED_M_S = 4.0
 """Keyframes that an object would reach only at a higher speed are errors of its track."""
 
 
-def find_objects(model: ScanModel, world: Surroundings, has_true_poses: bool) -> list[FoundObject]:
-    """Return the objects that the scans show and the static world does not have."""
+def find_objects(
+    model: ScanModel, world: Surroundings, has_true_poses: bool, robots: Sequence[FoundObject] = ()
+) -> list[FoundObject]:
+    """Return the objects that the scans show and the static world does not have, and the other `robots`."""
     tracks = track_objects(scan_clusters(model, world, has_true_poses))
     usable = np.flatnonzero(usable_scans(model))
     moving = [track for track in tracks if _moves(model, track, usable)]
     standing = _merged([track for track in tracks if track not in moving], model, usable)
     moving.sort(key=lambda track: (-len(track.clusters), track.begin))
-    found: list[FoundObject] = []
+    found: list[FoundObject] = [*robots]
     for track in moving:
         if not any(_is_part(track, thing) for thing in found):
             found.append(_found(model, track, usable, moves=True))
@@ -50,7 +53,7 @@ def find_objects(model: ScanModel, world: Surroundings, has_true_poses: bool) ->
     for track in standing:
         if len(track.clusters) >= MIN_CLUSTERS_STANDING and not any(_is_part(track, thing) for thing in known):
             found.append(_found(model, track, usable, moves=False))
-    found = [thing for thing in found if max(thing.size) >= MIN_SIZE_M]
+    found = [thing for thing in found[len(robots) :] if max(thing.size) >= MIN_SIZE_M]
     found.sort(key=lambda thing: (thing.keyframes[0][0], *thing.keyframes[0][1:3]))
     kinds = {True: "moving object", False: "object"}
     counts = {True: 0, False: 0}
@@ -58,7 +61,20 @@ def find_objects(model: ScanModel, world: Surroundings, has_true_poses: bool) ->
     for thing in found:
         counts[thing.is_moving] += 1
         named.append(replace(thing, name=f"{kinds[thing.is_moving]} {counts[thing.is_moving]}"))
-    return named
+    return [*robots, *named]
+
+
+def object_along(name: str, outline: Polygon, times: Array, poses: Array) -> FoundObject:
+    """Return a box around an outline in the frame of poses x, y, yaw (n, 3), which are known at `times` (n,) in s."""
+    corners = np.array(outline)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x, y = ((low + high) / 2).tolist()
+    centers = np.column_stack((poses[:, 0] + c * x - s * y, poses[:, 1] + s * x + c * y, poses[:, 2]))
+    length, width = np.round(high - low, 2).tolist()
+    keyframes = tuple(simplified(ObjectShape((length, width), times, centers)))
+    evidence = Evidence("its true poses in the log", float(times[0]), float(times[-1]))
+    return FoundObject(name, (length, width), keyframes, None, None, evidence, is_robot=True)
 
 
 def _moves(model: ScanModel, track: ObjectTrack, usable: Indices) -> bool:

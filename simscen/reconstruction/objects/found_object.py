@@ -59,6 +59,7 @@ class FoundObject:
         appears: Time in s at which it appears; None if it is there from the start.
         disappears: Time in s at which it disappears; None if it stays.
         evidence: Why it is there.
+        is_robot: Whether it is another robot, whose poses are in the log.
         walk: How a pedestrian walks that reproduces the keyframes; None if it is no person or none does.
     """
 
@@ -68,6 +69,7 @@ class FoundObject:
     appears: float | None = None
     disappears: float | None = None
     evidence: Evidence = field(default_factory=lambda: Evidence(""))
+    is_robot: bool = False
     walk: FoundWalk | None = None
 
     @property

@@ -32,8 +32,9 @@ MEETING_DISTANCE_M, SURPRISE_DISTANCE_M = 3.0, 4.0
 """Distance from the robot within which a person would evade it, or stop and look at it."""
 BETTER_M = 0.05
 """Amount by which the RMSE of a more complex explanation must be smaller."""
-GOOD_RMSE_M, HOPELESS_RMSE_M = 0.1, 0.9
-"""RMSE below which no other path is tried, and above which no other speed is."""
+GOOD_RMSE_M, HOPELESS_RMSE_M, LOST_M = 0.12, 0.6, 1.2
+"""RMSE below which nothing else is tried, RMSE above which no other speed is tried, and distance from the track at which
+a simulation ends."""
 SPEED_FACTORS = (0.93, 1.07)
 
 
@@ -82,7 +83,7 @@ def _error(thing: FoundObject) -> float:
 
 def is_person(thing: FoundObject) -> bool:
     """Return whether the size and the speed of an object are those of a person who walks."""
-    if not thing.is_moving:
+    if not thing.is_moving or thing.is_robot:
         return False
     if thing.is_cylinder:
         is_body = MIN_CYLINDER_RADIUS_M <= thing.size[0] <= MAX_CYLINDER_RADIUS_M
@@ -128,12 +129,17 @@ def _fitted_walk(
     distances = trial.robot_distances(track.times, track.positions)
     meets = bool(distances.min() < MEETING_DISTANCE_M)
 
+    def is_lost(time: float, position: tuple[float, float]) -> bool:
+        return time > track.times[0] and math.dist(position, track.at(time)) > LOST_M
+
     def tried(begin: float, walker: WalkingPedestrian) -> FoundWalk:
-        walked = trial.positions([(begin, walker)], people, objects, float(track.times[-1]))
+        walked = trial.positions([(begin, walker)], people, objects, float(track.times[-1]), is_lost)
         return _compared(track, begin, walker, *walked[walker.name])
 
     best: FoundWalk | None = None
     for reaction in _reactions(track, distances, meets):
+        if best is not None and best.rmse < GOOD_RMSE_M:
+            break
         for begin, walker in _walkers(thing, track, reaction, trial):
             best = _better(best, tried(begin, walker), BETTER_M)
             if best.rmse < GOOD_RMSE_M:

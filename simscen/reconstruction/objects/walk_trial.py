@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -17,7 +17,12 @@ from simscen.sim.body.outline import circle
 
 STEP_S = 0.05
 """Step of the pedestrian model."""
-VELOCITY_SPAN_S = 0.5
+NEAR_M = 4.0
+"""Distance from a pedestrian within which others count."""
+Walker = tuple[float, WalkingPedestrian]
+"""Time in s at which a pedestrian appears, and the pedestrian."""
+GiveUp = Callable[[float, tuple[float, float]], bool]
+"""Returns whether a pedestrian at a time and a position is so far from its track that the rest does not matter."""
 
 
 class WalkTrial:
@@ -34,48 +39,86 @@ class WalkTrial:
 
     def positions(
         self,
-        walkers: Sequence[tuple[float, WalkingPedestrian]],
+        walkers: Sequence[Walker],
         people: Sequence[FoundObject],
         objects: Sequence[FoundObject],
         end: float,
+        give_up: GiveUp = lambda _time, _position: False,
     ) -> dict[str, tuple[Array, Array]]:
-        """Return times (n,) and positions (n, 2) of each of `walkers`, which appear at the time before each.
+        """Return times (n,) and positions (n, 2) of each of `walkers` until `end`, or until one is given up.
 
         `people` and `objects` follow their keyframes; the walkers evade `people` as other pedestrians.
         """
         crowd = Crowd(self.world.walls, self.world.plan_path)
         paths: dict[str, list[tuple[float, float, float]]] = {walker.name: [] for _, walker in walkers}
-        time = min(begin for begin, _ in walkers)
         waiting = sorted(walkers, key=lambda item: item[0])
-        while time <= end + 1e-9:
+        begin = waiting[0][0]
+        times = begin + STEP_S * np.arange(int((end - begin) / STEP_S + 1e-9) + 1)
+        robot = _MovingDisc("robot", self._radius, self._poses.poses_at(times))
+        discs = [_MovingDisc(person.name, person.radius, person.poses_at(times)) for person in people]
+        outlines = [_MovingOutline(thing, times) for thing in objects]
+        present = [np.array([thing.is_there(time) for time in times.tolist()]) for thing in (*people, *objects)]
+        for index, time in enumerate(times.tolist()):
             while waiting and waiting[0][0] <= time + 1e-9:
                 crowd.add(waiting.pop(0)[1])
-            for name, pose in crowd.poses().items():
+            poses = crowd.poses()
+            for name, pose in poses.items():
                 paths[name].append((time, pose.x, pose.y))
-            crowd.step(self._surroundings(time, people, objects), STEP_S)
-            time += STEP_S
-        arrays = {name: np.array(path).reshape(-1, 3) for name, path in paths.items()}
-        return {name: (path[:, 0], path[:, 1:]) for name, path in arrays.items()}
-
-    def _surroundings(self, time: float, people: Sequence[FoundObject], objects: Sequence[FoundObject]) -> Surroundings:
-        around = np.array([time - VELOCITY_SPAN_S / 2, time, time + VELOCITY_SPAN_S / 2])
-        robots = [_disc("robot", self._poses.poses_at(around), self._radius)]
-        for person in people:
-            if person.is_there(time):
-                robots.append(_disc(person.name, person.poses_at(around), person.radius))
-        outlines = [ObservedObject(thing.name, (_outline(thing, time),)) for thing in objects if thing.is_there(time)]
-        return Surroundings(tuple(robots), tuple(outlines))
-
-
-def _disc(name: str, poses: Array, radius: float) -> ObservedRobot:
-    """Return a round robot from its poses (3, 3) before, at, and after a time."""
-    vx, vy = ((poses[2, :2] - poses[0, :2]) / VELOCITY_SPAN_S).tolist()
-    return ObservedRobot(name, Pose2(*poses[1].tolist()), (vx, vy), radius, np.array(circle(radius)))
+            if any(give_up(time, (pose.x, pose.y)) for pose in poses.values()):
+                break
+            places = np.array([pose[:2] for pose in poses.values()])
+            near = [
+                thing
+                for thing, is_present in zip((*discs, *outlines), present, strict=True)
+                if is_present[index] and thing.is_near(index, places)
+            ]
+            robots = tuple(disc.observed(index) for disc in (robot, *near) if isinstance(disc, _MovingDisc))
+            things = tuple(one.observed(index) for one in near if isinstance(one, _MovingOutline))
+            crowd.step(Surroundings(robots, things), STEP_S)
+        return {name: (path[:, 0], path[:, 1:]) for name, path in _arrays(paths)}
 
 
-def _outline(thing: FoundObject, time: float) -> Array:
-    pose = Pose2(*thing.poses_at(np.array([time]))[0].tolist())
-    if thing.is_cylinder:
-        return pose.apply(np.array(circle(thing.size[0])))
-    x, y = thing.size[0] / 2, thing.size[1] / 2
-    return pose.apply(np.array([(x, y), (-x, y), (-x, -y), (x, -y)]))
+def _arrays(paths: dict[str, list[tuple[float, float, float]]]) -> Iterator[tuple[str, Array]]:
+    for name, path in paths.items():
+        yield name, np.array(path).reshape(-1, 3)
+
+
+class _Moving:
+    """Something that follows its poses (n, 3), one for each step."""
+
+    def __init__(self, poses: Array) -> None:
+        self.poses = poses
+
+    def is_near(self, index: int, places: Array) -> bool:
+        """Return whether it is within NEAR_M of one of the places (m, 2)."""
+        return bool(len(places)) and float(np.hypot(*(places - self.poses[index, :2]).T).min()) < NEAR_M
+
+
+class _MovingDisc(_Moving):
+    """A robot or a person, whom pedestrians evade as another pedestrian."""
+
+    def __init__(self, name: str, radius: float, poses: Array) -> None:
+        super().__init__(poses)
+        self._name, self._radius, self._outline = name, radius, np.array(circle(radius, 12))
+        several = len(poses) > 1
+        self._velocities: Array = np.gradient(poses[:, :2], STEP_S, axis=0) if several else np.zeros((1, 2))
+
+    def observed(self, index: int) -> ObservedRobot:
+        vx, vy = self._velocities[index].tolist()
+        return ObservedRobot(self._name, Pose2(*self.poses[index].tolist()), (vx, vy), self._radius, self._outline)
+
+
+class _MovingOutline(_Moving):
+    """An object, which pedestrians avoid as a wall."""
+
+    def __init__(self, thing: FoundObject, times: Array) -> None:
+        super().__init__(thing.poses_at(times))
+        self._name = thing.name
+        if thing.is_cylinder:
+            self._outline = np.array(circle(thing.size[0], 12))
+        else:
+            x, y = thing.size[0] / 2, thing.size[1] / 2
+            self._outline = np.array([(x, y), (-x, y), (-x, -y), (x, -y)])
+
+    def observed(self, index: int) -> ObservedObject:
+        return ObservedObject(self._name, (Pose2(*self.poses[index].tolist()).apply(self._outline),))

@@ -21,6 +21,8 @@ SAME_PLACE_M = 0.3
 """Maximum distance between both robots at which their scans are compared."""
 SAME_RANGE_M = 0.2
 """Maximum difference between two ranges that show the same."""
+MIN_SCANS = 3
+"""Number of scans that must show a range, because a single one may be an error."""
 MAX_INCIDENT_DISTANCE_M, MAX_INCIDENT_TIME_S = 1.0, 5.0
 """Distance and time within which the same kind of incident counts as the same incident."""
 
@@ -149,7 +151,8 @@ def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator
 
 
 def _numbers(name: str, log: float, run: float, unit: str) -> ComparedQuantity:
-    return ComparedQuantity(name, f"{log:.2f} {unit}", f"{run:.2f} {unit}", f"{run - log:+.2f} {unit}")
+    difference = round(run - log, 2) + 0.0  # no minus sign before a zero
+    return ComparedQuantity(name, f"{log:.2f} {unit}", f"{run:.2f} {unit}", f"{difference:+.2f} {unit}")
 
 
 def _goal(number: int, recorded: RecordedDrive, repeated: RecordedDrive) -> ComparedQuantity:
@@ -183,12 +186,24 @@ def distances_to_path(points: Array, path: Array) -> Array:
     return np.asarray(cKDTree(path).query(points)[0], dtype=np.float64)
 
 
-def nearest_return(drive: RecordedDrive) -> float | None:
-    """Return the smallest range in m that at least three scans have measured; None without scans."""
-    if drive.scans is None or len(drive.scans) < 3:
+def nearest_returns(drive: RecordedDrive) -> tuple[Array, Array] | None:
+    """Return the times (n,) in s of the scans, and the smallest range in m of each; None without scans.
+
+    Scans without a return are left out.
+    """
+    if drive.scans is None or len(drive.scans) < MIN_SCANS:
         return None
-    ranges = np.where(drive.scans.is_hit(), drive.scans.ranges, np.inf).min(axis=1)
-    return float(np.sort(ranges)[2])
+    nearest = np.where(drive.scans.is_hit(), drive.scans.ranges, np.inf).min(axis=1)
+    seen = np.isfinite(nearest)
+    return drive.scans.times[seen], nearest[seen]
+
+
+def nearest_return(drive: RecordedDrive) -> float | None:
+    """Return the smallest range in m that at least three scans have measured; None if there are fewer."""
+    found = nearest_returns(drive)
+    if found is None or len(found[1]) < MIN_SCANS:
+        return None
+    return float(np.sort(found[1])[MIN_SCANS - 1])
 
 
 def share_seen_alike(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> float | None:

@@ -1,5 +1,6 @@
 """Iteration over the serialized messages of MCAP files and rosbag2 folders."""
 
+import json
 import re
 from collections.abc import Container, Iterator
 from contextlib import contextmanager
@@ -9,6 +10,7 @@ from typing import NamedTuple
 from mcap import records
 
 from simscen.record.log_file import RecordReader, open_log
+from simscen.record.log_header import ROBOTS
 from simscen.record.log_reader.read import LOG_READ_ERRORS, invalid_log
 from simscen.record.mcap_writer import MAGIC
 
@@ -99,6 +101,20 @@ def is_simscen_log(path: Path) -> bool:
     except Exception:
         return True
     return False
+
+
+def recorded_robots(path: Path) -> tuple[str, ...]:
+    """Return the names of the robots of a log of simscen with several robots; () for all other files."""
+    try:
+        with open_log(path) as stream:
+            for record in RecordReader(stream):
+                if isinstance(record, records.Metadata) and record.name == "simscen":
+                    return tuple(json.loads(record.metadata.get(ROBOTS, "[]")))
+                if isinstance(record, records.Message):
+                    return ()
+    except Exception:
+        return ()
+    return ()
 
 
 def _reject_ros1(profile: str) -> None:

@@ -64,11 +64,12 @@ def test_the_page_loads_nothing_and_escapes_names():
     incidents, others = compare_incidents([STUCK], [])
     verified = Verification(one, one, Path("x.mcap"), [*compare_drives(one, one)], incidents, others, ["stuck"])
     thing = FoundObject("<b>cart</b>", (0.9, 0.6), ((0.0, 4.0, 1.0, 0.0),))
-    page = verification_page("<script>", drives.room().grid, [thing], verified)
+    page = verification_page("<script>", drives.room(), [thing], verified)
     assert "<script>" not in page and "<b>cart" not in page
     assert "http" not in page.replace("http-equiv", "")
     assert "default-src 'none'" in page
-    assert page.count("<svg") == 3
+    assert page.count("<figure>") == 3  # two maps, and the distance; without scans, no clearance
+    assert "The run does not repeat the incident of the log." in page
     assert "not reproduced: stuck" in page
 
 
@@ -79,3 +80,14 @@ def test_a_drive_is_compared_with_a_shorter_one(steps):
     short = replace(one, duration=5.0 + steps, poses=drives.signal(one.poses.times[kept], one.poses.values[kept]))
     rows = {row.name: row.difference for row in compare_drives(one, short)}
     assert rows["distance at the same time"].startswith("0.00 m")
+
+
+def test_the_page_shows_the_clearance_and_what_is_not_on_the_map():
+    measured = drives.scans(lambda time: [drives.body(4.5, 1.0, 0.0, (0.8, 0.4))])
+    one = drives.drive(measured)
+    verified = Verification(one, drives.drive(drives.scans()), Path("x.mcap"), [], [], [], [])
+    page = verification_page("drive", drives.room(), [], verified)
+    pictures = page.split("data:image/png;base64,")[1:]
+    assert len(pictures) == 2 and pictures[0].partition('"')[0] != pictures[1].partition('"')[0]
+    assert page.count("<figure>") == 4
+    assert "no incident" in page

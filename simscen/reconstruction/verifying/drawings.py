@@ -1,0 +1,219 @@
+"""SVG drawings of a verification: a drive on its map, and charts over time."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image
+
+from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN
+from simscen.core.geometry import Array
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.reconstruction.objects.found_object import FoundObject
+from simscen.reconstruction.scans.surroundings import Surroundings, beam_ends, lidar_poses
+from simscen.reconstruction.scenario.incidents import Incident
+
+WALL, UNSEEN, NEW_HIT = (112, 117, 128, 255), (128, 133, 144, 60), (219, 39, 119, 255)
+"""Colors of occupied and unknown cells, and of cells in which the lidar measured something that is not on the map."""
+WALL_DISTANCE_M = 0.15
+"""Distance from a wall up to which a return belongs to the wall."""
+MAX_SCANS = 300
+MAX_POINTS = 600
+MAX_TIME_MARKS, MIN_MARK_DISTANCE = 12, 0.06
+"""Number of time marks on a path, and their distance as a share of the drawing."""
+MARGIN_M, MIN_ASPECT = 1.0, 0.45
+"""Distance of the edge of a drawing from what it shows, and smallest ratio of its sides."""
+FONT_SHARE = 0.026
+"""Height of the text in a map as a share of the larger side."""
+CHART_WIDTH, CHART_HEIGHT, LEFT, BOTTOM = 420.0, 150.0, 40.0, 18.0
+STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+
+
+def text(value: str) -> str:
+    """Return text for HTML."""
+    return html.escape(value)
+
+
+@dataclass(frozen=True)
+class Box:
+    """Part of the map that is drawn: the smallest coordinates and the size in m."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    @property
+    def font(self) -> float:
+        """Height of the text in m."""
+        return FONT_SHARE * max(self.width, self.height)
+
+
+def box_around(drives: Sequence[RecordedDrive], objects: Sequence[FoundObject]) -> Box:
+    """Return the box that holds the paths, goals, and objects of all drives."""
+    points = [drive.poses.values[:, :2] for drive in drives]
+    points += [np.array([[goal.pose.x, goal.pose.y]]) for drive in drives for goal in drive.goals]
+    points += [np.array(thing.keyframes)[:, 1:3] for thing in objects]
+    every = np.concatenate(points)
+    size = np.ptp(every, axis=0) + 2 * MARGIN_M
+    size = np.maximum(size, MIN_ASPECT * size.max())
+    (x, y), (width, height) = ((every.min(axis=0) + every.max(axis=0) - size) / 2).tolist(), size.tolist()
+    return Box(x, y, width, height)
+
+
+def drive_map(
+    title: str,
+    name: str,
+    drive: RecordedDrive,
+    other: RecordedDrive,
+    objects: Sequence[FoundObject],
+    incidents: Sequence[Incident],
+    world: Surroundings,
+    box: Box,
+) -> str:
+    """Return an SVG in map coordinates, with y upward. `name` is the class of the drive: "log" or "run"."""
+    grid = world.grid
+    height, width = (cells * grid.resolution for cells in grid.shape)
+    x, y, _ = grid.origin
+    image = _picture(world, drive)
+    shapes = [f'<image href="{image}" x="{x:.3f}" y="{-y - height:.3f}" width="{width:.3f}" height="{height:.3f}"/>']
+    shapes.append(f'<polyline class="other {_other(name)}" points="{_points(other.poses.values)}"/>')
+    shapes += [part for thing in objects for part in _object(thing, box)]
+    shapes.append(f'<polyline class="path {name}" points="{_points(drive.poses.values)}"/>')
+    shapes += _time_marks(drive, name, box)
+    for number, goal in enumerate(drive.goals, 1):
+        label = goal.name or f"goal-{number}"
+        shapes.append(f'<circle class="goal" cx="{goal.pose.x:.3f}" cy="{-goal.pose.y:.3f}" r="{0.6 * box.font:.3f}"/>')
+        shapes.append(_label(goal.pose.x, goal.pose.y - 1.7 * box.font, label, box, "goalname"))
+    for number, incident in enumerate(incidents):
+        at_x, at_y = incident.place
+        tip = f"<title>{text(f'{incident.kind} at {incident.time:.2f} s')}</title>"
+        shapes.append(f'<circle class="incident" cx="{at_x:.3f}" cy="{-at_y:.3f}" r="{box.font:.3f}">{tip}</circle>')
+        shapes.append(
+            _label(at_x, at_y + 1.3 * box.font, f"{incident.kind}, {incident.time:.1f} s", box, "incidentname")
+        )
+    view = f"{box.x:.3f} {-box.y - box.height:.3f} {box.width:.3f} {box.height:.3f}"
+    return f'<svg role="img" aria-label="{text(title)}" viewBox="{view}">{"".join(shapes)}</svg>'
+
+
+def _other(name: str) -> str:
+    return "run" if name == "log" else "log"
+
+
+def _label(x: float, y: float, label: str, box: Box, kind: str = "") -> str:
+    """Return a label that is centered on a point, and kept inside of the box."""
+    half = 0.27 * box.font * len(label)
+    x = min(max(x, box.x + half), box.x + box.width - half)
+    return f'<text class="{kind}" x="{x:.2f}" y="{-y:.2f}" font-size="{box.font:.3f}">{text(label)}</text>'
+
+
+def _time_marks(drive: RecordedDrive, name: str, box: Box) -> Iterator[str]:
+    """Yield dots on the path with their times, a dot for the start, and an arrow for the end."""
+    step = next((step for step in STEPS if drive.duration / step <= MAX_TIME_MARKS), STEPS[-1])
+    step = max(step, 1.0)
+    times = np.append(np.arange(0.0, drive.duration, step), drive.duration)
+    poses = drive.poses.poses_at(times)
+    size, last = max(box.width, box.height), None
+    for time, (x, y, _) in zip(times.tolist()[:-1], poses.tolist()[:-1], strict=True):
+        if last is not None and math.dist(last, (x, y)) < MIN_MARK_DISTANCE * size:
+            continue
+        last = (x, y)
+        yield f'<circle class="mark {name}" cx="{x:.3f}" cy="{-y:.3f}" r="{0.28 * box.font:.3f}"/>'
+        yield _label(x, y + 0.6 * box.font, f"{time:.0f} s", box)
+    x, y, yaw = poses[-1].tolist()
+    tip = 0.8 * box.font
+    corners = " ".join(
+        f"{x + tip * math.cos(yaw + turn):.3f},{-y - tip * math.sin(yaw + turn):.3f}" for turn in (0.0, 2.5, -2.5)
+    )
+    yield f'<polygon class="mark {name}" points="{corners}"><title>end at {times[-1]:.1f} s</title></polygon>'
+
+
+def _object(thing: FoundObject, box: Box) -> Iterator[str]:
+    _, x, y, yaw = thing.keyframes[0]
+    if thing.is_moving:
+        yield f'<polyline class="object" points="{_points(np.array(thing.keyframes)[:, 1:3])}"/>'
+        yield f'<circle class="object start" cx="{x:.3f}" cy="{-y:.3f}" r="{0.25 * box.font:.3f}"/>'
+    elif thing.is_cylinder:
+        yield f'<circle class="object" cx="{x:.3f}" cy="{-y:.3f}" r="{thing.size[0]:.3f}"/>'
+    else:
+        length, width = thing.size
+        turn = f"translate({x:.3f} {-y:.3f}) rotate({-math.degrees(yaw):.1f})"
+        corner = f'x="{-length / 2:.3f}" y="{-width / 2:.3f}" width="{length:.3f}" height="{width:.3f}"'
+        yield f'<rect class="object" {corner} transform="{turn}"/>'
+    yield _label(x, y + 0.6 * box.font, thing.name, box, "objectname")
+
+
+def _points(poses: Array) -> str:
+    step = max(1, len(poses) // MAX_POINTS)
+    return " ".join(f"{x:.2f},{-y:.2f}" for x, y in poses[::step, :2].tolist())
+
+
+def _picture(world: Surroundings, drive: RecordedDrive) -> str:
+    """Return the map, and what the lidar saw that is not on it, as a data URL of a PNG with a clear background."""
+    grid = world.grid
+    colors = np.zeros((*grid.shape, 4), dtype=np.uint8)
+    colors[grid.cells == UNKNOWN] = UNSEEN
+    colors[grid.cells == OCCUPIED] = WALL
+    cells = grid.cell_of(_returns_off_the_map(world, drive))
+    cells = cells[grid.inside(cells)]
+    colors[cells[:, 0], cells[:, 1]] = NEW_HIT
+    out = io.BytesIO()
+    Image.fromarray(colors[::-1]).quantize(16).save(out, "PNG", optimize=True)
+    return f"data:image/png;base64,{base64.b64encode(out.getvalue()).decode()}"
+
+
+def _returns_off_the_map(world: Surroundings, drive: RecordedDrive) -> Array:
+    """Return the ends (n, 2) of the beams that measured something else than walls."""
+    if drive.scans is None or not len(drive.scans):
+        return np.empty((0, 2))
+    scans = drive.scans.every(max(1, len(drive.scans) // MAX_SCANS))
+    ends: Array = beam_ends(lidar_poses(drive, scans), scans.angles, scans.ranges)[scans.is_hit()]
+    return ends[world.distance_to_walls(ends) > WALL_DISTANCE_M]
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Line of a chart: values (n,) at times (n,) in s. `name` is its class."""
+
+    name: str
+    times: Array
+    values: Array
+
+
+def chart(label: str, series: Sequence[Series], unit: str) -> str:
+    """Return an SVG chart of values over time, from 0."""
+    series = [one for one in series if len(one.times)]
+    end = max((float(one.times[-1]) for one in series), default=1.0) or 1.0
+    top = max(0.1, *(float(np.max(one.values)) for one in series)) if series else 1.0
+    across, up = CHART_WIDTH - LEFT - 10.0, CHART_HEIGHT - BOTTOM - 8.0
+    parts = []
+    for value in _ticks(top, 5):
+        y = CHART_HEIGHT - BOTTOM - up * value / top
+        parts.append(f'<line class="axis" x1="{LEFT:g}" y1="{y:.1f}" x2="{CHART_WIDTH - 10:g}" y2="{y:.1f}"/>')
+        parts.append(
+            f'<text class="tick" x="{LEFT - 4:g}" y="{y + 4:.1f}" font-size="11">{value:g} {text(unit)}</text>'
+        )
+    for value in _ticks(end, 7):
+        x = LEFT + across * value / end
+        parts.append(f'<text x="{x:.1f}" y="{CHART_HEIGHT - 4:g}" font-size="11">{value:g} s</text>')
+    for one in series:
+        step = max(1, len(one.times) // MAX_POINTS)
+        points = " ".join(
+            f"{LEFT + across * time / end:.1f},{CHART_HEIGHT - BOTTOM - up * value / top:.1f}"
+            for time, value in zip(one.times[::step].tolist(), one.values[::step].tolist(), strict=True)
+        )
+        parts.append(f'<polyline class="path {one.name}" points="{points}"/>')
+    view = f"0 -4 {CHART_WIDTH:g} {CHART_HEIGHT + 4:g}"
+    return f'<svg role="img" aria-label="{text(label)}" viewBox="{view}">{"".join(parts)}</svg>'
+
+
+def _ticks(top: float, count: int) -> list[float]:
+    """Return at most `count` round values from 0 to `top`."""
+    step = next((step for step in STEPS if top / step <= count - 1), top)
+    return [round(step * number, 3) for number in range(int(top / step + 1e-9) + 1)]
