@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simscen.core.environment.world_model import Unseen, WalkingPedestrian
+from simscen.core.environment.world_model import Behavior, Unseen, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2
 from simscen.pedestrians.forces import RELAXATION_TIME_S
 from simscen.reconstruction.evidence import windows
@@ -20,6 +20,8 @@ MAX_LEGS_SIDE_M = 0.7
 """Longest side of a box around two legs."""
 MIN_BODY_RADIUS_M, MAX_BODY_RADIUS_M, LEGS_BODY_RADIUS_M = 0.2, 0.35, 0.25
 MIN_WALK_M = 1.0
+MAX_PEOPLE = 4
+"""Number of people above which none becomes a pedestrian, because small differences grow too fast in a crowd."""
 MIN_WALKING_SPEED_M_S, MAX_WALKING_SPEED_M_S = 0.3, 2.2
 MAX_RMSE_M, MAX_TIME_SHIFT_S = 0.3, 0.5
 """Largest difference between a track and the pedestrian that replaces it."""
@@ -33,8 +35,8 @@ MEETING_DISTANCE_M, SURPRISE_DISTANCE_M = 3.0, 4.0
 BETTER_M = 0.05
 """Amount by which the RMSE of a more complex explanation must be smaller."""
 GOOD_RMSE_M, HOPELESS_RMSE_M, LOST_M = 0.12, 0.6, 1.2
-"""RMSE below which nothing else is tried, RMSE above which no other speed is tried, and distance from the track at which
-a simulation ends."""
+"""RMSE below which nothing else is tried, RMSE above which no other speed is tried, and distance from the track beyond
+which a simulation ends."""
 SPEED_FACTORS = (0.93, 1.07)
 
 
@@ -42,7 +44,7 @@ SPEED_FACTORS = (0.93, 1.07)
 class _Reaction:
     """How a person may react to the robot."""
 
-    behavior: str = "regular"
+    behavior: Behavior = "regular"
     duration: float = 0.0
     blind_to: frozenset[Unseen] = frozenset()
 
@@ -50,6 +52,8 @@ class _Reaction:
 def with_walks(objects: Sequence[FoundObject], trial: WalkTrial) -> list[FoundObject]:
     """Return the objects; those that a pedestrian reproduces have a walk, and their names begin with "person"."""
     people = [thing for thing in objects if is_person(thing)]
+    if len(people) > MAX_PEOPLE:
+        return [*objects]
     others = [thing for thing in objects if thing not in people]
     walks = {
         thing.name: _fitted_walk(thing, [one for one in people if one is not thing], others, trial) for thing in people
@@ -176,33 +180,29 @@ def _walkers(
     A pedestrian starts at rest. One whose track begins in motion appears earlier by its relaxation time.
     """
     radius, walls = body_radius(thing), trial.world.walls
-    seen: set[tuple[float, tuple[tuple[float, float], ...]]] = set()
+    lead = RELAXATION_TIME_S if track.speeds[0] > MOVING_SPEED_M_S else 0.0
+    begin = round(max(0.0, float(track.times[0]) - lead), 2)
+    x, y = track.at(begin + lead)
+    tried: set[tuple[tuple[float, float], ...]] = set()
     for tolerance in PATH_TOLERANCES_M:
-        goals = [*_corners(track.positions, tolerance)[1:-1], _last_goal(track, radius, trial)]
-        rounded = tuple((round(float(x), 2), round(float(y), 2)) for x, y in goals)
-        if any(walls.distance(goal) < radius + 0.01 for goal in rounded):
+        places = [*_corners(track.positions, tolerance)[1:-1], _last_goal(track, radius, trial)]
+        goals = tuple((round(float(a), 2), round(float(b), 2)) for a, b in places)
+        if goals in tried or any(walls.distance(place) < radius + 0.01 for place in ((x, y), *goals)):
             continue
-        for lead in (RELAXATION_TIME_S, 0.0):
-            begin = round(max(0.0, float(track.times[0]) - lead), 2)
-            x, y = track.at(begin + lead)
-            if (begin, rounded) in seen or walls.distance((x, y)) < radius + 0.01:
-                continue
-            seen.add((begin, rounded))
-            yaw = math.atan2(rounded[0][1] - y, rounded[0][0] - x)
-            yield (
-                begin,
-                WalkingPedestrian(
-                    name=thing.name,
-                    pose=Pose2(round(x, 3), round(y, 3), round(yaw, 2)),
-                    goals=rounded,
-                    speed=round(track.speed, 2),
-                    radius=radius,
-                    behavior=reaction.behavior,  # type: ignore[arg-type]
-                    blind_to=reaction.blind_to,
-                    reacts_within=SURPRISE_DISTANCE_M if reaction.behavior == "surprised" else 0.0,
-                    reacts_for=reaction.duration,
-                ),
-            )
+        tried.add(goals)
+        yaw = math.atan2(goals[0][1] - y, goals[0][0] - x)
+        walker = WalkingPedestrian(
+            name=thing.name,
+            pose=Pose2(round(x, 3), round(y, 3), round(yaw, 2)),
+            goals=goals,
+            speed=round(track.speed, 2),
+            radius=radius,
+            behavior=reaction.behavior,
+            blind_to=reaction.blind_to,
+            reacts_within=SURPRISE_DISTANCE_M if reaction.behavior == "surprised" else 0.0,
+            reacts_for=reaction.duration,
+        )
+        yield begin, walker
 
 
 def body_radius(thing: FoundObject) -> float:

@@ -95,9 +95,10 @@ def drive_map(
         at_x, at_y = incident.place
         tip = f"<title>{text(f'{incident.kind} at {incident.time:.2f} s')}</title>"
         shapes.append(f'<circle class="incident" cx="{at_x:.3f}" cy="{-at_y:.3f}" r="{box.font:.3f}">{tip}</circle>')
-        shapes.append(
-            _label(at_x, at_y + 1.3 * box.font, f"{incident.kind}, {incident.time:.1f} s", box, "incidentname")
-        )
+        row = 1 + number // 2
+        beside = (1.7 * row if number % 2 == 0 else -0.7 - 1.7 * row) * box.font
+        label = f"{incident.kind}, {incident.time:.1f} s"
+        shapes.append(_label(at_x, at_y + beside, label, box, "incidentname"))
     view = f"{box.x:.3f} {-box.y - box.height:.3f} {box.width:.3f} {box.height:.3f}"
     return f'<svg role="img" aria-label="{text(title)}" viewBox="{view}">{"".join(shapes)}</svg>'
 
