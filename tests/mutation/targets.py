@@ -60,14 +60,17 @@ TESTS_OF_MODULE = {
     "criteria/stl/operators": [TEMPORAL, [f"{_STL}/test_operators.py"]],
     "criteria/stl/criterion": [TEMPORAL, [f"{_STL}/test_criterion.py", f"{_STL}/test_description.py"]],
     "criteria/trace_signals/distances": [
-        [f"{_SIGNALS}/test_distances.py", f"{_SIGNALS}/test_readers.py"],
+        [f"{_SIGNALS}/test_{of}.py" for of in ("distances", "readers", "motion_signals")],
         TEMPORAL,
         ["golden", "personal_space"],
     ],
     "criteria/trace_signals/catalog": [
         [f"{_SIGNALS}/test_catalog.py", f"{_STL}/test_condition.py", f"{_STL}/test_criterion.py"]
     ],
-    "criteria/trace_signals/readers": [[f"{_SIGNALS}/test_readers.py"], TEMPORAL],
+    "criteria/trace_signals/readers": [
+        [f"{_SIGNALS}/test_readers.py", f"{_SIGNALS}/test_motion_signals.py"],
+        TEMPORAL,
+    ],
     "criteria/trace_signals/ground_truth": [
         [f"{_SIGNALS}/test_ground_truth.py", f"{_SIGNALS}/test_nees.py"],
         ["golden"],
