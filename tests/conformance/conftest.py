@@ -129,6 +129,17 @@ def with_scenario(folder: Path, refused: Refused) -> Refused:
     return call
 
 
+@pytest.fixture
+def with_world(folder: Path, with_scenario: Refused) -> Refused:
+    """Writes the world file `name`, and calls `refused` with a scenario that uses it; the robot stands at (1, 1)."""
+
+    def call(content: str | bytes, name: str = "bad.world.yaml") -> str:
+        (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
+        return with_scenario(replace={"room.world.yaml": name})
+
+    return call
+
+
 MEASURED = """
 import sys, time
 from simscen.cli.main import main
