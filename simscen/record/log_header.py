@@ -1,6 +1,7 @@
 """Metadata and attachments of a log: everything except the messages that is needed to judge or repeat the run."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
@@ -81,11 +82,15 @@ def case_to_json(case: Case) -> str:
 
 
 def case_from_json(text: str | bytes) -> Case:
-    """Parse the JSON that `case_to_json` wrote. Raises ValueError if it is not a Case."""
+    """Parse the JSON that `case_to_json` wrote. Raises ValueError if it is not a Case, or its poses are not finite."""
     try:
-        return _CASES.validate_json(text)
+        case = _CASES.validate_json(text)
     except ValidationError as error:
         raise ValueError(f"not a case: {error.errors(include_url=False)[0]['msg']}") from None
+    poses = case.start, *(goal.pose for goal in case.every_goal)
+    if not all(math.isfinite(value) for pose in poses for value in pose):
+        raise ValueError("not a case: a pose is not finite")
+    return case
 
 
 def media_type(name: str) -> str:

@@ -78,6 +78,46 @@ def test_103_an_edited_log_does_not_pass(simscen, folder: Path, passed_log: Path
         assert code in (1, 2), name
 
 
+def merge(logs: Sequence[Path], target: Path, end: str | None = None, delay_s: float = 0.0) -> Path:
+    """Write the records of several logs into one, each with its own channels.
+
+    `end` replaces the tick at which the run ended; `delay_s` is added to the log times of the truth.
+    """
+    with target.open("wb") as sink:
+        writer = Writer(sink)
+        writer.start("ros2", "a log editor")
+        for log in logs:
+            with log.open("rb") as source:
+                reader = make_reader(source)
+                channels: dict[int, int] = {}
+                for record in reader.iter_metadata():
+                    tick = {"tick": end} if end and "tick" in record.metadata else {}
+                    writer.add_metadata(record.name, record.metadata | tick)
+                for attachment in reader.iter_attachments():
+                    writer.add_attachment(0, 0, attachment.name, attachment.media_type, attachment.data)
+                for schema, channel, message in reader.iter_messages(log_time_order=False):
+                    assert schema is not None
+                    if channel.id not in channels:
+                        registered = writer.register_schema(schema.name, schema.encoding, schema.data)
+                        channels[channel.id] = writer.register_channel(channel.topic, "cdr", registered)
+                    late = round(delay_s * 1e9) if channel.topic == "/ground_truth/odom" else 0
+                    writer.add_message(channels[channel.id], message.log_time + late, message.data, message.log_time)
+        writer.finish()
+    return target
+
+
+def test_111_a_log_that_contradicts_itself_is_refused(simscen, folder: Path, passed_log: Path) -> None:
+    edited = folder / "edited.mcap"
+    assert simscen("judge", merge([passed_log], edited)).code == 0
+    for log in (
+        merge([passed_log, passed_log], edited),
+        merge([passed_log], folder / "early.mcap", end="1"),
+        merge([passed_log], folder / "late.mcap", delay_s=0.5),
+    ):
+        ended = simscen("judge", log)
+        assert ended.code == 2 and "the log is damaged" in ended.err, ended
+
+
 def test_104_a_low_rate_of_the_truth_is_refused(with_scenario) -> None:
     assert "must be at least 20" in with_scenario(replace={"time_limit": "physics: {truth_rate: 1 Hz}\ntime_limit"})
 

@@ -63,8 +63,12 @@ class LogJudge:
             if is_only_log or isinstance(error, UnusableScenario):
                 raise
             reason = "; ".join(": ".join(filter(None, (one.message, one.hint))) for one in error.problems)
-            result = error_result(RunKey(log.stem, 0), str(log), RunFailure("invalid", reason))
-            return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
+            return _not_judged(log, RunFailure("invalid", reason))
+        except Exception as error:  # a defect of simscen must not lose the verdicts of the other logs
+            if is_only_log:
+                raise
+            reason = f"{type(error).__name__}: {error}; judge this log alone for the traceback"
+            return _not_judged(log, RunFailure("internal", reason))
 
     def judge_for_replay(self, log: Path) -> tuple[Log, RunResult]:
         """Return a log with all data for a replay, and its result. Raises InvalidInput."""
@@ -165,6 +169,12 @@ class LogJudge:
         expected = expected_failure(spec)
         result = judge_run(key, file, spec.pass_, trace, case, criteria.lines, coverage, spec.metrics, expected)
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
+
+
+def _not_judged(log: Path, failure: RunFailure) -> RunFinished:
+    return RunFinished(
+        error_result(RunKey(log.stem, 0), str(log), failure), artifacts=Artifacts(mcap=str(log)), file=str(log)
+    )
 
 
 def _may_be_simscen_log(log: Path) -> bool:

@@ -72,11 +72,14 @@ def usual_period(ticks: Ticks) -> int:
 def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
     """Return the samples themselves if they are evenly spaced, else resampled to their median spacing.
 
-    Raises SignalUnavailable if there are fewer than two, or if a gap is too long for interpolation.
+    Raises SignalUnavailable if there are fewer than two, if their ticks do not increase, or if a gap is too long for
+    interpolation.
     """
     if len(samples) < 2:
         raise SignalUnavailable(f"the run is too short: {_samples(len(samples))} of the truth")
     ticks, steps = samples.ticks, np.diff(samples.ticks)
+    if (steps <= 0).any():
+        raise SignalUnavailable("the samples of the truth are not in chronological order")
     if (steps == steps[0]).all():
         return samples
     longest = int(np.argmax(steps))

@@ -19,6 +19,7 @@ from simscen.record.messages.decode import MessageReader
 from simscen.record.trace_builder import TraceRows
 
 NO_COUNTS = "the log has no message counts: an older simscen wrote it, or its end was edited"
+_MERGED = "; a log that was merged from several cannot be judged"
 
 _EVENTS = frozenset(
     {Evidence.CONTACTS, Evidence.NAVIGATION, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES}
@@ -40,22 +41,23 @@ class MessageCounts:
     def __init__(self) -> None:
         self._topics: dict[int, str] = {}
         self._scans: set[str] = set()
-        self._found: dict[int, int] = {}
-        self._newest: dict[int, int] = {}
+        self._found: dict[str, int] = {}
+        self._newest: dict[str, int] = {}
         self._expected: dict[str, int] | None = None
 
     def add_channel(self, channel: int, topic: str, message_type: str) -> None:
-        """Add a channel of the log, by its number; it holds the messages of one topic."""
+        """Add a channel of the log, by its number. Several channels may have the same topic."""
         self._topics[channel] = topic
         if message_type == topics.SCAN_TYPE:
             self._scans.add(topic)
 
     def add_message(self, channel: int, time: int) -> None:
         """Count a message. Raises ValueError if an earlier message of its topic has a later time."""
-        if time < self._newest.get(channel, time):
-            raise ValueError(f"the messages of {self._topics.get(channel, 'a topic')} are not in the order of time")
-        self._newest[channel] = time
-        self._found[channel] = self._found.get(channel, 0) + 1
+        topic = self._topics.get(channel, "")
+        if time < self._newest.get(topic, time):
+            raise ValueError(f"the messages of {topic or 'a topic'} are not in the order of time")
+        self._newest[topic] = time
+        self._found[topic] = self._found.get(topic, 0) + 1
 
     def set_expected(self, end: Mapping[str, str], robot: str = "") -> None:
         """Read the counts from the end record. With `robot`, use only the topics in its namespace."""
@@ -74,11 +76,10 @@ class MessageCounts:
         """
         if self._expected is None:
             return LogCoverage(partial=dict.fromkeys(Evidence, NO_COUNTS))
-        found = {topic: self._found.get(channel, 0) for channel, topic in self._topics.items()}
         missing: dict[Evidence, str] = {}
         partial: dict[Evidence, str] = {}
         for topic, count in self._expected.items():
-            number = found.get(topic, 0)
+            number = self._found.get(topic, 0)
             if number == count:
                 continue
             is_scan = topic in self._scans or topic.endswith("scan")  # the type of a removed topic is unknown
@@ -130,6 +131,8 @@ class LogContents:
             case records.Metadata(name="simscen"):
                 self._set_facts(record.metadata)
             case records.Metadata(name=log_header.END):
+                if self.end is not None:
+                    raise ValueError(f"it has two metadata records `{log_header.END}`{_MERGED}")
                 self.end = int(record.metadata["tick"])
                 self._counts.set_expected(record.metadata)
                 for name, contents in self.robots.items():
@@ -147,6 +150,8 @@ class LogContents:
     def header(self) -> LogHeader:
         """Return the description of the run. Raises NotSimscenLog if the log has none."""
         if self.robots:
+            if unknown := [name for name in self._files if name.endswith(f"/{log_header.CASE}")]:
+                raise ValueError(f"it has {unknown[0]}, but its list of robots is {', '.join(self.robots)}")
             return self._joint_header({name: contents.header() for name, contents in self.robots.items()})
         if not self._facts or log_header.CASE not in self._files:
             raise NotSimscenLog("it has no description of its run")
@@ -175,7 +180,10 @@ class LogContents:
         """Return the Trace until the end of the run, or else the last message. With several robots, of the first."""
         if self.robots:
             return self.traces()[next(iter(self.robots))]
-        return self._rows.trace(self._time.rate, self._last_tick if self.end is None else self.end)
+        trace = self._rows.trace(self._time.rate, self._last_tick if self.end is None else self.end)
+        if len(trace.truth) and (last := trace.truth.ticks[-1]) > trace.end:
+            raise ValueError(f"the ground truth lasts until tick {last}, but the run ended at tick {trace.end}")
+        return trace
 
     def traces(self) -> dict[str, Trace]:
         """Return the Trace of each of several robots by name."""
@@ -194,19 +202,25 @@ class LogContents:
     def _set_facts(self, facts: dict[str, str]) -> None:
         if facts.get("format") != log_header.FORMAT:
             raise NotSimscenLog(f"its format is {facts.get('format')}, this simscen reads {log_header.FORMAT}")
+        if self._facts:
+            raise ValueError(f"it has two metadata records `simscen`{_MERGED}")
         self._facts = facts
         self._time = self.sensors.time = SimTime(int(facts["tick_rate"]))
-        for name in json.loads(facts.get(log_header.ROBOTS, "[]")):
+        names = json.loads(facts.get(log_header.ROBOTS, "[]"))
+        if not isinstance(names, list) or len({name for name in names if isinstance(name, str)}) < len(names):
+            raise ValueError(f"its list of robots is {facts[log_header.ROBOTS]}")
+        for name in names:
             contents = self.robots[name] = LogContents(self._with_sensors)
             contents.sensors.frames = frame_names.RobotFrames(name)
             contents._set_facts({**log_header.robot_metadata(facts, name), log_header.ROBOTS: "[]"})
 
     def _add_attachment(self, file: records.Attachment) -> None:
         robot, _, name = file.name.partition("/")
-        if robot in self.robots and name == log_header.CASE:
-            self.robots[robot]._files[name] = file.data
-        else:
-            self._files[file.name] = file.data
+        is_case = robot in self.robots and name == log_header.CASE
+        files, name = (self.robots[robot]._files, name) if is_case else (self._files, file.name)
+        if name in files:
+            raise ValueError(f"it has two attachments {file.name}{_MERGED}")
+        files[name] = file.data
 
     def _add_message(self, message: records.Message) -> None:
         if not self._facts:
@@ -248,6 +262,8 @@ class LogContents:
 
     def _add_truth(self, tick: int, data: bytes) -> None:
         odometry = decode.odometry(MessageReader(data))
+        if self._time.tick(odometry.stamp) != tick:
+            raise ValueError(f"the log time of a message of {topics.TRUTH.name} differs from its stamp")
         self._rows.truth.add(tick, *odometry.pose, *(odometry.twist or ()))
 
     def _add_odometry(self, tick: int, data: bytes) -> None:
@@ -267,8 +283,11 @@ class LogContents:
         path = decode.path(MessageReader(data))
         self._rows.plans.append((self._time.tick(path.stamp), path.poses))
 
-    def _add_event(self, _: int, data: bytes) -> None:
-        self._rows.events.append(event_text.from_json(MessageReader(data).string()))
+    def _add_event(self, tick: int, data: bytes) -> None:
+        event = event_text.from_json(MessageReader(data).string())
+        if not 0 <= event.tick <= tick:
+            raise ValueError(f"an event has the tick {event.tick}, but was logged at tick {tick}")
+        self._rows.events.append(event)
 
     def _add_object_poses(self, tick: int, data: bytes) -> None:
         for link in decode.transforms(MessageReader(data)):

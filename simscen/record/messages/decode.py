@@ -22,6 +22,7 @@ _COVARIANCE_INDICES = (0, 1, 5, 7, 11, 35)
 """Indices of xx, xy, xyaw, yy, yyaw, yawyaw in the 36 numbers of a covariance."""
 _PLANAR_TWIST_INDICES = (0, 1, 5)
 _MAX_QUATERNION_NORM_ERROR = 0.1
+_NOT_A_ROTATION = "an orientation is not a quaternion of length 1"
 NO_COVARIANCE: Numbers = (0.0,) * 6
 
 
@@ -38,8 +39,14 @@ class MessageReader(CdrReader):
         return int(seconds) * NS_PER_SECOND + int(nanoseconds), self.frame()
 
     def pose(self) -> Numbers:
-        """Return x, y, z and the quaternion of a geometry_msgs/msg/Pose or Transform."""
-        return self.take("7d")
+        """Return x, y, z and the quaternion of a geometry_msgs/msg/Pose or Transform.
+
+        Raises ValueError if the length of the quaternion is not 1; a pose that is not a number is returned.
+        """
+        pose = self.take("7d")
+        if abs(math.hypot(*pose[3:]) - 1.0) > _MAX_QUATERNION_NORM_ERROR:
+            raise ValueError(_NOT_A_ROTATION)
+        return pose
 
 
 class CheckedReader(MessageReader):
@@ -58,11 +65,11 @@ class CheckedReader(MessageReader):
         return self.string().lstrip("/")
 
     def pose(self) -> Numbers:
-        """Return a pose with a normalized quaternion. Raises ValueError if the quaternion was never set."""
+        """Return a pose with a normalized quaternion. Raises ValueError if its length is not 1 or not a number."""
         pose = self.take("7d")
         norm = math.hypot(*pose[3:])
         if not abs(norm - 1.0) < _MAX_QUATERNION_NORM_ERROR:
-            raise ValueError("an orientation is not a quaternion of length 1")
+            raise ValueError(_NOT_A_ROTATION)
         return (*pose[:3], *(value / norm for value in pose[3:]))
 
 

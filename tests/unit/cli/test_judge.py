@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 
 from simscen.cli.main import main
+from simscen.cli.session import judging
+from simscen.core.records.run_result import RunKey, RunResult
+from simscen.judge.run_result import judge_run
 
 SCENARIO = """\
 simscen: 1
@@ -51,6 +54,23 @@ def test_run_folder_is_judged_as_its_log(simscen, out: Path) -> None:
     assert by_log == by_folder
     assert by_log.code == 1
     assert "speed: " in by_log.out and "> 0.05 m/s" in by_log.out
+
+
+def test_a_defect_of_simscen_in_one_log_does_not_lose_the_verdicts_of_the_others(
+    simscen, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail_on_bad(key: RunKey, *rest: object) -> RunResult:
+        if key.scenario == "bad":
+            raise AssertionError("a defect")
+        return judge_run(key, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(judging, "judge_run", fail_on_bad)
+    ended = simscen("judge", "out")
+    bad, good, total = ended.out.splitlines()
+    assert ended.code == 3
+    assert "internal: AssertionError: a defect; judge this log alone for the traceback" in bad
+    assert good.startswith("  ✓ ") and total == "1 passed, 1 could not be judged"
+    assert simscen("judge", str(_log(out, "bad"))).code == 4
 
 
 def test_output_folder_gives_one_line_per_log(simscen, out: Path) -> None:

@@ -1,6 +1,7 @@
 """Moments with any content that the core's types allow, as Hypothesis strategies."""
 
 import dataclasses
+import math
 
 import numpy as np
 from hypothesis import strategies as st
@@ -18,7 +19,15 @@ parts = st.floats(-1, 1) | st.just(float("nan"))
 
 twists = st.builds(Twist, floats, floats, floats)
 poses = st.builds(Pose2, floats, floats, floats)
-spatial = st.builds(Pose3, *[st.floats()] * 3, *[parts] * 4)
+
+
+def _unit(*quaternion: float) -> tuple[float, ...]:
+    length = math.hypot(*quaternion)
+    return (0.0, 0.0, 0.0, 1.0) if length == 0.0 else tuple(part / length for part in quaternion)
+
+
+rotations = st.builds(_unit, *[parts] * 4)
+spatial = st.builds(lambda x, y, z, q: Pose3(x, y, z, *q), *[st.floats()] * 3, rotations)
 truths = st.builds(Truth, spatial, twists, st.floats(), st.dictionaries(st.text(max_size=5), spatial, max_size=2))
 
 matrices = st.lists(st.floats(), min_size=9, max_size=9).map(lambda numbers: np.array(numbers).reshape(3, 3))
@@ -40,8 +49,18 @@ gaps = st.lists(st.integers(1, 300), min_size=MOST, max_size=MOST)
 
 
 def spread(run: list[Moment], apart: list[int]) -> list[Moment]:
-    """The same moments, so many ticks apart."""
-    return [dataclasses.replace(m, tick=t) for m, t in zip(run, np.cumsum(apart).tolist(), strict=False)]
+    """The same moments, so many ticks apart, with events that happened by then."""
+    return [_at(moment, tick) for moment, tick in zip(run, np.cumsum(apart).tolist(), strict=False)]
+
+
+def _at(moment: Moment, tick: int) -> Moment:
+    own, stack = (
+        tuple(dataclasses.replace(event, tick=min(event.tick, tick)) for event in events)
+        for events in (moment.events, moment.decision.events)
+    )
+    return dataclasses.replace(
+        moment, tick=tick, events=own, decision=dataclasses.replace(moment.decision, events=stack)
+    )
 
 
 runs = st.builds(spread, moments, gaps)

@@ -1,5 +1,7 @@
 """Tests that edited logs never pass."""
 
+import re
+import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -17,7 +19,11 @@ from simscen.core.records.trace import Decision, Moment
 from simscen.core.records.verdict import Evidence, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
+from simscen.record.log_header import case_to_json
+from simscen.record.log_reader.contents import LogContents
 from simscen.record.log_reader.read import Log, read_log
+from simscen.record.messages import decode
+from simscen.record.messages.decode import MessageReader
 from simscen.record.recorder import Recorder
 
 Keep = Callable[[str, float], bool]
@@ -119,3 +125,132 @@ def test_a_log_without_counts_is_not_passed(log: Path, tmp_path: Path) -> None:
 def test_messages_in_reverse_order_are_refused(log: Path, tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="not in the order of time"):
         read_log(edited(log, tmp_path / "edited.mcap", backwards=True))
+
+
+Record = dict[str, str]
+Edit = Callable[["Parts"], object]
+
+
+class Parts:
+    """The parts of a log that can be edited: metadata records, attachments, and messages with their channels."""
+
+    def __init__(self, log: Path) -> None:
+        with log.open("rb") as source:
+            reader = make_reader(source)
+            self.messages = [
+                [schema, channel.topic, message.log_time, message.data]
+                for schema, channel, message in reader.iter_messages(log_time_order=False)
+            ]
+            self.metadata = [(note.name, dict(note.metadata)) for note in reader.iter_metadata()]
+            self.attachments = [(file.name, file.data) for file in reader.iter_attachments()]
+
+    def record(self, name: str) -> Record:
+        """Return the metadata record of this name."""
+        return dict(self.metadata)[name]
+
+    def of_topic(self, topic: str) -> list[list]:
+        """Return the messages of a topic: schema, topic, log time, data."""
+        return [message for message in self.messages if message[1] == topic]
+
+    def write(self, path: Path, channels_per_topic: int = 1) -> Path:
+        """Write a log, with the messages of each topic spread over several channels in turn."""
+        with path.open("wb") as target:
+            writer = Writer(target)
+            writer.start("ros2", "somebody")
+            for name, record in self.metadata:
+                writer.add_metadata(name, record)
+            for name, data in self.attachments:
+                writer.add_attachment(0, 0, name, "text/plain", data)
+            channels: dict[tuple[str, int], int] = {}
+            for index, (schema, topic, time, data) in enumerate(self.messages):
+                key = topic, index % channels_per_topic
+                if key not in channels:
+                    number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                    channels[key] = writer.register_channel(topic, "cdr", number)
+                writer.add_message(channels[key], time, data, time)
+            writer.finish()
+        return path
+
+
+def test_the_channels_of_a_topic_are_counted_together(log: Path, tmp_path: Path) -> None:
+    read = read_log(Parts(log).write(tmp_path / "split.mcap", channels_per_topic=3))
+    assert judged(read).outcome is Outcome.PASSED
+
+
+def halve_times(parts: Parts) -> None:
+    for message in parts.of_topic(TRUTH):
+        message[2] //= 2
+
+
+def lose_orientation(parts: Parts) -> None:
+    for message in parts.of_topic(TRUTH):
+        pose = decode.odometry(MessageReader(message[3])).pose
+        message[3] = message[3].replace(struct.pack("<4d", *pose[3:]), bytes(32))
+
+
+def move_event(tick: int) -> Edit:
+    def edit(parts: Parts) -> None:
+        message = parts.of_topic(EVENTS)[0]
+        text = re.sub(r'"tick": ?\d+', f'"tick":{tick}', MessageReader(message[3]).string()).encode() + b"\0"
+        message[3] = message[3][:4] + struct.pack("<I", len(text)) + text
+
+    return edit
+
+
+REFUSED: dict[str, tuple[Edit, str]] = {
+    "times of the truth": (halve_times, "the log time of a message of /ground_truth/odom differs from its stamp"),
+    "no orientation": (lose_orientation, "an orientation is not a quaternion of length 1"),
+    "event in the future": (move_event(10**9), "an event has the tick 1000000000, but was logged at tick"),
+    "event before the start": (move_event(-1), "an event has the tick -1"),
+    "end before the truth": (
+        lambda parts: parts.record("simscen.end").update(tick="-5"),
+        "the ground truth lasts until tick 960, but the run ended at tick -5",
+    ),
+    "two descriptions": (
+        lambda parts: parts.metadata.append(("simscen", parts.record("simscen") | {"tick_rate": "500"})),
+        "two metadata records `simscen`; a log that was merged from several cannot be judged",
+    ),
+    "two ends": (lambda parts: parts.metadata.append(parts.metadata[-1]), "two metadata records `simscen.end`"),
+    "two cases": (lambda parts: parts.attachments.append(parts.attachments[0]), "two attachments case.json"),
+    "a goal at infinity": (
+        lambda parts: parts.attachments.__setitem__(
+            0, ("case.json", re.sub(rb'("pose": \[\s*)[-\d.]+', rb'\1"Infinity"', parts.attachments[0][1]))
+        ),
+        "a pose is not finite",
+    ),
+}
+
+
+@pytest.mark.parametrize("edit", REFUSED)
+def test_a_log_that_contradicts_itself_is_refused(log: Path, tmp_path: Path, edit: str) -> None:
+    change, message = REFUSED[edit]
+    parts = Parts(log)
+    change(parts)
+    with pytest.raises(InvalidInput, match=re.escape(message)):
+        read_log(parts.write(tmp_path / "edited.mcap"))
+
+
+def described(robots: str) -> LogContents:
+    """Return the contents of a log with this list of robots, and the cases of robots a and b."""
+    contents = LogContents()
+    contents.add(records.Metadata("simscen", about_run("a", robots)))
+    for name in ("a", "b"):
+        case = case_to_json(about().case).encode()
+        contents.add(records.Attachment(0, 0, f"{name}/case.json", "application/json", case))
+    return contents
+
+
+def about_run(name: str, robots: str) -> Record:
+    return {"format": "1", "scenario": name, "seed": "1", "tick_rate": "240", "robots": robots}
+
+
+def test_all_robots_of_a_log_are_listed() -> None:
+    assert list(described('["a", "b"]').header().robots) == ["a", "b"]
+    with pytest.raises(ValueError, match=r"it has b/case\.json, but its list of robots is a$"):
+        described('["a"]').header()
+
+
+@pytest.mark.parametrize("robots", ['["a", "a"]', '{"a": 1}', '"a"', "[[]]", "[1, 2]"])
+def test_the_list_of_robots_has_distinct_names(robots: str) -> None:
+    with pytest.raises(ValueError, match="its list of robots is"):
+        described(robots)

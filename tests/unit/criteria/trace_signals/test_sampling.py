@@ -55,6 +55,12 @@ def test_too_few_samples_are_refused() -> None:
         evenly_spaced(samples(5), RATE)
 
 
+@pytest.mark.parametrize("ticks", [(0, 0, 0), (0, 10, 10, 20), (0, 20, 10)])
+def test_samples_out_of_order_have_no_spacing(ticks: tuple[int, ...]) -> None:
+    with pytest.raises(SignalUnavailable, match="chronological order"):
+        evenly_spaced(samples(*ticks), RATE)
+
+
 def with_truth_at(*ticks: int, end: int = 480):  # type: ignore[no-untyped-def]
     trace = synthetic_trace({"seconds": end / RATE, "truth": [[0, 0, 0]], "clearance": 1.0})
     truth = Samples(np.array(ticks), np.zeros((len(ticks), 6)))
