@@ -53,7 +53,7 @@ class WalkTrial:
         paths: dict[str, list[tuple[float, float, float]]] = {walker.name: [] for _, walker in walkers}
         waiting = sorted(walkers, key=lambda item: item[0])
         begin = waiting[0][0]
-        times: Array = begin + STEP_S * np.arange(int((end - begin) / STEP_S + 1e-9) + 1)
+        times = begin + STEP_S * np.arange(int((end - begin) / STEP_S + 1e-9) + 1, dtype=np.float64)
         robot = _MovingDisc("robot", self._radius, self._poses.poses_at(times))
         discs = [_MovingDisc(person.name, person.radius, person.poses_at(times)) for person in people]
         outlines = [_MovingOutline(thing, times) for thing in objects]
