@@ -158,7 +158,7 @@ def cost(folder: Path) -> Callable[..., tuple[int, float, float, str]]:
 
     def call(*arguments: object) -> tuple[int, float, float, str]:
         command = [sys.executable, "-c", MEASURED, *map(str, arguments)]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=20, check=False)
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
         *err, measured = done.stderr.splitlines()
         _, peak, cpu = measured.split()
         return done.returncode, int(peak) / 1024, float(cpu), done.stdout + "\n".join(err)

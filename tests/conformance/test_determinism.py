@@ -13,7 +13,7 @@ from simscen.run.process import supervisor
 
 SIMSCEN = Path(sys.executable).with_name("simscen")
 TELLING = str(Path(__file__).with_name("telling_zygote.py"))
-BUSY = "import time; end = time.monotonic() + 60\nwhile time.monotonic() < end: sum(range(100000))"
+BUSY = "import os, time; os.nice(10); end = time.monotonic() + 60\nwhile time.monotonic() < end: sum(range(100000))"
 NOISY = """\
 events: [{when: {time: 1 s}, do: {spawn: {name: box, box: [0.2, 0.2, 0.4], pose: {x: 1.9, y: 1.6}}}}]
 faults:
