@@ -1,6 +1,7 @@
 """Tests that all commands and options in the documentation exist."""
 
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -18,13 +19,16 @@ QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'")
 GLOBAL = {"--help", "--version"}
 
 
-def shown():
-    """Page, words of the command, and the options beside it."""
+@cache
+def shown() -> list[tuple[str, str, str]]:
+    """Return pages, their commands, and the rest of the line."""
+    found = []
     for page in PAGES:
         for match in SHOWN.finditer(page.read_text(encoding="utf-8")):
             name, rest = match[1], QUOTED.sub("…", match[2])
             if name in COMMANDS:
-                yield page.relative_to(ROOT).as_posix(), name, rest
+                found.append((page.relative_to(ROOT).as_posix(), name, rest))
+    return found
 
 
 @pytest.mark.parametrize("page", sorted({page for page, _, _ in shown()}))

@@ -29,7 +29,7 @@ def follower(tmp_path_factory: pytest.TempPathFactory) -> ExternalCommand:
     return ExternalCommand((str(folder / "gap_follower"),), dict(os.environ), str(folder))
 
 
-@pytest.mark.parametrize("name", ["navigation/goal", "robots/mecanum_errand"])
+@pytest.mark.parametrize("name", ["navigation/goal", pytest.param("robots/mecanum_errand", marks=pytest.mark.slow)])
 def test_gap_follower_drives_a_shipped_scenario(follower: ExternalCommand, name: str) -> None:
     prepared = prepare(load_scenario(ROOT / f"scenarios/{name}.scenario.yaml", ROOT))
     stack = ExternalStackSpec(external="gaps")
