@@ -1,15 +1,24 @@
 """Test that `simscen bench` measures all parts of a run."""
 
+import shutil
+from pathlib import Path
+
 from simscen.bench.speed.measurement import Stopwatch
 from simscen.bench.speed.run_speed import PATROL, timed_run
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
 
 
-def test_every_part_of_the_patrol_takes_time() -> None:
+def test_every_part_of_the_patrol_takes_time(tmp_path: Path) -> None:
+    """The patrol itself takes 60 s."""
+    text = PATROL.read_text(encoding="utf-8")
+    assert "time_limit: 60 s" in text
+    shorter = tmp_path / "patrol" / PATROL.name
+    shutil.copytree(PATROL.parent, shorter.parent)
+    shorter.write_text(text.replace("time_limit: 60 s", "time_limit: 15 s"), encoding="utf-8")
     watch = Stopwatch()
-    simulated, _, wall = timed_run(prepare(load_scenario(PATROL, PATROL.parent)), watch)
-    assert simulated == 60.0
+    simulated, _, wall = timed_run(prepare(load_scenario(shorter, shorter.parent)), watch)
+    assert simulated == 15.0
     assert {"physics", "truth and contacts", "sensors", "localizer", "planner", "controller", "trace", "log"} <= set(
         watch.seconds
     )
