@@ -1,5 +1,6 @@
 """Settings of all tests, and packages that add to simscen, laid out as an installer leaves them."""
 
+import gc
 import os
 import re
 import shutil
@@ -16,6 +17,8 @@ from simscen.spec import choice, registry
 
 pin_kernels()  # before the tests import NumPy, so that runs in this process are the same as on the command line
 Lay = Callable[..., Path]
+QUICK_EXAMPLES = 25
+"""Examples of each property in `make test`; `make test-all` tries 100."""
 
 # Tests that run in the background ignore Ctrl-C, and every program that they start would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -27,7 +30,13 @@ os.environ["SIMSCEN_CACHE_DIR"] = "off"
 
 # A deadline for each example depends on how busy the machine is.
 settings.register_profile("simscen", parent=settings.default, deadline=None)
+settings.register_profile("quick", parent=settings.get_profile("simscen"), max_examples=QUICK_EXAMPLES)
 settings.load_profile("simscen")
+
+# Workers write the test modules that pytest rewrites to __pycache__, so that the next start need not rewrite them.
+sys.dont_write_bytecode = False
+# Modules and tests live until the end: collecting garbage while they are made finds nothing.
+gc.disable()
 
 LONG = ("tests/scenarios/test_shipped.py", "tests/ros/", "tests/conformance/")
 """Tests that start first because they take longest, so that no worker is left alone with them at the end."""
@@ -35,8 +44,25 @@ LONG = ("tests/scenarios/test_shipped.py", "tests/ros/", "tests/conformance/")
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int | None:
-    """Return one worker more than there are cores: some tests wait for other processes without using a core."""
-    return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else len(os.sched_getaffinity(0)) + 1
+    """Return the number of usable cores: the tests keep one busy each, and every worker imports all test modules."""
+    return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else len(os.sched_getaffinity(0))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Try fewer examples of properties where the slow tests are skipped."""
+    if config.option.markexpr == "not slow" and settings.get_current_profile_name() == "simscen":
+        settings.load_profile("quick")
+
+
+def pytest_collection_finish() -> None:
+    """Collect garbage again, but do not scan the modules and tests each time."""
+    gc.freeze()
+    gc.enable()
+
+
+def pytest_sessionfinish() -> None:
+    """Let the garbage collector see everything at exit, as libraries report what it does not free as leaks."""
+    gc.unfreeze()
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -119,6 +145,12 @@ def packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lay]:
         if str(getattr(sys.modules[module], "__file__", "")).startswith(str(site)):
             del sys.modules[module]
     forget()
+
+
+@pytest.fixture(scope="session")
+def is_quick(request: pytest.FixtureRequest) -> bool:
+    """Whether the slow tests are skipped, as by `make test`: statistical tests then draw fewer samples."""
+    return request.config.option.markexpr == "not slow"
 
 
 @pytest.fixture

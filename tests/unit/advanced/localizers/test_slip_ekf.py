@@ -42,15 +42,15 @@ def test_pose_without_noise_equals_the_truth(imu: bool) -> None:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("imu", [False, True])
-def test_covariance_is_consistent_with_the_errors(imu: bool) -> None:
-    """50 NEES of 3 degrees of freedom add up to chi-square with 150; all but one of 1000 such tests pass by chance."""
-    way, values = drive(10.0), []
-    for seed in range(50):
+def test_covariance_is_consistent_with_the_errors(imu: bool, is_quick: bool) -> None:
+    """NEES of 3 degrees of freedom add up to chi-square; all but one of 1000 such tests pass by chance."""
+    way, values, runs = drive(10.0), [], 15 if is_quick else 50
+    for seed in range(runs):
         start = Pose2(*(way.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
         subject = ekf(Estimate(start, (STD[0], STD[1], STD[2])))
         beliefs = run(subject, way, seed, AS_SPECIFIED, imu=imu)
         values.append(nees(beliefs[-1], errors(beliefs, way.truth)[-1]))
-    low, high = stats.chi2.ppf([0.0005, 0.9995], 150)
+    low, high = stats.chi2.ppf([0.0005, 0.9995], 3 * runs)
     assert low <= np.sum(values) <= high
 
 

@@ -14,7 +14,6 @@ from simscen.testing.synthetic_room import nees
 
 SPEC = SlipEkf(type="slip_ekf")
 TRACK = 0.4
-SEEDS = range(4000, 4020)
 Chance = np.random.Generator
 
 
@@ -88,10 +87,11 @@ def drive(what: object, seed: int) -> float:
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("what", [slide, ramp, turntable, lock, lock_on_ice, one_wheel, spin], ids=lambda f: f.__name__)
-def test_covariance_is_not_overconfident_for_any_slip(what: object) -> None:
+def test_covariance_is_not_overconfident_for_any_slip(what: object, is_quick: bool) -> None:
     """NEES of 3 degrees of freedom add up to chi-square; it may be less sure, as no sensor tells how a robot slides."""
-    total = sum(drive(what, seed) for seed in SEEDS)
-    assert len(SEEDS) < total < stats.chi2.ppf(0.999, 3 * len(SEEDS))
+    seeds = range(4000, 4008 if is_quick else 4020)
+    total = sum(drive(what, seed) for seed in seeds)
+    assert len(seeds) < total < stats.chi2.ppf(0.999, 3 * len(seeds))
 
 
 def test_slip_check_works_with_odometry_at_1_hz() -> None:

@@ -18,6 +18,7 @@ def test_the_way_round_the_room_is_tracked_to_five_centimeters(spec: Amcl) -> No
     assert measure.tracking(spec, SEEDS[:2], seconds).rmse.max() <= 0.05
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("world", "circumstance", "seed"),
     [("warehouse", "short", 3), ("office", "crowded", 1), ("house coarse", "crowded", 3)],
@@ -31,9 +32,10 @@ def test_a_robot_that_knows_its_start_is_not_believed_a_meter_off_where_the_best
     assert np.sqrt(np.mean(wrong**2)) < 0.2
 
 
-def test_an_estimate_half_a_meter_and_twenty_degrees_off_is_corrected() -> None:
-    assert measure.wrong_start(measure.SUM, SEEDS).found.all()
-    assert measure.wrong_start(measure.PROB, SEEDS).found.all()
+def test_an_estimate_half_a_meter_and_twenty_degrees_off_is_corrected(is_quick: bool) -> None:
+    seeds = SEEDS[:2] if is_quick else SEEDS
+    assert measure.wrong_start(measure.SUM, seeds).found.all()
+    assert measure.wrong_start(measure.PROB, seeds).found.all()
 
 
 @pytest.mark.slow
@@ -62,8 +64,8 @@ def test_recovery_does_not_take_a_good_cloud_apart_with_what_it_puts_anywhere(wo
     assert off(drive).max() < 1.0
 
 
-def test_a_kidnapped_robot_finds_itself_with_recovery_and_not_without() -> None:
-    assert measure.kidnapping(measure.RECOVERING, SEEDS[:2]).found.all()
+def test_a_kidnapped_robot_finds_itself_with_recovery_and_not_without(is_quick: bool) -> None:
+    assert measure.kidnapping(measure.RECOVERING, SEEDS[: 1 if is_quick else 2]).found.all()
     assert not measure.kidnapping(measure.PROB, SEEDS[:1]).found.any()
 
 
