@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from simscen.loading.checks.events import why_no_recovery
-from simscen.loading.checks.registry import MEANING, Finding, Keys
+from simscen.loading.checks.registry import MEANING, CheckFinding, Keys
 from simscen.loading.known_names import goal_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.navigation import expected_failure_name
@@ -22,24 +22,24 @@ LooseBounds = Iterator[tuple[str, str]]
 
 
 @MEANING.check("SC036")
-def undecidable_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
+def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find criteria that need more time than the run has."""
     limit = loaded.spec.time_limit
     for index, entry in enumerate(loaded.spec.pass_):
         horizon = getattr(entry.chosen, "horizon", 0.0)
         if horizon > limit:
             message = f"`{entry.kind}` can never hold: it needs {horizon:g} s, but the time limit is {limit:g} s"
-            yield Finding(("pass", index, entry.kind), message, at_key=True)
+            yield CheckFinding(("pass", index, entry.kind), message, at_key=True)
 
 
 @MEANING.check("SC051")
-def impossible_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
+def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find criteria that no run can pass."""
     for index, entry in enumerate(loaded.spec.pass_):
         check = _IMPOSSIBLE.get(entry.kind)
         reason = _why_no_goals(loaded, entry.kind, entry.chosen) or (check(loaded, entry.chosen) if check else None)
         if reason:
-            yield Finding(("pass", index, entry.kind), f"{entry.kind} can never hold: {reason}", at_key=True)
+            yield CheckFinding(("pass", index, entry.kind), f"{entry.kind} can never hold: {reason}", at_key=True)
 
 
 def _why_no_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
@@ -66,7 +66,7 @@ _IMPOSSIBLE = {"result": _result, "recoveries": _recoveries}
 
 
 @MEANING.check("SC051")
-def contradicting_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
+def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find pairs of criteria that require different results."""
     failing = any(expected_failure_name(goal.expect) for goal in loaded.spec.goals)
     required_results: dict[str, tuple[str, Keys]] = {}
@@ -82,12 +82,12 @@ def contradicting_criteria(loaded: LoadedScenario) -> Iterator[Finding]:
         if before:
             first = loaded.key_position_of(*before[1])
             message = f"{entry.kind} contradicts {before[0]} at {first.line}:{first.col}: no run can pass both"
-            yield Finding(keys, message, at_key=True)
+            yield CheckFinding(keys, message, at_key=True)
         required_results.setdefault(status, (entry.kind, keys))
 
 
 @MEANING.check("SC051")
-def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[Finding]:
+def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find goals after one that is expected to fail, in scenarios that stop at the first failure."""
     spec = loaded.spec
     new_goals = any(action.may("new_goal") for step in spec.steps for action in step.actions)
@@ -97,17 +97,17 @@ def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[Finding]:
         if expected_failure_name(goal.expect) and (spec.navigation.loops > 1 or index + 1 < len(spec.goals)):
             following = spec.goal_names[(index + 1) % len(spec.goals)]
             message = f"the robot never gets goal `{following}`: it stops after this goal, which is expected to fail"
-            yield Finding(("goals", index, "expect"), message, "set `on_goal_failure: continue`")
+            yield CheckFinding(("goals", index, "expect"), message, "set `on_goal_failure: continue`")
             return
 
 
 @MEANING.check("SC052", severity="warning")
-def loose_bounds(loaded: LoadedScenario) -> Iterator[Finding]:
+def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find bounds that physics or the time limit already guarantee."""
     for index, entry in enumerate(loaded.spec.pass_):
         check = _LOOSE.get(entry.kind)
         for key, reason in check(loaded, entry.chosen) if check else ():
-            yield Finding(("pass", index, entry.kind, key), f"{entry.kind} can hardly fail: {reason}")
+            yield CheckFinding(("pass", index, entry.kind, key), f"{entry.kind} can hardly fail: {reason}")
 
 
 def _loose_speed(loaded: LoadedScenario, speed: Any) -> LooseBounds:
@@ -164,7 +164,7 @@ _LOOSE: dict[str, Callable[[LoadedScenario, Any], LooseBounds]] = {
 
 
 @MEANING.check("SC052", severity="warning")
-def only_warnings(loaded: LoadedScenario) -> Iterator[Finding]:
+def only_warnings(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find scenarios in which no criterion can fail the run."""
     if all(entry.severity == "warn" for entry in loaded.spec.pass_):
-        yield Finding(("pass",), "no criterion can fail the run: all are `severity: warn`", at_key=True)
+        yield CheckFinding(("pass",), "no criterion can fail the run: all are `severity: warn`", at_key=True)

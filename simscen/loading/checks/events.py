@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from simscen.core.messages.navigation import matches_goal_name
-from simscen.loading.checks.registry import MEANING, Finding, Keys
+from simscen.loading.checks.registry import MEANING, CheckFinding, Keys
 from simscen.loading.known_names import own_goal_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.disturbances import SequenceStep
@@ -28,16 +28,16 @@ MAX_TRUTH_ERROR_M = 0.5
 
 
 @MEANING.check("SC050")
-def impossible_triggers(loaded: LoadedScenario) -> Iterator[Finding]:
+def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find events and faults that can never happen, whatever the robot does."""
     run = possible_run(loaded)
     for keys, trigger, name, required in run.triggers:
         if trigger is not None and (reason := run.why_never(trigger, keys)):
-            yield Finding(reason[0], f"`{name}` can never happen: {reason[1]}", warning=not required)
+            yield CheckFinding(reason[0], f"`{name}` can never happen: {reason[1]}", warning=not required)
 
 
 @MEANING.check("SC052", severity="warning")
-def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[Finding]:
+def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find events and faults with `times` that can happen only once."""
     run = possible_run(loaded)
     for keys, trigger, name, _ in run.triggers:
@@ -45,15 +45,15 @@ def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[Finding]:
             continue
         if run.why_never(trigger, keys) is None:
             message = f"`{name}` happens once, not {trigger.times} times: its condition stays true"
-            yield Finding((*keys, "times"), message)
+            yield CheckFinding((*keys, "times"), message)
     for index, fault in enumerate(loaded.spec.faults):
         if fault.when is not None and fault.when.times > 1 and fault.for_ is None:
             message = f"`{fault.label}` happens once, not {fault.when.times} times: without `for` it lasts to the end"
-            yield Finding(("faults", index, "when", "times"), message, "add `for`: how long it lasts")
+            yield CheckFinding(("faults", index, "when", "times"), message, "add `for`: how long it lasts")
 
 
 @MEANING.check("SC050")
-def impossible_steps(loaded: LoadedScenario) -> Iterator[Finding]:
+def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find steps of a story that need more time than the run has, or wait for an earlier step."""
     run = possible_run(loaded)
     limit, needed = loaded.spec.time_limit, dict[int, float]()
@@ -65,12 +65,12 @@ def impossible_steps(loaded: LoadedScenario) -> Iterator[Finding]:
         keys = (*step.keys, "when")
         if needed[number] >= limit > own and needed[step.after] < limit:
             reason = f"its story takes at least {needed[number]:g} s, but the time limit is {limit:g} s"
-            yield Finding(keys, f"`{step.name}` can never happen: {reason}", warning=not step.required)
+            yield CheckFinding(keys, f"`{step.name}` can never happen: {reason}", warning=not step.required)
         for part in step.when.parts():
             name = getattr(part.event, "name", None)
             if name in run.earlier_steps(step):
                 message = f"`{step.name}` waits for `{name}`, which has already happened; a step waits for new events"
-                yield Finding(keys, message)
+                yield CheckFinding(keys, message)
 
 
 def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:

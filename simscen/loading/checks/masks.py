@@ -6,13 +6,12 @@ import numpy as np
 
 from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks, in_keepout_mask
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
-from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2
-from simscen.core.geometry.polygons import depth_inside_polygon, separation_from_boxes
+from simscen.core.geometry.polygons import Polygon, depth_inside_polygon, separation_from_boxes
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.speed import Speed
 from simscen.loading.builders import KEEPOUT_KEYS, SPEED_KEYS, load_criterion_masks, load_masks
-from simscen.loading.checks.registry import Finding, Keys
+from simscen.loading.checks.registry import CheckFinding, Keys
 from simscen.loading.checks.scene import WORLD, Scene, expects_start_failure
 from simscen.loading.schema.messages import quoted
 
@@ -37,7 +36,7 @@ def criterion_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
 
 
 @WORLD.check("SC302")
-def check_stack_zones(scene: Scene) -> Iterator[Finding]:
+def check_stack_zones(scene: Scene) -> Iterator[CheckFinding]:
     """Find goals, and starts (a warning), in zones that the stack keeps out of."""
     regions = scene.world.regions
     zones: list[tuple[Keys, str, Forbids]] = [
@@ -51,10 +50,10 @@ def check_stack_zones(scene: Scene) -> Iterator[Finding]:
         hint = "move one of them, or expect the failure with `result: {status: FAILED, error_code: %s}`"
         for name in [goal.name for _, goal in scene.targets if forbids(goal.pose, MIN_DEPTH_M)]:
             message = f"goal `{name}` cannot be reached: it is {where}, which the stack keeps out of"
-            yield Finding(keys, message, hint % "GOAL_OCCUPIED")
+            yield CheckFinding(keys, message, hint % "GOAL_OCCUPIED")
         if forbids(scene.start, ESTIMATE_ERROR_M) and not expects_start_failure(scene.loaded.spec):
             message = f"the robot starts {where}, which the stack keeps out of"
-            yield Finding(keys, message, hint % "START_OCCUPIED", warning=True)
+            yield CheckFinding(keys, message, hint % "START_OCCUPIED", warning=True)
 
 
 def _inside_region(corners: Polygon) -> Forbids:
@@ -73,37 +72,37 @@ def forbidden_test(mask: OccupancyGrid) -> Forbids:
 
 
 @WORLD.check("SC055", severity="warning")
-def masks_without_effect(scene: Scene) -> Iterator[Finding]:
+def masks_without_effect(scene: Scene) -> Iterator[CheckFinding]:
     """Find masks of the stack that forbid or limit nothing."""
     masks = scene.cached(stack_masks)
     if masks.keepout is not None and not (masks.keepout.cells == OCCUPIED).any():
-        yield Finding(KEEPOUT_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
+        yield CheckFinding(KEEPOUT_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
     if masks.speed is not None and not masks.speed.has_limits:
-        yield Finding(SPEED_KEYS, f"the speed mask has no effect: {NO_LIMIT_REASON}")
+        yield CheckFinding(SPEED_KEYS, f"the speed mask has no effect: {NO_LIMIT_REASON}")
 
 
 @WORLD.check("SC311", severity="warning")
-def shades_in_keepout_mask(scene: Scene) -> Iterator[Finding]:
+def shades_in_keepout_mask(scene: Scene) -> Iterator[CheckFinding]:
     """Find keepout masks with cells that are neither free nor occupied."""
     keepout = scene.cached(stack_masks).keepout
     if keepout is not None and (keepout.cells == OCCUPIED).any():
         count = np.count_nonzero((keepout.cells > FREE) & (keepout.cells < OCCUPIED))
         if count:
             message = f"{count} cells of the keepout mask are neither free nor occupied: they forbid nothing"
-            yield Finding(KEEPOUT_KEYS, message)
+            yield CheckFinding(KEEPOUT_KEYS, message)
 
 
 @WORLD.check("SC055", severity="warning")
-def criterion_masks_without_effect(scene: Scene) -> Iterator[Finding]:
+def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckFinding]:
     """Find masks of criteria that forbid or limit nothing."""
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         match entry.chosen:
             case Keepout(mask=str(name)) if not len(masks[name].forbidden):
                 message = "the criterion judges nothing: no cell of the mask is occupied"
-                yield Finding(("pass", index, "keepout", "mask"), message)
+                yield CheckFinding(("pass", index, "keepout", "mask"), message)
             case Speed(mask=spec) if spec is not None and not spec.over(masks[spec.file].grid).has_limits:
-                yield Finding(
+                yield CheckFinding(
                     ("pass", index, "speed", "mask", "file"), f"the criterion judges nothing: {NO_LIMIT_REASON}"
                 )
             case _:
@@ -111,7 +110,7 @@ def criterion_masks_without_effect(scene: Scene) -> Iterator[Finding]:
 
 
 @WORLD.check("SC051")
-def keepout_masks_on_goals(scene: Scene) -> Iterator[Finding]:
+def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckFinding]:
     """Find keepout criteria whose mask forbids the start or a goal."""
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
@@ -123,10 +122,10 @@ def keepout_masks_on_goals(scene: Scene) -> Iterator[Finding]:
             continue
         start = mask.to_mask_frame(np.array([scene.start]))
         if separation_from_boxes(start, scene.outline, mask.forbidden)[0] < 0:
-            yield Finding(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
+            yield CheckFinding(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
             continue
         forbids = forbidden_test(mask.grid)
         inside = [goal.name for _, goal in scene.targets if forbids(goal.pose, goal.xy_tolerance)]
         if inside:
             message = f"keepout cannot hold if goal `{inside[0]}` is reached: {quoted(name)} forbids its position"
-            yield Finding(keys, message)
+            yield CheckFinding(keys, message)

@@ -14,7 +14,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast
 from simscen.core.geometry.shapes import MotionPath, Solid
 from simscen.core.messages.navigation import Goal
-from simscen.loading.checks.registry import Finding, Keys
+from simscen.loading.checks.registry import CheckFinding, Keys
 from simscen.loading.checks.scene import SILL_M, START, TOUCH_M, WORLD, Scene, expects_start_failure
 from simscen.loading.yaml.tree import MappingNode
 from simscen.sim.body.outline import radius_and_height
@@ -34,25 +34,25 @@ MotionStop = tuple[Keys, str, tuple[float, float]]
 """Keys below the motion, name and position of a keyframe or waypoint."""
 
 
-def blocked_poses(scene: Scene) -> dict[Keys, Finding]:
+def blocked_poses(scene: Scene) -> dict[Keys, CheckFinding]:
     """Return the findings for the start, goals and kidnap poses at which the robot cannot be, by their keys."""
     found = [*_start(scene), *_goals(scene), *_kidnaps(scene)]
     return {finding.keys: finding for finding in found}
 
 
 @WORLD.check("SC301")
-def check_robot_poses(scene: Scene) -> Iterator[Finding]:
+def check_robot_poses(scene: Scene) -> Iterator[CheckFinding]:
     """Find start, goal and kidnap poses inside an obstacle or outside the map."""
     yield from scene.cached(blocked_poses).values()
 
 
-def _start(scene: Scene) -> Iterator[Finding]:
+def _start(scene: Scene) -> Iterator[CheckFinding]:
     if not expects_start_failure(scene.loaded.spec):
         solids = (*scene.world.solids, *scene.bodies)
         yield from _pose_problem(scene, START, "the robot's start", scene.start, solids, START_HINT)
 
 
-def _goals(scene: Scene) -> Iterator[Finding]:
+def _goals(scene: Scene) -> Iterator[CheckFinding]:
     for keys, goal in scene.targets:
         hint = OUTSIDE_HINT if scene.area.outside(goal.pose) else GOAL_HINT
         found = list(_pose_problem(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
@@ -61,7 +61,7 @@ def _goals(scene: Scene) -> Iterator[Finding]:
         position = goal.pose.x, goal.pose.y
         if not found and (thing := first_solid_in_disc(scene.unmoved_bodies, position, TOUCH_M, scene.z_range)):
             message = f"goal `{goal.name}` is inside `{thing}`, and no event moves or removes `{thing}`"
-            yield Finding(keys, message, GOAL_HINT, warning=True)
+            yield CheckFinding(keys, message, GOAL_HINT, warning=True)
 
 
 def _fits_nearby(scene: Scene, goal: Goal) -> bool:
@@ -78,7 +78,7 @@ def _fits_nearby(scene: Scene, goal: Goal) -> bool:
     return any(scene.footprint_conflict(pose, scene.world.solids) is None for pose in near)
 
 
-def _kidnaps(scene: Scene) -> Iterator[Finding]:
+def _kidnaps(scene: Scene) -> Iterator[CheckFinding]:
     for keys, _, action in scene.actions:
         if isinstance(action, Kidnap):
             what = "the pose to which the robot is kidnapped"
@@ -87,14 +87,14 @@ def _kidnaps(scene: Scene) -> Iterator[Finding]:
 
 def _pose_problem(
     scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
-) -> Iterator[Finding]:
+) -> Iterator[CheckFinding]:
     conflict = scene.area.outside(pose) or scene.footprint_conflict(pose, solids)
     if conflict:
-        yield Finding(keys, f"{what} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
+        yield CheckFinding(keys, f"{what} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
 
 
 @WORLD.check("SC304")
-def check_spawns(scene: Scene) -> Iterator[Finding]:
+def check_spawns(scene: Scene) -> Iterator[CheckFinding]:
     """Find objects that are spawned inside an obstacle or on the robot."""
     for keys, _, action in scene.actions:
         if isinstance(action, Spawn):
@@ -102,7 +102,7 @@ def check_spawns(scene: Scene) -> Iterator[Finding]:
             when = scene.loaded.spec.events[int(keys[1])].when if is_event else None
             where = _inside_obstacle(scene, action) or _on_robot(scene, action, when)
             if where:
-                yield Finding((*keys, "name"), f"`{action.name}` would appear {where}", "choose another pose")
+                yield CheckFinding((*keys, "name"), f"`{action.name}` would appear {where}", "choose another pose")
 
 
 def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
@@ -140,7 +140,7 @@ def _outline(spawn: Spawn) -> Polygon:
 
 
 @WORLD.check("SC304")
-def check_pedestrians(scene: Scene) -> Iterator[Finding]:
+def check_pedestrians(scene: Scene) -> Iterator[CheckFinding]:
     """Find pedestrians whose start or goals are too close to obstacles."""
     solids = (*scene.world.solids, *scene.immovable_bodies)
     for keys, _, action in scene.actions:
@@ -151,11 +151,11 @@ def check_pedestrians(scene: Scene) -> Iterator[Finding]:
         for below, what, (x, y) in stops:
             if solid := first_solid_in_disc(solids, (x, y), action.radius, (SILL_M, action.height)):
                 message = f'{what} ({x:g}, {y:g}) is closer to obstacle "{solid}" than {action.radius:g} m'
-                yield Finding((*keys, *below), message, "choose a position with enough room")
+                yield CheckFinding((*keys, *below), message, "choose a position with enough room")
 
 
 @WORLD.check("SC304", severity="warning")
-def check_motions(scene: Scene) -> Iterator[Finding]:
+def check_motions(scene: Scene) -> Iterator[CheckFinding]:
     """Find keyframes, waypoints and teleport targets inside the fixed world."""
     for keys, _, action in scene.actions:
         stops: list[MotionStop] = []
@@ -166,18 +166,20 @@ def check_motions(scene: Scene) -> Iterator[Finding]:
         for below, what, (x, y) in stops:
             if solid := first_solid_in_disc(scene.world.solids, (x, y), TOUCH_M, scene.z_range):
                 message = f'{what} ({x:g}, {y:g}) is inside obstacle "{solid}"'
-                yield Finding((*keys, *below), message, "move it to free space: walls do not stop scripted motions")
+                yield CheckFinding(
+                    (*keys, *below), message, "move it to free space: walls do not stop scripted motions"
+                )
 
 
 @WORLD.check("SC305")
-def check_motion_speeds(scene: Scene) -> Iterator[Finding]:
+def check_motion_speeds(scene: Scene) -> Iterator[CheckFinding]:
     """Find scripted motions so fast that contact with the robot could be missed between two ticks."""
     tick = 1 / scene.loaded.spec.physics.tick_rate
     for keys, tree, name, path, solids in _motions(scene):
         step = largest_step(path, tick, radius_and_height(solids)[0] if solids else 0.0)
         if step > MAX_STEP_M:
             hint = f"make it {math.ceil(10 * step / MAX_STEP_M) / 10:g} times slower, or raise `physics.tick_rate`"
-            yield Finding(keys, too_fast(name, step), hint, tree=tree)
+            yield CheckFinding(keys, too_fast(name, step), hint, tree=tree)
 
 
 def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, MotionPath, Sequence[Solid]]]:

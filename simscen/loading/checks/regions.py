@@ -11,15 +11,14 @@ from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.geometry.polygons import depth_inside_polygon, distance_to_polygon
+from simscen.core.geometry.polygons import Polygon, depth_inside_polygon, distance_to_polygon
 from simscen.core.geometry.shapes import Solid
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.localization import LocalizationError
 from simscen.loading.checks.events import MAX_SPEED_RATIO
 from simscen.loading.checks.placement import blocked_poses
-from simscen.loading.checks.registry import Finding, Keys
+from simscen.loading.checks.registry import CheckFinding, Keys
 from simscen.loading.checks.scene import START, WORLD, Scene
 from simscen.loading.world_cache import extend_bounds
 from simscen.triggers.base import AnyCondition
@@ -161,7 +160,7 @@ def _start_is_blocked(scene: Scene) -> bool:
 
 
 @WORLD.check("SC050")
-def unreachable_triggers(scene: Scene) -> Iterator[Finding]:
+def unreachable_triggers(scene: Scene) -> Iterator[CheckFinding]:
     """Find events and faults that wait for the robot at a position that it cannot reach."""
     if _start_is_blocked(scene) or scene.may_do():  # an action of an installed package may take the robot anywhere
         return
@@ -169,14 +168,14 @@ def unreachable_triggers(scene: Scene) -> Iterator[Finding]:
     for keys, name, what, corners, distance in scene.cached(trigger_areas):
         center = Pose2(*(sum(values) / len(corners) for values in zip(*corners, strict=True)))
         if not scene.cached(robot_routes).can_enter(starts, center, distance):
-            yield Finding(keys, f"`{name}` can never happen: no route leads the robot to {what}")
+            yield CheckFinding(keys, f"`{name}` can never happen: no route leads the robot to {what}")
         elif robot is not None and min(map(distance, starts)) > MAX_SPEED_RATIO * robot.top_speed * limit:
             reason = f"at {robot.top_speed:g} m/s, its top speed, the robot does not reach {what} within the time limit"
-            yield Finding(keys, f"`{name}` can never happen: {reason}")
+            yield CheckFinding(keys, f"`{name}` can never happen: {reason}")
 
 
 @WORLD.check("SC051")
-def keepout_regions_on_goals(scene: Scene) -> Iterator[Finding]:
+def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckFinding]:
     """Find keepout criteria whose region contains the start or a goal."""
     if _start_is_blocked(scene):
         return
@@ -186,17 +185,17 @@ def keepout_regions_on_goals(scene: Scene) -> Iterator[Finding]:
         region, keys = entry.chosen.region, ("pass", index, "keepout", "region")
         corners = scene.world.regions[region]
         if polygons_overlap(corners, place_polygon(scene.outline, scene.start)):
-            yield Finding(keys, f"keepout can never hold: the robot starts in `{region}`")
+            yield CheckFinding(keys, f"keepout can never hold: the robot starts in `{region}`")
             continue
         inside = [
             goal.name for _, goal in scene.targets if depth_inside_polygon(goal.pose, corners) > goal.xy_tolerance
         ]
         if inside:
-            yield Finding(keys, f"keepout cannot hold if goal `{inside[0]}` is reached: it is in `{region}`")
+            yield CheckFinding(keys, f"keepout cannot hold if goal `{inside[0]}` is reached: it is in `{region}`")
 
 
 @WORLD.check("SC055", severity="warning")
-def goals_reached_at_once(scene: Scene) -> Iterator[Finding]:
+def goals_reached_at_once(scene: Scene) -> Iterator[CheckFinding]:
     """Find goals that the robot has already reached when it is sent to them."""
     if _start_is_blocked(scene):
         return
@@ -206,11 +205,11 @@ def goals_reached_at_once(scene: Scene) -> Iterator[Finding]:
         turned = abs(wrap(before.yaw - goal.pose.yaw))
         if before.distance(goal.pose) <= goal.xy_tolerance and turned <= goal.yaw_tolerance:
             message = f"the robot is already within the tolerances of goal `{goal.name}` when it is sent there"
-            yield Finding(keys, message)
+            yield CheckFinding(keys, message)
 
 
 @WORLD.check("SC052", severity="warning")
-def loose_localization_bounds(scene: Scene) -> Iterator[Finding]:
+def loose_localization_bounds(scene: Scene) -> Iterator[CheckFinding]:
     """Find bounds on the localization error that are larger than the world."""
     if _start_is_blocked(scene):
         return
@@ -221,4 +220,4 @@ def loose_localization_bounds(scene: Scene) -> Iterator[Finding]:
             bound = getattr(entry.chosen, key)
             if bound is not None and 0 < diagonal < bound:
                 message = f"localization_error can hardly fail: the diagonal of the world is {diagonal:.1f} m"
-                yield Finding(("pass", index, "localization_error", key), message)
+                yield CheckFinding(("pass", index, "localization_error", key), message)

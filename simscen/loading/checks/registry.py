@@ -1,10 +1,10 @@
 """Interface of semantic checks, and the stages in which checks run.
 
-A check is a generator function that yields one Finding per problem. It is registered for a stage together with the
+A check is a generator function that yields one CheckFinding per problem. It is registered for a stage together with the
 error code that it reports:
 
     @MEANING.check("SC050")
-    def impossible_events(loaded: LoadedScenario) -> Iterator[Finding]: ...
+    def impossible_events(loaded: LoadedScenario) -> Iterator[CheckFinding]: ...
 
 Stages, in the order in which they run (a scenario with errors does not reach the next one):
 
@@ -31,7 +31,7 @@ from simscen.model.scenario import ScenarioSpec
 Keys = tuple[Key, ...]
 
 
-class Finding(NamedTuple):
+class CheckFinding(NamedTuple):
     """A problem found by a check: where it is, what is wrong, and what to do.
 
     `keys` lead to the value to mark, or to the key itself with `at_key`. They are keys of the checked file, or of
@@ -62,12 +62,12 @@ class Subject(Protocol):
 
 
 S = TypeVar("S", bound=Subject)
-Check = Callable[[S], Iterable[Finding]]
+Check = Callable[[S], Iterable[CheckFinding]]
 C = TypeVar("C", bound=Callable[..., Any])
 
 
 @dataclass
-class Stage(Generic[S]):
+class CheckStage(Generic[S]):
     """Checks that run together, in the order in which they were registered."""
 
     name: str
@@ -114,12 +114,12 @@ class NameScope(NamedTuple):
         return self.loaded.tree
 
 
-ROBOT_NAMES: Stage[WrittenScenario] = Stage("robot names")
-WORLD_FILE: Stage[LoadedWorld] = Stage("world file")
-NAMES: Stage[NameScope] = Stage("names")
-MEANING: Stage[LoadedScenario] = Stage("meaning")
+ROBOT_NAMES: CheckStage[WrittenScenario] = CheckStage("robot names")
+WORLD_FILE: CheckStage[LoadedWorld] = CheckStage("world file")
+NAMES: CheckStage[NameScope] = CheckStage("names")
+MEANING: CheckStage[LoadedScenario] = CheckStage("meaning")
 
 
-def warnings(findings: Iterable[Finding]) -> Iterator[Finding]:
+def warnings(findings: Iterable[CheckFinding]) -> Iterator[CheckFinding]:
     """Return the findings as warnings."""
     return (finding._replace(warning=True) for finding in findings)

@@ -13,7 +13,7 @@ from simscen.core.messages.navigation import matches_goal_name as is_named
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.placement import blocked_poses
 from simscen.loading.checks.regions import robot_routes
-from simscen.loading.checks.registry import Finding
+from simscen.loading.checks.registry import CheckFinding
 from simscen.loading.checks.scene import START, TIMING, WORLD, Scene, expects_failure
 from simscen.loading.goals import scenario_goals
 from simscen.model.robot import RobotSpec
@@ -31,7 +31,7 @@ class Gap(NamedTuple):
     position: tuple[float, float]
 
 
-def closed_gaps(scene: Scene) -> list[tuple[Finding, Gap]]:
+def closed_gaps(scene: Scene) -> list[tuple[CheckFinding, Gap]]:
     """Return a finding for each goal without a route, and the gap that is too narrow.
 
     It is an error if fixed walls block the goal, and a warning if the robot might pass or push what blocks it.
@@ -48,19 +48,21 @@ def closed_gaps(scene: Scene) -> list[tuple[Finding, Gap]]:
         gap = _widest_gap(scene, goal.pose, solids)
         message = f"goal `{goal.name}` cannot be reached from the start: {gap.description}"
         if solids is not world and routes.is_reachable(starts, goal.pose, world):
-            finding = Finding(keys, message, "no event opens, moves or removes it", warning=True)
+            finding = CheckFinding(keys, message, "no event opens, moves or removes it", warning=True)
         elif scene.may_do():
-            finding = Finding(keys, message, "unless an action of an installed package opens a route", warning=True)
+            finding = CheckFinding(
+                keys, message, "unless an action of an installed package opens a route", warning=True
+            )
         elif len(scene.certain_walls) < len(world) and routes.is_reachable(starts, goal.pose, scene.certain_walls):
-            finding = Finding(keys, message, _ramp_hint(scene), warning=True)
+            finding = CheckFinding(keys, message, _ramp_hint(scene), warning=True)
         else:
-            finding = Finding(keys, message, NO_ROUTE_HINT)
+            finding = CheckFinding(keys, message, NO_ROUTE_HINT)
         found.append((finding, gap))
     return found
 
 
 @WORLD.check("SC302")
-def check_reachability(scene: Scene) -> Iterator[Finding]:
+def check_reachability(scene: Scene) -> Iterator[CheckFinding]:
     """Find goals that no route leads to."""
     return (finding for finding, _ in scene.cached(closed_gaps))
 
@@ -141,7 +143,7 @@ class Drive:
 
 
 @TIMING.check("SC303")
-def impossible_time_bounds(scene: Scene) -> Iterator[Finding]:
+def impossible_time_bounds(scene: Scene) -> Iterator[CheckFinding]:
     """Find timeouts, time limits and bounds of criteria that no drive can meet."""
     goals, robot = scenario_goals(scene.loaded.spec), scene.loaded.robot.spec
     failing = any(expects_failure(scene.loaded.spec, goal.name) for goal in goals)
@@ -157,7 +159,7 @@ def impossible_time_bounds(scene: Scene) -> Iterator[Finding]:
         yield from _violated_bounds(scene, Drive(goals, robot, exact))
 
 
-def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[Finding]:
+def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckFinding]:
     spec = scene.loaded.spec
     for index, goal in enumerate(drive.goals[: len(spec.goals)]):
         is_sent = index == 0 or spec.on_goal_failure == "stop"
@@ -165,16 +167,16 @@ def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[Finding]:
             length = drive.lengths[index]
             reason = f"the path of {length:.2f} m takes {length / drive.robot.top_speed:.1f} s {drive.top_speed_text}"
             message = f"goal `{goal.name}` cannot be reached within {goal.timeout:g} s: {reason}"
-            yield Finding(("goals", index, "timeout"), message)
+            yield CheckFinding(("goals", index, "timeout"), message)
     waits = sum(goal.wait for goal in drive.goals)
     if sum(drive.least_times) + waits > spec.time_limit and any(map(_requires_success, spec.pass_)):
         keys = ("time_limit",) if "time_limit" in spec.model_fields_set else ("goals",)
         waiting = f", and the robot waits {waits:g} s at goals" if waits else ""
         message = f"the goals cannot be reached within {spec.time_limit:g} s: {drive.description}{waiting}"
-        yield Finding(keys, message)
+        yield CheckFinding(keys, message)
     for index, entry in enumerate(spec.pass_):
         for key, reason in _violated_criterion_bounds(entry, drive):
-            yield Finding(("pass", index, entry.kind, key), f"{entry.kind} can never hold: {reason}")
+            yield CheckFinding(("pass", index, entry.kind, key), f"{entry.kind} can never hold: {reason}")
 
 
 def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tuple[str, str]]:

@@ -16,7 +16,7 @@ from simscen.core.geometry.shapes import Body, Solid
 from simscen.core.messages.navigation import ErrorCode, Goal, matches_goal_name
 from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.loading.builders import load_map
-from simscen.loading.checks.registry import Keys, Stage
+from simscen.loading.checks.registry import CheckStage, Keys
 from simscen.loading.goals import event_goals, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.robot_size import RobotSize
@@ -201,8 +201,8 @@ def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:
             yield Solid(solid.shape, body.pose.compose(solid.pose), body.name)
 
 
-WORLD: Stage[Scene] = Stage("world")
-TIMING: Stage[Scene] = Stage("timing")
+WORLD: CheckStage[Scene] = CheckStage("world")
+TIMING: CheckStage[Scene] = CheckStage("timing")
 """Checks of time bounds, which need routes to all goals: they run only if all other checks pass."""
 
 

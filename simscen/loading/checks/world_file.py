@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from simscen.loading.checks.registry import WORLD_FILE, Finding, Keys
+from simscen.loading.checks.registry import WORLD_FILE, CheckFinding, Keys
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.model.world import WorldObject, WorldSpec
@@ -14,7 +14,7 @@ def _spec(world: LoadedWorld) -> WorldSpec:
 
 
 @WORLD_FILE.check("SC033")
-def shared_names(world: LoadedWorld) -> Iterator[Finding]:
+def shared_names(world: LoadedWorld) -> Iterator[CheckFinding]:
     """Find obstacles and walls with the name of an object or a door, or obstacles that share a name (a warning)."""
     spec = _spec(world)
     moving = {thing.name for thing in spec.objects} | {door.name for door in spec.doors}
@@ -23,38 +23,38 @@ def shared_names(world: LoadedWorld) -> Iterator[Finding]:
         keys: Keys = ("obstacles", index, "name")
         if obstacle.name in moving:
             message = f"an object or a door is also called {quoted(obstacle.name)}"
-            yield Finding(keys, message, "rename one of them")
+            yield CheckFinding(keys, message, "rename one of them")
         elif obstacle.name in seen:
             message = f"another obstacle is also called {quoted(obstacle.name)}; reports cannot distinguish them"
-            yield Finding(keys, message, warning=True)
+            yield CheckFinding(keys, message, warning=True)
         seen.add(obstacle.name)
     for number, wall in enumerate(spec.walls, start=1):
         if wall.label(number) in moving:
             message = f"an object or a door is also called {quoted(wall.label(number))}"
-            yield Finding(("walls", number - 1, "name"), message, "rename one of them")
+            yield CheckFinding(("walls", number - 1, "name"), message, "rename one of them")
 
 
 @WORLD_FILE.check("SC313")
-def no_extent(world: LoadedWorld) -> Iterator[Finding]:
+def no_extent(world: LoadedWorld) -> Iterator[CheckFinding]:
     """Find walls, ramps and doors of zero size, and motions that end where they start (a warning)."""
     spec = _spec(world)
     for index, wall in enumerate(spec.walls):
         if all(point == wall.points[0] for point in wall.points):
-            yield Finding(("walls", index, "points"), "the wall has no length: all its points are the same")
+            yield CheckFinding(("walls", index, "points"), "the wall has no length: all its points are the same")
     for index, ramp in enumerate(spec.ramps):
         if ramp.start == ramp.end:
-            yield Finding(("ramps", index, "end"), "the ramp has no length: `start` and `end` are the same")
+            yield CheckFinding(("ramps", index, "end"), "the ramp has no length: `start` and `end` are the same")
     for index, door in enumerate(spec.doors):
         if door.points[0] == door.points[1]:
-            yield Finding(("doors", index, "points"), "the door has no width: both points are the same")
+            yield CheckFinding(("doors", index, "points"), "the door has no width: both points are the same")
     for index, thing in enumerate(spec.objects):
         if thing.move is not None and len(set(thing.move.path(thing.pose.pose).poses)) == 1:
             key = "through" if thing.move.keyframes is None else "keyframes"
-            yield Finding(("objects", index, "move", key), "the motion leads nowhere", warning=True)
+            yield CheckFinding(("objects", index, "move", key), "the motion leads nowhere", warning=True)
 
 
 @WORLD_FILE.check("SC054", severity="warning")
-def duplicate_shapes(world: LoadedWorld) -> Iterator[Finding]:
+def duplicate_shapes(world: LoadedWorld) -> Iterator[CheckFinding]:
     """Find the same shape at the same pose under another name."""
     spec = _spec(world)
     things: list[tuple[Keys, WorldObject]] = [(("obstacles", k), thing) for k, thing in enumerate(spec.obstacles)]
@@ -64,15 +64,15 @@ def duplicate_shapes(world: LoadedWorld) -> Iterator[Finding]:
         shape = (thing.box, thing.cylinder, thing.polygon, thing.height, thing.z, thing.pose.pose)
         same = next((name for other, name in seen if other == shape), None)
         if same is not None:
-            yield Finding(keys, f"{quoted(same)} has the same shape and pose", at_key=True)
+            yield CheckFinding(keys, f"{quoted(same)} has the same shape and pose", at_key=True)
         seen.append((shape, thing.name))
 
 
 @WORLD_FILE.check("SC030")
-def unknown_friction_regions(world: LoadedWorld) -> Iterator[Finding]:
+def unknown_friction_regions(world: LoadedWorld) -> Iterator[CheckFinding]:
     """Find friction in regions that do not exist."""
     spec = _spec(world)
     for name in spec.friction:
         if name not in spec.regions:
             message, hint = f"no region is called {quoted(name)}", suggestion(name, spec.regions)
-            yield Finding(("friction", name), message, hint, at_key=True)
+            yield CheckFinding(("friction", name), message, hint, at_key=True)

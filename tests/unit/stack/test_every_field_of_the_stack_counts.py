@@ -198,7 +198,7 @@ ELSEWHERE = {
     "StackSpec.latency": "tests/unit/run/test_latency.py",  # `robot` is what the robot's file says
     "OmplPlanner.gap_clearance": "tests/unit/stack/planners/test_ompl_planner.py",
     "Recovery.clear_entirely": "tests/unit/advanced/test_costmap_clearing.py",
-    "ClearCostmap.clear_entirely": "tests/unit/stack/behaviors/test_motions.py",
+    "ClearCostmap.clear_entirely": "tests/unit/stack/test_behaviors.py",
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
     "VelocitySmoother.counter_turn_slip": "tests/unit/advanced/test_turn_slip.py",
     "ScanMatchingAmcl.sure_update_interval": "tests/unit/advanced/localizers/test_scan_matching_amcl.py",
