@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field, model_validator
 
+from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
@@ -136,14 +137,12 @@ class Speed(Spec, Criterion):
 
     def _inside(self, trace: Trace, case: Case, signal: Samples) -> ground_truth.Flags | None:
         """Return whether the robot's center was in the region; always without a region, None for an unknown one."""
-        from simscen.criteria.trace_signals.readers import points_in_polygon
-
         if self.in_ is None:
             return np.ones(len(signal), dtype=bool)
         if self.in_ not in case.regions:
             return None
         positions = ground_truth.truth(trace).at(signal.ticks)[:, :2]
-        return points_in_polygon(positions, np.array(case.regions[self.in_], dtype=np.float64))
+        return points_in_polygon(case.regions[self.in_], positions)
 
 
 def _highest_around(values: Array, ticks: Ticks, reach: int) -> Array:

@@ -153,14 +153,3 @@ RULES: Dict[str, Any] = {
 }
 NODES = ("amcl", "bt_navigator", "controller_server", "planner_server", "behavior_server", *sorted(COSTMAPS))
 """The nodes that a run needs; another localizer that publishes map -> odom may replace `amcl`."""
-
-
-def flatten(tree: Mapping[str, Any], prefix: str = "") -> Dict[str, Any]:
-    """Return nested parameters with dotted keys."""
-    parameters: Dict[str, Any] = {}
-    for key, value in tree.items():
-        if isinstance(value, Mapping):
-            parameters.update(flatten(value, f"{prefix}{key}."))
-        else:
-            parameters[f"{prefix}{key}"] = value
-    return parameters

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
+from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.messages.navigation import matches_goal_name
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Samples, Ticks
@@ -182,9 +183,7 @@ def in_region(query: SignalQuery) -> Array:
     name = str(query.arguments["region"])
     if name not in query.case.regions:
         raise SignalUnavailable(f"the world has no region `{name}`")
-    return _as_numbers(
-        points_in_polygon(poses_of(query.trace)[:, :2], np.array(query.case.regions[name], dtype=np.float64))
-    )
+    return _as_numbers(points_in_polygon(query.case.regions[name], poses_of(query.trace)[:, :2]))
 
 
 def in_collision(query: SignalQuery) -> Array:
@@ -240,20 +239,6 @@ def replan_count(query: SignalQuery) -> Array:
 def recovery_count(query: SignalQuery) -> Array:
     """Return the number of recoveries that have started so far."""
     return _count(query.trace, [event.tick for event in query.trace.of_kind(EventKind.RECOVERY_STARTED)])
-
-
-def points_in_polygon(points: Array, corners: Array) -> Flags:
-    """Return whether each of `points` (n, 2) is inside a polygon (m, 2), by counting the edges that a ray crosses.
-
-    The left and the lower border belong to the polygon, so that each point is in one of two adjacent regions.
-    """
-    x, y = points[:, :1], points[:, 1:]
-    others = np.roll(corners, 1, axis=0)
-    crosses = (corners[:, 1] > y) != (others[:, 1] > y)
-    rise = np.where(corners[:, 1] == others[:, 1], np.inf, others[:, 1] - corners[:, 1])
-    right = x < corners[:, 0] + (y - corners[:, 1]) / rise * (others[:, 0] - corners[:, 0])
-    odd: Flags = (crosses & right).sum(axis=1) % 2 == 1
-    return odd
 
 
 def poses_of(trace: Trace) -> Array:

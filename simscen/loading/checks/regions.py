@@ -11,8 +11,9 @@ from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.geometry.polygons import Polygon, depth_inside_polygon, distance_to_polygon
+from simscen.core.geometry.polygons import depth_inside_polygon, distance_to_polygon
 from simscen.core.geometry.shapes import Solid
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.localization import LocalizationError

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import shapely
 
+from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.messages.navigation import Path
 from simscen.core.records.trace import Samples, Trace
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal
-from simscen.criteria.trace_signals.readers import points_in_polygon
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
@@ -234,15 +234,15 @@ def test_a_robot_is_in_a_region_with_its_center():
 @pytest.mark.parametrize("corners", [[[1, 0], [0, 1], [-1, 0], [0, -1]], [[1, 0], [0, -1], [-1, 0], [0, 1]]])
 def test_inside_is_inside_at_the_height_of_a_corner_too(corners):
     points = np.array([[-2.0, 0.0], [-0.5, 0.0], [0.0, 0.0], [0.5, 0.0], [2.0, 0.0], [-0.5, 1.0], [-0.5, -1.0]])
-    assert points_in_polygon(points, np.array(corners)).tolist() == [False, True, True, True, False, False, False]
+    assert points_in_polygon(corners, points).tolist() == [False, True, True, True, False, False, False]
 
 
 def test_of_regions_side_by_side_each_place_is_in_one():
     square, right, above = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) + by for by in ([0, 0], [1, 0], [0, 1]))
     border = np.array([[0.0, 0.5], [0.5, 0.0], [1.0, 0.5], [0.5, 1.0]])
-    assert points_in_polygon(border, square).tolist() == [True, True, False, False]
-    assert points_in_polygon(border, right).tolist() == [False, False, True, False]
-    assert points_in_polygon(border, above).tolist() == [False, False, False, True]
+    assert points_in_polygon(square.tolist(), border).tolist() == [True, True, False, False]
+    assert points_in_polygon(right.tolist(), border).tolist() == [False, False, True, False]
+    assert points_in_polygon(above.tolist(), border).tolist() == [False, False, False, True]
 
 
 def test_inside_are_the_points_that_are_inside_for_shapely():
@@ -250,7 +250,7 @@ def test_inside_are_the_points_that_are_inside_for_shapely():
     rng = np.random.default_rng(5)
     points = rng.uniform(-2, 6, (400, 2))
     within = shapely.contains_xy(shapely.Polygon(corners), *points.T)
-    assert points_in_polygon(points, np.array(corners)).tolist() == within.tolist()
+    assert points_in_polygon(corners, points).tolist() == within.tolist()
 
 
 def test_a_fault_is_active_from_its_start_to_before_its_end_and_an_event_without_one_to_the_last_sample():
