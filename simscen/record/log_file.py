@@ -6,13 +6,15 @@ import os
 import stat
 import struct
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
+from lz4.frame import LZ4FrameDecompressor
 from mcap import records
 from mcap.exceptions import EndOfFile, McapError
 from mcap.reader import make_reader
-from mcap.stream_reader import StreamReader
+from mcap.stream_reader import StreamReader, breakup_chunk
 
 from simscen.core.errors import RunError
 from simscen.record.log_header import RESULT
@@ -46,20 +48,34 @@ class RecordReader:
     """Iterates over all records of an MCAP file, including those inside chunks.
 
     Stops before a truncated record and then sets `is_truncated`. Raises the exceptions of the mcap library on bytes
-    that are not MCAP.
+    that are not MCAP, and ValueError if a chunk is too large.
     """
 
     def __init__(self, stream: IO[bytes]) -> None:
         # The library does not detect a truncated record. StreamReader accepts any object with a `read` method.
         exact: Any = _ExactStream(stream)
-        self._reader = StreamReader(exact, validate_crcs=True, record_size_limit=MAX_RECORD_BYTES)
+        self._reader = StreamReader(exact, emit_chunks=True, validate_crcs=True, record_size_limit=MAX_RECORD_BYTES)
         self.is_truncated = False
 
     def __iter__(self) -> Iterator[records.McapRecord]:
         try:
-            yield from self._reader.records
+            for record in self._reader.records:
+                if isinstance(record, records.Chunk):
+                    yield from breakup_chunk(_decompressed(record), validate_crc=True)
+                else:
+                    yield record
         except EndOfFile:
             self.is_truncated = True
+
+
+def _decompressed(chunk: records.Chunk) -> records.Chunk:
+    """Return a chunk with its data decompressed. Raises ValueError if these are more than MAX_RECORD_BYTES."""
+    if chunk.compression == "lz4":  # the library would decompress it without a limit
+        data = LZ4FrameDecompressor().decompress(chunk.data, max_length=MAX_RECORD_BYTES + 1)
+        chunk = replace(chunk, compression="", data=data, uncompressed_size=len(data))
+    if chunk.uncompressed_size > MAX_RECORD_BYTES:
+        raise ValueError(f"a chunk has more than {MAX_RECORD_BYTES >> 20} MiB of messages")
+    return chunk
 
 
 class _ExactStream:

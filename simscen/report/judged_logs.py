@@ -7,7 +7,7 @@ from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.verdict import Status, Verdict
 from simscen.judge.finding_text import tightest_margin
-from simscen.report.display_text import StyledLine, StyledText, escape_control, one_line
+from simscen.report.display_text import StyledLine, StyledText, one_line
 from simscen.report.session_lines import SYMBOLS, violation_lines
 from simscen.report.violations import error_summary, excuse_text, first_violation
 
@@ -64,7 +64,7 @@ def _head(result: RunResult, name: str) -> tuple[StyledText, ...]:
     return (
         StyledText("  "),
         StyledText(symbol, role),
-        StyledText(f" {escape_control(name)}", "name"),
+        StyledText(f" {one_line(name)}", "name"),
         StyledText(length, "quiet"),
     )
 

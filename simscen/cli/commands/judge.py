@@ -28,7 +28,7 @@ from simscen.cli.shared_options import (
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import result_data
 from simscen.record.foreign.options import ForeignLogOptions
-from simscen.report.display_text import plain_text
+from simscen.report.display_text import escape_ci_commands, plain_text
 from simscen.report.judged_logs import full_log_lines, margin_table, short_log_line, summary_line
 from simscen.report.results_json import as_document, in_order
 
@@ -92,7 +92,7 @@ def _print(runs: list[tuple[str, RunFinished]], same_criteria: bool) -> None:
             summary_line([run for _, run in runs]),
         ]
     for line in lines:
-        print_text(plain_text(line))
+        print_text(escape_ci_commands(plain_text(line)))
 
 
 def _document(runs: list[RunFinished], options: list[str]) -> str:

@@ -111,6 +111,8 @@ def _read(stream: IO[bytes], contents: LogContents) -> bool:
     records = RecordReader(stream)
     for record in records:
         contents.add(record)
+    if stream.read(1):
+        raise ValueError("data follows its end; a file of several logs cannot be judged")
     return contents.end is not None and not records.is_truncated
 
 

@@ -25,6 +25,10 @@ SUPERSAMPLING = 2
 LABEL_CELL_PX = 4
 """Size in pixels of the cells in which free space for labels is tracked."""
 
+MAX_ELLIPSE_RADIUS_PX = 4000.0
+"""Larger discs are drawn as polygons: Pillow's time for an ellipse grows with its area, also outside of the image."""
+_SIDES_OF_LARGE_DISC = 2000
+
 
 @lru_cache(maxsize=16)
 def font(size: int) -> Font:
@@ -174,6 +178,11 @@ class Canvas:
         busy: bool = False,
     ) -> None:
         """Draw a disc of `radius` pixels at a point in meters."""
+        if radius > MAX_ELLIPSE_RADIUS_PX:
+            angles = np.linspace(0.0, 2.0 * math.pi, _SIDES_OF_LARGE_DISC, endpoint=False)
+            ring = radius / self.scale * np.column_stack((np.cos(angles), np.sin(angles)))
+            self.polygon(np.array((x, y)) + ring, fill, outline, width, busy)
+            return
         u, v = (SUPERSAMPLING * part for part in self.pixel(x, y))
         r = SUPERSAMPLING * radius
         box = (u - r, v - r, u + r, v + r)

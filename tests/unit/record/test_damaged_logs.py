@@ -11,14 +11,16 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mcap.exceptions import EndOfFile
+from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 from moments import CASE, CLOCK, about, moments
 
 from simscen.core.errors import InvalidInput
 from simscen.core.records.trace import Trace
+from simscen.record import log_file
+from simscen.record.log_file import RecordReader
 from simscen.record.log_reader.read import Log, read_log
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
@@ -106,6 +108,36 @@ def test_file_of_another_type_is_reported(
     path = tmp_path / "run.mcap"
     path.write_bytes(change(log.read_bytes()))
     assert problem(path) == expected
+
+
+def test_a_file_of_two_logs_is_refused(tmp_path: Path, log: Path) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(2 * log.read_bytes())
+    told = "SC802 the log is damaged: data follows its end; a file of several logs cannot be judged"
+    assert problem(path) == told
+
+
+def chunked(path: Path, compression: CompressionType, data: bytes) -> Path:
+    """A bag with one chunk, which holds one message."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=compression)
+        writer.start("ros2", "rosbag2")
+        channel = writer.register_channel("/odom", "cdr", writer.register_schema("std_msgs/msg/String", "ros2msg", b""))
+        writer.add_message(channel, 5, data, 5)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize("compression", CompressionType)
+def test_chunks_are_read_up_to_a_limit(tmp_path: Path, monkeypatch, compression: CompressionType) -> None:
+    path = chunked(tmp_path / "run.mcap", compression, bytes(10_000))
+    monkeypatch.setattr(log_file, "MAX_RECORD_BYTES", 20_000)
+    with path.open("rb") as stream:
+        (message,) = [record for record in RecordReader(stream) if isinstance(record, Message)]
+    assert message.data == bytes(10_000)
+    monkeypatch.setattr(log_file, "MAX_RECORD_BYTES", 9_000)
+    with path.open("rb") as stream, pytest.raises((ValueError, McapError), match=r"more than|exceeds limit"):
+        list(RecordReader(stream))
 
 
 def test_a_missing_file_is_reported(tmp_path: Path) -> None:

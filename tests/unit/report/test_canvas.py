@@ -1,0 +1,32 @@
+"""Tests of shapes on the canvas of pictures."""
+
+import time
+
+import numpy as np
+import pytest
+
+from simscen.report.picture.canvas import MAX_ELLIPSE_RADIUS_PX, SUPERSAMPLING, Canvas
+
+WHITE, RED, BLUE = (255, 255, 255), (255, 0, 0), (0, 0, 255)
+
+
+def drawn(x: float, radius_px: float) -> np.ndarray:
+    """Return the pixels of a canvas of 10 m x 10 m, 50 pixels per meter, with a disc at (x, 5)."""
+    canvas = Canvas((0.0, 0.0, 10.0, 10.0), 50.0, WHITE)
+    image = canvas._image
+    canvas.disc(x, 5.0, radius_px, RED, BLUE, 1.0, busy=True)
+    return np.asarray(image)
+
+
+@pytest.mark.parametrize("radius_px", [MAX_ELLIPSE_RADIUS_PX, MAX_ELLIPSE_RADIUS_PX + 1, 1e6])
+def test_the_edge_of_a_large_disc_is_where_it_belongs(radius_px: float) -> None:
+    row = drawn(5.0 - radius_px / 50.0, radius_px)[500]
+    edge = 5 * 50 * SUPERSAMPLING
+    assert row[edge - 8].tolist() == list(RED)
+    assert row[edge + 8].tolist() == list(WHITE)
+
+
+def test_a_disc_of_kilometers_takes_no_longer_than_a_small_one() -> None:
+    start = time.process_time()
+    assert (drawn(5.0, 1e6) == RED).all()
+    assert time.process_time() - start < 1.0
