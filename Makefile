@@ -102,6 +102,7 @@ screenshots: setup  ## Create the screenshots for the docs (needs Chromium)
 	@$(BIN)/python tests/browser/screenshots.py
 	@$(BIN)/python tests/browser/suite_screenshots.py
 	@$(BIN)/python tests/browser/editor_screenshots.py
+	@$(BIN)/python tests/browser/verify_screenshots.py
 
 bench: setup  ## Measure speed (simscen bench)
 	@$(BIN)/simscen bench

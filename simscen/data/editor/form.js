@@ -10,6 +10,12 @@ export function fieldValue(text) {
   return NUMBER.test(plain) ? Number(plain) : plain;
 }
 
+/** Whether a list holds the coordinates of a point: of a line, or of a trigger or an action at a place. */
+function isPoint(field) {
+  const key = field.keys.at(-1);
+  return field.type === "list" && field.fields.length === 2 && field.fields.every((one) => one.type === "number") && (Number.isInteger(key) || key === "of" || key === "at");
+}
+
 export class Form {
   /** `change(edits, what)` is called with the edits of a field. */
   constructor(element, change) {
@@ -36,13 +42,14 @@ export class Form {
   contents(field) {
     if (field.omitted) return [el("p", { class: "quiet" }, `${field.omitted} values: edit them on the map or in the text.`)];
     if (field.type !== "group" && field.type !== "list") return [this.field(field)];
-    const fields = field.fields.map((one) => this.field(one, field.type === "list"));
+    const names = isPoint(field) ? ["x", "y"] : null;
+    const fields = field.fields.map((one, index) => this.field(one, field.type === "list", names?.[index]));
     const list = field.type === "list" && field.fields.every((one) => one.type === "number") ? [el("div", { class: "items" }, ...fields)] : fields;
     return [...list, this.adder(field)];
   }
 
-  field(field, item = false) {
-    const label = item ? `${Number(field.key) + 1}` : field.key;
+  field(field, item = false, called = "") {
+    const label = called || (item ? `${Number(field.key) + 1}` : field.key);
     if (field.type === "group" || field.type === "list") {
       return el("fieldset", {}, el("legend", {}, item ? `${field.keys.at(-2)} ${label}` : label), field.help ? el("p", { class: "help quiet" }, field.help) : null,
         ...this.contents(field), this.remover(field));

@@ -67,7 +67,8 @@ def _goals(value: Any, keys: Keys, prefix: str, places: Places) -> Iterator[MapO
         own = (*keys, index)
         pose = goal if isinstance(goal, str) else mapping(goal).get("pose")
         default = pose if isinstance(pose, str) else f"goal-{index + 1}"
-        label = f"{prefix}goal {mapping(goal).get('name', default)}"
+        name = str(mapping(goal).get("name", default))
+        label = prefix + (name if name.startswith("goal") else f"goal {name}")
         radius = number(mapping(goal).get("xy_tolerance"))
         radius_keys = (*own, "xy_tolerance") if radius is not None else ()
         handle = pose_handle(pose, (*own, "pose"), places)

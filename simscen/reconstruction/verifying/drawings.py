@@ -209,7 +209,7 @@ def chart(label: str, series: Sequence[Series], unit: str) -> str:
             f"{LEFT + across * time / end:.1f},{CHART_HEIGHT - BOTTOM - up * value / top:.1f}"
             for time, value in zip(one.times[::step].tolist(), one.values[::step].tolist(), strict=True)
         )
-        parts.append(f'<polyline class="path {one.name}" points="{points}"/>')
+        parts.append(f'<polyline class="path line {one.name}" points="{points}"/>')
     view = f"0 -4 {CHART_WIDTH:g} {CHART_HEIGHT + 4:g}"
     return f'<svg role="img" aria-label="{text(label)}" viewBox="{view}">{"".join(parts)}</svg>'
 

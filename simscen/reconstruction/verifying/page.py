@@ -45,7 +45,7 @@ text.goalname { fill: var(--good); } text.objectname { fill: var(--object); } te
 .mark { stroke: none; } .mark.log { fill: var(--log); } .mark.run { fill: var(--run); }
 .object { stroke: var(--object); stroke-width: 1.5; } .object.start { fill: var(--object); }
 .goal { stroke: var(--good); stroke-width: 2; } .incident { stroke: var(--bad); stroke-width: 3; }
-.axis { stroke: var(--line); }
+.line.run { stroke-dasharray: 7 5; } .axis { stroke: var(--line); }
 .legend { display: flex; flex-wrap: wrap; gap: .25rem 1.2rem; padding: 0; margin: .5rem 0; list-style: none; }
 .legend svg { width: 1.8rem; height: .9rem; display: inline-block; vertical-align: -.1rem; margin-right: .3rem; }
 .new { fill: var(--new); }
@@ -146,7 +146,7 @@ def _charts(verified: Verification) -> Iterator[str]:
         if found is not None
     ]
     if nearest:
-        yield _figure("Smallest range that the lidar measured, in the log and in the run", nearest)
+        yield _figure("Smallest range of each scan, in the log and in the run (dashed)", nearest)
     yield "</div>"
 
 
