@@ -2,10 +2,6 @@
 
 import numpy as np
 import pytest
-from simscen.model.checkers import ProgressChecker as ProgressSpec
-from simscen.model.checkers import SimpleGoalChecker as CheckerSpec
-from simscen.stack.behaviors.motions import BehaviorSequence, Wait
-from simscen.stack.costmap.speed_filter import SpeedFilter
 
 from simscen.advanced.replanning import ClearancePlan
 from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
@@ -13,12 +9,16 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.model.controllers import ProgressChecker as ProgressSpec
+from simscen.model.controllers import SimpleGoalChecker as CheckerSpec
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.recovery import Recovery
 from simscen.model.recovery import Wait as WaitSpec
 from simscen.model.stack import StackSpec
+from simscen.stack.behaviors import BehaviorSequence, Wait
 from simscen.stack.checkers import STANDSTILL_CHECKS, ProgressChecker, SimpleGoalChecker
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
+from simscen.stack.costmap.layers import SpeedFilter
 from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.tasks import Task

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simscen.stack.path_geometry import poses_along
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -13,6 +12,7 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.collision_checker import time_to_collision
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
+from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
 
