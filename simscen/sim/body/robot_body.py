@@ -152,7 +152,8 @@ def check_robot_size(body: RobotBody, file: Path | None) -> None:
         raise InvalidInput([Problem(str(file or body.name), 0, 0, "SC402", message, hint)])
 
 
-SLOPES_RAD = np.radians(np.arange(0.0, 50.0, 0.1))
+MAX_SLOPE_DEG, SLOPE_STEP_DEG = 50.0, 0.1
+"""Steepest slope that is examined, and the distance between two slopes."""
 
 
 class ClimbLimits(NamedTuple):
@@ -207,6 +208,7 @@ def approach_angle(body: RobotBody) -> float:
     corners = [(x - foremost.x, z, 0.0) for x, _, z in points.tolist() if x > foremost.x]
     corners += [(c.pose.x - foremost.x, c.pose.z, c.shape.radius) for c in raised if isinstance(c.shape, Sphere)]
     radius = foremost.radius
-    is_clear = [-x * np.sin(SLOPES_RAD) + (z - radius) * np.cos(SLOPES_RAD) >= size - radius for x, z, size in corners]
-    touches = ~np.logical_and.reduce(is_clear) if is_clear else np.zeros(len(SLOPES_RAD), np.bool_)
-    return float(SLOPES_RAD[np.argmax(touches)]) if touches.any() else float(SLOPES_RAD[-1])
+    slopes = np.radians(np.arange(0.0, MAX_SLOPE_DEG, SLOPE_STEP_DEG))
+    is_clear = [-x * np.sin(slopes) + (z - radius) * np.cos(slopes) >= size - radius for x, z, size in corners]
+    touches = ~np.logical_and.reduce(is_clear) if is_clear else np.zeros(len(slopes), np.bool_)
+    return float(slopes[np.argmax(touches)]) if touches.any() else float(slopes[-1])
