@@ -130,6 +130,11 @@ def test_104_a_run_ends_at_its_time_limit(simscen, folder: Path) -> None:
     assert run["simulated_seconds"] == 2.0
 
 
+def test_104_a_run_of_a_single_sample_is_refused(with_scenario) -> None:
+    told = with_scenario(f"simscen: 1\n{ROOM}time_limit: 20 ms\npass: [{{collisions: {{max: 0}}}}]\n")
+    assert "bad.scenario.yaml:4:13: error[SC036] nothing can be judged: the second sample" in told
+
+
 @pytest.mark.parametrize(
     "criterion",
     [

@@ -32,6 +32,15 @@ def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
             yield CheckFinding(("pass", index, entry.kind), message, at_key=True)
 
 
+@MEANING.check("SC036")
+def runs_without_motion(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+    """Find a time limit that ends the run before the second sample of the ground truth."""
+    period = 1.0 / loaded.spec.physics.truth_rate
+    if loaded.spec.time_limit < period:
+        message = f"nothing can be judged: the second sample of the ground truth is at t = {period:g} s"
+        yield CheckFinding(("time_limit",), message)
+
+
 @MEANING.check("SC051")
 def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find criteria that no run can pass."""
