@@ -14,7 +14,7 @@ from simscen.core.records.verdict import Status
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.stl.condition import Window
-from simscen.criteria.stl.robustness import EvaluationContext, robustness
+from simscen.criteria.stl.robustness import EvaluationContext, ResponseRobustness, robustness
 from simscen.judge.evaluation import judge
 
 
@@ -118,6 +118,17 @@ def test_an_answer_below_other_conditions_is_due_from_the_first_sample_on():
     formula = validated({"all": [{"whenever": premise, "then": answer}]})
     scene = EvaluationContext(run([1.0, 0.0, 0.0], [-1.0, 1.0, 1.0]), CASE, over=True)
     assert robustness(formula, scene).low.tolist() == [-0.5, 0.5, 0.5]
+
+
+@pytest.mark.parametrize(("clearance", "may_have_held"), [(0.75, True), (0.5, False)])
+def test_a_premise_may_have_held_by_little_when_the_run_ends(clearance: float, may_have_held: bool) -> None:
+    later = {"eventually": {"signal": "yaw_rate", "op": ">", "value": 5, "within": 9}}
+    premise = {"all": [{"signal": "clearance", "op": ">", "value": 0.5}, later]}
+    formula = validated({"whenever": premise, "then": {"signal": "yaw_rate", "op": "<", "value": 9}})
+    found = robustness(formula, EvaluationContext(run([clearance] * 3, [0.0] * 3), CASE, over=True))
+    assert isinstance(found, ResponseRobustness)
+    assert not found.tested
+    assert found.may_have_held is may_have_held
 
 
 def test_a_signal_that_is_no_number_is_named_with_its_first_moment():
