@@ -190,6 +190,8 @@ class Adapter:
             nonlocal changed_at, nodes
             missing[:] = self._readiness.missing()
             self._check_unavailable()
+            if self._report is not None:
+                self._report.follow_log()
             if missing or nodes != self._graph.nodes():
                 changed_at, nodes = time.monotonic(), self._graph.nodes()
             return time.monotonic() - changed_at >= self._options.settle
@@ -199,6 +201,8 @@ class Adapter:
                 waited = time.monotonic() - self._started_at
                 missing = list(dict.fromkeys([*self._readiness.likely_causes(), *missing]))
                 reasons = "; ".join(missing) or "nodes keep appearing and disappearing"
+                errors = [] if self._report is None else self._report.errors()
+                reasons += f"; errors in the log: {'; '.join(errors)}" if errors else ""
                 raise AdapterError(f"the graph is not ready after {waited:.0f} s: {reasons}")
         finally:
             self._graph.node.destroy_timer(timer)

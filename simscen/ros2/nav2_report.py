@@ -13,8 +13,9 @@ if TYPE_CHECKING:
 
 BEHAVIOR_TREE_LOG = "/behavior_tree_log"
 ROSOUT = "/rosout"
-INFO, WARNING = 20, 30
+INFO, WARNING, ERROR = 20, 30, 40
 """Levels of rcl_interfaces/msg/Log."""
+LISTED_ERRORS = 3
 NODES = (
     *("amcl", "map_server", "planner_server", "controller_server", "smoother_server", "behavior_server"),
     *("bt_navigator", "waypoint_follower", "velocity_smoother", "collision_monitor"),
@@ -40,27 +41,41 @@ class Nav2Report:
         self._graph, self._barrier = graph, barrier
         self._known = NodeParameters(graph, barrier)
         self._lines: list[Line] = []
+        self._follows_log = False
         self.parameters: dict[str, dict[str, Any]] = {}
         """Values of all parameters by node."""
 
     def begin(self) -> None:
         """Subscribe to the logs of the graph, and read the parameters of Nav2's nodes."""
         self._follow(self._graph.names(BEHAVIOR_TREE_LOG), "nav2_msgs/msg/BehaviorTreeLog", self._take_tree)
-        self._follow(ROSOUT, "rcl_interfaces/msg/Log", self._take_log)
+        self.follow_log()
+        self._lines.clear()
         for node in self._barrier.nodes:
             if node.rpartition("/")[2] in NODES:
                 self.parameters[node] = self._read_parameters(node)
+
+    def follow_log(self) -> None:
+        """Subscribe to the log of all nodes as soon as a node publishes it."""
+        if not self._follows_log:
+            self._follows_log = self._follow(ROSOUT, "rcl_interfaces/msg/Log", self._take_log)
+
+    def errors(self) -> list[str]:
+        """Return the last different errors that nodes have logged since the last lines were taken."""
+        errors = dict.fromkeys(f"{line.name}: {line.text}" for line in self._lines if line.level >= ERROR)
+        return list(errors)[-LISTED_ERRORS:]
 
     def take_lines(self) -> list[Line]:
         """Return the lines since the last call, by logger: lines of different nodes arrive in random order."""
         lines, self._lines = self._lines, []
         return sorted(lines, key=lambda line: line.name)
 
-    def _follow(self, topic: str, type_name: str, take: Callable[[Any], None]) -> None:
+    def _follow(self, topic: str, type_name: str, take: Callable[[Any], None]) -> bool:
+        """Subscribe to a topic; return False if no node publishes it."""
         message_type = find_type(type_name)
-        if message_type is not None and self._graph.publishers_of(topic):
-            profile = self._graph.subscription_profile(topic)
-            self._graph.node.create_subscription(message_type, topic, take, profile)
+        if message_type is None or not self._graph.publishers_of(topic):
+            return False
+        self._graph.node.create_subscription(message_type, topic, take, self._graph.subscription_profile(topic))
+        return True
 
     def _take_tree(self, message: Any) -> None:
         for change in message.event_log:

@@ -47,3 +47,14 @@ def test_lines_are_taken_once_and_sorted_by_logger() -> None:
         Line(40, "planner_server", "no path"),
     ]
     assert report.take_lines() == []
+
+
+def test_the_last_different_errors_are_listed() -> None:
+    missing: Any = None
+    report = Nav2Report(missing, missing)
+    for number in (1, 2, 2, 3, 4):
+        report._take_log(SimpleNamespace(level=40, name="planner_server", msg=f"error {number}"))
+    report._take_log(SimpleNamespace(level=30, name="amcl", msg="a warning"))
+    assert report.errors() == ["planner_server: error 2", "planner_server: error 3", "planner_server: error 4"]
+    report.take_lines()
+    assert report.errors() == []
