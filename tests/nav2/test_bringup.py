@@ -25,7 +25,11 @@ def with_parameters(nav2: Nav2, folder: Path, change: Callable[[dict[str, Any]],
 def with_filters(nodes: dict[str, Any]) -> None:
     """Add the costmap filters of docs/reference/ros2.md."""
     keepout = {"plugin": "nav2_costmap_2d::KeepoutFilter", "filter_info_topic": "/keepout_costmap_filter_info"}
-    speed = {"plugin": "nav2_costmap_2d::SpeedFilter", "filter_info_topic": "/speed_costmap_filter_info"}
+    speed = {
+        "plugin": "nav2_costmap_2d::SpeedFilter",
+        "filter_info_topic": "/speed_costmap_filter_info",
+        "speed_limit_topic": "/speed_limit",
+    }
     for name in ("global_costmap", "local_costmap"):
         costmap = nodes[name][name]["ros__parameters"]
         costmap |= {"filters": ["keepout_filter"], "keepout_filter": {**keepout, "enabled": True}}
