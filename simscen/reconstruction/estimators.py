@@ -52,10 +52,15 @@ def find_all(
     world: Surroundings,
     robot: KnownRobot = UNKNOWN_ROBOT,
     other_robots: Sequence[FoundObject] = (),
+    is_map_built: bool = False,
 ) -> Findings:
-    """Return everything that the estimators find in a drive. `other_robots` are known to be there."""
+    """Return everything that the estimators find in a drive.
+
+    `other_robots` are known to be there. `is_map_built` if the `world` is from the scans of the drive.
+    """
     unknowns = [NEVER_KNOWN]
-    faults, objects = _from_scans(drive, world, robot, other_robots, unknowns)
+    is_calibrated = drive.has_independent_poses and not is_map_built
+    faults, objects = _from_scans(drive, world, robot, other_robots, unknowns, is_calibrated)
     kidnaps = list(_kidnaps(drive))
     faults += stream_faults("odom", drive.odometry.times, drive.odometry.arrivals, drive.duration)
     faults += stream_faults("imu", drive.turn_rates.times, drive.turn_rates.arrivals, drive.duration)
@@ -65,6 +70,8 @@ def find_all(
             faults += gyroscope_faults(drive)
     else:
         unknowns.append("errors of odometry, gyroscope, and mount of the lidar, which need a ground truth (--truth)")
+    if drive.has_independent_poses and not is_calibrated:
+        unknowns.append("errors of the ranges and of the mount of the lidar, which need a map (--map)")
     unknowns += _unknown_reactions(objects)
     faults += command_faults(drive, 0.0 if robot.skids else robot.separation)
     faults += localizer_faults(drive)
@@ -91,6 +98,7 @@ def _from_scans(
     robot: KnownRobot,
     other_robots: Sequence[FoundObject],
     unknowns: list[str],
+    is_calibrated: bool,
 ) -> tuple[list[FoundFault], list[FoundObject]]:
     scans = drive.scans
     if scans is None or len(scans) < 3:
@@ -103,7 +111,7 @@ def _from_scans(
         scans = scans.every(step)
         unknowns.append(f"what only some scans show: of the {step * len(scans)} scans, every {step}th was used")
     model = scan_model(drive, scans, world)
-    mount = mount_fault(model, world) if drive.has_independent_poses else None
+    mount = mount_fault(model, world) if is_calibrated else None
     if mount is not None:
         faults.append(mount)
         model = with_mount_error(model, world)
@@ -117,7 +125,7 @@ def _from_scans(
         # Single beams that end early look like a little noise.
         is_known = robot.is_known and not false_returns
         faults += noise_faults(model, drive.duration, robot.lidar_noise, is_known)
-    if drive.has_independent_poses:
+    if is_calibrated:
         faults += range_error_faults(model)
     glass = glass_fault(model, world, usable_scans(model))
     faults += [] if glass is None else [glass]

@@ -135,7 +135,7 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
         object_along(name, outline, times[times >= drive.begin] - drive.begin, poses[times >= drive.begin])
         for name, outline, times, poses in described.others
     ]
-    findings = find_all(drive, surroundings, robot, others)
+    findings = find_all(drive, surroundings, robot, others, choice.is_built)
     name = out.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario").replace("_", " ")
     contents, findings = _write_valid(drive, given, findings, name, log, out)
     return Reconstruction(log, (out, *choice.files), drive, findings, contents, surroundings)

@@ -90,9 +90,12 @@ def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[Foun
 def _slow(target: str, times: Array, period: float, end: float) -> FoundFault | None:
     """Return the fault of a stream that is regular, but slower than usual, for at least half a second."""
     steps = np.diff(times)
-    for window in windows(steps > SLOW_FACTOR * period, times[1:], max_gap=1.2 * period):
+    is_slow = steps > SLOW_FACTOR * period
+    if not is_slow.all() and not _is_regular(steps[~is_slow]):
+        return None
+    for window in windows(is_slow, times[1:], max_gap=1.2 * period):
         inside = steps[window.samples]
-        if len(inside) < 4 or float(np.std(inside)) > 0.15 * float(np.mean(inside)):
+        if len(inside) < 4 or not _is_regular(inside):
             continue
         step = float(np.median(inside))
         begin = float(times[window.first])
@@ -101,6 +104,10 @@ def _slow(target: str, times: Array, period: float, end: float) -> FoundFault | 
         start, length = (None, None) if whole else (begin, window.end - begin)
         return FoundFault(target, "slow", {"rate": f"{1 / step:.2f} Hz"}, start, length, evidence)
     return None
+
+
+def _is_regular(steps: Array) -> bool:
+    return float(np.std(steps)) <= 0.15 * float(np.mean(steps))
 
 
 def _delay(target: str, times: Array, arrivals: Array, period: float, end: float) -> Iterator[FoundFault]:

@@ -50,13 +50,14 @@ class GivenFiles:
 
 @dataclass
 class WorldChoice:
-    """World of the scenario: how it is written, as data, and why."""
+    """World of the scenario: how it is written, as data, and why. `is_built` if it is from the scans of the log."""
 
     written: str | Mapping[str, Any]
     world: World
     evidence: Evidence
     map: str = ""
     map_evidence: Evidence | None = None
+    is_built: bool = False
     unknowns: list[str] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
     """Files that were written beside the scenario."""
@@ -110,7 +111,14 @@ def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldCh
         unknowns.append("which parts of the built map were on the robot's own map")
     save_map(grid, file)
     written_files = [file, file.with_suffix(".pgm")]
-    return WorldChoice(file.name, world_from_map(grid, _stem(out)), evidence, unknowns=unknowns, files=written_files)
+    return WorldChoice(
+        file.name,
+        world_from_map(grid, _stem(out)),
+        evidence,
+        is_built=drive.map is None,
+        unknowns=unknowns,
+        files=written_files,
+    )
 
 
 def _world_of_file(file: Path, out: Path, evidence: Evidence) -> WorldChoice:

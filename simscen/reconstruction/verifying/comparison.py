@@ -10,7 +10,7 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.reader import DriveOptions, read_drive
-from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, Scans
 from simscen.reconstruction.scenario.criteria import path_length
 from simscen.reconstruction.scenario.incidents import Incident, incidents_of
 from simscen.reconstruction.scenario_from_log import Reconstruction
@@ -206,18 +206,30 @@ def nearest_return(drive: RecordedDrive) -> float | None:
     return float(np.sort(found[1])[MIN_SCANS - 1])
 
 
+def _hits(scans: Scans) -> Array:
+    """Return the ranges (n, beams), nan where nothing returned, which lidars write as 0, inf, or nan."""
+    return np.where(scans.is_hit(), scans.ranges, np.nan)
+
+
 def share_seen_alike(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> float | None:
-    """Return the share of the beams that show the same while both robots are near the same pose; None if never."""
+    """Return the share of the beams that show the same while both robots are near the same place; None if never.
+
+    Beams are compared with those in the same direction, because the robots may have different headings.
+    """
     one, other = recorded.scans, repeated.scans
-    if one is None or other is None or not len(one) or not len(other) or len(one.angles) != len(other.angles):
+    if one is None or other is None or not len(one) or not len(other) or len(other.angles) < 2:
         return None
     near = distances_between(recorded, repeated, times) < SAME_PLACE_M
     first = np.clip(np.searchsorted(one.times, times[near]), 0, len(one) - 1)
     second = np.clip(np.searchsorted(other.times, times[near]), 0, len(other) - 1)
     if not len(first):
         return None
-    a, b = one.ranges[first], other.ranges[second]
-    both = np.isfinite(a) & np.isfinite(b)
+    headings = recorded.poses.poses_at(one.times[first])[:, 2] - repeated.poses.poses_at(other.times[second])[:, 2]
+    directions = headings[:, None] + one.mount.yaw - other.mount.yaw + one.angles - other.angles[0]
+    step, last = float(other.angles[1] - other.angles[0]), len(other.angles) - 1
+    beams = (np.mod(np.sign(step) * directions + abs(step) / 2, 2 * np.pi) / abs(step)).astype(int)
+    a, b = _hits(one)[first], _hits(other)[second[:, None], np.minimum(beams, last)]
+    both = np.isfinite(a) & np.isfinite(b) & (beams <= last)
     if not both.any():
         return None
     return float(np.mean(np.abs(a[both] - b[both]) <= SAME_RANGE_M))

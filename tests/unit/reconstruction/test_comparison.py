@@ -35,6 +35,21 @@ def test_a_shifted_drive_is_that_far_away():
     assert rows["distance at the same time"] == "0.20 m RMS, at most 0.20 m"
 
 
+def test_scans_are_compared_in_the_same_directions_and_without_what_did_not_return():
+    one = drives.drive(drives.scans())
+    turned = replace(
+        one,
+        poses=drives.signal(one.poses.times, one.poses.values + np.array([0.0, 0.0, 0.5])),
+        scans=replace(one.scans, angles=one.scans.angles - 0.5),
+    )
+    zeros = one.scans.ranges.copy()
+    zeros[:, ::3] = 0.0
+    times = np.arange(0.0, 10.0, 0.1)
+    assert share_seen_alike(one, turned, times) > 0.98
+    assert share_seen_alike(replace(one, scans=replace(one.scans, ranges=zeros)), one, times) == 1.0
+    assert share_seen_alike(one, replace(one, poses=turned.poses), times) < 0.7
+
+
 def test_scans_are_compared_only_where_both_robots_are_at_one_place():
     one = drives.drive(drives.scans())
     assert share_seen_alike(one, shifted(one, 1.0), np.arange(0.0, 10.0, 0.1)) is None

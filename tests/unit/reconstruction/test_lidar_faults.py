@@ -145,3 +145,12 @@ def test_a_fault_of_a_sensor_that_the_robot_lacks_is_only_mentioned():
     found = find_all(replace(drive, turn_rates=rates), drives.room(), KnownRobot(sensors={"lidar": "lidar"}))
     assert found.faults == []
     assert any("imu.bias" in unknown for unknown in found.unknowns)
+
+
+def test_a_map_of_the_same_scans_shows_no_error_of_their_ranges():
+    drive = drives.drive(drives.with_ranges(measured := drives.scans(), measured.ranges + 0.05))
+    kinds = [fault.kind for fault in find_all(drive, drives.room()).faults]
+    assert kinds == ["bias"]
+    built = find_all(drive, drives.room(), is_map_built=True)
+    assert [fault.kind for fault in built.faults] == []
+    assert any("--map" in unknown for unknown in built.unknowns)

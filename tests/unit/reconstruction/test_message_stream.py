@@ -39,8 +39,10 @@ def test_messages_lost_at_random_are_a_dropout_with_its_probability():
 
 def test_a_sensor_that_measures_irregularly_loses_nothing():
     """A robot polled over Wi-Fi: 90 % of the periods of its public log are 0.156 to 0.268 s."""
-    times = np.cumsum(np.random.default_rng(4).uniform(0.15, 0.28, 130))
-    assert [fault.kind for fault in found(times)] == []
+    steps = np.random.default_rng(4).uniform(0.15, 0.28, 150)
+    steps[60:65] = 0.3
+    times = np.cumsum(steps)
+    assert [fault.kind for fault in found(times[times < END])] == []
 
 
 def test_several_gaps_are_an_intermittent_sensor():
