@@ -144,7 +144,7 @@ def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
 def _bends(path: Array, first: int, last: int) -> list[int]:
     """Return the indices between `first` and `last` at which a path (n, 2) is farthest from straight lines.
 
-    This is the line simplification of Ramer, Douglas, and Peucker with the tolerance MIN_BEND_M.
+    Source: Douglas and Peucker, Algorithms for the reduction of the number of points (1973), tolerance MIN_BEND_M.
     """
     line = path[last] - path[first]
     offsets = path[first : last + 1] - path[first]
