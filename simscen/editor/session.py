@@ -13,7 +13,7 @@ from simscen.editor.files import EditedFile
 from simscen.editor.forms import form_data
 from simscen.editor.map_view.background import Backgrounds
 from simscen.editor.map_view.map_edits import edits_of
-from simscen.editor.map_view.problem_places import object_at_problem
+from simscen.editor.map_view.map_objects import object_at_problem
 from simscen.editor.map_view.scene import map_objects, scene_data, scene_parts
 from simscen.editor.preview import preview_data
 from simscen.editor.text_editing.splices import EditRefused

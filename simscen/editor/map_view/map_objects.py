@@ -5,10 +5,12 @@ cannot be read is left out.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from simscen.core.errors import Problem
+from simscen.loading.yaml.source_nodes import SourceNode, source_at
 from simscen.loading.yaml.tree import Key
 from simscen.spec.quantities import si_number
 
@@ -150,3 +152,20 @@ def motion_path(
     elif keyframes := keyframe_handles(motion.get("keyframes"), (*keys, "keyframes")):
         begins_there = number(items(items(motion.get("keyframes"))[0])[0]) == 0
         yield MapObject(keys, "path", label, keyframes, line="open", origin=None if begins_there else start)
+
+
+def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
+    """Return the id of the smallest thing whose text contains the position of a problem; "" if there is none.
+
+    If none contains it, this is the smallest one that begins later in the same line, such as behind a key.
+    """
+    if not problem.line or source is None:
+        return ""
+    lines = text.split("\n")
+    line_start = sum(len(line) + 1 for line in lines[: problem.line - 1])
+    index, line_end = line_start + max(problem.col - 1, 0), line_start + len(lines[problem.line - 1])
+    nodes = [(node, one) for one in objects if one.keys and (node := source_at(source, one.keys)) is not None]
+    around = [(node.end - node.start, one) for node, one in nodes if node.start <= index <= node.end]
+    behind = [(node.end - node.start, one) for node, one in nodes if index < node.start <= line_end]
+    found = around or behind
+    return "/".join(map(str, min(found, key=lambda each: each[0])[1].keys)) if found else ""
