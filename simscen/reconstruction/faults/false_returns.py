@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.evidence import FoundFault, windows
 from simscen.reconstruction.faults.lidar_readings import (
@@ -21,6 +22,8 @@ from simscen.reconstruction.scans.scan_model import ScanModel
 MIN_FALSE_SHARE = 0.015
 JUMP_M = 0.3
 """Difference in range from which on two neighbor beams ended at different things."""
+BESIDE_BEAMS, SAME_OBJECT_M = 3, 0.3
+"""Number of beams beside a ghost that must not show it, and difference of the ranges of one object."""
 MIN_GHOST_SHARE, MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS, MIN_DRIVEN_M = 0.3, 0.02, 2.0, 0.6
 """Share of the scans in its time that show a ghost, spread of its range in m and in standard deviations of the noise,
 and distance in m that the lidar must move meanwhile."""
@@ -93,4 +96,17 @@ def ghost_beams(model: ScanModel) -> list[tuple[int, int, float]]:
     share = seen / np.maximum(last - first + 1, 1)
     limit = max(MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS * float(np.median(model.noise)))
     fixed = chosen & moved & (spread < limit) & (share > MIN_GHOST_SHARE)
-    return [(a, b, float(np.median(center[a : b + 1]))) for a, b in mask_runs(fixed) if b - a + 1 >= MIN_SECTOR_BEAMS]
+    ghosts = [(a, b, float(np.median(center[a : b + 1]))) for a, b in mask_runs(fixed) if b - a + 1 >= MIN_SECTOR_BEAMS]
+    return [(a, b, distance) for a, b, distance in ghosts if not _is_wider(ranges, a, b, distance)]
+
+
+def _is_wider(ranges: Array, first: int, last: int, distance: float) -> bool:
+    """Return whether beams beside a sector usually show the same distance, as of an object that only passes by.
+
+    `ranges` (n, beams) are those of beams that end before the world, nan for others.
+    """
+    with np.errstate(invalid="ignore"):
+        same = np.abs(ranges - distance) < SAME_OBJECT_M
+    rows = same[:, (first + last) // 2]
+    beside = [beam for beam in (first - BESIDE_BEAMS, last + BESIDE_BEAMS) if 0 <= beam < ranges.shape[1]]
+    return any(float(same[rows, beam].mean()) > 0.5 for beam in beside) if rows.any() else False
