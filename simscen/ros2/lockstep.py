@@ -9,8 +9,8 @@
    run. While there is no command, one more round per node follows, so that a command can pass through filters.
 4. If there is still no command while driving to a goal, wait a short wall time for nodes that take /clock in a separate
    thread, as those of rclcpp do.
-5. If a server of Nav2 executes an action that moves the robot, and its command is due, wait for it: `limit_s` of wall
-   time at most, then the run ends with an error that names the node.
+5. If a server of Nav2 executes an action that moves the robot, and its command is due, wait for it, at most `limit_s`
+   of wall time. Without a command in the simulated second after that, the run ends with an error that names the node.
 
 The command of the period is the last one received. Without one, the robot keeps its command, as a real robot would; the
 adapter counts such periods. Time stands still within a control period: /clock publishes multiples of it only.
@@ -72,13 +72,13 @@ class Lockstep:
             commanded = overdue is None or _last_command(self._graph.inbox[start:]) is not None
             return [] if commanded or overdue is None else [overdue.node]
 
-        if not self._barrier.step_time.wait_for(late_server, self._limit):
-            overdue = self._actions.overdue_command(now)
+        if not self._barrier.step_time.wait_for(late_server, self._actions.wait_s(self._limit)):
+            overdue = self._actions.record_missing(now)
             if overdue is not None:
-                reason = (
-                    f"has sent no command for {self._limit:g} s of wall time, although it executes {overdue.action}"
+                raise AdapterError(
+                    f"{overdue.node} sends no commands, although it executes {overdue.action}: none within "
+                    f"{self._limit:g} s of wall time, and none in the simulated second after that"
                 )
-                raise AdapterError(f"{overdue.node} {reason}")
 
     def _count(self, now: int, command: Optional[Received]) -> None:
         self.counters["beats"] += 1

@@ -27,6 +27,15 @@ RATE_PARAMETERS = {
 """Actions that move the robot, and the parameter of their server with the rate of its commands in Hz."""
 
 
+MISSING_LIMIT_NS = NANOSECONDS
+"""Simulated time that may pass without a due command, because the server may itself wait for simulated time.
+
+Nav2's controller server, for example, waits for a current costmap for `costmap_update_timeout`.
+"""
+NEXT_WAIT_S = 0.25
+"""Wall time to wait for a due command after one that did not arrive."""
+
+
 class OverdueCommand(NamedTuple):
     """A due command that was not received: the node that must send it, and the action that it executes."""
 
@@ -47,6 +56,7 @@ class MotionActions:
         self._servers: dict[str, _Server] = {}
         self._executing: dict[str, bool] = {}
         self._last_command: int | None = None
+        self._missing_since: int | None = None
 
     def subscribe(self) -> None:
         """Subscribe to the status of the actions that exist in the graph now."""
@@ -61,7 +71,18 @@ class MotionActions:
 
     def record_command(self, now: int) -> None:
         """Record that a command was received at `now` nanoseconds."""
-        self._last_command = now
+        self._last_command, self._missing_since = now, None
+
+    def wait_s(self, limit_s: float) -> float:
+        """Return how long to wait for a due command: `limit_s`, but less after one that did not arrive."""
+        return limit_s if self._missing_since is None else min(limit_s, NEXT_WAIT_S)
+
+    def record_missing(self, now: int) -> OverdueCommand | None:
+        """Record that the due command did not arrive; return it if none has arrived for MISSING_LIMIT_NS."""
+        overdue = self.overdue_command(now)
+        self._missing_since = None if overdue is None else now if self._missing_since is None else self._missing_since
+        is_late = self._missing_since is not None and now - self._missing_since >= MISSING_LIMIT_NS
+        return overdue if is_late else None
 
     def overdue_command(self, now: int) -> OverdueCommand | None:
         """Return the command that is due at `now` nanoseconds, or None. Slower control loops are due less often."""

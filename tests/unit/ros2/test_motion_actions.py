@@ -56,6 +56,22 @@ def test_a_controller_owes_a_command_in_each_of_its_periods_while_it_executes_a_
 
 
 @pytest.mark.usefixtures("types")
+def test_a_server_may_miss_commands_for_a_simulated_second() -> None:
+    graph = FakeGraph({"follow_path": "/controller_server"}, {"/controller_server": 20.0})
+    actions = MotionActions(graph, graph)  # type: ignore[arg-type]
+    actions.subscribe()
+    graph.report("follow_path", 2)
+    assert actions.wait_s(5.0) == 5.0
+    assert actions.record_missing(100 * MS) is None
+    assert actions.wait_s(5.0) == 0.25
+    assert actions.record_missing(1050 * MS) is None
+    assert actions.record_missing(1100 * MS) == OverdueCommand("/controller_server", "follow_path")
+    actions.record_command(1150 * MS)
+    assert actions.wait_s(5.0) == 5.0
+    assert actions.record_missing(1200 * MS) is None
+
+
+@pytest.mark.usefixtures("types")
 def test_servers_without_a_rate_or_without_a_status_owe_nothing() -> None:
     graph = FakeGraph({"spin": "/behavior_server", "follow_path": "/silent"}, {"/behavior_server": 0.0})
     actions = MotionActions(graph, graph)  # type: ignore[arg-type]
