@@ -38,6 +38,8 @@ def mount_error(model: ScanModel, world: Surroundings) -> Pose2:
         return error
     ranges, angles, reach = model.scans.ranges[chosen], model.scans.angles, model.scans.range_max
     hit = model.is_hit[chosen]
+    if int(hit.sum()) < MIN_BEAMS:
+        return error
 
     def differences(offset: Pose2) -> Array:
         return ranges - world.ranges_from(_shifted(model.poses[chosen], offset), angles, reach)

@@ -8,7 +8,7 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2
 from simscen.reconstruction.drive.recorded_drive import no_values
 from simscen.reconstruction.estimators import find_all
-from simscen.reconstruction.faults.lidar_calibration import range_error_faults
+from simscen.reconstruction.faults.lidar_calibration import mount_error, range_error_faults
 from simscen.reconstruction.faults.lidar_readings import blind_sector
 from simscen.reconstruction.faults.transparent_walls import glass_fault
 from simscen.reconstruction.objects.clusters import usable_scans
@@ -29,6 +29,12 @@ def all_faults(measured):
 
 def test_a_good_lidar_has_no_fault():
     assert all_faults(drives.scans()) == []
+
+
+def test_a_lidar_that_measures_nothing_has_no_error_of_its_mount():
+    measured = drives.scans()
+    blind = drives.with_ranges(measured, np.full_like(measured.ranges, np.inf))
+    assert mount_error(drives.model(blind), drives.room()) == Pose2(0.0, 0.0, 0.0)
 
 
 def test_invalid_scans_are_garbage_with_their_probability():
