@@ -319,3 +319,18 @@ def _distance_to_border(points: Array, polygon: Array) -> Array:
     gap = offset - share[..., np.newaxis] * along[:, np.newaxis]
     distance: Array = np.hypot(gap[..., 0], gap[..., 1]).min(axis=(1, 2))
     return distance
+
+
+def path_corners(path: Array, tolerance: float) -> list[int]:
+    """Return the indices, without both ends, between which a path (n, 2) is within `tolerance` m of straight lines.
+
+    Source: Douglas and Peucker, Algorithms for the reduction of the number of points (1973).
+    """
+    line, offsets = path[-1] - path[0], path - path[0]
+    along = np.clip(offsets @ line / max(float(line @ line), 1e-9), 0.0, 1.0)
+    away = np.hypot(*(offsets - along[:, None] * line).T)
+    bend = int(np.argmax(away))
+    if away[bend] <= tolerance or bend in (0, len(path) - 1):
+        return []
+    after = [bend + index for index in path_corners(path[bend:], tolerance)]
+    return [*path_corners(path[: bend + 1], tolerance), bend, *after]

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.polygons import path_corners
 from simscen.core.records.events import Event, EventKind
 from simscen.reconstruction.drive.log_messages import LogMessages
 from simscen.reconstruction.drive.recorded_drive import RecordedGoal, TimedValues
@@ -130,7 +131,7 @@ def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
         ends.append((float(poses.times[-1]), float(poses.times[-1]), len(poses) - 1))
     for begin, end, index in ends:
         pose = Pose2(*poses.values[index].tolist())
-        bends = _bends(poses.values[:, :2], since, index)
+        bends = [since + bend for bend in path_corners(poses.values[since : index + 1, :2], MIN_BEND_M)]
         if pose.distance(last) < MIN_LEG_M and not bends:
             continue
         for bend in bends:
@@ -139,18 +140,3 @@ def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
             sent = passed
         yield RecordedGoal("", pose, sent, begin, "reached", source=STOP_SOURCE)
         last, sent, since = pose, end, index
-
-
-def _bends(path: Array, first: int, last: int) -> list[int]:
-    """Return the indices between `first` and `last` at which a path (n, 2) is farthest from straight lines.
-
-    Source: Douglas and Peucker, Algorithms for the reduction of the number of points (1973), tolerance MIN_BEND_M.
-    """
-    line = path[last] - path[first]
-    offsets = path[first : last + 1] - path[first]
-    along = np.clip(offsets @ line / max(float(line @ line), 1e-9), 0.0, 1.0)
-    away = np.hypot(*(offsets - along[:, None] * line).T)
-    bend = first + int(np.argmax(away))
-    if away.max() <= MIN_BEND_M or bend in (first, last):
-        return []
-    return [*_bends(path, first, bend), bend, *_bends(path, bend, last)]

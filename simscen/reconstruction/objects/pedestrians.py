@@ -10,6 +10,7 @@ import numpy as np
 
 from simscen.core.environment.world_model import Behavior, Unseen, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.polygons import path_corners
 from simscen.pedestrians.forces import RELAXATION_TIME_S
 from simscen.reconstruction.evidence import windows
 from simscen.reconstruction.objects.found_object import FoundObject, FoundWalk
@@ -185,7 +186,7 @@ def _walkers(
     x, y = track.at(begin + lead)
     tried: set[tuple[tuple[float, float], ...]] = set()
     for tolerance in PATH_TOLERANCES_M:
-        places = [*_corners(track.positions, tolerance)[1:-1], _last_goal(track, radius, trial)]
+        places = [*track.positions[path_corners(track.positions, tolerance)], _last_goal(track, radius, trial)]
         goals = tuple((round(float(a), 2), round(float(b), 2)) for a, b in places)
         if goals in tried or any(walls.distance(place) < radius + 0.01 for place in ((x, y), *goals)):
             continue
@@ -223,22 +224,6 @@ def _last_goal(track: _Track, radius: float, trial: WalkTrial) -> Array:
     walls = trial.world.walls
     has_room = walls.distance((float(farther[0]), float(farther[1]))) >= radius + 0.01
     return farther if has_room and walls.visible(end[None], farther[None])[0] else end
-
-
-def _corners(path: Array, tolerance: float) -> list[Array]:
-    """Return the points of a path (n, 2) between which straight lines are at most `tolerance` m away from it.
-
-    Source: Douglas and Peucker, Algorithms for the reduction of the number of points (1973).
-    """
-    along = path[-1] - path[0]
-    length = float(np.hypot(*along))
-    offsets = path - path[0]
-    share = np.clip(offsets @ along / max(length**2, 1e-9), 0.0, 1.0)
-    away = np.hypot(*(offsets - share[:, None] * along).T)
-    worst = int(np.argmax(away))
-    if len(path) < 3 or float(away[worst]) <= tolerance:
-        return [path[0], path[-1]]
-    return [*_corners(path[: worst + 1], tolerance), *_corners(path[worst:], tolerance)[1:]]
 
 
 def _walked_together(found: Sequence[FoundObject], trial: WalkTrial) -> list[FoundObject]:

@@ -4,7 +4,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.core.geometry.polygons import convex_pieces, polygon_defect
+from simscen.core.geometry.polygons import convex_pieces, path_corners, polygon_defect
 
 L = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))
 
@@ -54,3 +54,12 @@ def test_a_convex_ring_stays_whole():
     ring = tuple((float(np.cos(a)), float(np.sin(a))) for a in angles)
     assert convex_pieces(ring) == [ring]
     assert len(convex_pieces(L)) == 2
+
+
+def test_corners_of_a_path_are_where_it_leaves_straight_lines():
+    steps = np.linspace(0.0, 2.0, 21)
+    there = np.column_stack((steps, 0.01 * np.sin(20 * steps)))
+    up = np.column_stack((np.full(20, 2.0), steps[1:]))
+    assert path_corners(np.vstack((there, up)), 0.1) == [20]
+    assert path_corners(there, 0.1) == []
+    assert path_corners(np.vstack((there, there[-2::-1])), 0.1) == [20], "where it turns back"
