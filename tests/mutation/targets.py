@@ -56,7 +56,7 @@ TESTS_OF_MODULE = {
         EVERY_CRITERION,
     ],
     "criteria/stl/condition": [[f"{_STL}/test_condition.py"], [f"{_STL}/test_decision_horizon.py"], TEMPORAL],
-    "criteria/stl/robustness": [TEMPORAL, [f"{_STL}/test_robustness.py"]],
+    "criteria/stl/robustness": [TEMPORAL, [f"{_STL}/test_robustness.py", "tests/properties/test_three_valued.py"]],
     "criteria/stl/operators": [TEMPORAL, [f"{_STL}/test_operators.py"]],
     "criteria/stl/criterion": [TEMPORAL, [f"{_STL}/test_criterion.py", f"{_STL}/test_description.py"]],
     "criteria/trace_signals/distances": [

@@ -306,8 +306,7 @@ def response_robustness(
     negated = _NegationRobustness(-premise_part.high, -premise_part.low, premise_part)
     implied = _combine([negated, response_part], "any")
     always = _windowed("always", implied, samples, context)
-    # A nested response is evaluated at every later sample as well; one at the start of the run only there.
-    end = None if window is None or samples.unbounded or not len(samples.last) else int(samples.last[begin]) + 1
+    end = int(samples.last[begin]) + 1 if begin < len(samples.last) else None
     found = ResponseRobustness(
         always.low, always.high, premise_part, response_part, implied, samples, premise, slice(start, end), required
     )
