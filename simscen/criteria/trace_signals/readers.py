@@ -272,8 +272,6 @@ def _differences(trace: Trace, values: Array, order: int) -> Array:
     count as a change.
     """
     ticks = sample_ticks(trace)
-    if len(ticks) <= order:
-        raise SignalUnavailable(f"the run is too short: {len(ticks)} samples of the truth")
     even = evenly_spaced(Samples(ticks, values[:, np.newaxis]), trace.tick_rate)
     if len(even) <= order:
         raise SignalUnavailable(f"the run is too short: {len(even)} samples of the truth")

@@ -53,7 +53,7 @@ def test_jerk_needs_three_samples_and_acceleration_two():
     assert len(read_signal("jerk", driving([[0, 0, 0], [1, 0, 0], [1, 0, 0]]), case, {})) == 3
     with pytest.raises(SignalUnavailable, match="too short: 2 samples"):
         read_signal("jerk", driving([[0, 0, 0], [1, 0, 0]]), case, {})
-    with pytest.raises(SignalUnavailable, match="too short: 1 samples"):
+    with pytest.raises(SignalUnavailable, match="too short: 1 sample of"):
         read_signal("acceleration", driving([[0, 0, 0]]), case, {})
 
 
