@@ -342,8 +342,9 @@ def test_events_are_counted_in_whatever_order_they_were_written():
     assert [at(values, t) for t in (0, 1, 2, 3, 4)] == [0, 1, 2, 3, 3]
 
 
-def test_an_accepted_goal_counts_under_the_name_that_its_number_was_added_to():
-    events = [[1, "goal.accepted", "shelf-2"], [2, "goal.reached", "shelf-2"], [3, "recovery.started", "spin-2"]]
+def test_a_goal_matches_its_name_in_each_loop_and_other_names_match_exactly():
+    events = [[1, "goal.accepted", "shelf#2"], [2, "goal.reached", "shelf#2"], [3, "recovery.started", "spin#2"]]
     words = {"seconds": 4, "truth": [[0, 0, 0]], "events": events}
-    assert at(signal("goal_active", words, goal="shelf-2"), 1.5) == 1
+    assert [at(signal("goal_active", words, goal=name), 1.5) for name in ("shelf", "shelf#2", "shelf#1")] == [1, 1, 0]
+    assert signal("recovery_active", words, recovery="spin#2").any()
     assert not signal("recovery_active", words, recovery="spin").any()
