@@ -274,6 +274,32 @@ def test_impossible_trigger_is_refused(words):
         Trigger.model_validate({"time": 1, **words})
 
 
+TOUR = tuple(
+    Event(tick, kind, name)
+    for tick, kind, name in (
+        (1, EventKind.GOAL_ACCEPTED, "shelf"),
+        (2, EventKind.GOAL_REACHED, "shelf"),
+        (3, EventKind.GOAL_FAILED, "door"),
+        (4, EventKind.GOAL_PASSED, "shelf#2"),
+    )
+)
+
+
+@pytest.mark.parametrize(
+    ("words", "events"),
+    [
+        ({}, 2),
+        ({"count": 2}, 4),
+        ({"name": "shelf", "count": 2}, 4),
+        ({"name": "shelf#2"}, 4),
+        ({"name": "door"}, None),
+    ],
+)
+def test_waypoints_are_goals_that_were_reached_or_passed_in_any_loop(words, events):
+    held = [number for number in range(len(TOUR) + 1) if holds({"waypoint": words}, events=TOUR[:number])]
+    assert held == ([] if events is None else list(range(events, len(TOUR) + 1)))
+
+
 @pytest.mark.parametrize("kind", ["goal", "replan", "recovery"])
 @pytest.mark.parametrize("count", [0, 10_001])
 def test_counts_are_at_least_one(kind, count):
