@@ -140,13 +140,22 @@ def test_a_robot_is_lost_when_its_position_or_its_heading_is_off(off, turn, expe
     assert holds({"localization_lost": {}}, robot=Pose2(1.0, 1.0, 3.0), belief=belief) is expected
 
 
-@pytest.mark.parametrize(("bound", "expected"), [(0.49, True), (0.51, False)])
+@pytest.mark.parametrize(("bound", "expected"), [(0.499, True), (0.501, False)])
 def test_a_robot_that_is_unsure_is_lost_as_far_as_it_is_least_sure(bound, expected):
     turned = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
     covariance = np.eye(3)
     covariance[:2, :2] = turned @ np.diag([0.5**2, 0.1**2]) @ turned.T
     belief = Belief(Pose2(1.0, 1.0), covariance)
     assert holds({"localization_lost": {"std": bound}}, robot=Pose2(1.0, 1.0), belief=belief) is expected
+
+
+def test_a_belief_at_its_limits_is_not_lost():
+    limits = {"tolerance": 0.5, "yaw_tolerance": 0.5, "std": 0.5}
+    belief = Belief(Pose2(0.0, 0.0), np.diag([0.25, 0.25, 0.0]))
+    assert not holds({"localization_lost": limits}, robot=Pose2(0.5, 0.0, 0.5), belief=belief)
+    certain = Belief(Pose2(0.0, 0.0), np.diag([0.01, 0.0025, 0.0]))
+    assert not holds({"localization_lost": {"std": 0.1001}}, robot=Pose2(0.0, 0.0), belief=certain)
+    assert holds({"localization_lost": {"std": 0.0999}}, robot=Pose2(0.0, 0.0), belief=certain)
 
 
 def test_without_a_belief_nothing_is_lost():
