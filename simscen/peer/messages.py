@@ -301,6 +301,15 @@ def particle_cloud(stamp: Stamp, particles: Sequence[Sequence[float]]) -> bytes:
     return message.done()
 
 
+BEHAVIOR_TREE_LOGGER = "behavior_tree"
+"""Logger of the lines that `tree_change` returns."""
+
+
+def tree_change(node: str, before: str, after: str) -> str:
+    """Return the log line for a node of a behavior tree that changed its status, e.g. from `IDLE` to `RUNNING`."""
+    return f"{node}: {before} -> {after}"
+
+
 def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
     """Return an rcl_interfaces/msg/Log: `name` is the logger; `level` is 10 debug, 20 info, 30 warning, 40 error."""
     message = Writer().put("iI", *stamp).put("B", level)

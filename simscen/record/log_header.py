@@ -120,6 +120,12 @@ def robot_metadata(run_metadata: Mapping[str, str], robot: str) -> dict[str, str
     return {**run_metadata, **own}
 
 
+def stack_facts(facts: Mapping[str, str], robot: str) -> dict[str, str]:
+    """Return the facts about the external stack of one of several robots, from the metadata record of all stacks."""
+    prefix = f"{robot}."
+    return {name.removeprefix(prefix): fact for name, fact in facts.items() if name.startswith(prefix)}
+
+
 def extra_facts(run_metadata: Mapping[str, str]) -> dict[str, str]:
     """Return `LogHeader.facts` from the metadata record."""
     return {name[len(_FACT_PREFIX) :]: value for name, value in run_metadata.items() if name.startswith(_FACT_PREFIX)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Callable, NamedTuple
 
+from simscen.peer.messages import BEHAVIOR_TREE_LOGGER, tree_change
 from simscen.ros2.messages import find_type
 from simscen.ros2.node_parameters import NodeParameters
 
@@ -79,8 +80,8 @@ class Nav2Report:
 
     def _take_tree(self, message: Any) -> None:
         for change in message.event_log:
-            text = f"{change.node_name}: {change.previous_status} -> {change.current_status}"
-            self._lines.append(Line(INFO, "behavior_tree", text))
+            text = tree_change(change.node_name, change.previous_status, change.current_status)
+            self._lines.append(Line(INFO, BEHAVIOR_TREE_LOGGER, text))
 
     def _take_log(self, message: Any) -> None:
         if message.level >= WARNING:

@@ -108,6 +108,8 @@ class LogContents:
         self.end: int | None = None
         """Tick of the end of the run; None if the log has no end record."""
         self.sensors = SensorMessages()
+        self.stack: dict[str, str] = {}
+        """Facts about the external stacks."""
         self._with_sensors = with_sensors
         self._facts: dict[str, str] = {}
         self._files: dict[str, bytes] = {}
@@ -137,6 +139,8 @@ class LogContents:
                 self._counts.set_expected(record.metadata)
                 for name, contents in self.robots.items():
                     contents._counts.set_expected(record.metadata, name)
+            case records.Metadata(name=log_header.STACK_RECORD):
+                self._set_stack(record.metadata)
             case records.Attachment():
                 self._add_attachment(record)
             case records.Schema():
@@ -214,6 +218,13 @@ class LogContents:
             contents.sensors.frames = frame_names.RobotFrames(name)
             contents._set_facts({**log_header.robot_metadata(facts, name), log_header.ROBOTS: "[]"})
 
+    def _set_stack(self, facts: dict[str, str]) -> None:
+        if self.stack:
+            raise ValueError(f"it has two metadata records `{log_header.STACK_RECORD}`{_MERGED}")
+        self.stack = facts
+        for name, contents in self.robots.items():
+            contents.stack = log_header.stack_facts(facts, name)
+
     def _add_attachment(self, file: records.Attachment) -> None:
         robot, _, name = file.name.partition("/")
         is_case = robot in self.robots and name == log_header.CASE
@@ -256,9 +267,14 @@ class LogContents:
             ("/odom", topics.ODOMETRY_TYPE): self._add_odometry,
         }
         handler = self._add_scan if message_type == topics.SCAN_TYPE else by_topic.get((channel.topic, message_type))
-        sensor_handler = self.sensors.handler(channel.topic, message_type) if self._with_sensors else None
+        sensor_handler = self._sensor_handler(channel.topic, message_type) if self._with_sensors else None
         if handlers := [one for one in (handler, sensor_handler) if one is not None]:
             self._handlers[channel.id] = handlers[0] if len(handlers) == 1 else _call_all(handlers)
+
+    def _sensor_handler(self, topic: str, message_type: str) -> Handler | None:
+        if (topic, message_type) == topics.ROSOUT[:2]:
+            return lambda tick, data: self.sensors.lines.append((tick, data))
+        return self.sensors.handler(topic, message_type)
 
     def _add_truth(self, tick: int, data: bytes) -> None:
         odometry = decode.odometry(MessageReader(data))

@@ -47,6 +47,8 @@ class Log:
         complete: False if the run was aborted; the trace then ends with the last message.
         sensors: Messages that are not part of the trace. Empty unless requested.
         coverage: Evidence that is missing because the log has fewer messages than were recorded.
+        stack: Facts about the external stack, as in stack.json; `about` is JSON. Empty for the reference stack, and if
+            the run was aborted.
     """
 
     header: LogHeader
@@ -56,6 +58,7 @@ class Log:
     robots: Mapping[str, "Log"] = field(default_factory=dict)
     sensors: SensorMessages = field(default_factory=SensorMessages)
     coverage: LogCoverage = COMPLETE_COVERAGE
+    stack: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def traces(self) -> list[Trace]:
@@ -90,11 +93,12 @@ def read_log(path: "str | Path", partial: bool | None = None, with_sensors: bool
             hint = "to read it nevertheless, rename it to *.partial.mcap"
             raise invalid_log(path, "SC803", "the log is truncated: its run was aborted", hint)
         robots = {
-            name: Log(header.robots[name], trace, "", complete, {}, robot.sensors, robot.coverage())
+            name: Log(header.robots[name], trace, "", complete, {}, robot.sensors, robot.coverage(), robot.stack)
             for (name, trace), robot in zip(contents.traces().items(), contents.robots.values(), strict=True)
         }
         trace, result = contents.trace(), contents.result()
-        return Log(header, trace, result, complete, robots, contents.sensors, contents.coverage())
+        own = contents.sensors, contents.coverage(), contents.stack
+        return Log(header, trace, result, complete, robots, *own)
     except OSError as error:
         raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror}") from error
     except NotSimscenLog as error:

@@ -7,10 +7,12 @@ from simscen.core.clock import SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
 from simscen.core.messages.sensor_data import Scan, level_scan
+from simscen.core.records.trace import LogLine
 from simscen.record import topics
 from simscen.record.frame_names import RobotFrames
 from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader
+from simscen.record.messages.event_text import EVENT_LOGGER
 from simscen.record.trace_builder import to_planar
 
 LoggedMessages = list[tuple[int, bytes]]
@@ -26,6 +28,7 @@ class SensorMessages:
         scans: Messages by topic.
         costmaps: Messages by topic.
         mounts: Poses of lidars on the base, by frame.
+        lines: Messages of /rosout, including the events of simscen itself.
         stamped: Whether the stamps of messages count from the start of the run. Otherwise, use the tick of logging.
         frames: Frame names of the robot.
     """
@@ -36,6 +39,7 @@ class SensorMessages:
     local_plans: LoggedMessages = field(default_factory=list)
     costmaps: dict[str, LoggedMessages] = field(default_factory=dict)
     mounts: dict[str, Pose3] = field(default_factory=dict)
+    lines: LoggedMessages = field(default_factory=list)
     stamped: bool = True
     frames: RobotFrames = field(default_factory=RobotFrames)
 
@@ -67,6 +71,11 @@ class SensorMessages:
     def path(self, data: bytes) -> Array:
         """Decode the points x, y (n, 2) of a path."""
         return decode.path(MessageReader(data)).poses[:, :2]
+
+    def stack_lines(self) -> list[tuple[int, LogLine]]:
+        """Return the log lines of an external stack with their ticks."""
+        decoded = [(tick, decode.log_line(MessageReader(data))) for tick, data in self.lines]
+        return [(tick, line) for tick, line in decoded if line.name != EVENT_LOGGER]
 
     def costmap(self, data: bytes) -> tuple[str, OccupancyGrid]:
         """Decode the frame and the cells of a costmap."""

@@ -13,6 +13,7 @@ import numpy as np
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.core.records.trace import LogLine
 from simscen.record.messages.cdr import HEADER, CdrReader
 
 Numbers = tuple[float, ...]
@@ -209,6 +210,13 @@ def occupancy_grid(reader: MessageReader) -> tuple[str, OccupancyGrid]:
     reader.count()
     cells = reader.array("i1", (height, width)).astype(np.int8)
     return frame, OccupancyGrid(cells, resolution, Pose2(*origin))
+
+
+def log_line(reader: MessageReader) -> LogLine:
+    """Decode level, logger and text of rcl_interfaces/msg/Log."""
+    reader.take("iI")
+    (level,) = reader.take("B")
+    return LogLine(int(level), reader.string(), reader.string())
 
 
 def goal_states(reader: MessageReader) -> list[GoalState]:

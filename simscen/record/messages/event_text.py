@@ -5,6 +5,8 @@ from typing import Any
 
 from simscen.core.records.events import Event, EventKind
 
+EVENT_LOGGER = "simscen"
+"""Logger of the events on /rosout."""
 INFO, WARN, ERROR = 20, 30, 40
 _LEVELS = {
     EventKind.GOAL_FAILED: ERROR,

@@ -39,9 +39,10 @@ class EventPublisher:
 
     def write(self, now: int, event: Event) -> None:
         """Write an event at `now` nanoseconds."""
-        stamp, line = self._time.stamp(event.tick), event_text.sentence(event)
+        stamp = self._time.stamp(event.tick)
+        line = event_text.level(event), event_text.EVENT_LOGGER, event_text.sentence(event)
         self._out.publish(topics.EVENTS, now, messages.string(event_text.to_json(event)))
-        self._out.publish(topics.ROSOUT, now, messages.log(stamp, event_text.level(event), "simscen", line))
+        self._out.publish(topics.ROSOUT, now, messages.log(stamp, *line))
         pose = self._pose(event) if event.kind == EventKind.GOAL_ACCEPTED else None
         if pose is not None:
             self._out.publish(topics.GOAL, now, self._goal(stamp, Pose3.planar(pose)))

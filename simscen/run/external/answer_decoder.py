@@ -268,10 +268,7 @@ def _event_data(data: bytes) -> dict[str, Any]:
 
 
 def _log_line(data: bytes) -> LogLine:
-    reader = Reader(data)
-    reader.take("iI")
-    (level,) = reader.take("B")
-    return LogLine(level, reader.string(), reader.string())
+    return decode.log_line(MessageReader(data))
 
 
 def _decode_last(messages: MessagesByTopic, name: str, decoder: Callable[[bytes], T]) -> T | None:
