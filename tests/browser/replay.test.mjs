@@ -58,3 +58,36 @@ test("an address names a time and what is selected, and nonsense names nothing",
   assert.deepEqual(fromHash(toHash(3.25, { kind: "v", number: 2 })), { time: 3.25, selected: { kind: "v", number: 2 } });
   for (const hash of ["", "#", "#t=", "#t=abc", "#t=-1", "#t=Infinity", "#v=x", "#e=-1", "#<script>"]) assert.deepEqual(fromHash(hash), { time: null, selected: null });
 });
+
+const STACK = {
+  letter: "", rate: 100, robots: [{
+    name: "", lines: [[150, "error", "controller_server", "No progress"], [10, "info", "amcl", "created"]],
+    changes: [[0, "Root", "idle", "running"], [0, "FollowPath", "idle", "running"], [20, "IsStuck", "idle", "failure"], [150, "FollowPath", "running", "failure"],
+      [150, "FollowPath", "failure", "idle"], [150, "Spin", "idle", "running"], [200, "Spin", "running", "idle"]].map(([tick, node, before, status]) => ({ tick, node, before, status })),
+    parameters: [{ node: "/amcl", total: 2, values: [["max_particles", "2000", true], ["z_hit", "0.5", false]] }],
+  }],
+};
+
+test("the nodes of a behavior tree run from their change to running to their next change", async () => {
+  const { runningAt } = await load("stacklog");
+  const at = (tick) => runningAt(STACK.robots[0], tick);
+  assert.deepEqual([-1, 0, 149, 150, 200].map(at), [[], ["Root", "FollowPath"], ["Root", "FollowPath"], ["Root", "Spin"], ["Root"]]);
+});
+
+test("the log of a stack is in order of time, with durations, resets and problems", async () => {
+  const { entriesOf } = await load("stacklog");
+  const entries = entriesOf([STACK]);
+  assert.deepEqual(entries.map(({ seconds }) => seconds), [0, 0, 0.1, 0.2, 1.5, 1.5, 1.5, 1.5, 2]);
+  assert.deepEqual(entries.filter(({ took }) => took !== undefined).map(({ node, said, took }) => [node, said, took]), [["FollowPath", "failure", 1.5], ["Spin", "halted", 0.5]]);
+  assert.deepEqual(entries.filter(({ problem }) => problem).map(({ node, said }) => `${node} ${said}`), ["FollowPath failure", "controller_server error: No progress"]);
+  assert.equal(entries.filter(({ reset }) => reset).length, 1);
+});
+
+test("the parameters of two runs are side by side, and a run without parameters is left out", async () => {
+  const { parametersOf } = await load("parameters");
+  const run = (letter, ...values) => ({ letter, robots: [{ name: "", parameters: values.length ? [{ node: "/amcl", total: values.length, values }] : [] }] });
+  const both = parametersOf([run("A", ["z_hit", "0.5", false]), run("B", ["z_hit", "0.7", false], ["beams", "60", false])]);
+  assert.deepEqual(both.letters, ["A", "B"]);
+  assert.deepEqual(both.rows.map(({ name, values }) => [name, values]), [["z_hit", ["0.5", "0.7"]], ["beams", [null, "60"]]]);
+  assert.deepEqual(parametersOf([run("A"), run("B", ["z_hit", "0.7", false])]).rows.map(({ values }) => values), [["0.7"]]);
+});

@@ -12,6 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from drive import drive
 from hostile import EVIL, hostile_log
+from nav2_report import ERROR, with_nav2_report
 from rig import Opened, Opener
 
 from simscen.core.records.trace import Samples
@@ -42,6 +43,14 @@ def one(logs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def two(logs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made(tmp_path_factory.mktemp("two") / "replay.html", logs)
+
+
+@pytest.fixture(scope="session")
+def nav2(logs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The drive, as if a Nav2 had reported its behavior tree, log lines, and parameters."""
+    page, log = tmp_path_factory.mktemp("nav2") / "replay.html", read_run(logs[0], with_sensors=True)
+    write_replay(page, [(with_nav2_report(log), from_json(log.result))])
+    return page
 
 
 def ready(opened: Opened) -> Opened:
@@ -157,9 +166,9 @@ def test_all_functions_of_the_replay_work_by_keyboard(open_page: Opener, one: Pa
 
 
 @pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)], ids=["wide and light", "phone and dark"])
-def test_axe_finds_nothing_serious(open_page: Opener, one: Path, axe: str, width: int, dark: bool) -> None:
-    opened = ready(open_page(one, dark=dark, size=(width, 800)))
-    for view in ("Scenario", "Now", "Events"):
+def test_axe_finds_nothing_serious(open_page: Opener, nav2: Path, axe: str, width: int, dark: bool) -> None:
+    opened = ready(open_page(nav2, dark=dark, size=(width, 800)))
+    for view in ("Scenario", "Now", "Events", "Log", "Parameters"):
         opened.page.get_by_role("tab", name=view).click()
         assert opened.grave_findings(axe) == []
     assert opened.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
@@ -236,3 +245,106 @@ def test_log_without_ground_truth_shows_the_estimated_pose(open_page: Opener, tm
     for key in ("w", "n", "p", "c", ",", "f"):
         opened.page.keyboard.press(key)
     assert "not recorded" in opened.page.get_by_role("tabpanel", name="Now").inner_text()
+
+
+def lit_rows(opened: Opened) -> list[str]:
+    """Return the highlighted entries of the log, e.g. "9.25 s ✓ Spin success 0.05 s"."""
+    rows = opened.page.locator("#view-log li.lit")
+    return [" ".join(text.split()) for text in rows.all_inner_texts()]
+
+
+def test_log_of_the_stack_follows_the_time_and_entries_lead_to_their_time(open_page: Opener, nav2: Path) -> None:
+    opened = ready(open_page(nav2, where="#t=2.3"))
+    page = opened.page
+    page.keyboard.press("l")
+    assert lit_rows(opened) == ["2.25 s ✓ ComputePathToPose success 0.05 s"]
+    running = page.locator("#view-log .running-now")
+    assert running.inner_text() == "Running now: NavigateRecovery · NavigateWithReplanning · FollowPath"
+    page.get_by_role("combobox", name="Entries to show").select_option("problems")
+    page.locator("#view-log li", has_text="FollowPath").click()
+    failed = time(opened)
+    assert failed == pytest.approx(0.75 * opened.page.evaluate("simscen.runs[0].seconds"), abs=0.01)
+    opened.until(
+        "document.querySelector('#view-log .running-now').textContent.endsWith('NavigateWithReplanning · Spin')"
+    )
+    assert [row.split(" ", 2)[2] for row in lit_rows(opened)] == [
+        f"✗ FollowPath failure {failed - 0.25:.2f} s",
+        "! controller_server error: Failed to make progress",
+    ]
+
+
+def test_log_of_the_stack_can_be_filtered_and_walked_through_by_keyboard(open_page: Opener, nav2: Path) -> None:
+    opened = ready(open_page(nav2, where="#t=0"))
+    page = opened.page
+    page.keyboard.press("l")
+    rows = page.locator("#view-log li")
+    everything = rows.count()
+    page.get_by_role("searchbox", name="Filter the log").fill("spin RUN")
+    assert [row.split()[3:] for row in rows.all_inner_texts()] == [["Spin", "running"]]
+    page.get_by_role("searchbox", name="Filter the log").fill("")
+    assert rows.count() == everything
+    rows.first.get_by_role("button").focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Enter")
+    assert time(opened) == pytest.approx(0.2, abs=0.005)
+    assert "ComputePathToPose running" in page.evaluate("document.activeElement.innerText.replace(/\\s+/g, ' ')")
+
+
+def test_rows_around_the_time_are_shown_of_a_long_log(open_page: Opener, logs: list[Path], tmp_path: Path) -> None:
+    log = read_run(logs[0], with_sensors=True)
+    lines = tuple((ERROR, f"error {number}") for number in range(900))
+    write_replay(tmp_path / "replay.html", [(with_nav2_report(log, lines=lines), from_json(log.result))])
+    opened = ready(open_page(tmp_path / "replay.html", where="#t=0"))
+    page = opened.page
+    page.keyboard.press("l")
+    rows = page.locator("#view-log li")
+    assert rows.count() < 200
+    page.keyboard.press("End")
+    opened.until("document.querySelector('#view-log li:last-child').textContent.endsWith('error 899')")
+    page.locator("#view-log .more").click()
+    assert "later" in rows.last.inner_text() and rows.count() < 200
+    marks = page.locator(".lanes .sign.stack")
+    assert marks.count() == 2  # of 900 errors at one time there is one
+    marks.first.dispatch_event("click")
+    assert "FollowPath failure" in lit_rows(opened)[0]
+
+
+def test_parameters_of_the_stack_can_be_searched(open_page: Opener, nav2: Path) -> None:
+    opened = ready(open_page(nav2))
+    page = opened.page
+    page.keyboard.press("m")
+    first = page.locator("#view-parameters details").first
+    assert "FollowPath.desired_linear_vel" in first.inner_text() and "odom_topic" not in first.inner_text()
+    shown = page.locator("#view-parameters .parameter:visible")
+    page.get_by_role("searchbox", name="Filter the parameters").fill("local_costmap radius")
+    assert [row.split() for row in shown.all_inner_texts()] == [["inflation_layer.inflation_radius", "0.55"]]
+    page.get_by_role("searchbox", name="Filter the parameters").fill("nothing like that")
+    assert shown.count() == 0
+    page.get_by_role("searchbox", name="Filter the parameters").fill("")
+    assert first.is_visible()
+
+
+def test_parameters_that_differ_between_two_runs_come_first(
+    open_page: Opener, logs: list[Path], tmp_path: Path
+) -> None:
+    log = read_run(logs[0], with_sensors=True)
+    result = from_json(log.result)
+    nodes = [{"/amcl": {"z_hit": 0.5, "z_max": 0.05}}, {"/amcl": {"z_hit": 0.7, "z_max": 0.05, "beams": 60}}]
+    write_replay(tmp_path / "replay.html", [(with_nav2_report(log, one), result) for one in nodes])
+    opened = ready(open_page(tmp_path / "replay.html"))
+    opened.page.get_by_role("tab", name="Parameters").click()
+    rows = opened.page.locator("#view-parameters details[open] .parameter")
+    assert [row.split() for row in rows.all_inner_texts()] == [
+        ["z_hit", "A", "0.5", "B", "0.7"],
+        ["beams", "A", "–", "B", "60"],
+    ]
+
+
+def test_page_of_the_reference_stack_has_no_empty_views(open_page: Opener, one: Path) -> None:
+    opened = ready(open_page(one))
+    for key in ("l", "m"):
+        opened.page.keyboard.press(key)
+    assert opened.page.get_by_role("tab").all_inner_texts() == ["Scenario", "Now", "Events"]
+    assert opened.page.get_by_role("tab", name="Scenario").get_attribute("aria-selected") == "true"
+    assert "Stack log" not in opened.page.locator(".lanes").inner_text()

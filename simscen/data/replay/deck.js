@@ -13,7 +13,7 @@ export class Deck {
     this.player = player;
     this.act = act;
     [this.from, this.to] = [0, player.end || 1];
-    this.lanes = new Lanes(runs, act.choose);
+    this.lanes = new Lanes(runs, act.choose, act.showLog);
     this.play = button("Play", icon("play"), act.play, "space");
     this.clock = el("output", { class: "clock", "aria-hidden": "true" });
     this.speed = el("output", { class: "quiet" });

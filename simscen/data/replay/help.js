@@ -14,6 +14,7 @@ export const KEYS = [
   ["[ ] \\", "timeline: zoom in, zoom out, show all"],
   ["1 … 9 0 l with Alt", "toggle map layers"],
   ["s w e", "scenario, current values, events"],
+  ["l m", "log and parameters of an external stack, if there are any"],
   ["d", "dark or light theme"],
   ["?", "this list"],
 ];

@@ -1,5 +1,6 @@
 // The timeline: a lane for each kind of thing that happens, over a stretch of the run.
 import { clockText, el, fill, svg } from "./dom.js";
+import { entriesOf } from "./stacklog.js";
 
 export const LANES = [
   { id: "goals", name: "Goals" },
@@ -7,6 +8,7 @@ export const LANES = [
   { id: "faults", name: "Faults" },
   { id: "plans", name: "Plans" },
   { id: "recoveries", name: "Recoveries" },
+  { id: "stack", name: "Stack log" },
   { id: "failures", name: "Failures" },
 ];
 const QUIET = new Set(["goal.reached", "goal.passed", "goal.canceled", "recovery.ended", "collision.ended", "fault.ended",
@@ -22,14 +24,16 @@ export function isShown(event) {
   return !QUIET.has(event.kind);
 }
 
-/** Lanes for one run or two; `chosen` is called with what is clicked on. */
+/** Lanes for one run or two; `chosen` is called with what is clicked on, `showLog` with seconds. */
 export class Lanes {
-  constructor(runs, chosen) {
+  constructor(runs, chosen, showLog) {
     this.runs = runs;
     this.chosen = chosen;
+    this.showLog = showLog;
+    this.problems = entriesOf(runs).filter((entry) => entry.problem);
     this.groups = runs.flatMap((run) => run.robots.map((robot, number) => ({ run, robot: robot.name, first: number === 0 })));
     this.row = this.groups.length > 1 ? 14 : 18;
-    this.rows = LANES.filter((lane) => lane.id === "failures" || runs.some((run) => run.events.some((event) => event.lane === lane.id && isShown(event))));
+    this.rows = LANES.filter((lane) => lane.id === "failures" || (lane.id === "stack" && this.problems.length) || runs.some((run) => run.events.some((event) => event.lane === lane.id && isShown(event))));
     this.tracks = this.rows.map(() => svg("svg", { class: "track", height: this.row * this.groups.length, "aria-hidden": "true" }));
     this.element = el("div", { class: "lanes" }, ...this.rows.map((lane, k) => el("div", { class: "row" }, el("span", { class: "gutter" }, lane.name), runs.length > 1 ? letters(runs) : null, this.tracks[k])));
   }
@@ -48,7 +52,23 @@ export class Lanes {
     const mine = (whose) => (whose ?? "") === robot || (first && !whose);
     const events = run.events.filter((event) => event.lane === lane && isShown(event) && mine(event.robot)).map((event) => this.#event(run, event, at, top, width, selected));
     const failures = lane === "failures" ? run.failures.filter(({ verdict }) => mine(verdict.robot)).map((failure) => this.#failure(run, failure, at, top, width, selected)) : [];
-    return [...events, ...failures].filter(Boolean);
+    const problems = lane === "stack" ? this.#problems(run, robot, at, top, width) : [];
+    return [...events, ...failures, ...problems].filter(Boolean);
+  }
+
+  /** The failures of a behavior tree, errors and warnings; of several at one place, the first. */
+  #problems(run, robot, at, top, width) {
+    const places = new Map();
+    for (const entry of this.problems) {
+      const u = at(entry.seconds), place = `${Math.round(u / 4)} ${entry.status === "warning"}`;
+      if (entry.run === run && entry.robot.name === robot && u >= -8 && u <= width + 8) places.set(place, [...(places.get(place) ?? []), entry]);
+    }
+    return [...places.values()].map((entries) => {
+      const u = at(entries[0].seconds), v = top + this.row / 2, isWarning = entries[0].status === "warning";
+      const texts = entries.slice(0, 5).map((entry) => `${entry.node} ${entry.said}, ${clockText(entry.seconds)}`);
+      const more = entries.length > texts.length ? [`${entries.length - texts.length} more`] : [];
+      return svg("g", { class: `sign stack ${isWarning ? "odd" : "bad"}`, onclick: () => this.showLog(entries[0].seconds) }, svg("title", {}, [...texts, ...more].join("\n")), isWarning ? sign({ lane: "stack" }, u, v) : cross(u, v));
+    });
   }
 
   #event(run, event, at, top, width, selected) {

@@ -34,7 +34,7 @@ class Page {
     this.follows = false;
     this.player = new Player(Math.max(...runs.map((run) => run.seconds)), () => this.#changed());
     this.maps = runs.map((run) => new MapView(run, this.camera, (what) => (what === "fit" ? this.fit() : this.#changed())));
-    this.panel = new Panel(runs, (run, selected, finding) => run && this.choose(run, selected, finding));
+    this.panel = new Panel(runs, (run, selected, finding) => run && this.choose(run, selected, finding), (seconds) => (this.player.pause(), this.player.seek(seconds)));
     this.deck = new Deck(runs, this.player, this.#actions());
     this.help = helpWindow();
   }
@@ -183,6 +183,7 @@ class Page {
     const step = (seconds) => () => (this.player.pause(), this.player.seek(this.player.time + seconds));
     return {
       choose: (run, selected) => this.choose(run, selected), laidOut: () => this.laidOut(),
+      showLog: (seconds) => (this.player.pause(), this.player.seek(seconds), this.panel.show("log")),
       play: () => this.player.toggle(), begin: () => this.player.seek(0), end: () => this.player.seek(this.player.end),
       back: step(-0.1), on: step(0.1), previous: () => this.#event(-1), next: () => this.#event(1), failure: () => this.#failure(),
       slower: () => this.player.pace(-1), faster: () => this.player.pace(1),
@@ -230,7 +231,7 @@ class Page {
       " ": act.play, ArrowLeft: seek(-0.1 * longer), ArrowRight: seek(0.1 * longer), ",": () => this.#sample(-1), ".": () => this.#sample(1), p: act.previous, n: act.next, f: act.failure,
       Home: act.begin, End: act.end, "<": act.slower, ">": act.faster, "+": () => this.maps[0].zoom(1.25), "=": () => this.maps[0].zoom(1.25), "-": () => this.maps[0].zoom(0.8), 0: () => this.fit(),
       c: () => this.#follow(), "[": () => this.deck.zoom(0.7), "]": () => this.deck.zoom(1 / 0.7), "\\": () => this.deck.zoomAll(), d: () => this.#theme(), "?": () => this.help.showModal(),
-      s: () => this.panel.show("text"), w: () => (this.panel.show("now"), this.#changed()), e: () => this.panel.show("events"),
+      s: () => this.panel.show("text"), w: () => (this.panel.show("now"), this.#changed()), e: () => this.panel.show("events"), l: () => this.panel.show("log"), m: () => this.panel.show("parameters"),
     };
     if (!keys[event.key] || event.altKey || (event.key === " " && event.target.matches?.("button, summary, input[type=checkbox]"))) return;
     if (event.key.startsWith("Arrow") && event.target.closest?.("[role=tablist], .view")) return;

@@ -1,23 +1,28 @@
 // Beside the map: how each criterion came out, what is going on now, the scenario's text, all events.
 import { clockText, el, fill } from "./dom.js";
 import { isShown, told } from "./lanes.js";
+import { ParameterList } from "./parameters.js";
+import { StackLog, runningAt } from "./stacklog.js";
 
 const SIGNS = { pass: "✓", fail: "✗", inconclusive: "?", error: "!" };
 const WORDS = { pass: "passed", fail: "failed", inconclusive: "undecided", error: "error" };
 
-/** Verdicts above, and three views of the rest below; `chosen` is called with what is clicked on. */
+/** Verdicts above, and views of the rest below; `chosen` is called with what is clicked on, `seek` with seconds. */
 export class Panel {
-  constructor(runs, chosen) {
+  constructor(runs, chosen, seek) {
     this.runs = runs;
     this.chosen = chosen;
     this.cards = [];
-    this.now = el("div", { class: "view", id: "view-now", role: "tabpanel", "aria-labelledby": "tab-now", tabindex: "0" });
-    this.text = el("div", { class: "view code", id: "view-text", role: "tabpanel", "aria-labelledby": "tab-text", tabindex: "0" });
-    this.list = el("div", { class: "view", id: "view-events", role: "tabpanel", "aria-labelledby": "tab-events", tabindex: "0" });
+    this.text = viewBox("text", "code");
+    this.now = viewBox("now");
+    this.list = viewBox("events");
     this.views = { text: ["Scenario", this.text], now: ["Now", this.now], events: ["Events", this.list] };
+    const robots = runs.flatMap((run) => run.robots);
+    if (robots.some((robot) => robot.changes.length || robot.lines.length)) this.#addLog(seek);
+    if (robots.some((robot) => robot.parameters.length)) this.#addParameters();
     this.tabs = Object.entries(this.views).map(([id, [name]]) => this.#tab(id, name));
     const bar = el("div", { role: "tablist", class: "tabs", "aria-label": "Details" }, ...this.tabs);
-    this.elements = [el("div", { class: "verdicts" }, ...runs.map((run) => this.#verdicts(run))), bar, this.text, this.now, this.list];
+    this.elements = [el("div", { class: "verdicts" }, ...runs.map((run) => this.#verdicts(run))), bar, ...Object.values(this.views).map(([, view]) => view)];
     this.rows = new Map();
     this.lines = new Map();
     fill(this.list, ...runs.map((run) => this.#events(run)));
@@ -25,8 +30,23 @@ export class Panel {
     this.show("text");
   }
 
-  /** Bring a view to the front. */
+  #addLog(seek) {
+    const view = viewBox("log");
+    this.log = new StackLog(this.runs, seek);
+    view.append(...this.log.elements);
+    this.views.log = ["Log", view];
+  }
+
+  #addParameters() {
+    const view = viewBox("parameters");
+    this.parameters = new ParameterList(this.runs);
+    view.append(...this.parameters.elements);
+    this.views.parameters = ["Parameters", view];
+  }
+
+  /** Bring a view to the front, if there is such a view. */
   show(id) {
+    if (!this.views[id]) return;
     for (const tab of this.tabs) {
       const front = tab.dataset.view === id;
       tab.setAttribute("aria-selected", front);
@@ -34,6 +54,8 @@ export class Panel {
     }
     for (const [name, [, view]] of Object.entries(this.views)) view.hidden = name !== id;
     this.front = id;
+    if (id === "parameters") this.parameters.show();
+    this.tell(this.seconds ?? 0);
   }
 
   /** Light up what is selected: its card, its row, its line. */
@@ -60,8 +82,9 @@ export class Panel {
 
   /** What is going on at a time. */
   tell(seconds) {
-    if (this.now.hidden) return;
-    fill(this.now, ...this.runs.flatMap((run) => run.robots.map((robot) => this.#state(run, robot, run.tick(seconds)))));
+    this.seconds = seconds;
+    if (this.front === "log") this.log.tell(seconds);
+    if (this.front === "now") fill(this.now, ...this.runs.flatMap((run) => run.robots.map((robot) => this.#state(run, robot, run.tick(seconds)))));
   }
 
   #tab(id, name) {
@@ -158,6 +181,7 @@ export class Panel {
       ["clearance", value("clearance")],
       ["faults", names("faults")],
       ["recovery", names("recoveries")],
+      ["behavior tree", runningAt(robot, tick).join(" · ")],
       ["events", run.going("events", tick).map((event) => event.name).join(", ")],
       ["zones", run.zonesAt(tick).map((zone) => zone.region).join(", ")],
     ];
@@ -165,6 +189,11 @@ export class Panel {
     return el("section", {}, head ? el("h3", {}, head) : null,
       el("dl", {}, ...facts.filter(([, told_]) => told_).flatMap(([name, told_]) => [el("dt", {}, name), el("dd", {}, told_)])));
   }
+}
+
+/** The box of a view, which its tab shows. */
+function viewBox(id, look = "") {
+  return el("div", { class: `view ${look}`, id: `view-${id}`, role: "tabpanel", "aria-labelledby": `tab-${id}`, tabindex: "0" });
 }
 
 /** Scroll a box, and nothing around it, so that something in it is seen. */

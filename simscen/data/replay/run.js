@@ -79,6 +79,13 @@ export class Run {
   }
 }
 
+/** The changes of a behavior tree in order: tick, node, its status before, and its status. */
+function changesOf(column, tree) {
+  if (!tree) return [];
+  const [node, before, status] = [tree.node, tree.before, tree.status].map(column);
+  return Array.from(column(tree.ticks), (tick, k) => ({ tick, node: tree.nodes[node[k]], before: tree.statuses[before[k]], status: tree.statuses[status[k]] }));
+}
+
 /** One of the robots of a run. */
 class Robot {
   constructor(data, run) {
@@ -89,6 +96,7 @@ class Robot {
     this.belief = data.belief && readAll(column, data.belief);
     this.plans = paths(column, data.plans);
     this.local = paths(column, data.local);
+    this.changes = changesOf(column, data.tree);
     this.strips = new Map(data.strips.map((strip) => [strip.name, new Strip(strip, this, column)]));
   }
 

@@ -18,6 +18,7 @@ from simscen.record.log_reader.sensor_messages import LoggedMessages, SensorMess
 from simscen.report.display_text import one_line
 from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, spaced_in_time
 from simscen.report.replay.signal_plots import signal_limits, signal_plots
+from simscen.report.replay.stack_report import lines_of, parameters_of, tree_of
 from simscen.report.replay.timeline import SourceLines
 
 MAX_BEAMS, MAX_RANGES = 360, 300_000
@@ -191,6 +192,9 @@ def robot_data(
         "plans": plans_of(trace.plans, columns),
         "local": local_plans_of(log.sensors, columns),
         "costmaps": costmaps_of(log.sensors, trace, columns),
+        "tree": tree_of(log, columns),
+        "lines": lines_of(log, columns),
+        "parameters": parameters_of(log, columns),
         "clock": columns.add(trace.truth.ticks),
         "strips": signal_plots(trace, case, spec, columns),
         "limits": signal_limits(verdicts, name),

@@ -1,0 +1,170 @@
+// The log of an external stack: changes of its behavior tree, and its log lines, around the time that is shown.
+import { clockText, el, fill } from "./dom.js";
+import { newest } from "./series.js";
+
+const SIGNS_OF_STATUS = { success: "✓", failure: "✗", running: "▸", idle: "○", error: "!", warning: "!", info: "·" };
+const ROWS_SHOWN = 160, ROWS_AHEAD = 30;
+
+const KINDS = {
+  steps: ["no resets", (entry) => !entry.reset],
+  problems: ["problems", (entry) => entry.problem],
+  all: ["all", () => true],
+};
+
+/** All entries of the stacks of the runs, in order of time. A reset is a change to idle of a node that had ended. */
+export function entriesOf(runs) {
+  const entries = runs.flatMap((run) => run.robots.flatMap((robot) => {
+    const source = [run.letter, robot.name].filter(Boolean).join(" ");
+    const lines = robot.lines.map(([tick, severity, node, text]) => ({ seconds: tick / run.rate, source, node, status: severity, said: severity === "info" ? text : `${severity}: ${text}`, problem: severity !== "info" }));
+    return [...changesOfTree(robot, run.rate).map((change) => ({ ...change, source })), ...lines].map((entry) => ({ ...entry, run, robot }));
+  }));
+  for (const entry of entries) entry.search = `${entry.source} ${entry.node} ${entry.said}`.toLowerCase();
+  return entries.sort((a, b) => a.seconds - b.seconds);
+}
+
+/** The changes of a behavior tree, with how long a node ran that ends.
+ *
+ * It is a problem if a node fails that was running. Others are conditions, for which to fail is an answer. */
+function changesOfTree(robot, rate) {
+  const begun = new Map();
+  return robot.changes.map(({ tick, node, before, status }) => {
+    const seconds = tick / rate, since = before === "running" ? begun.get(node) : undefined;
+    if (status === "running") begun.set(node, seconds);
+    const word = status === "idle" && before === "running" ? "halted" : status;
+    return { seconds, node, status, said: word, took: since === undefined ? undefined : seconds - since, reset: status === "idle" && before !== "running", problem: status === "failure" && before === "running" };
+  });
+}
+
+/** The nodes of a behavior tree that run at a tick, in the order in which they began. */
+export function runningAt(robot, tick) {
+  const running = new Set(), { changes } = robot;
+  for (let k = 0; k < changes.length && changes[k].tick <= tick; k++) {
+    if (changes[k].status === "running") running.add(changes[k].node);
+    else running.delete(changes[k].node);
+  }
+  return [...running];
+}
+
+/** A list that follows the time; `seek` is called with the seconds of the entry that is clicked on. */
+export class StackLog {
+  constructor(runs, seek) {
+    this.runs = runs;
+    this.seek = seek;
+    this.entries = entriesOf(runs);
+    this.everyTime = this.entries.map((entry) => entry.seconds);
+    this.filter = el("input", { type: "search", placeholder: "Filter: Spin failure", "aria-label": "Filter the log", oninput: () => this.#choose() });
+    const kinds = Object.entries(KINDS).map(([value, [name]]) => el("option", { value }, name));
+    this.kind = el("select", { "aria-label": "Entries to show", onchange: () => this.#choose() }, ...kinds);
+    this.count = el("span", { class: "quiet", role: "status" });
+    this.running = el("div", { class: "running-now" });
+    this.list = el("ol", { class: "events", onkeydown: (event) => this.#key(event) });
+    this.elements = [el("div", { class: "bar" }, this.filter, this.kind, this.count, this.running), this.list];
+    this.#pick();
+  }
+
+  /** Show the entries around a time. */
+  tell(seconds) {
+    this.time = seconds;
+    this.#tellRunning(seconds);
+    const at = newest(this.times, seconds + 1e-9);
+    if (at === this.at) return;
+    this.at = at;
+    const isNear = this.begin !== undefined && at >= this.begin + (this.begin ? ROWS_AHEAD : 0) && at < this.end - (this.end < this.shown.length ? ROWS_AHEAD : 0);
+    if (!isNear) this.#show(at);
+    this.#mark();
+  }
+
+  /** Say which nodes run, if that may have changed. */
+  #tellRunning(seconds) {
+    const passed = newest(this.everyTime, seconds + 1e-9);
+    if (passed === this.passed) return;
+    this.passed = passed;
+    fill(this.running, ...this.runs.flatMap((run) => run.robots.map((robot) => this.#runningText(run, robot, run.tick(seconds)))));
+  }
+
+  #runningText(run, robot, tick) {
+    const nodes = runningAt(robot, tick), whose = [run.letter, robot.name].filter(Boolean).join(" ");
+    if (!robot.changes.length) return null;
+    return el("p", {}, el("span", { class: "quiet" }, `${whose ? `${whose} r` : "R"}unning now: `), nodes.length ? nodes.join(" · ") : "nothing");
+  }
+
+  /** Show what matches the filter, around the time that is shown. */
+  #choose() {
+    this.#pick();
+    [this.at, this.begin] = [undefined, undefined];
+    this.tell(this.time ?? 0);
+  }
+
+  #pick() {
+    const words = this.filter.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const [, belongs] = KINDS[this.kind.value];
+    this.shown = this.entries.filter((entry) => belongs(entry) && words.every((word) => entry.search.includes(word)));
+    this.times = this.shown.map((entry) => entry.seconds);
+    this.count.textContent = `${this.shown.length} of ${this.entries.length}`;
+  }
+
+  /** Put the rows around an entry into the list; the entry that has the focus keeps it. */
+  #show(middle) {
+    const focused = this.list.contains(document.activeElement) ? document.activeElement.closest("li").dataset.k : null;
+    this.begin = Math.max(0, Math.min(middle - ROWS_SHOWN / 2, this.shown.length - ROWS_SHOWN));
+    this.end = Math.min(this.shown.length, this.begin + ROWS_SHOWN);
+    const rows = this.shown.slice(this.begin, this.end).map((entry, k) => this.#row(entry, this.begin + k));
+    const more = (count, text, to) => (count ? el("li", {}, el("button", { type: "button", class: "event more", onclick: () => this.#focus(to) }, `${count} ${text}`)) : null);
+    fill(this.list, more(this.begin, "earlier", this.begin - 1), ...rows, more(this.shown.length - this.end, "later", this.end));
+    if (!this.shown.length) fill(this.list, el("li", { class: "quiet" }, "Nothing matches."));
+    if (focused !== null) this.list.querySelector(`li[data-k="${focused}"] button`)?.focus({ preventScroll: true });
+  }
+
+  #row(entry, k) {
+    return el("li", { "data-k": k }, el("button", { type: "button", class: `event of-stack ${entry.status}`, onclick: () => this.seek(entry.seconds) },
+      el("span", { class: "when" }, clockText(entry.seconds)),
+      el("span", { class: "mark", "aria-hidden": "true" }, SIGNS_OF_STATUS[entry.status] ?? "·"),
+      el("span", {}, entry.source ? el("span", { class: "quiet" }, `${entry.source} `) : null, el("b", {}, entry.node), ` ${entry.said}`),
+      entry.took === undefined ? null : el("span", { class: "took", title: "how long it ran" }, clockText(entry.took))));
+  }
+
+  /** Light up the newest entries, and scroll to them. */
+  #mark(scroll = true) {
+    const newestTime = this.times[this.at];
+    let last = null;
+    for (const row of this.list.children) {
+      const k = Number(row.dataset.k), lit = k <= this.at && this.times[k] === newestTime;
+      row.classList.toggle("lit", lit);
+      if (lit) row.setAttribute("aria-current", "true");
+      else row.removeAttribute("aria-current");
+      if (lit) last = row;
+    }
+    if (scroll) this.#reveal(last ?? this.list.firstElementChild);
+  }
+
+  /** Scroll the view, and nothing around it, so that a row is seen below the bar. */
+  #reveal(row) {
+    const box = this.list.parentElement;
+    if (!row || !box || box.hidden) return;
+    const inner = row.getBoundingClientRect(), outer = box.getBoundingClientRect(), top = outer.top + this.elements[0].offsetHeight;
+    if (inner.top >= top && inner.bottom <= outer.bottom) return;
+    box.scrollTop += inner.top - top - Math.max(outer.bottom - top - inner.height, 0) / 2;
+  }
+
+  /** Up and down go from entry to entry, also beyond the rows that are shown. */
+  #key(event) {
+    const step = { ArrowUp: -1, ArrowDown: 1 }[event.key], here = event.target.closest("li")?.dataset.k;
+    if (!step || here === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const next = Number(here) + step;
+    if (next < 0 || next >= this.shown.length) return;
+    this.#focus(next);
+  }
+
+  /** Move the focus to an entry, and show the rows around it if it is not among those that are shown. */
+  #focus(k) {
+    if (k < this.begin || k >= this.end) {
+      this.#show(k);
+      this.#mark(false);
+    }
+    const row = this.list.querySelector(`li[data-k="${k}"]`);
+    row.firstElementChild.focus({ preventScroll: true });
+    this.#reveal(row);
+  }
+}

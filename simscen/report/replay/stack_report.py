@@ -1,0 +1,134 @@
+"""What an external stack reported about itself, for the replay page: its behavior tree, log lines, and parameters."""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from simscen.core.records.trace import LogLine
+from simscen.peer.messages import BEHAVIOR_TREE_LOGGER
+from simscen.record.log_reader.read import Log
+from simscen.report.display_text import escape_control, one_line
+from simscen.report.replay.packed_columns import PackedColumns
+
+MAX_TREE_CHANGES = 20_000
+"""Maximum number of changes of a behavior tree; the last ones are kept, because a run ends with its failure."""
+MAX_LINES, MAX_LINE_CHARACTERS = 1000, 400
+"""Maximum number of log lines, and the length of each."""
+MAX_PARAMETERS, MAX_VALUE_CHARACTERS = 3000, 300
+"""Maximum number of parameters of all nodes, and the length of each value."""
+_WARNING, _ERROR = 30, 40
+_TREE_CHANGE = re.compile(r"(.*): (\w+) -> (\w+)", re.DOTALL)
+
+NODE_ORDER = (
+    *("bt_navigator", "controller_server", "planner_server", "smoother_server", "behavior_server"),
+    *("local_costmap", "global_costmap", "amcl", "map_server", "waypoint_follower"),
+)
+"""Nodes of Nav2 that come first, because most failures depend on their parameters."""
+MAIN_PARAMETERS = frozenset(
+    (
+        *("plugin", "plugins", "filters", "planner_plugins", "controller_plugins", "behavior_plugins"),
+        *("default_nav_to_pose_bt_xml", "default_nav_through_poses_bt_xml"),
+        *("controller_frequency", "expected_planner_frequency", "failure_tolerance", "failure_timeout"),
+        *("desired_linear_vel", "max_vel_x", "max_vel_theta", "vx_max", "wz_max", "max_rotational_vel"),
+        *("xy_goal_tolerance", "yaw_goal_tolerance", "required_movement_radius", "movement_time_allowance"),
+        *("tolerance", "allow_unknown", "lookahead_dist", "use_collision_detection", "motion_model"),
+        *("robot_radius", "footprint", "footprint_padding", "resolution", "width", "height", "update_frequency"),
+        *("inflation_radius", "cost_scaling_factor", "obstacle_max_range", "observation_sources"),
+        *("min_particles", "max_particles", "robot_model_type", "laser_model_type", "transform_tolerance"),
+        *("update_min_a", "update_min_d", "recovery_alpha_fast", "recovery_alpha_slow"),
+    )
+)  # fmt: skip
+"""Last parts of the names of parameters that the page lists first: plug-ins, speeds, tolerances, sizes, and rates."""
+
+
+def tree_of(log: Log, columns: PackedColumns) -> dict[str, Any] | None:
+    """Return the changes of the behavior tree in order: tick, node, previous status, and status; None without any."""
+    changes = list(_tree_changes(log))
+    if not changes:
+        return None
+    kept = changes[-MAX_TREE_CHANGES:]
+    columns.note_reduction("changes of the behavior tree, the last ones", len(kept), len(changes))
+    nodes = {node: number for number, node in enumerate(dict.fromkeys(change[1] for change in kept))}
+    names = dict.fromkeys(status for change in kept for status in change[2:])
+    statuses = {status: number for number, status in enumerate(names)}
+    return {
+        "nodes": [one_line(node) for node in nodes],
+        "statuses": [status.lower() for status in statuses],
+        "ticks": columns.add([tick for tick, *_ in kept]),
+        "node": columns.add([nodes[node] for _, node, _, _ in kept]),
+        "before": columns.add([statuses[before] for _, _, before, _ in kept]),
+        "status": columns.add([statuses[after] for *_, after in kept]),
+    }
+
+
+def _tree_changes(log: Log) -> Iterator[tuple[int, str, str, str]]:
+    for tick, line in log.sensors.stack_lines():
+        if line.name == BEHAVIOR_TREE_LOGGER and (found := _TREE_CHANGE.fullmatch(line.text)):
+            yield tick, found[1], found[2], found[3]
+
+
+def lines_of(log: Log, columns: PackedColumns) -> list[list[Any]]:
+    """Return the log lines of the stack besides its behavior tree: tick, severity, logger, and text of each."""
+    lines = [(tick, line) for tick, line in log.sensors.stack_lines() if not _is_tree_change(line)]
+    kept = lines[-MAX_LINES:]
+    columns.note_reduction("log lines of the stack, the last ones", len(kept), len(lines))
+    return [
+        [tick, _severity(line.level), one_line(line.name), _shortened(one_line(line.text), MAX_LINE_CHARACTERS)]
+        for tick, line in kept
+    ]
+
+
+def _is_tree_change(line: LogLine) -> bool:
+    return line.name == BEHAVIOR_TREE_LOGGER and _TREE_CHANGE.fullmatch(line.text) is not None
+
+
+def _severity(level: int) -> str:
+    return "error" if level >= _ERROR else "warning" if level >= _WARNING else "info"
+
+
+def parameters_of(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
+    """Return the nodes with the names, values and importance of their parameters; empty if the stack reports none."""
+    nodes = _reported_parameters(log)
+    total = sum(map(len, nodes.values()))
+    budget = MAX_PARAMETERS
+    data = []
+    for node in sorted(nodes, key=_node_rank):
+        names = sorted(nodes[node], key=lambda name: (not is_main_parameter(name), name))[:budget]
+        budget -= len(names)
+        rows = [[one_line(name), _value_text(nodes[node][name]), is_main_parameter(name)] for name in sorted(names)]
+        data.append({"node": one_line(node), "values": rows, "total": len(nodes[node])})
+    columns.note_reduction("parameters of the stack", MAX_PARAMETERS - budget, total)
+    return data
+
+
+def _reported_parameters(log: Log) -> dict[str, Mapping[str, Any]]:
+    """Return the values by name and node that the stack reported in `about`, without what has another form."""
+    try:
+        about = json.loads(log.stack.get("about", "{}"))
+    except ValueError:
+        return {}
+    nodes = about.get("parameters") if isinstance(about, dict) else None
+    if not isinstance(nodes, dict):
+        return {}
+    return {node: values for node, values in nodes.items() if isinstance(values, dict) and values}
+
+
+def is_main_parameter(name: str) -> bool:
+    """Return whether a parameter is among the first that a reader looks for, e.g. `FollowPath.desired_linear_vel`."""
+    return name.rpartition(".")[2] in MAIN_PARAMETERS
+
+
+def _node_rank(node: str) -> tuple[int, str]:
+    name = node.rpartition("/")[2]
+    return NODE_ORDER.index(name) if name in NODE_ORDER else len(NODE_ORDER), node
+
+
+def _value_text(value: object) -> str:
+    """Return a value as in a YAML file: texts without quotes, except for empty ones."""
+    text = value if isinstance(value, str) and value.strip() else json.dumps(value, ensure_ascii=False)
+    return _shortened(escape_control(text), MAX_VALUE_CHARACTERS)
+
+
+def _shortened(text: str, max_characters: int) -> str:
+    return text if len(text) <= max_characters else f"{text[:max_characters]} … ({len(text)} characters)"

@@ -1,0 +1,145 @@
+"""Tests of what an external stack reported about itself, on replay pages."""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "browser"))
+from nav2_report import ERROR, INFO, PARAMETERS, WARNING, with_nav2_report
+
+from simscen.core.clock import SimTime
+from simscen.core.geometry import Pose2
+from simscen.core.records.case import Case
+from simscen.peer.messages import BEHAVIOR_TREE_LOGGER, log, tree_change
+from simscen.record.log_header import LogHeader
+from simscen.record.log_reader.read import Log
+from simscen.record.log_reader.sensor_messages import SensorMessages
+from simscen.record.messages.event_text import EVENT_LOGGER
+from simscen.report.replay import stack_report
+from simscen.report.replay.packed_columns import PackedColumns
+from simscen.report.replay.stack_report import lines_of, parameters_of, tree_of
+from simscen.testing.synthetic_trace import synthetic_trace
+
+RATE = 240
+
+
+def log_with(*lines: tuple[int, int, str, str], stack: dict[str, str] | None = None) -> Log:
+    """Return a log with lines of /rosout: tick, severity, logger, and text."""
+    time = SimTime(RATE)
+    messages = [(tick, log(time.stamp(tick), *line)) for tick, *line in lines]
+    trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]})
+    sensors = SensorMessages(time, lines=messages)
+    return Log(LogHeader("hall/drive", 7, Case(Pose2(0, 0), ())), trace, "", True, sensors=sensors, stack=stack or {})
+
+
+def change(tick: int, node: str, before: str, after: str) -> tuple[int, int, str, str]:
+    return tick, INFO, BEHAVIOR_TREE_LOGGER, tree_change(node, before, after)
+
+
+class Spy(PackedColumns):
+    """Keeps the values of the columns."""
+
+    def add(self, values: Any, step: float = 1.0) -> Any:
+        return list(values)
+
+
+def reported(nodes: object) -> Log:
+    return log_with(stack={"about": json.dumps({"parameters": nodes})})
+
+
+def test_changes_of_a_behavior_tree_keep_their_order_within_a_tick() -> None:
+    lines = [
+        change(0, "Root", "IDLE", "RUNNING"),
+        change(0, "name: a -> b", "IDLE", "RUNNING"),
+        (12, WARNING, "amcl", "no transform"),
+        change(24, "Root", "RUNNING", "FAILURE"),
+    ]
+    tree = tree_of(log_with(*lines), Spy())
+    assert tree is not None
+    names = [[tree["nodes"][k] for k in tree["node"]]]
+    names += [[tree["statuses"][k] for k in tree[key]] for key in ("before", "status")]
+    assert list(zip(tree["ticks"], *names, strict=True)) == [
+        (0, "Root", "idle", "running"),
+        (0, "name: a -> b", "idle", "running"),
+        (24, "Root", "running", "failure"),
+    ]
+
+
+def test_lines_of_the_stack_are_there_but_events_of_simscen_are_not() -> None:
+    lines = [
+        (0, INFO, EVENT_LOGGER, "goal.accepted shelf"),
+        (5, WARNING, "planner_server", "no\npath"),
+        (6, ERROR, "controller_server", "x" * 1000),
+        (7, INFO, BEHAVIOR_TREE_LOGGER, "not a change"),
+    ]
+    read = lines_of(log_with(*lines), Spy())
+    assert [line[:3] for line in read] == [
+        [5, "warning", "planner_server"],
+        [6, "error", "controller_server"],
+        [7, "info", BEHAVIOR_TREE_LOGGER],
+    ]
+    assert read[0][3] == "no path"
+    assert read[1][3] == f"{'x' * stack_report.MAX_LINE_CHARACTERS} … (1000 characters)"
+
+
+def test_parameters_are_shown_as_in_a_file_with_the_main_ones_marked() -> None:
+    controller = {"FollowPath.vx_max": 1.0, "empty": "", "list": ["x"], "no": False}
+    nodes = parameters_of(reported({"/amcl": {"z_hit": 0.5}, "/controller_server": controller}), Spy())
+    assert [(node["node"], node["total"]) for node in nodes] == [("/controller_server", 4), ("/amcl", 1)]
+    assert nodes[0]["values"] == [
+        ["FollowPath.vx_max", "1.0", True],
+        ["empty", '""', False],
+        ["list", '["x"]', False],
+        ["no", "false", False],
+    ]
+
+
+@pytest.mark.parametrize("nodes", [None, [], {"/amcl": 3}, {"/amcl": {}}, "text"])
+def test_parameters_in_another_form_are_not_shown(nodes: object) -> None:
+    assert parameters_of(reported(nodes), Spy()) == []
+
+
+@pytest.mark.parametrize("about", ["{", "[]", "3"])
+def test_a_description_that_is_no_object_has_no_parameters(about: str) -> None:
+    assert parameters_of(log_with(stack={"about": about}), Spy()) == []
+
+
+def test_a_log_without_an_external_stack_has_nothing_of_it() -> None:
+    empty = log_with((0, INFO, EVENT_LOGGER, "goal.accepted shelf"))
+    assert (tree_of(empty, Spy()), lines_of(empty, Spy()), parameters_of(empty, Spy())) == (None, [], [])
+
+
+def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stack_report, "MAX_TREE_CHANGES", 2)
+    monkeypatch.setattr(stack_report, "MAX_LINES", 1)
+    monkeypatch.setattr(stack_report, "MAX_PARAMETERS", 1)
+    lines: Sequence[tuple[int, int, str, str]] = [
+        *(change(tick, "Root", "IDLE", "RUNNING") for tick in range(3)),
+        (3, ERROR, "amcl", "first"),
+        (4, ERROR, "amcl", "last"),
+    ]
+    nodes = {"/amcl": {"a": 1, "max_particles": 2000}}
+    log_ = replace(log_with(*lines), stack=reported(nodes).stack)
+    columns = Spy()
+    tree, shown = tree_of(log_, columns), parameters_of(log_, columns)
+    assert tree is not None and tree["ticks"] == [1, 2]
+    assert [text for *_, text in lines_of(log_, columns)] == ["last"]
+    assert shown == [{"node": "/amcl", "values": [["max_particles", "2000", True]], "total": 2}]
+    assert columns.left_out == [
+        "changes of the behavior tree, the last ones: 2 of 3",
+        "parameters of the stack: 1 of 2",
+        "log lines of the stack, the last ones: 1 of 2",
+    ]
+
+
+def test_the_stand_in_reports_all_of_it() -> None:
+    log_ = with_nav2_report(log_with())
+    tree = tree_of(log_, Spy())
+    assert tree is not None and "FollowPath" in tree["nodes"]
+    assert lines_of(log_, Spy()) == [[720, "error", "controller_server", "Failed to make progress"]]
+    assert [node["node"] for node in parameters_of(log_, Spy())] == [*list(PARAMETERS)[1:], "/amcl"]
