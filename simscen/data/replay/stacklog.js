@@ -51,7 +51,7 @@ export class StackLog {
     this.runs = runs;
     this.seek = seek;
     this.entries = entriesOf(runs);
-    this.everyTime = this.entries.map((entry) => entry.seconds);
+    this.allTimes = this.entries.map((entry) => entry.seconds);
     this.filter = el("input", { type: "search", placeholder: "Filter: Spin failure", "aria-label": "Filter the log", oninput: () => this.#choose() });
     const kinds = Object.entries(KINDS).map(([value, [name]]) => el("option", { value }, name));
     this.kind = el("select", { "aria-label": "Entries to show", onchange: () => this.#choose() }, ...kinds);
@@ -76,7 +76,7 @@ export class StackLog {
 
   /** Say which nodes run, if that may have changed. */
   #tellRunning(seconds) {
-    const passed = newest(this.everyTime, seconds + 1e-9);
+    const passed = newest(this.allTimes, seconds + 1e-9);
     if (passed === this.passed) return;
     this.passed = passed;
     fill(this.running, ...this.runs.flatMap((run) => run.robots.map((robot) => this.#runningText(run, robot, run.tick(seconds)))));
@@ -85,7 +85,7 @@ export class StackLog {
   #runningText(run, robot, tick) {
     const nodes = runningAt(robot, tick), whose = [run.letter, robot.name].filter(Boolean).join(" ");
     if (!robot.changes.length) return null;
-    return el("p", {}, el("span", { class: "quiet" }, `${whose ? `${whose} r` : "R"}unning now: `), nodes.length ? nodes.join(" · ") : "nothing");
+    return el("p", {}, el("span", { class: "quiet" }, whose ? `${whose} running now: ` : "Running now: "), nodes.length ? nodes.join(" · ") : "nothing");
   }
 
   /** Show what matches the filter, around the time that is shown. */

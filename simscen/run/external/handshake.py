@@ -160,7 +160,7 @@ def _polygon(corners: Any) -> list[list[float]]:
 
 
 MAX_NAME_LENGTH = 200
-MAX_ABOUT_LENGTH = 65_536
+MAX_ABOUT_LENGTH = 1 << 20
 MAX_FIRST_ANSWER_S = 3700
 
 
