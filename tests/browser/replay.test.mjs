@@ -80,7 +80,16 @@ test("the log of a stack is in order of time, with durations, resets and problem
   assert.deepEqual(entries.map(({ seconds }) => seconds), [0, 0, 0.1, 0.2, 1.5, 1.5, 1.5, 1.5, 2]);
   assert.deepEqual(entries.filter(({ took }) => took !== undefined).map(({ node, said, took }) => [node, said, took]), [["FollowPath", "failure", 1.5], ["Spin", "halted", 0.5]]);
   assert.deepEqual(entries.filter(({ problem }) => problem).map(({ node, said }) => `${node} ${said}`), ["FollowPath failure", "controller_server error: No progress"]);
-  assert.equal(entries.filter(({ reset }) => reset).length, 1);
+  assert.deepEqual(entries.filter(({ minor }) => minor).map(({ node, said }) => `${node} ${said}`), ["IsStuck failure", "FollowPath idle"]);
+});
+
+test("a recovery node with the name of its action becomes idle before it ends, as in Nav2 Jazzy", async () => {
+  const { entriesOf, runningAt } = await load("stacklog");
+  const node = "ComputePathToPose", changes = [[0, "idle", "running"], [0, "idle", "running"], [30, "running", "failure"], [30, "failure", "idle"], [30, "running", "idle"], [30, "idle", "success"], [40, "success", "idle"]];
+  const robot = { name: "", lines: [], parameters: [], changes: changes.map(([tick, before, status]) => ({ tick, node, before, status })) };
+  assert.deepEqual([29, 30].map((tick) => runningAt(robot, tick)), [[node], []]);
+  const steps = entriesOf([{ letter: "", rate: 100, robots: [robot] }]).filter(({ minor }) => !minor);
+  assert.deepEqual(steps.map(({ said, took, problem }) => [said, took, Boolean(problem)]), [["running", undefined, false], ["running", undefined, false], ["failure", 0.3, true], ["success", 0.3, false]]);
 });
 
 test("the parameters of two runs are side by side, and a run without parameters is left out", async () => {

@@ -6,43 +6,57 @@ const SIGNS_OF_STATUS = { success: "✓", failure: "✗", running: "▸", idle: 
 const ROWS_SHOWN = 160, ROWS_AHEAD = 30;
 
 const KINDS = {
-  steps: ["no resets", (entry) => !entry.reset],
+  steps: ["steps", (entry) => !entry.minor],
   problems: ["problems", (entry) => entry.problem],
   all: ["all", () => true],
 };
+const knownEntries = new WeakMap();
 
-/** All entries of the stacks of the runs, in order of time. A reset is a change to idle of a node that had ended. */
+/** All entries of the stacks of the runs, in order of time. */
 export function entriesOf(runs) {
+  if (knownEntries.has(runs)) return knownEntries.get(runs);
   const entries = runs.flatMap((run) => run.robots.flatMap((robot) => {
     const source = [run.letter, robot.name].filter(Boolean).join(" ");
-    const lines = robot.lines.map(([tick, severity, node, text]) => ({ seconds: tick / run.rate, source, node, status: severity, said: severity === "info" ? text : `${severity}: ${text}`, problem: severity !== "info" }));
-    return [...changesOfTree(robot, run.rate).map((change) => ({ ...change, source })), ...lines].map((entry) => ({ ...entry, run, robot }));
-  }));
-  for (const entry of entries) entry.search = `${entry.source} ${entry.node} ${entry.said}`.toLowerCase();
-  return entries.sort((a, b) => a.seconds - b.seconds);
+    const lines = robot.lines.map(([tick, severity, node, text]) => ({ tick, node, status: severity, said: severity === "info" ? text : `${severity}: ${text}`, problem: severity !== "info" }));
+    return [...changesOfTree(robot, run.rate), ...lines].map((entry) => ({ ...entry, run, robot, source, seconds: entry.tick / run.rate, search: `${source} ${entry.node} ${entry.said}`.toLowerCase() }));
+  })).sort((a, b) => a.seconds - b.seconds);
+  knownEntries.set(runs, entries);
+  return entries;
 }
 
-/** The changes of a behavior tree, with how long a node ran that ends.
+/** The changes of a behavior tree, with how long a node ran that ends. Several nodes may have one name.
  *
- * It is a problem if a node fails that was running. Others are conditions, for which to fail is an answer. */
+ * Minor are conditions, which never run, resets to idle, and what a recovery node does before it ends: it becomes idle.
+ * It is a problem if a node fails that was running; for a condition, to fail is an answer. */
 function changesOfTree(robot, rate) {
-  const begun = new Map();
-  return robot.changes.map(({ tick, node, before, status }) => {
-    const seconds = tick / rate, since = before === "running" ? begun.get(node) : undefined;
-    if (status === "running") begun.set(node, seconds);
-    const word = status === "idle" && before === "running" ? "halted" : status;
-    return { seconds, node, status, said: word, took: since === undefined ? undefined : seconds - since, reset: status === "idle" && before !== "running", problem: status === "failure" && before === "running" };
-  });
+  const everRun = new Set(robot.changes.filter(({ status }) => status === "running").map(({ node }) => node));
+  const begun = new Map(), halted = new Map();
+  const found = [];
+  for (const { tick, node, before, status } of robot.changes) {
+    const entry = { tick, node, status, said: status, minor: !everRun.has(node) || (status === "idle" && before !== "running") };
+    const halt = before === "idle" && status !== "running" ? halted.get(node) : undefined;
+    if (status === "running") begun.set(node, [...(begun.get(node) ?? []), tick]);
+    if (before === "running") entry.since = begun.get(node)?.pop();
+    if (halt?.tick === tick) [entry.since, halt.since, halt.said, halt.minor] = [halt.since, undefined, "idle", true];
+    if (before === "running" && status === "idle") entry.said = "halted";
+    halted.set(node, entry.said === "halted" ? entry : undefined);
+    if (entry.since !== undefined) entry.problem = status === "failure";
+    found.push(entry);
+  }
+  for (const entry of found) if (entry.since !== undefined) entry.took = (entry.tick - entry.since) / rate;
+  return found;
 }
 
 /** The nodes of a behavior tree that run at a tick, in the order in which they began. */
 export function runningAt(robot, tick) {
-  const running = new Set(), { changes } = robot;
-  for (let k = 0; k < changes.length && changes[k].tick <= tick; k++) {
-    if (changes[k].status === "running") running.add(changes[k].node);
-    else running.delete(changes[k].node);
+  const running = new Map();
+  for (const { tick: when, node, before, status } of robot.changes) {
+    if (when > tick) break;
+    const number = (running.get(node) ?? 0) + (status === "running") - (before === "running");
+    if (number > 0) running.set(node, number);
+    else running.delete(node);
   }
-  return [...running];
+  return [...running.keys()];
 }
 
 /** A list that follows the time; `seek` is called with the seconds of the entry that is clicked on. */
@@ -98,9 +112,10 @@ export class StackLog {
   #pick() {
     const words = this.filter.value.toLowerCase().split(/\s+/).filter(Boolean);
     const [, belongs] = KINDS[this.kind.value];
-    this.shown = this.entries.filter((entry) => belongs(entry) && words.every((word) => entry.search.includes(word)));
+    const found = this.entries.filter((entry) => belongs(entry) && words.every((word) => entry.search.includes(word)));
+    this.shown = joined(found);
     this.times = this.shown.map((entry) => entry.seconds);
-    this.count.textContent = `${this.shown.length} of ${this.entries.length}`;
+    this.count.textContent = `${found.length} of ${this.entries.length}`;
   }
 
   /** Put the rows around an entry into the list; the entry that has the focus keeps it. */
@@ -119,7 +134,7 @@ export class StackLog {
     return el("li", { "data-k": k }, el("button", { type: "button", class: `event of-stack ${entry.status}`, onclick: () => this.seek(entry.seconds) },
       el("span", { class: "when" }, clockText(entry.seconds)),
       el("span", { class: "mark", "aria-hidden": "true" }, SIGNS_OF_STATUS[entry.status] ?? "·"),
-      el("span", {}, entry.source ? el("span", { class: "quiet" }, `${entry.source} `) : null, el("b", {}, entry.node), ` ${entry.said}`),
+      el("span", {}, entry.source ? el("span", { class: "quiet" }, `${entry.source} `) : null, el("b", {}, entry.node), ` ${entry.said}${entry.times > 1 ? ` ×${entry.times}` : ""}`),
       entry.took === undefined ? null : el("span", { class: "took", title: "how long it ran" }, clockText(entry.took))));
   }
 
@@ -167,4 +182,15 @@ export class StackLog {
     row.firstElementChild.focus({ preventScroll: true });
     this.#reveal(row);
   }
+}
+
+/** The entries, with equal ones at one time that follow each other joined. */
+function joined(entries) {
+  const found = [];
+  for (const entry of entries) {
+    const last = found.at(-1);
+    if (last && last.seconds === entry.seconds && last.search === entry.search) found[found.length - 1] = { ...entry, times: last.times + 1 };
+    else found.push({ ...entry, times: 1 });
+  }
+  return found;
 }

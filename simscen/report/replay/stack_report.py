@@ -12,7 +12,8 @@ from simscen.report.display_text import escape_control, one_line
 from simscen.report.replay.packed_columns import PackedColumns
 
 MAX_TREE_CHANGES = 20_000
-"""Maximum number of changes of a behavior tree; the last ones are kept, because a run ends with its failure."""
+"""Maximum number of changes of a behavior tree. If there are more, conditions are left out, then the first changes."""
+_RUNNING = "RUNNING"
 MAX_LINES, MAX_LINE_CHARACTERS = 1000, 400
 """Maximum number of log lines, and the length of each."""
 MAX_PARAMETERS, MAX_VALUE_CHARACTERS = 3000, 300
@@ -47,8 +48,11 @@ def tree_of(log: Log, columns: PackedColumns) -> dict[str, Any] | None:
     changes = list(_tree_changes(log))
     if not changes:
         return None
-    kept = changes[-MAX_TREE_CHANGES:]
-    columns.note_reduction("changes of the behavior tree, the last ones", len(kept), len(changes))
+    kept = changes
+    if len(changes) > MAX_TREE_CHANGES:
+        running = {node for _, node, _, after in changes if after == _RUNNING}
+        kept = [change for change in changes if change[1] in running][-MAX_TREE_CHANGES:]
+    columns.note_reduction("changes of the behavior tree, without conditions", len(kept), len(changes))
     nodes = {node: number for number, node in enumerate(dict.fromkeys(change[1] for change in kept))}
     names = dict.fromkeys(status for change in kept for status in change[2:])
     statuses = {status: number for number, status in enumerate(names)}

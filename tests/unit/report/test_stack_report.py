@@ -120,6 +120,7 @@ def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.M
     monkeypatch.setattr(stack_report, "MAX_PARAMETERS", 1)
     lines: Sequence[tuple[int, int, str, str]] = [
         *(change(tick, "Root", "IDLE", "RUNNING") for tick in range(3)),
+        *(change(tick, "GoalUpdated", "IDLE", "FAILURE") for tick in range(2, 4)),
         (3, ERROR, "amcl", "first"),
         (4, ERROR, "amcl", "last"),
     ]
@@ -131,7 +132,7 @@ def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.M
     assert [text for *_, text in lines_of(log_, columns)] == ["last"]
     assert shown == [{"node": "/amcl", "values": [["max_particles", "2000", True]], "total": 2}]
     assert columns.left_out == [
-        "changes of the behavior tree, the last ones: 2 of 3",
+        "changes of the behavior tree, without conditions: 2 of 5",
         "parameters of the stack: 1 of 2",
         "log lines of the stack, the last ones: 1 of 2",
     ]
