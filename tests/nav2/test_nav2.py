@@ -12,6 +12,10 @@ import pytest
 import yaml
 from mcap.reader import make_reader
 
+from simscen.record.log_reader.read import read_run
+from simscen.report.replay.packed_columns import PackedColumns
+from simscen.report.replay.stack_report import parameters_of, tree_of
+
 pytestmark = pytest.mark.slow
 GOAL = "navigation/goal.scenario.yaml"
 DWB = {
@@ -68,6 +72,17 @@ def test_the_log_contains_what_nav2_computed(run) -> None:
     parameters = ended.about["parameters"]
     assert parameters["/controller_server"]["FollowPath.desired_linear_vel"] == 0.4
     assert parameters["/local_costmap/local_costmap"]["plugins"] == ["voxel_layer", "inflation_layer"]
+
+
+def test_the_replay_page_has_the_behavior_tree_and_the_parameters(run) -> None:
+    ended = run(GOAL)
+    assert ended.code == 0, ended.said
+    log, columns = read_run(next(ended.out.rglob("run.mcap")), with_sensors=True), PackedColumns()
+    tree = tree_of(log, columns)
+    assert tree is not None and {"NavigateRecovery", "ComputePathToPose", "FollowPath"} <= set(tree["nodes"])
+    assert {"idle", "running", "success"} <= set(tree["statuses"])
+    values = {node["node"]: {name: text for name, text, _ in node["values"]} for node in parameters_of(log, columns)}
+    assert values["/controller_server"]["FollowPath.desired_linear_vel"] == "0.4"
 
 
 def test_nav2_becomes_active_although_scans_are_delayed(run) -> None:

@@ -135,7 +135,7 @@ export class StackLog {
       el("span", { class: "when" }, clockText(entry.seconds)),
       el("span", { class: "mark", "aria-hidden": "true" }, SIGNS_OF_STATUS[entry.status] ?? "·"),
       el("span", {}, entry.source ? el("span", { class: "quiet" }, `${entry.source} `) : null, el("b", {}, entry.node), ` ${entry.said}${entry.times > 1 ? ` ×${entry.times}` : ""}`),
-      entry.took === undefined ? null : el("span", { class: "took", title: "how long it ran" }, clockText(entry.took))));
+      entry.took ? el("span", { class: "took", title: "how long it ran" }, clockText(entry.took)) : null));
   }
 
   /** Light up the newest entries, and scroll to them. */
