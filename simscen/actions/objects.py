@@ -18,7 +18,7 @@ from simscen.spec.moving_objects import Motion, Shaped
 from simscen.spec.places import MovableName, Name, PlaceOrPose
 from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength, PositiveDuration
 
-POSE_TOLERANCE = 1e-3
+POSE_TOLERANCE_M_RAD = 1e-3
 """Meters and radians within which an object is already at the requested pose."""
 
 
@@ -154,7 +154,11 @@ class Teleport(Spec, WorldAction):
         if current is None:
             return Effect(False, f"there is nothing called {self.name}")
         distance, is_moving = current.distance(target), stage.motion(self.name) is not None
-        if distance < POSE_TOLERANCE and abs(wrap(current.yaw - target.yaw)) < POSE_TOLERANCE and not is_moving:
+        if (
+            distance < POSE_TOLERANCE_M_RAD
+            and abs(wrap(current.yaw - target.yaw)) < POSE_TOLERANCE_M_RAD
+            and not is_moving
+        ):
             return Effect(False, f"{self.name} was already there")
         stage.place(self.name, target)
         return Effect(True, f"moved {self.name} by {distance:.2f} m to ({target.x:.2f}, {target.y:.2f})")

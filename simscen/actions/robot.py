@@ -14,7 +14,7 @@ from simscen.spec.base import Spec
 from simscen.spec.places import MovableName, Name, PlaceOrPose
 from simscen.spec.quantities import Force, Impulse, PositiveAngle, PositiveDuration, PositiveLength
 
-POSE_TOLERANCE = 1e-3
+POSE_TOLERANCE_M_RAD = 1e-3
 """Meters and radians within which the robot is already at the requested pose."""
 
 
@@ -33,7 +33,7 @@ class Kidnap(Spec, Action):
         """Move the robot; has no effect if it is already there."""
         current, target = stage.robot, self.pose.pose
         distance = current.distance(target)
-        if distance < POSE_TOLERANCE and abs(wrap(current.yaw - target.yaw)) < POSE_TOLERANCE:
+        if distance < POSE_TOLERANCE_M_RAD and abs(wrap(current.yaw - target.yaw)) < POSE_TOLERANCE_M_RAD:
             return Effect(False, "the robot was already there")
         stage.place_robot(target)
         return Effect(True, f"moved the robot by {distance:.2f} m to ({target.x:.2f}, {target.y:.2f})")

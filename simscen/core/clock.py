@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-DEFAULT_TICK_RATE = 240
+DEFAULT_TICK_RATE_HZ = 240
 
 
 @dataclass(frozen=True)
@@ -12,7 +12,7 @@ class Clock:
     `rate` is the number of physics ticks per second.
     """
 
-    rate: int = DEFAULT_TICK_RATE
+    rate: int = DEFAULT_TICK_RATE_HZ
 
     def seconds(self, tick: int) -> float:
         """Return the simulated time of `tick` in seconds."""

@@ -11,7 +11,7 @@ from simscen.core.environment.world_model import PedestrianAction, WalkingPedest
 from simscen.core.geometry import Array, Pose2
 from simscen.pedestrians import forces
 from simscen.pedestrians.forces import RELAXATION_TIME_S, Indices, MoveLimits, clip_moves, move_limits
-from simscen.pedestrians.pedestrian import SCARED_FORCE, THREATENING_SPEED, Intent, Pedestrian
+from simscen.pedestrians.pedestrian import SCARED_FORCE_M2_S2, THREATENING_SPEED_M_S, Intent, Pedestrian
 from simscen.pedestrians.surroundings import (
     REACH_M,
     NearestPoints,
@@ -24,11 +24,11 @@ from simscen.pedestrians.surroundings import (
 
 INTERACTION_RANGE_M = 10.0
 """Distance beyond which pedestrians do not react to each other (HuNavSim's max_dist_view)."""
-MIN_SOCIAL_FORCE = 0.05
+MIN_SOCIAL_FORCE_M_S2 = 0.05
 """m/s²; weaker social forces count as 0, so that a new pedestrian does not change others far away."""
 VIEW_CHECK_STEPS = 20
 """Number of steps between two checks whether the next corner of a path is still in view."""
-MIN_SPEED = 0.01
+MIN_SPEED_M_S = 0.01
 """m/s; pedestrians that would walk more slowly stand still."""
 REFERENCE_RADIUS_M = 0.25
 """Radius of the pedestrians with whom the parameters of the model were determined."""
@@ -83,7 +83,7 @@ class Crowd:
     def top_speed(self, name: str) -> float:
         """Return the maximum walking speed of a pedestrian in m/s."""
         spec = self._people[name].spec
-        return max(forces.MAX_SPEED_RATIO * spec.speed, THREATENING_SPEED)
+        return max(forces.MAX_SPEED_RATIO * spec.speed, THREATENING_SPEED_M_S)
 
     def step(self, surroundings: Surroundings, seconds: float) -> list[PedestrianAction]:
         """Move all pedestrians, each in a straight line. Return their actions."""
@@ -155,7 +155,7 @@ class Crowd:
             elif robot is not None and person.spec.behavior == "scared":
                 away = positions[number] - np.array(robot.pose[:2])
                 distance = max(math.hypot(*away), 1e-6)
-                force[number] += SCARED_FORCE / max(distance - person.spec.radius, 0.1) * away / distance
+                force[number] += SCARED_FORCE_M2_S2 / max(distance - person.spec.radius, 0.1) * away / distance
         return force
 
     def _social_forces(
@@ -175,7 +175,7 @@ class Crowd:
         force = forces.social(
             towards[person, other], velocities[person] - others.velocities[other], others.extra_radii[other]
         )
-        is_strong = np.hypot(force[:, 0], force[:, 1]) > MIN_SOCIAL_FORCE
+        is_strong = np.hypot(force[:, 0], force[:, 1]) > MIN_SOCIAL_FORCE_M_S2
         person, other, force = person[is_strong], other[is_strong], force[is_strong]
         visible = self._walls.visible(positions[person], others.positions[other])
         return _sum_by_person(person[visible], force[visible], len(people))
@@ -268,7 +268,7 @@ def _integrate(
     max_speeds = np.array([intent.max_speed for intent in intents])
     after = _limit_lengths(steady + (velocities - steady) * decay, max_speeds)
     moves = steady * seconds + (velocities - steady) * RELAXATION_TIME_S * (1 - decay)
-    is_standing = (np.hypot(*steady.T) < MIN_SPEED) & (np.hypot(*velocities.T) < MIN_SPEED)
+    is_standing = (np.hypot(*steady.T) < MIN_SPEED_M_S) & (np.hypot(*velocities.T) < MIN_SPEED_M_S)
     moves[is_standing] = after[is_standing] = 0.0
     return _limit_lengths(moves, max_speeds * seconds), after
 

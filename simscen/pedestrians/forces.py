@@ -23,21 +23,21 @@ RELAXATION_TIME_S = 0.54
 MAX_SPEED_RATIO = 1.3
 """Ratio of the maximum speed to the preferred speed [HM95]."""
 
-SOCIAL_STRENGTH = 4.5
+SOCIAL_STRENGTH_M_S2 = 4.5
 """A in m/s² [M09]."""
-LAMBDA = 2.0
+VELOCITY_WEIGHT_S_PER_M = 2.0
 """λ in s/m: weight of the relative velocity relative to the direction to the other [M09]."""
-GAMMA = 0.35
+RANGE_PER_INTERACTION_M = 0.35
 """γ in m: range of the interaction, B = γ|D| [M09]."""
-N_TURN, N_BRAKE = 2.0, 3.0
+TURN_DECAY_PER_M, BRAKE_DECAY_PER_M = 2.0, 3.0
 """n and n′ in 1/m: angular decay of the turning and of the braking force [M09]."""
-HEAD_ON_BIAS = 0.005
+HEAD_ON_BIAS_RAD_PER_M = 0.005
 """ε in rad/m: bias that makes pedestrians who meet exactly head-on evade to the right [M09]."""
 
-WALL_STRENGTH, WALL_RANGE_M = 3.0, 0.1
+WALL_STRENGTH_M_S2, WALL_RANGE_M = 3.0, 0.1
 """a in m/s² and b in m [M09]."""
 
-GAZE, COHERENCE, REPULSION = 4.0, 3.0, 1.0
+GAZE_WEIGHT_PER_RAD_S, COHERENCE_M_S2, REPULSION_M_S2 = 4.0, 3.0, 1.0
 """β₁ in 1/(rad s), β₂ and β₃ in m/s² [M10]."""
 HALF_VISION_RAD = math.pi / 2
 """Angle to each side in which a pedestrian sees its group without turning the head [M10]."""
@@ -54,22 +54,24 @@ def social(towards: Array, closing: Array, extra_radii: Array) -> Array:
     separation = np.hypot(towards[:, 0], towards[:, 1])
     distance = np.maximum(separation, 1e-6)
     along = towards / distance[:, np.newaxis]
-    interaction = LAMBDA * closing + along
+    interaction = VELOCITY_WEIGHT_S_PER_M * closing + along
     length = np.maximum(np.hypot(interaction[:, 0], interaction[:, 1]), 1e-6)
     t = interaction / length[:, np.newaxis]
     left = np.stack((-t[:, 1], t[:, 0]), axis=1)
-    interaction_range = GAMMA * length
-    angle = np.arctan2(np.sum(left * along, axis=1), np.sum(t * along, axis=1)) + HEAD_ON_BIAS * interaction_range
-    strength = SOCIAL_STRENGTH * np.exp(-np.maximum(distance - extra_radii, 0.0) / interaction_range)
-    brake = strength * np.exp(-((N_BRAKE * interaction_range * angle) ** 2))
-    turn = strength * np.exp(-((N_TURN * interaction_range * angle) ** 2)) * np.where(angle < 0, -1.0, 1.0)
+    interaction_range = RANGE_PER_INTERACTION_M * length
+    angle = (
+        np.arctan2(np.sum(left * along, axis=1), np.sum(t * along, axis=1)) + HEAD_ON_BIAS_RAD_PER_M * interaction_range
+    )
+    strength = SOCIAL_STRENGTH_M_S2 * np.exp(-np.maximum(distance - extra_radii, 0.0) / interaction_range)
+    brake = strength * np.exp(-((BRAKE_DECAY_PER_M * interaction_range * angle) ** 2))
+    turn = strength * np.exp(-((TURN_DECAY_PER_M * interaction_range * angle) ** 2)) * np.where(angle < 0, -1.0, 1.0)
     force: Array = -brake[:, np.newaxis] * t - turn[:, np.newaxis] * left
     return force
 
 
 def wall(directions: Array, gaps: Array) -> Array:
     """Return the repulsive forces (n, 2) of walls and objects `gaps` (n,) in m away, along `directions` (n, 2)."""
-    force: Array = (WALL_STRENGTH * np.exp(-np.maximum(gaps, 0.0) / WALL_RANGE_M))[:, np.newaxis] * directions
+    force: Array = (WALL_STRENGTH_M_S2 * np.exp(-np.maximum(gaps, 0.0) / WALL_RANGE_M))[:, np.newaxis] * directions
     return force
 
 
@@ -81,14 +83,14 @@ def group(positions: Array, velocities: Array) -> Array:
     forces = []
     for (x, y), (vx, vy) in zip(points, point_velocities, strict=True):
         ratio = count / (count - 1)  # of the distances to the centers of the others and of all
-        turn = GAZE * _head_turn(vx, vy, ratio * (mx - x), ratio * (my - y))
+        turn = GAZE_WEIGHT_PER_RAD_S * _head_turn(vx, vy, ratio * (mx - x), ratio * (my - y))
         fx, fy, distance = -turn * vx, -turn * vy, math.hypot(mx - x, my - y)
         if distance > (count - 1) / 2:
-            fx, fy = fx + COHERENCE * (mx - x) / distance, fy + COHERENCE * (my - y) / distance
+            fx, fy = fx + COHERENCE_M_S2 * (mx - x) / distance, fy + COHERENCE_M_S2 * (my - y) / distance
         for ox, oy in points:
             gap = math.hypot(x - ox, y - oy)
             if 0 < gap < MIN_GROUP_GAP_M:
-                fx, fy = fx + REPULSION * (x - ox) / gap, fy + REPULSION * (y - oy) / gap
+                fx, fy = fx + REPULSION_M_S2 * (x - ox) / gap, fy + REPULSION_M_S2 * (y - oy) / gap
         forces.append((fx, fy))
     return np.array(forces)
 

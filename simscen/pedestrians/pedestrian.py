@@ -14,17 +14,17 @@ CORNER_RADIUS_M = 0.5
 """Distance at which a corner counts as passed."""
 HALF_FIELD_OF_VIEW_RAD = math.pi / 2 + 0.17
 """Field of view to each side (HuNavSim's lineOfSight)."""
-MAX_TURN_RATE = math.pi
+MAX_TURN_RATE_RAD_S = math.pi
 """Maximum turn rate in rad/s (HuNavSim's max_ang_vel)."""
-MIN_TURNING_SPEED = 0.1
+MIN_TURNING_SPEED_M_S = 0.1
 """Speed in m/s above which a pedestrian turns to its direction of motion."""
 LOST_RANGE_RATIO = 1.5
 """Hysteresis: a reaction ends at this multiple of the distance at which it begins."""
-CURIOUS_SPEED, CURIOUS_DISTANCE_M = 1.8, 1.5
+CURIOUS_SPEED_M_S, CURIOUS_DISTANCE_M = 1.8, 1.5
 """Speed in m/s at which curious pedestrians approach, slower when nearer, and distance at which they stop."""
-SCARED_SPEED, SCARED_FORCE = 0.6, 4.0
+SCARED_SPEED_M_S, SCARED_FORCE_M2_S2 = 0.6, 4.0
 """Maximum speed in m/s of scared pedestrians, and repelling force times the gap, in m²/s² (20 x 0.2)."""
-THREATENING_SPEED, BLOCKING_DISTANCE_M, STARING_RANGE_M = 2.0, 1.1, 1.2
+THREATENING_SPEED_M_S, BLOCKING_DISTANCE_M, STARING_RANGE_M = 2.0, 1.1, 1.2
 """Maximum speed in m/s of threatening pedestrians, their distance in front of the robot, and the distance within which
 they look at it."""
 STOPPING_DISTANCE_M = 0.05
@@ -156,10 +156,10 @@ class Pedestrian:
             case "curious":
                 distance = math.dist(self.position, robot_position)
                 if distance <= max(CURIOUS_DISTANCE_M, robot.radius + self.spec.radius):
-                    return Intent(None, 0.0, CURIOUS_SPEED, robot_position, is_immovable=True)
-                return Intent(robot_position, CURIOUS_SPEED * distance / self.spec.reacts_within, CURIOUS_SPEED)
+                    return Intent(None, 0.0, CURIOUS_SPEED_M_S, robot_position, is_immovable=True)
+                return Intent(robot_position, CURIOUS_SPEED_M_S * distance / self.spec.reacts_within, CURIOUS_SPEED_M_S)
             case "scared":
-                return Intent(self._target(), SCARED_SPEED if not self.has_arrived else 0.0, SCARED_SPEED)
+                return Intent(self._target(), SCARED_SPEED_M_S if not self.has_arrived else 0.0, SCARED_SPEED_M_S)
             case "threatening":
                 return self._blocking_intent(robot)
             case _:
@@ -180,8 +180,8 @@ class Pedestrian:
         yaw = robot.pose.yaw
         target = robot.pose.x + gap * math.cos(yaw), robot.pose.y + gap * math.sin(yaw)
         is_near = math.dist(self.position, robot.pose[:2]) <= max(STARING_RANGE_M, gap + STOPPING_DISTANCE_M)
-        speed = min(THREATENING_SPEED, _braking(math.dist(self.position, target)))
-        return Intent(target, speed, THREATENING_SPEED, robot.pose[:2] if is_near else None)
+        speed = min(THREATENING_SPEED_M_S, _braking(math.dist(self.position, target)))
+        return Intent(target, speed, THREATENING_SPEED_M_S, robot.pose[:2] if is_near else None)
 
     # Motion
 
@@ -192,9 +192,9 @@ class Pedestrian:
         facing = self.yaw
         if looks_at is not None:
             facing = math.atan2(looks_at[1] - self.y, looks_at[0] - self.x)
-        elif math.hypot(*self.velocity) > MIN_TURNING_SPEED:
+        elif math.hypot(*self.velocity) > MIN_TURNING_SPEED_M_S:
             facing = math.atan2(self.velocity[1], self.velocity[0])
-        turn, max_turn = wrap(facing - self.yaw), MAX_TURN_RATE * seconds
+        turn, max_turn = wrap(facing - self.yaw), MAX_TURN_RATE_RAD_S * seconds
         self.yaw = wrap(self.yaw + max(-max_turn, min(max_turn, turn)))
 
 

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-ROUNDING = 1e-8
+ROUNDING_S = 1e-8
 """Tolerance in seconds for times that come from integer nanoseconds."""
 
 
@@ -56,7 +56,7 @@ class Goals:
 
     def accept(self) -> Goal | None:
         """Accept the next goal unless there is a current one; return the current goal, None if there is none yet."""
-        if self.current is None and self.waiting and self.now >= self._wait_until - ROUNDING:
+        if self.current is None and self.waiting and self.now >= self._wait_until - ROUNDING_S:
             self.current = self.waiting.pop(0)
             self.report("goal.accepted", self.current.name)
         return self.current

@@ -43,8 +43,8 @@ SENSORS = ("lidar", "odom", "imu")
 """Usual names of the sensors that faults are found for."""
 NEVER_KNOWN = "doors that open or close, pushes, slippery floor, and changes of the payload; add them by hand"
 """What no estimator looks for."""
-MIN_KIDNAP_M = 0.5
-MAX_KIDNAP_S = 0.3
+MIN_KIDNAP_M, MAX_KIDNAP_S = 0.5, 0.3
+"""Smallest jump of the true pose that is a kidnapping, and longest time between the two poses."""
 
 
 def find_all(

@@ -19,91 +19,91 @@ _COLUMNS = {
 Difference = tuple[int, str]
 
 
-def first_difference(one: Trace, other: Trace) -> str | None:
+def first_difference(first: Trace, second: Trace) -> str | None:
     """Return the first tick and field in which two traces differ by at least one bit, as text; None if they are equal.
 
     If several fields differ first at the same tick, the likely cause is named: truth before odometry before belief
     before command.
     """
-    if one.tick_rate != other.tick_rate:
-        return f"tick rate: {one.tick_rate} against {other.tick_rate} Hz"
-    differences = list(_differences(one, other))
+    if first.tick_rate != second.tick_rate:
+        return f"tick rate: {first.tick_rate} against {second.tick_rate} Hz"
+    differences = list(_differences(first, second))
     if not differences:
         return None
     tick, text = min(differences, key=lambda difference: difference[0])
-    return f"tick {tick} (t = {one.seconds(tick):.3f} s): {text}"
+    return f"tick {tick} (t = {first.seconds(tick):.3f} s): {text}"
 
 
-def _differences(one: Trace, other: Trace) -> Iterator[Difference]:
+def _differences(first: Trace, second: Trace) -> Iterator[Difference]:
     for name in ("truth", "velocity", "clearance", "odometry"):
-        yield from _in_samples(name, getattr(one, name), getattr(other, name))
+        yield from _in_samples(name, getattr(first, name), getattr(second, name))
     empty = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
-    for name in sorted({*one.objects, *other.objects}):
-        yield from _in_samples(f"object {name}", one.objects.get(name, empty), other.objects.get(name, empty))
-    yield from _in_samples("scan", *(Samples(t.scans, np.empty((len(t.scans), 0))) for t in (one, other)))
+    for name in sorted({*first.objects, *second.objects}):
+        yield from _in_samples(f"object {name}", first.objects.get(name, empty), second.objects.get(name, empty))
+    yield from _in_samples("scan", *(Samples(t.scans, np.empty((len(t.scans), 0))) for t in (first, second)))
     for name in ("belief", "command"):
-        yield from _in_samples(name, getattr(one, name), getattr(other, name))
-    for a, b in zip(one.plans, other.plans, strict=False):
+        yield from _in_samples(name, getattr(first, name), getattr(second, name))
+    for a, b in zip(first.plans, second.plans, strict=False):
         if a.tick != b.tick or a.points.tobytes() != b.points.tobytes():
-            yield min(a.tick, b.tick), f"plan: {len(a.points)} against {len(b.points)} poses, or other poses"
-    yield from _missing("plan", [p.tick for p in one.plans], [p.tick for p in other.plans])
-    for event, twin in zip(one.events, other.events, strict=False):
-        if repr(event) != repr(twin):
+            yield min(a.tick, b.tick), f"plan: {len(a.points)} against {len(b.points)} poses, or second poses"
+    yield from _missing("plan", [p.tick for p in first.plans], [p.tick for p in second.plans])
+    for event, other_event in zip(first.events, second.events, strict=False):
+        if repr(event) != repr(other_event):
             yield (
-                min(event.tick, twin.tick),
-                f"event: {event.kind} {event.name} against {twin.kind} {twin.name}",
+                min(event.tick, other_event.tick),
+                f"event: {event.kind} {event.name} against {other_event.kind} {other_event.name}",
             )
-    yield from _missing("event", [e.tick for e in one.events], [e.tick for e in other.events])
-    if one.end != other.end:
-        yield min(one.end, other.end), f"end of the run: tick {one.end} against {other.end}"
+    yield from _missing("event", [e.tick for e in first.events], [e.tick for e in second.events])
+    if first.end != second.end:
+        yield min(first.end, second.end), f"end of the run: tick {first.end} against {second.end}"
 
 
-def _in_samples(name: str, one: Samples, other: Samples) -> Iterator[Difference]:
+def _in_samples(name: str, first: Samples, second: Samples) -> Iterator[Difference]:
     """Yield the first row that differs, bit for bit (nan equals itself, 0.0 differs from -0.0)."""
-    n = min(len(one), len(other))
-    a, b = (np.ascontiguousarray(samples.values[:n]) for samples in (one, other))
+    n = min(len(first), len(second))
+    a, b = (np.ascontiguousarray(samples.values[:n]) for samples in (first, second))
     differs = a.view(np.int64) != b.view(np.int64)
-    rows = np.flatnonzero(differs.any(axis=1) | (one.ticks[:n] != other.ticks[:n]))
+    rows = np.flatnonzero(differs.any(axis=1) | (first.ticks[:n] != second.ticks[:n]))
     if not len(rows):
-        yield from _missing(name, one.ticks.tolist(), other.ticks.tolist())
+        yield from _missing(name, first.ticks.tolist(), second.ticks.tolist())
         return
     row = int(rows[0])
-    tick = int(min(one.ticks[row], other.ticks[row]))
+    tick = int(min(first.ticks[row], second.ticks[row]))
     columns = np.flatnonzero(differs[row])
-    if one.ticks[row] != other.ticks[row] or not len(columns):
-        yield tick, f"{name}: at tick {one.ticks[row]} against {other.ticks[row]}"
+    if first.ticks[row] != second.ticks[row] or not len(columns):
+        yield tick, f"{name}: at tick {first.ticks[row]} against {second.ticks[row]}"
         return
     column = int(columns[0])
     label = _COLUMNS.get(name, _POSE)[column]
     yield tick, f"{name}.{label}: {float(a[row, column])!r} against {float(b[row, column])!r}"
 
 
-def _missing(name: str, one: list[int], other: list[int]) -> Iterator[Difference]:
+def _missing(name: str, first: list[int], second: list[int]) -> Iterator[Difference]:
     """Yield a difference if one run has more ticks than the other."""
-    if len(one) != len(other):
-        longer = max(one, other, key=len)
-        yield longer[min(len(one), len(other))], f"{name}: {len(one)} against {len(other)}"
+    if len(first) != len(second):
+        longer = max(first, second, key=len)
+        yield longer[min(len(first), len(second))], f"{name}: {len(first)} against {len(second)}"
 
 
-POSE_TOLERANCE = 1e-5
+POSE_TOLERANCE_M_RAD = 1e-5
 """Tolerance for true poses in m and rad. Machines with different arithmetic differ by less than 1e-12 after 90 s."""
 
 
-def first_disagreement(one: Trace, other: Trace) -> str | None:
-    """Return the first tick at which true poses differ by more than POSE_TOLERANCE, as text; None if there is none."""
-    if one.tick_rate != other.tick_rate:
-        return f"tick rate: {one.tick_rate} against {other.tick_rate} Hz"
-    count = min(len(one.truth.ticks), len(other.truth.ticks))
-    distance = np.abs(one.truth.values[:count] - other.truth.values[:count])
+def first_disagreement(first: Trace, second: Trace) -> str | None:
+    """Return the first tick at which true poses differ by more than the tolerance, as text; None if there is none."""
+    if first.tick_rate != second.tick_rate:
+        return f"tick rate: {first.tick_rate} against {second.tick_rate} Hz"
+    count = min(len(first.truth.ticks), len(second.truth.ticks))
+    distance = np.abs(first.truth.values[:count] - second.truth.values[:count])
     distance[:, 2] = np.minimum(distance[:, 2], np.abs(2 * np.pi - distance[:, 2]))
     rows = np.flatnonzero(
-        (one.truth.ticks[:count] != other.truth.ticks[:count]) | ~(distance <= POSE_TOLERANCE).all(axis=1)
+        (first.truth.ticks[:count] != second.truth.ticks[:count]) | ~(distance <= POSE_TOLERANCE_M_RAD).all(axis=1)
     )
     if len(rows):
-        tick = int(one.truth.ticks[rows[0]])
+        tick = int(first.truth.ticks[rows[0]])
         x, y, yaw = distance[rows[0]].tolist()
-        when = f"tick {tick} (t = {one.seconds(tick):.3f} s)"
+        when = f"tick {tick} (t = {first.seconds(tick):.3f} s)"
         return f"{when}: the true pose differs by {x:.2g} m, {y:.2g} m, {yaw:.2g} rad"
-    if one.end != other.end:
-        return f"the runs end at ticks {one.end} and {other.end}"
+    if first.end != second.end:
+        return f"the runs end at ticks {first.end} and {second.end}"
     return None

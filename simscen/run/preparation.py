@@ -45,7 +45,7 @@ from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.routes.shortest_paths import Leg, legs_between
 from simscen.worlds.world_file import world_from_spec
 
-DEFAULT_LIDAR_HEIGHT = 0.2
+DEFAULT_LIDAR_HEIGHT_M = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +194,7 @@ def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | Non
 def lidar_height(robot: RobotSpec) -> float:
     """Return the height in m at which the world is mapped: that of the first lidar."""
     heights = [sensor.lidar.mount.z for sensor in robot.sensors.values() if sensor.lidar]
-    return heights[0] if heights else DEFAULT_LIDAR_HEIGHT
+    return heights[0] if heights else DEFAULT_LIDAR_HEIGHT_M
 
 
 def effective_stack(spec: ScenarioSpec) -> AnyStack:

@@ -14,8 +14,8 @@ from simscen.sim.simulation import FIRMWARE_RATE_HZ
 from simscen.sim.single_robot import SingleRobotSimulation
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
-TICK_RATE = 240
-COMMAND_PERIOD = TICK_RATE // FIRMWARE_RATE_HZ
+TICK_RATE_HZ = 240
+COMMAND_PERIOD = TICK_RATE_HZ // FIRMWARE_RATE_HZ
 """Ticks between two commands; the robot reaches each velocity before the next command."""
 REST_TICKS, SETTLING_TICKS = 240, 60
 """Ticks at rest before the first trial and after each leg."""

@@ -18,7 +18,7 @@ CORNER_TURN_S = 0.25
 """Time of turning before and after a corner, or a quarter of the time along a shorter leg."""
 SMOOTH_DURATION_FACTOR = 1.5
 """Duration of an eased leg from rest to rest, relative to a leg at constant speed with the same top speed."""
-LOOP_TOLERANCE = 1e-6
+LOOP_TOLERANCE_M_RAD = 1e-6
 """Largest difference in m and rad between the first and the last keyframe of a loop."""
 
 Keyframe = Annotated[tuple[Duration, Length, Length, Angle], Field(strict=False)]
@@ -76,7 +76,7 @@ class Motion(Spec):
         if self.repeat != "once" and (first[0] > 0 or len(self.keyframes) == 1):
             raise ValueError(f"`repeat: {self.repeat}` needs two keyframes or more, the first of them at 0 s")
         difference = max(math.dist(first[1:3], last[1:3]), abs(wrap(last[3] - first[3])))
-        if self.repeat == "loop" and difference > LOOP_TOLERANCE:
+        if self.repeat == "loop" and difference > LOOP_TOLERANCE_M_RAD:
             raise ValueError("the last keyframe of a loop must have the same pose as the first keyframe")
         duration = last[0] * (2 if self.repeat == "back_and_forth" else 1)
         if self.phase and self.phase >= duration:

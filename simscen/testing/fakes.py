@@ -135,7 +135,7 @@ class FakeStage:
         self.done.append(("record_event", event))
 
 
-LINEAR_SPEED, ANGULAR_SPEED = 0.3, 0.2
+LINEAR_SPEED_M_S, ANGULAR_SPEED_RAD_S = 0.3, 0.2
 """Speeds of the robot in m/s and rad/s."""
 ROOM_HALF_WIDTH_M = 4.0
 """Half of the side length of the room."""
@@ -149,13 +149,17 @@ class FakeSensorView:
 
     def base_pose(self) -> Pose3:
         """Return a pose on a circle around (0, 1.5)."""
-        yaw, radius = ANGULAR_SPEED * self.seconds, LINEAR_SPEED / ANGULAR_SPEED
+        yaw, radius = ANGULAR_SPEED_RAD_S * self.seconds, LINEAR_SPEED_M_S / ANGULAR_SPEED_RAD_S
         return Pose3.planar(Pose2(radius * math.sin(yaw), radius * (1 - math.cos(yaw)), yaw))
 
     def base_velocity(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Return the velocity in the world frame."""
-        yaw = ANGULAR_SPEED * self.seconds
-        return (LINEAR_SPEED * math.cos(yaw), LINEAR_SPEED * math.sin(yaw), 0.0), (0.0, 0.0, ANGULAR_SPEED)
+        yaw = ANGULAR_SPEED_RAD_S * self.seconds
+        return (LINEAR_SPEED_M_S * math.cos(yaw), LINEAR_SPEED_M_S * math.sin(yaw), 0.0), (
+            0.0,
+            0.0,
+            ANGULAR_SPEED_RAD_S,
+        )
 
     def placements(self) -> int:
         """Return 0: the robot is never placed elsewhere."""
@@ -164,7 +168,7 @@ class FakeSensorView:
     def encoders(self) -> tuple[float, ...]:
         """Return the angles of the left and the right wheel in rad."""
         half = DRIVE.wheel_separation / 2
-        left, right = (LINEAR_SPEED - ANGULAR_SPEED * half), (LINEAR_SPEED + ANGULAR_SPEED * half)
+        left, right = (LINEAR_SPEED_M_S - ANGULAR_SPEED_RAD_S * half), (LINEAR_SPEED_M_S + ANGULAR_SPEED_RAD_S * half)
         return tuple(speed * self.seconds / DRIVE.wheel_radius for speed in (left, right))
 
     def touching(self) -> bool:

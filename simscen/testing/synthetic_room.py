@@ -19,9 +19,9 @@ from simscen.model.localizers import LocalizerSpec
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 from simscen.stack.setting import Setting
 
-TICK_RATE, ODOMETRY_PERIOD, SCAN_PERIOD = 240, 6, 24
+TICK_RATE_HZ, ODOMETRY_PERIOD, SCAN_PERIOD = 240, 6, 24
 READINGS_PER_SCAN = SCAN_PERIOD // ODOMETRY_PERIOD
-RANGE_MAX, BEAMS = 12.0, 360
+RANGE_MAX_M, BEAMS = 12.0, 360
 # Boxes as (left, bottom, right, top) in m: four walls of different depth, then furniture.
 BOXES = np.array([
     (-5.07, -4.03, 5.12, -3.87), (-5.07, 3.91, 5.12, 4.06), (-5.07, -4.03, -4.88, 4.06), (4.93, -4.03, 5.12, 4.06),
@@ -81,7 +81,7 @@ def record(truth: Array) -> Drive:
 @cache
 def drive(seconds: float, first: int = 0) -> Drive:
     """Return a drive through the room at up to 0.5 m/s and 1 rad/s, from the waypoint `first`."""
-    dt, pose, goal = ODOMETRY_PERIOD / TICK_RATE, Pose2(*WAYPOINTS[first], 0.0), first + 1
+    dt, pose, goal = ODOMETRY_PERIOD / TICK_RATE_HZ, Pose2(*WAYPOINTS[first], 0.0), first + 1
     truth = [pose]
     for _ in range(round(seconds / dt)):
         waypoint = Pose2(*WAYPOINTS[goal % len(WAYPOINTS)])
@@ -96,7 +96,7 @@ def drive(seconds: float, first: int = 0) -> Drive:
 
 def surroundings(room: OccupancyGrid | None = None) -> Surroundings:
     """Return the surroundings for a stack in the room."""
-    return Surroundings(ROBOT, grid() if room is None else room, TICK_RATE)
+    return Surroundings(ROBOT, grid() if room is None else room, TICK_RATE_HZ)
 
 
 def localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
@@ -127,7 +127,7 @@ def run(
     """Return the beliefs (k) of a localizer, one for each row of the truth."""
     rng, beliefs = np.random.default_rng((seed, 2)), []
     ranges = drive.ranges + rng.normal(0, noise.lidar, drive.ranges.shape)
-    ranges = np.where(ranges < RANGE_MAX, np.round(ranges, 3), np.inf)
+    ranges = np.where(ranges < RANGE_MAX_M, np.round(ranges, 3), np.inf)
     odometry, bias = Pose2(0, 0, 0), rng.normal(0, noise.gyro_bias)
     for row, step in enumerate(drive.steps):
         tick, distance = row * ODOMETRY_PERIOD, float(np.hypot(step[0], step[1]))
@@ -135,7 +135,7 @@ def run(
         scale = 1 + rng.normal() * noise.translation * np.sqrt(distance) / max(distance, 1e-9)
         odometry = odometry.compose(Pose2(step[0] * scale, step[1] * scale, step[2] + rng.normal() * heading_std))
         if imu and row:
-            rate = step[2] * TICK_RATE / ODOMETRY_PERIOD + bias + rng.normal() * noise.gyro
+            rate = step[2] * TICK_RATE_HZ / ODOMETRY_PERIOD + bias + rng.normal() * noise.gyro
             subject.on_imu(Imu("imu", tick, (0.0, 0.0, rate), (0.0, 0.0, 9.81)))
         subject.on_odometry(Odometry("odom", tick, odometry, Twist()))
         if tick % SCAN_PERIOD == 0:
@@ -150,7 +150,7 @@ def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
         "angle_min": -np.pi,
         "angle_increment": 2 * np.pi / max(len(ranges), 1),
         "range_min": 0.05,
-        "range_max": RANGE_MAX,
+        "range_max": RANGE_MAX_M,
     }
     return Scan("lidar", tick, ranges, **(defaults | changes))  # type: ignore[arg-type]
 

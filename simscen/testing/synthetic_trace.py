@@ -12,7 +12,7 @@ from simscen.core.records.case import CLEARANCE_RANGE, Case, Passage
 from simscen.core.records.events import Disturbance, Event, EventKind
 from simscen.core.records.trace import Samples, Ticks, Trace
 
-TICK_RATE, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
+TICK_RATE_HZ, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
 
 
 def synthetic_trace(description: Mapping[str, Any]) -> Trace:
@@ -23,11 +23,11 @@ def synthetic_trace(description: Mapping[str, Any]) -> Trace:
     scans: intervals [from, to] with scans · events: [t, kind, name, {data}] · plans: [t, [[x, y], …]] · objects:
     {name: waypoints} · ended: why the run ended; null for a truncated log.
     """
-    end = round(description["seconds"] * TICK_RATE)
+    end = round(description["seconds"] * TICK_RATE_HZ)
     ticks = np.arange(0, end + 1, TRUTH_PERIOD, dtype=np.int64)
     truth = _poses_at(description["truth"], ticks)
     return Trace(
-        tick_rate=TICK_RATE,
+        tick_rate=TICK_RATE_HZ,
         truth=truth,
         velocity=Samples(ticks, _velocity(truth)),
         clearance=_clearance(description.get("clearance", 1.0), ticks),
@@ -35,7 +35,7 @@ def synthetic_trace(description: Mapping[str, Any]) -> Trace:
         odometry=truth,
         command=Samples(ticks, _velocity(truth)),
         scans=_scans(description.get("scans", [[0, description["seconds"]]]), end),
-        plans=tuple(Path(_path_points(points), round(t * TICK_RATE)) for t, points in description.get("plans", [])),
+        plans=tuple(Path(_path_points(points), round(t * TICK_RATE_HZ)) for t, points in description.get("plans", [])),
         events=_events(description, end),
         objects={
             name: _poses_at(waypoints, ticks) for name, waypoints in sorted(description.get("objects", {}).items())
@@ -47,7 +47,7 @@ def synthetic_trace(description: Mapping[str, Any]) -> Trace:
 def _poses_at(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
     """Return x, y, yaw at `ticks`, interpolated between waypoints; headings turn the shorter way."""
     points = np.array([[*point, 0.0][:4] for point in waypoints], dtype=np.float64)
-    times = ticks / TICK_RATE
+    times = ticks / TICK_RATE_HZ
     columns = [np.interp(times, points[:, 0], points[:, axis]) for axis in (1, 2)]
     yaw = wrap_array(np.interp(times, points[:, 0], np.unwrap(points[:, 3])))
     return Samples(ticks, np.column_stack((*columns, yaw)))
@@ -57,7 +57,7 @@ def _velocity(truth: Samples) -> Array:
     """Return vx, vy, wz in the base frame over the step after each sample; the last value is repeated."""
     if len(truth) < 2:
         return np.zeros((len(truth), 3))
-    step = np.diff(truth.ticks) / TICK_RATE
+    step = np.diff(truth.ticks) / TICK_RATE_HZ
     dx, dy, turn = np.diff(truth.values, axis=0).T / step
     turn = wrap_array(turn * step) / step
     c, s = np.cos(truth.values[:-1, 2]), np.sin(truth.values[:-1, 2])
@@ -79,14 +79,14 @@ def _belief(description: Any, truth: Sequence[Sequence[float]], end: int) -> Sam
 
 def _clearance(values: Any, ticks: Ticks) -> Samples:
     points = np.array([[0.0, values]] if isinstance(values, int | float) else values, dtype=np.float64)
-    return Samples(ticks, np.interp(ticks / TICK_RATE, points[:, 0], points[:, 1])[:, np.newaxis])
+    return Samples(ticks, np.interp(ticks / TICK_RATE_HZ, points[:, 0], points[:, 1])[:, np.newaxis])
 
 
 def _scans(intervals: Sequence[Sequence[float]], end: int) -> Ticks:
     ticks = np.arange(0, end + 1, SCAN_PERIOD, dtype=np.int64)
     has_scan = np.zeros(len(ticks), dtype=bool)
     for begin, until in intervals:
-        has_scan |= (ticks >= begin * TICK_RATE) & (ticks <= until * TICK_RATE)
+        has_scan |= (ticks >= begin * TICK_RATE_HZ) & (ticks <= until * TICK_RATE_HZ)
     return ticks[has_scan]
 
 
@@ -94,7 +94,7 @@ def _events(description: Mapping[str, Any], end: int) -> tuple[Event, ...]:
     events = []
     for seconds, kind, *rest in description.get("events", []):
         name, data = [*rest, "", {}][:2] if len(rest) != 1 else (rest[0], {})
-        events.append(Event(round(seconds * TICK_RATE), kind, name, data))
+        events.append(Event(round(seconds * TICK_RATE_HZ), kind, name, data))
     ended = description.get("ended", "navigation ended")
     return (*events, *([] if ended is None else [Event(end, EventKind.RUN_ENDED, ended)]))
 

@@ -18,7 +18,7 @@ from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.core.random_streams import Streams
 
-TIME_LIMIT = 100.0
+TIME_LIMIT_S = 100.0
 DWA = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
 """Published results of the dynamic window approach at 0.5 m/s in 50 worlds with 10 runs each."""
 

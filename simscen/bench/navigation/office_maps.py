@@ -15,7 +15,7 @@ from simscen.core.random_streams import Streams
 
 FINE_CELL_M = 0.05
 """Cell size in which a floor is drawn, before it is reduced to the resolution of its map."""
-RESOLUTIONS = (0.05, 0.05, 0.10, 0.15, 0.20, 0.25)
+RESOLUTIONS_M = (0.05, 0.05, 0.10, 0.15, 0.20, 0.25)
 FLOOR_WIDTHS_M, FLOOR_DEPTHS_M = (20.0, 45.0), (12.0, 28.0)
 """Ranges of width and depth of a floor in m."""
 CORRIDOR_WIDTHS_M, DOOR_WIDTHS_M = (1.7, 2.6), (0.9, 1.3)
@@ -42,7 +42,7 @@ class _Floor:
 def building(number: int) -> tuple[Image, float]:
     """Generate the map of the floor with this number (from 1). Return the image and its resolution in m."""
     rng = Streams(number).generator("building")
-    resolution = RESOLUTIONS[number % len(RESOLUTIONS)]
+    resolution = RESOLUTIONS_M[number % len(RESOLUTIONS_M)]
     width, depth = float(rng.uniform(*FLOOR_WIDTHS_M)), float(rng.uniform(*FLOOR_DEPTHS_M))
     image = np.full((int(depth / FINE_CELL_M), int(width / FINE_CELL_M)), FREE, np.uint8)
     floor = _Floor(image, float(rng.choice([0.05, 0.1, 0.2])))

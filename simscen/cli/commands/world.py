@@ -32,7 +32,7 @@ Root = Annotated[Path | None, typer.Option(help="Root folder; the world may only
 WorldPath = Annotated[list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")]
 Lenient = Annotated[bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")]
 Height = Annotated[float, typer.Option(min=0.0, max=100.0, help="Height of the lidar in meters.")]
-LIDAR_HEIGHT = 0.2
+LIDAR_HEIGHT_M = 0.2
 
 
 @app.callback()
@@ -44,7 +44,7 @@ def _world() -> None:
 def inspect(
     path: File,
     png: Annotated[Path | None, typer.Option(help="Draw the cross-section at lidar height and the map (png).")] = None,
-    height: Height = LIDAR_HEIGHT,
+    height: Height = LIDAR_HEIGHT_M,
     everything: Annotated[bool, typer.Option("--all", help="List all solids instead of the first ones.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
     root: Root = None,
@@ -78,7 +78,7 @@ def inspect(
 def export(
     path: File,
     map_: Annotated[Path, typer.Option("--map", help="Map YAML file to write; its image (pgm) is written beside it.")],
-    height: Height = LIDAR_HEIGHT,
+    height: Height = LIDAR_HEIGHT_M,
     resolution: Annotated[float, typer.Option(min=0.005, max=1.0, help="Cell size in meters.")] = 0.05,
     root: Root = None,
     world_path: WorldPath = None,
@@ -104,7 +104,7 @@ def export(
 def convert(
     path: File,
     out: Annotated[Path, typer.Argument(help="*.world.yaml file to write.")],
-    height: Height = LIDAR_HEIGHT,
+    height: Height = LIDAR_HEIGHT_M,
     root: Root = None,
     world_path: WorldPath = None,
     lenient: Lenient = False,

@@ -41,10 +41,10 @@ Seconds = Callable[[int], float]
 def goals_of(messages: LogMessages, seconds: Seconds, poses: TimedValues) -> tuple[tuple[RecordedGoal, ...], str]:
     """Return the goals of a drive and the final result of the navigation, "" if unknown."""
     sent = [
-        RecordedGoal("", Pose2(*planar_pose(one.message.pose)), seconds(one.logged), source="/goal_pose")
-        for one in messages.of("goal")
+        RecordedGoal("", Pose2(*planar_pose(message.content.pose)), seconds(message.log_time), source="/goal_pose")
+        for message in messages.of("goal")
     ]
-    events = [(seconds(one.logged), event_text.from_json(one.message)) for one in messages.of("events")]
+    events = [(seconds(message.log_time), event_text.from_json(message.content)) for message in messages.of("events")]
     if events:
         return tuple(_with_events(sent, events)), _result(events)
     if not sent:
@@ -82,7 +82,7 @@ def _result(events: Sequence[tuple[float, Event]]) -> str:
 
 def _with_status(sent: Sequence[RecordedGoal], messages: LogMessages, seconds: Seconds) -> Iterator[RecordedGoal]:
     """Yield the goals with the results of their actions, if the log has as many actions as goals."""
-    states = [(one.logged, one.message) for one in messages.of("status")]
+    states = [(message.log_time, message.content) for message in messages.of("status")]
     names = [str(number) for number in range(len(sent))]
     events = goal_events(states, names) if states and sent else "no status"
     if isinstance(events, str):
@@ -103,12 +103,12 @@ def _with_status(sent: Sequence[RecordedGoal], messages: LogMessages, seconds: S
 def _ends_of_plans(messages: LogMessages, seconds: Seconds) -> Iterator[RecordedGoal]:
     """Yield a goal for each plan that ends elsewhere than the previous one."""
     last: Pose2 | None = None
-    for one in messages.of("plan"):
-        if not len(one.message.poses):
+    for message in messages.of("plan"):
+        if not len(message.content.poses):
             continue
-        end = Pose2(*planar_pose(tuple(one.message.poses[-1].tolist())))
+        end = Pose2(*planar_pose(tuple(message.content.poses[-1].tolist())))
         if last is None or end.distance(last) > SAME_GOAL_M:
-            yield RecordedGoal("", end, seconds(one.logged), source="end of the plan on /plan")
+            yield RecordedGoal("", end, seconds(message.log_time), source="end of the plan on /plan")
         last = end
 
 

@@ -17,12 +17,12 @@ from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader, decode_checked
 
 
-class Logged(NamedTuple):
-    """A decoded message; `logged` and `stamp` are in ns, and `stamp` is 0 if the message has none."""
+class LoggedMessage(NamedTuple):
+    """A decoded message, with the time at which it was logged and its stamp in ns; 0 if it has no stamp."""
 
-    logged: int
+    log_time: int
     stamp: int
-    message: Any
+    content: Any
 
 
 class ImuMessage(NamedTuple):
@@ -94,11 +94,11 @@ _DECODERS: Mapping[str, Decoders] = {
 class LogMessages:
     """Messages of a log by role, in the order of logging, and the message types of all its topics."""
 
-    by_role: dict[str, list[Logged]] = field(default_factory=dict)
+    by_role: dict[str, list[LoggedMessage]] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
     is_complete: bool = True
 
-    def of(self, role: str) -> list[Logged]:
+    def of(self, role: str) -> list[LoggedMessage]:
         """Return the messages of a role."""
         return self.by_role.get(role, [])
 
@@ -117,7 +117,7 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
         roles[prefix + truth.removeprefix(prefix)] = "truth"
     stream = open_messages(path, _AnyTopic(roles) if path.is_dir() else roles)
     messages = LogMessages()
-    other_scans: dict[str, list[Logged]] = {}
+    other_scans: dict[str, list[LoggedMessage]] = {}
     for raw in stream:
         role = roles.get(raw.topic)
         if role is not None and raw.type in _DECODERS[role]:
@@ -126,11 +126,11 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
             other_scans.setdefault(raw.topic, []).append(_decoded(raw, "scan"))
     if not messages.of("scan") and other_scans:
         messages.by_role["scan"] = other_scans[min(other_scans)]
-    own = {name: kind for name, kind in stream.topics.items() if not robot or name.startswith(f"{prefix}/")}
-    messages.topics = {name.removeprefix(prefix): kind for name, kind in own.items()}
+    robot_topics = {name: kind for name, kind in stream.topics.items() if not robot or name.startswith(f"{prefix}/")}
+    messages.topics = {name.removeprefix(prefix): kind for name, kind in robot_topics.items()}
     messages.is_complete = stream.complete
-    for logged in messages.by_role.values():
-        logged.sort(key=lambda one: one.logged)
+    for role_messages in messages.by_role.values():
+        role_messages.sort(key=lambda message: message.log_time)
     return messages
 
 
@@ -144,30 +144,30 @@ class _AnyTopic:
         return topic in self._roles or "scan" in str(topic)
 
 
-def _decoded(raw: RawMessage, role: str) -> Logged:
+def _decoded(raw: RawMessage, role: str) -> LoggedMessage:
     if raw.encoding != "cdr":
         raise UnusableLog(f"{raw.topic} is encoded as {raw.encoding or 'something unknown'}, not as CDR")
     try:
         message = _DECODERS[role][raw.type](raw.data)
     except (struct.error, ValueError, UnicodeDecodeError, OverflowError) as error:
         raise UnusableLog(f"a message of {raw.topic} cannot be read as {raw.type}: {error}") from error
-    return Logged(raw.time, _stamp(message), message)
+    return LoggedMessage(raw.time, _stamp(message), message)
 
 
-def _without_robot(logged: Logged, robot: str) -> Logged:
+def _without_robot(message: LoggedMessage, robot: str) -> LoggedMessage:
     """Return a message without the name of the robot in its frames."""
     if not robot:
-        return logged
+        return message
     frames = RobotFrames(robot)
 
-    def stripped(message: Any) -> Any:
-        names = [name for name in ("frame", "child") if name in getattr(message, "_fields", ())]
-        return message._replace(**{name: frames.stack_frame(getattr(message, name)) for name in names})
+    def stripped(part: Any) -> Any:
+        names = [name for name in ("frame", "child") if name in getattr(part, "_fields", ())]
+        return part._replace(**{name: frames.stack_frame(getattr(part, name)) for name in names})
 
-    message = logged.message
-    if isinstance(message, list) and message and hasattr(message[0], "_fields"):
-        return logged._replace(message=[stripped(one) for one in message])
-    return logged._replace(message=stripped(message)) if hasattr(message, "_fields") else logged
+    content = message.content
+    if isinstance(content, list) and content and hasattr(content[0], "_fields"):
+        return message._replace(content=[stripped(part) for part in content])
+    return message._replace(content=stripped(content)) if hasattr(content, "_fields") else message
 
 
 def _stamp(message: Any) -> int:

@@ -10,6 +10,7 @@ from simscen.core.geometry import Array, wrap_array
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValues
 
 STEP_S = 0.5
+"""Duration of a step."""
 MAX_STEP_M = 2.0
 """Longer steps are jumps of the pose, not motion."""
 

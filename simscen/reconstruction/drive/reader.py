@@ -15,7 +15,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.reconstruction.drive.drive_window import from_first_goal
 from simscen.reconstruction.drive.goals import goals_of
-from simscen.reconstruction.drive.log_messages import Logged, LogMessages, collect_messages
+from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, collect_messages
 from simscen.reconstruction.drive.recorded_drive import Polygon, RecordedDrive, Scans, TimedValues, no_values
 from simscen.record import topics
 from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
@@ -26,8 +26,13 @@ from simscen.record.messages.decode import ScanMessage, StampedPose
 BASE_FRAMES = ("base_link", "base_footprint")
 NO_TRUTH = "none"
 MAX_CLOCK_DIFFERENCE_NS = 10 * NS_PER_SECOND
-"""Maximum difference between stamps and times of logging of one clock."""
+"""Maximum difference between stamps and times of logging of message clock."""
 MIN_POSES = 2
+"""Number of poses that a source of poses needs."""
+DEFAULT_LIDAR_HEIGHT_M, MIN_LIDAR_HEIGHT_M = 0.2, 0.05
+"""Height of a lidar with unknown mount, and smallest height of any lidar."""
+MAX_FOOTPRINT_M = 5.0
+"""Largest coordinate of a footprint; larger polygons are something else."""
 
 
 @dataclass(frozen=True)
@@ -53,19 +58,19 @@ def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
 
 
 class _DriveReader:
-    """Converts the messages of one log."""
+    """Converts the messages of message log."""
 
     def __init__(self, path: Path, messages: LogMessages) -> None:
         self._path, self._messages = path, messages
         self._notes: list[str] = []
-        moving = [one for role, logged in messages.by_role.items() if role not in _LATCHED for one in logged]
+        moving = [message for role, logged in messages.by_role.items() if role not in _LATCHED for message in logged]
         if not moving:
             names = ", ".join(sorted(messages.topics)[:12]) or "none"
             raise UnusableLog("it has no messages of a drive", f"its topics: {names}; name others with --topic")
-        own = topics.EVENTS.name in messages.topics
-        self._start = 0 if own else min(one.logged for one in moving)
+        has_events = topics.EVENTS.name in messages.topics
+        self._start = 0 if has_events else min(message.log_time for message in moving)
         self._stamp_start = self._start + self._clock_offset()
-        self._end = max(one.logged for one in moving)
+        self._end = max(message.log_time for message in moving)
         if not messages.is_complete:
             self._notes.append("the log is truncated; the scenario covers what it holds")
 
@@ -74,7 +79,9 @@ class _DriveReader:
         poses, source, independent = self._poses(odometry, belief)
         scans = self._scans()
         duration = (self._end - self._start) / NS_PER_SECOND
-        commands = self._signal("cmd_vel", [tuple(one.message.values) for one in self._messages.of("cmd_vel")], 3)
+        commands = self._signal(
+            "cmd_vel", [tuple(message.content.values) for message in self._messages.of("cmd_vel")], 3
+        )
         goals, result = goals_of(self._messages, self._seconds, poses)
         return RecordedDrive(
             name=self._path.stem,
@@ -86,8 +93,8 @@ class _DriveReader:
             corrections=self._poses_of_tf("map", "odom") or no_values(3),
             odometry=odometry,
             commands=commands,
-            turn_rates=self._signal("imu", [(one.message.turn_rate,) for one in self._messages.of("imu")], 1),
-            bumper=self._signal("bumper", [(float(one.message),) for one in self._messages.of("bumper")], 1),
+            turn_rates=self._signal("imu", [(message.content.turn_rate,) for message in self._messages.of("imu")], 1),
+            bumper=self._signal("bumper", [(float(message.content),) for message in self._messages.of("bumper")], 1),
             scans=scans,
             map=self._map(),
             goals=goals,
@@ -99,10 +106,10 @@ class _DriveReader:
     def _clock_offset(self) -> int:
         """Return how much later the clock of the stamps is in ns, or 0 if it is the clock of logging."""
         differences = [
-            one.stamp - one.logged
+            message.stamp - message.log_time
             for role in ("scan", "odom", "amcl_pose", "truth")
-            for one in self._messages.of(role)
-            if one.stamp
+            for message in self._messages.of(role)
+            if message.stamp
         ]
         if not differences:
             return 0
@@ -115,12 +122,12 @@ class _DriveReader:
     def _seconds(self, logged: int) -> float:
         return (logged - self._start) / NS_PER_SECOND
 
-    def _times(self, messages: Sequence[Logged]) -> tuple[Array, Array]:
+    def _times(self, messages: Sequence[LoggedMessage]) -> tuple[Array, Array]:
         """Return the times of measurement and of logging in s."""
-        arrivals = np.array([one.logged - self._start for one in messages], dtype=np.float64) / NS_PER_SECOND
-        if not any(one.stamp for one in messages):
+        arrivals = np.array([message.log_time - self._start for message in messages], dtype=np.float64) / NS_PER_SECOND
+        if not any(message.stamp for message in messages):
             return arrivals, arrivals
-        stamps = np.array([one.stamp - self._stamp_start for one in messages], dtype=np.float64) / NS_PER_SECOND
+        stamps = np.array([message.stamp - self._stamp_start for message in messages], dtype=np.float64) / NS_PER_SECOND
         return stamps, arrivals
 
     def _signal(self, role: str, rows: Sequence[Sequence[float]], columns: int) -> TimedValues:
@@ -134,18 +141,24 @@ class _DriveReader:
 
     def _odometry(self) -> TimedValues:
         messages = self._messages.of("odom")
-        rows = [(*planar_pose(one.message.pose), *(one.message.twist or (0.0, 0.0, 0.0))) for one in messages]
+        rows = [
+            (*planar_pose(message.content.pose), *(message.content.twist or (0.0, 0.0, 0.0))) for message in messages
+        ]
         return self._signal("odom", rows, 6)
 
     def _belief(self) -> TimedValues:
         messages = self._messages.of("amcl_pose")
-        rows = [(*planar_pose(one.message.pose), *one.message.covariance) for one in messages]
+        rows = [(*planar_pose(message.content.pose), *message.content.covariance) for message in messages]
         return self._signal("amcl_pose", rows, 9)
 
     def _poses(self, odometry: TimedValues, belief: TimedValues) -> tuple[TimedValues, str, bool]:
         """Return the best known poses in the map frame, their source, and whether they are a ground truth."""
         if truth := self._messages.of("truth"):
-            return self._signal("truth", [planar_pose(one.message.pose) for one in truth], 3), "ground truth", True
+            return (
+                self._signal("truth", [planar_pose(message.content.pose) for message in truth], 3),
+                "ground truth",
+                True,
+            )
         for base in BASE_FRAMES:
             poses = self._poses_of_tf("map", base)
             if poses is not None:
@@ -183,25 +196,25 @@ class _DriveReader:
     def _transforms(self) -> TransformTree:
         tree = TransformTree()
         for role in ("tf_static", "tf"):
-            for one in self._messages.of(role):
-                tree.add(one.logged, one.message, static=role == "tf_static")
+            for message in self._messages.of(role):
+                tree.add(message.log_time, message.content, static=role == "tf_static")
         return tree
 
     def _scans(self) -> Scans | None:
         messages = self._messages.of("scan")
         if not messages:
             return None
-        frames = Counter(one.message.frame for one in messages)
+        frames = Counter(message.content.frame for message in messages)
         frame = min(frames, key=lambda name: (-frames[name], name))
-        messages = [one for one in messages if one.message.frame == frame]
-        beams = Counter(len(one.message.ranges) for one in messages).most_common(1)[0][0]
+        messages = [message for message in messages if message.content.frame == frame]
+        beams = Counter(len(message.content.ranges) for message in messages).most_common(1)[0][0]
         times, arrivals = self._times(messages)
         order = np.argsort(times, kind="stable")
-        first: ScanMessage = next(one.message for one in messages if len(one.message.ranges) == beams)
+        first: ScanMessage = next(message.content for message in messages if len(message.content.ranges) == beams)
         ranges = np.full((len(messages), beams), np.nan)
         malformed = np.zeros(len(messages), dtype=bool)
         for row, index in enumerate(order.tolist()):
-            values = messages[index].message.ranges
+            values = messages[index].content.ranges
             malformed[row] = len(values) != beams
             if not malformed[row]:
                 ranges[row] = values
@@ -213,24 +226,26 @@ class _DriveReader:
     def _mount(self, frame: str) -> tuple[Pose2, float]:
         """Return the pose of the lidar on the base and its height, from static transforms, or else the first ones."""
         links: dict[str, StampedPose] = {}
-        for one in (*self._messages.of("tf_static"), *self._messages.of("tf")):
-            for link in one.message:
+        for message in (*self._messages.of("tf_static"), *self._messages.of("tf")):
+            for link in message.content:
                 links.setdefault(link.child, link)
-        base = next((one.message.child for one in self._messages.of("odom") if one.message.child), BASE_FRAMES[0])
+        base = next(
+            (message.content.child for message in self._messages.of("odom") if message.content.child), BASE_FRAMES[0]
+        )
         mount = lidar_mount(frame, base, links)
         if mount is None:
             self._notes.append(f"the mount of the lidar `{frame}` is unknown; it is assumed at the base")
-            return Pose2(0.0, 0.0, 0.0), 0.2
+            return Pose2(0.0, 0.0, 0.0), DEFAULT_LIDAR_HEIGHT_M
         height, at = 0.0, frame
         while at in links and at != base:
             height, at = height + Pose3(*links[at].pose).z, links[at].frame
         if mount.is_upside_down:
             self._notes.append(f"the lidar `{frame}` is mounted upside down")
-        return Pose2(*mount.pose), max(height, 0.05)
+        return Pose2(*mount.pose), max(height, MIN_LIDAR_HEIGHT_M)
 
     def _map(self) -> OccupancyGrid | None:
         maps = self._messages.of("map")
-        grid: OccupancyGrid | None = maps[-1].message if maps else None
+        grid: OccupancyGrid | None = maps[-1].content if maps else None
         if grid is None:
             return None
         # The message rounds the resolution to single precision.
@@ -241,10 +256,10 @@ class _DriveReader:
         messages = self._messages.of("footprint")
         if not messages:
             return ()
-        corners = np.array(messages[0].message, dtype=np.float64).reshape(-1, 2)
-        if len(corners) < 3 or np.abs(corners).max() > 5.0:
+        corners = np.array(messages[0].content, dtype=np.float64).reshape(-1, 2)
+        if len(corners) < 3 or np.abs(corners).max() > MAX_FOOTPRINT_M:
             return ()
-        x, y, yaw = poses.poses_at(np.array([self._seconds(messages[0].logged)]))[0].tolist()
+        x, y, yaw = poses.poses_at(np.array([self._seconds(messages[0].log_time)]))[0].tolist()
         inside = np.hypot(*corners.mean(axis=0)) < 0.5
         local = corners if inside else Pose2(x, y, yaw).inverse().apply(corners)
         return tuple((round(a, 3), round(b, 3)) for a, b in local.tolist())

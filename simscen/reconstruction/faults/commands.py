@@ -12,25 +12,36 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
 from simscen.reconstruction.evidence import Evidence, FoundFault, windows
 
-GRID_S = 0.025
+SAMPLE_PERIOD_S = 0.025
+"""Period at which commands and odometry are compared."""
 MAX_LAG_S, MIN_LAG_S = 1.0, 0.16
+"""Largest lag that is searched, and smallest one that is reported."""
 NORMAL_LAG_S = 0.09
 """Lag of a base without faults, which needs a moment to accelerate."""
 MIN_COMMAND_M_S = 0.1
+"""Speed above which a command, or a motion, counts as driving."""
 IGNORED_SHARE, MIN_IGNORED_S = 0.1, 0.4
+"""Ratio of driven to commanded speed below which the base ignores a command, for at least this time."""
 KEPT_SHARE, MIN_KEPT_S = 0.5, 0.6
 """Ratio of commanded to driven speed below which the base should slow down, for longer than braking takes."""
-STEADY_S, STEADY_CHANGE = 0.4, 0.05
+STEADY_S, MAX_STEADY_CHANGE = 0.4, 0.05
+"""Time in which a steady command changes by at most this share of its value."""
 MIN_GAIN_ERROR = 0.08
-MIN_STEADY = 20
+"""Smallest difference of a gain from 1 that is reported."""
+MIN_STEADY_SAMPLES = 20
+"""Number of samples with a steady command that the estimate of a speed limit or a gain needs."""
 MIN_SIDE_DIFFERENCE, MAX_UNEXPLAINED = 0.1, 0.05
 """Difference of the gains of both sides, and share of the motion that they do not explain, for a fault of one side."""
-CAP_MARGIN_M_S, CAP_SPREAD_M_S = 0.04, 0.03
+MIN_SHORTFALL_M_S, MAX_LIMIT_SPREAD_M_S = 0.04, 0.03
+"""Difference between commanded and driven speed above which the base is limited, and largest standard deviation of the
+speeds at one limit."""
 SMOOTHING_S = 0.5
 """Time over which the noise of the odometry is averaged."""
-MIN_CAP_FALL_M_S = 0.05
-MIN_CORRELATION_GAIN = 0.02
-MIN_SPREAD = 0.05
+MIN_LIMIT_FALL_M_S = 0.05
+"""Decrease of a speed limit during the drive above which it is a low battery."""
+MIN_ERROR_DECREASE = 0.02
+"""Decrease of the mean squared error, in squared standard deviations of the command, that shows a lag."""
+MIN_COMMAND_STD = 0.05
 """Standard deviation of a commanded velocity, in m/s or rad/s, below which its changes say nothing about the lag."""
 
 
@@ -49,7 +60,7 @@ def command_faults(drive: RecordedDrive, separation: float = 0.0) -> Iterator[Fo
         yield FoundFault(
             "cmd_vel", "delay", values, evidence=Evidence(text, float(times[0]), float(times[-1]), "medium")
         )
-    shift = round(lag / GRID_S)
+    shift = round(lag / SAMPLE_PERIOD_S)
     if shift:
         commanded, driven, times = commanded[:-shift], driven[shift:], times[shift:]
     ignored = [*_ignored(times, commanded, driven), *_kept(times, commanded, driven)]
@@ -68,7 +79,7 @@ def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
     if len(commands) < 2 or len(odometry) < 2:
         return np.empty(0), np.empty((0, 2)), np.empty((0, 2))
     begin = max(float(commands.times[0]), float(odometry.times[0]))
-    times = np.arange(begin, min(float(commands.times[-1]), float(odometry.times[-1])), GRID_S)
+    times = np.arange(begin, min(float(commands.times[-1]), float(odometry.times[-1])), SAMPLE_PERIOD_S)
     # Commands have no stamp in many logs, so the time of logging counts for both.
     command = commands.values[np.maximum(np.searchsorted(commands.arrivals, times, side="right") - 1, 0)]
     moved = odometry.values[np.maximum(np.searchsorted(odometry.times, times, side="right") - 1, 0)]
@@ -77,25 +88,25 @@ def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
 
 def _averaged(speeds: Array) -> Array:
     """Return speeds (n,) without the noise of the odometry."""
-    result: Array = uniform_filter1d(speeds, round(SMOOTHING_S / GRID_S), mode="nearest")
+    result: Array = uniform_filter1d(speeds, round(SMOOTHING_S / SAMPLE_PERIOD_S), mode="nearest")
     return result
 
 
 def _lag(commanded: Array, driven: Array) -> float:
     """Return the lag in s with which the driven velocity follows the command best."""
-    best, lag, none = -np.inf, 0, -np.inf
-    varies = np.std(commanded, axis=0) >= MIN_SPREAD
+    best, lag, error_without_lag = -np.inf, 0, -np.inf
+    varies = np.std(commanded, axis=0) >= MIN_COMMAND_STD
     if not varies.any():
         return 0.0
     commanded, driven = commanded[:, varies], driven[:, varies]
     scale = np.std(commanded, axis=0)
-    for shift in range(0, min(round(MAX_LAG_S / GRID_S), len(commanded) // 4)):
+    for shift in range(0, min(round(MAX_LAG_S / SAMPLE_PERIOD_S), len(commanded) // 4)):
         ahead = commanded[: len(commanded) - shift] / scale
         error = -float(np.mean((ahead - driven[shift:] / scale) ** 2))
-        none = error if shift == 0 else none
+        error_without_lag = error if shift == 0 else error_without_lag
         if error > best + 1e-9:
             best, lag = error, shift
-    return lag * GRID_S if best - none > MIN_CORRELATION_GAIN else 0.0
+    return lag * SAMPLE_PERIOD_S if best - error_without_lag > MIN_ERROR_DECREASE else 0.0
 
 
 def _ignored(times: Array, commanded: Array, driven: Array) -> list[FoundFault]:
@@ -115,7 +126,7 @@ def _kept(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]
     speed = _averaged(driven[:, 0])
     keeps = (np.abs(speed) > MIN_COMMAND_M_S) & (np.abs(commanded[:, 0]) < KEPT_SHARE * np.abs(speed))
     for window in windows(keeps, times, MIN_KEPT_S, 0.1):
-        if float(np.std(speed[window.samples])) < CAP_SPREAD_M_S:
+        if float(np.std(speed[window.samples])) < MAX_LIMIT_SPREAD_M_S:
             text = "the base keeps its speed although it is commanded to stop"
             evidence = Evidence(text, window.begin, window.end, "medium")
             begin = max(0.0, window.begin - STEADY_S)
@@ -129,7 +140,7 @@ def _side_gains(times: Array, commanded: Array, driven: Array, separation: float
     half = separation / 2
     gains, remaining = [], []
     for side in (-half, half):
-        command, speed = (_averaged(one[:, 0] + side * one[:, 1]) for one in (commanded, driven))
+        command, speed = (_averaged(motion[:, 0] + side * motion[:, 1]) for motion in (commanded, driven))
         gain = float(command @ speed) / max(float(command @ command), 1e-9)
         gains.append(gain)
         remaining.append(float(np.mean((speed - gain * command) ** 2)) / max(float(np.mean(speed**2)), 1e-9))
@@ -144,23 +155,25 @@ def _side_gains(times: Array, commanded: Array, driven: Array, separation: float
 def _limits(times: Array, commanded: Array, driven: Array) -> Iterator[FoundFault]:
     """Yield a lower maximum speed, or a constant ratio between driven and commanded speed."""
     steady = _steady(commanded) & (np.abs(commanded[:, 0]) > MIN_COMMAND_M_S)
-    if int(steady.sum()) < MIN_STEADY:
+    if int(steady.sum()) < MIN_STEADY_SAMPLES:
         return
     command, speed, at = np.abs(commanded[steady, 0]), np.abs(_averaged(driven[:, 0]))[steady], times[steady]
     ratio = speed / command
-    slow = command - speed > CAP_MARGIN_M_S
+    slow = command - speed > MIN_SHORTFALL_M_S
     if slow.mean() < 0.2:
         return
     evidence_times = float(at[slow][0]), float(at[slow][-1])
     start, end, drain, spread = _falling_limit(at[slow], speed[slow])
-    if start - end > MIN_CAP_FALL_M_S and spread < CAP_SPREAD_M_S:
+    if start - end > MIN_LIMIT_FALL_M_S and spread < MAX_LIMIT_SPREAD_M_S:
         values = {"start": f"{start:.2f} m/s", "end": f"{max(end, 0.01):.2f} m/s", "drain": f"{drain:.0f} s"}
         text = f"the speed falls from {start:.2f} to {end:.2f} m/s although more is commanded"
         yield FoundFault("cmd_vel", "low_battery", values, evidence=Evidence(text, *evidence_times, "medium"))
         return
     cap = float(np.median(speed[slow]))
     below = (command < cap) & ~slow
-    if float(np.std(speed[slow])) < CAP_SPREAD_M_S and (np.std(command[slow]) > CAP_SPREAD_M_S or below.any()):
+    if float(np.std(speed[slow])) < MAX_LIMIT_SPREAD_M_S and (
+        np.std(command[slow]) > MAX_LIMIT_SPREAD_M_S or below.any()
+    ):
         text = f"the robot drives at most {cap:.2f} m/s although more is commanded"
         values = {"linear": f"{cap:.2f} m/s"}
         yield FoundFault("cmd_vel", "saturation", values, evidence=Evidence(text, *evidence_times, "medium"))
@@ -186,11 +199,11 @@ def _falling_limit(times: Array, speeds: Array) -> tuple[float, float, float, fl
 
 def _steady(commanded: Array) -> Mask:
     """Return when the commanded speed has hardly changed for STEADY_S."""
-    count = round(STEADY_S / GRID_S)
+    count = round(STEADY_S / SAMPLE_PERIOD_S)
     speed = np.abs(commanded[:, 0])
     steady = np.zeros(len(speed), dtype=bool)
     if len(speed) <= count:
         return steady
     view = np.lib.stride_tricks.sliding_window_view(speed, count + 1)
-    steady[count:] = np.ptp(view, axis=1) <= STEADY_CHANGE * np.maximum(speed[count:], MIN_COMMAND_M_S)
+    steady[count:] = np.ptp(view, axis=1) <= MAX_STEADY_CHANGE * np.maximum(speed[count:], MIN_COMMAND_M_S)
     return steady

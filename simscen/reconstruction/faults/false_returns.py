@@ -20,6 +20,7 @@ from simscen.reconstruction.faults.lidar_readings import (
 from simscen.reconstruction.scans.scan_model import ScanModel
 
 MIN_FALSE_SHARE = 0.015
+"""Share of isolated beams in a scan above which there is dust."""
 JUMP_M = 0.3
 """Difference in range from which on two neighbor beams ended at different things."""
 BESIDE_BEAMS, SAME_OBJECT_M = 3, 0.3
@@ -28,6 +29,7 @@ MIN_GHOST_SHARE, MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS, MIN_DRIVEN_M = 0.3, 0.
 """Share of the scans in its time that show a ghost, spread of its range in m and in standard deviations of the noise,
 and distance in m that the lidar must move meanwhile."""
 MIN_GHOST_S = 2.0
+"""Time for which a ghost must be seen."""
 
 
 def false_return_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:

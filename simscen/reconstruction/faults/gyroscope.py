@@ -11,14 +11,17 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.evidence import Evidence, FoundFault
 
-BIN_S = 0.5
-MIN_BINS = 8
+BIN_S, MIN_BINS = 0.5, 8
+"""Length of the intervals over which turn rates are averaged, and number of intervals that an estimate needs."""
 MIN_BIAS_RAD_S, MIN_DRIFTED_RAD_S = 0.006, 0.006
+"""Smallest bias, and smallest change of the bias by drift, that are reported."""
 MIN_SCALE_ERROR, MIN_TURN_RAD = 0.03, 2.0
+"""Smallest difference of the scale from 1 that is reported, and total turn that its estimate needs."""
 MAX_RATE_CHANGE_RAD_S = 0.2
 """Change of the turn rate between two bins above which small errors of the times would look like errors of the rate."""
 MIN_RAMP_S, MIN_RAMP_SIGMAS = 4.0, 4.0
-BETTER = 0.2
+"""Shortest duration of a drift, and its smallest change in standard deviations of the remaining errors."""
+MAX_ERROR_RATIO = 0.2
 """Share of the squared error below which a drift, or a scale, explains the differences better than a constant."""
 
 
@@ -29,7 +32,7 @@ def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
         return
     turned = float(np.abs(true).sum() * BIN_S)
     scale = float(true @ measured) / max(float(true @ true), 1e-9) if turned > MIN_TURN_RAD else 1.0
-    explained = float(np.sum((measured - scale * true) ** 2)) < BETTER * float(np.sum((measured - true) ** 2))
+    explained = float(np.sum((measured - scale * true) ** 2)) < MAX_ERROR_RATIO * float(np.sum((measured - true) ** 2))
     if abs(scale - 1.0) > MIN_SCALE_ERROR and explained:
         text = f"the gyroscope reports {100 * scale:.1f} % of the turns"
         yield FoundFault("imu", "scale", {"factor": f"{100 * scale:.1f} %"}, evidence=Evidence(text, float(times[0])))
@@ -44,7 +47,7 @@ def gyroscope_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
     constant = float(np.sum((errors - errors.mean()) ** 2))
     scatter = math.sqrt(remaining / max(1, len(times) - 4))
     grown = abs(slope) * (end - begin)
-    if grown > max(MIN_DRIFTED_RAD_S, MIN_RAMP_SIGMAS * scatter) and remaining < BETTER * constant:
+    if grown > max(MIN_DRIFTED_RAD_S, MIN_RAMP_SIGMAS * scatter) and remaining < MAX_ERROR_RATIO * constant:
         text = f"the bias of the gyroscope grows by {slope:.5f} rad/s per second"
         whole = end >= float(times[-1]) - BIN_S
         from_start = begin <= float(times[0]) + BIN_S

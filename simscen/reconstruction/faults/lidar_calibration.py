@@ -19,14 +19,18 @@ STEP_M, STEP_RAD = 0.01, math.radians(0.25)
 """Steps of the numerical derivatives."""
 TRIED_YAWS_RAD = tuple(math.radians(yaw) for yaw in range(-24, 25, 3))
 """Rotations of the mount from which the estimate may start."""
-BETTER_FIT = 0.7
+MAX_FIT_RATIO = 0.7
 """Ratio of the median differences below which it starts there and not at the nominal mount."""
 ITERATIONS = 6
+"""Number of Gauss-Newton steps."""
 OUTLIER_M = 0.5
+"""Difference from the expected range above which a beam is ignored; halved with each step, down to 0.1 m."""
 MIN_BEAMS = 200
+"""Number of beams that the estimate needs."""
 MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)
 """Smallest error of a mount that is reported; smaller ones are within the errors of poses and walls."""
 MIN_BIAS_M, MIN_SCALE_ERROR, MIN_DRIFT_M_S = 0.03, 0.015, 0.003
+"""Smallest bias, difference of the scale from 1, and drift of ranges that are reported."""
 
 
 def mount_error(model: ScanModel, world: Surroundings) -> Pose2:
@@ -50,7 +54,7 @@ def mount_error(model: ScanModel, world: Surroundings) -> Pose2:
             for yaw in TRIED_YAWS_RAD
         }
     nearest = min(TRIED_YAWS_RAD, key=lambda yaw: (misfit[yaw], abs(yaw)))
-    error = Pose2(0.0, 0.0, nearest if misfit[nearest] < BETTER_FIT * misfit[0.0] else 0.0)
+    error = Pose2(0.0, 0.0, nearest if misfit[nearest] < MAX_FIT_RATIO * misfit[0.0] else 0.0)
     outlier = OUTLIER_M
     for _ in range(ITERATIONS):
         with np.errstate(invalid="ignore"):

@@ -15,34 +15,47 @@ from simscen.reconstruction.scans.scan_model import ScanModel
 
 LIDAR = "lidar"
 MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR = 0.012, 0.8
+"""Additional noise that is reported: at least this in m, and this multiple of the nominal noise."""
 KNOWN_NOISE_FACTOR, MIN_KNOWN_EXTRA_NOISE_M = 1.2, 0.002
 """Factor of the noise, and additional noise in m, that is reported if the noise of the lidar is known."""
 MIN_NOISE_S = 2.0
-MIN_INVALID = 2
-INVALID_HIT_SHARE, NORMAL_HIT_SHARE = 0.1, 0.3
+"""Shortest time with additional noise that is reported."""
+MIN_INVALID_SCANS = 2
+"""Number of invalid scans from which on they are reported."""
+MAX_INVALID_HIT_SHARE, MIN_EXPECTED_HIT_SHARE = 0.1, 0.3
+"""A scan is invalid if a smaller share of its beams than the first hits something, and a larger share than the second
+should hit the static world."""
 MIN_NAN_SHARE = 0.03
-ALWAYS, SELDOM = 0.95, 0.6
+"""Share of beams without a return above which beams are missing."""
+BLIND_SHARE = 0.95
+"""Share of the scans in which a beam of a blind sector returns nothing."""
 MIN_SECTOR_BEAMS = 3
-MIN_MISSING_SHARE, MAX_IMPURE_SHARE = 0.03, 0.1
+"""Number of neighboring beams that form a sector."""
+MIN_MISSING_SHARE, MAX_NEAR_SHARE = 0.03, 0.1
+"""Share of beams that miss the static world above which the range is limited, and largest share of these beams whose
+range is below the limit."""
 MIN_WINDOW_S, MAX_WINDOW_GAP_S = 0.4, 0.6
+"""Shortest time of a fault, and longest interruption within it."""
 RAIN_ALPHA, RAIN_EXPONENT, RAIN_NOISE_PER_M = 0.01, 0.6, 0.02
 """Model of the fault `rain` (Goodin et al., 2019): extinction α = 0.01 R^0.6 per meter, noise 0.02 z (1 - e^-R)²."""
 WHITE_REFLECTIVITY = 0.9
+"""Reflectivity of a surface that the lidar just detects at its maximum range in clear air, as in the fault `rain`."""
 HEAVY_RAIN_MM_H = 25.0
+"""Largest rain rate that is reported."""
 
 
 def invalid_scans(model: ScanModel) -> Mask:
     """Return which scans (n,) are meaningless: of the wrong length, or with hardly a valid range."""
     hits = model.is_hit.mean(axis=1)
     expected = np.isfinite(model.expected).mean(axis=1)
-    result: Mask = model.scans.malformed | ((hits < INVALID_HIT_SHARE) & (expected > NORMAL_HIT_SHARE))
+    result: Mask = model.scans.malformed | ((hits < MAX_INVALID_HIT_SHARE) & (expected > MIN_EXPECTED_HIT_SHARE))
     return result
 
 
 def invalid_scan_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
     """Yield the fault of invalid scans among valid ones, or of a time with invalid scans alone."""
     invalid, times = invalid_scans(model), model.scans.times
-    if int(invalid.sum()) < MIN_INVALID:
+    if int(invalid.sum()) < MIN_INVALID_SCANS:
         return
     indices = np.flatnonzero(invalid)
     first, last = int(indices[0]), int(indices[-1])
@@ -79,10 +92,10 @@ def missing_beam_faults(model: ScanModel, end: float) -> Iterator[FoundFault]:
     usable = ~invalid_scans(model)
     missing = np.isnan(model.scans.ranges)
     blind = np.zeros(missing.shape[1], dtype=bool)
-    for window in usable_windows(missing[:, :].mean(axis=1) > MIN_NAN_SHARE, usable, model):
+    for window in usable_windows(missing.mean(axis=1) > MIN_NAN_SHARE, usable, model):
         chosen = missing[window.samples][usable[window.samples]]
-        always = chosen.mean(axis=0) > ALWAYS
-        if always.mean() < ALWAYS and (
+        always = chosen.mean(axis=0) > BLIND_SHARE
+        if always.mean() < BLIND_SHARE and (
             runs := [run for run in mask_runs(always) if run[1] - run[0] + 1 >= MIN_SECTOR_BEAMS]
         ):
             for first, last in runs:
@@ -128,7 +141,7 @@ def range_faults(model: ScanModel, end: float, nominal_noise: float) -> Iterator
         limit = float(np.percentile(hits, 99.8))
         beyond = near[rows] & (model.expected[rows] > limit + 0.3)
         before = lost[rows] & (model.expected[rows] < limit - 0.3)
-        if before.sum() > MAX_IMPURE_SHARE * max(1, lost[rows].sum()) or not beyond.any():
+        if before.sum() > MAX_NEAR_SHARE * max(1, lost[rows].sum()) or not beyond.any():
             continue
         if lost[rows][beyond].mean() < 0.8:
             continue

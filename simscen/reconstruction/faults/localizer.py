@@ -12,10 +12,13 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.evidence import Evidence, FoundFault, windows
 
 MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
+"""Smallest change of the error of the estimated pose, between two estimates, that is a jump."""
 MIN_SILENCE_S, MIN_SILENCE_PERIODS = 1.0, 6.0
-MIN_CORRECTION = 1e-9
+"""Shortest time without an estimate that is reported: the larger of a time and a multiple of the usual period."""
+MIN_CORRECTION_M_RAD = 1e-9
 """Change of the pose of the odom frame on the map, in m and rad, that a working localizer exceeds."""
 MAX_JUMP_S = 30.0
+"""Longest time between a jump and the jump back."""
 MIN_DRIVEN_M = 0.6
 """Distance that the robot must drive meanwhile: more than twice Nav2's update_min_d, 0.25 m."""
 
@@ -98,7 +101,7 @@ def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
     corrections = drive.corrections
     if len(corrections) < 2 or len(drive.odometry) < 2:
         return
-    still = np.abs(np.diff(corrections.values, axis=0)).max(axis=1) < MIN_CORRECTION
+    still = np.abs(np.diff(corrections.values, axis=0)).max(axis=1) < MIN_CORRECTION_M_RAD
     usual = windows(still, corrections.times[1:])
     if not usual or still.all():
         return

@@ -12,19 +12,23 @@ from simscen.reconstruction.evidence import Evidence, FoundFault, windows
 
 MIN_OUTAGE_PERIODS = 4.5
 """Time between two messages, in periods, from which on it is an outage and not a few lost messages."""
-LOST_PERIODS = 1.5
-MIN_LOST_SHARE = 0.03
-MIN_LOST = 4
-MAX_OFF_MULTIPLE, MIN_MULTIPLE_SHARE = 0.2, 0.7
+MIN_GAP_PERIODS = 1.5
+"""Time between two messages, in periods, from which on messages are missing in between."""
+MIN_LOST_SHARE, MIN_LOST_MESSAGES = 0.03, 4
+"""Share and number of missing messages from which on they are reported."""
+MAX_MULTIPLE_ERROR, MIN_MULTIPLE_SHARE = 0.2, 0.7
 """Where messages are lost, most steps are within a fifth of a period of two, three, … periods. Otherwise the sensor
 measures irregularly."""
 MIN_DELAY_PERIODS, MIN_DELAY_S = 0.3, 0.03
 """Delays below both are those of normal drivers and networks."""
 MIN_OUTAGES_INTERMITTENT = 3
+"""Number of outages from which on they are one intermittent fault."""
 SLOW_FACTOR = 1.6
 """Ratio of the period in a part of the drive to the usual period from which on the sensor was slow there."""
-MIN_REPEATED = 3
-MIN_BEAMS_REPEATED = 20
+MIN_REPEATED_SCANS = 3
+"""Number of equal scans in a row that are reported."""
+MIN_EQUAL_BEAMS = 20
+"""Number of beams with a return that the comparison of two scans needs."""
 
 
 def stream_faults(
@@ -70,12 +74,12 @@ def _gaps(target: str, times: Array, period: float, end: float) -> Iterator[Foun
         until_end = edges[index + 1] >= end - period
         evidence = Evidence(f"no message for {steps[index]:.2f} s", float(edges[index]), float(edges[index + 1]))
         yield FoundFault(target, "off", {}, begin, None if until_end else length, evidence)
-    short = (steps > LOST_PERIODS * period) & (steps <= MIN_OUTAGE_PERIODS * period)
+    short = (steps > MIN_GAP_PERIODS * period) & (steps <= MIN_OUTAGE_PERIODS * period)
     lost = int(np.round(steps[short] / period - 1.0).sum())
     expected = len(times) + lost
     periods = steps[short] / period
-    is_multiple = np.abs(periods - np.round(periods)) < MAX_OFF_MULTIPLE
-    if lost >= MIN_LOST and lost / expected > MIN_LOST_SHARE and is_multiple.mean() > MIN_MULTIPLE_SHARE:
+    is_multiple = np.abs(periods - np.round(periods)) < MAX_MULTIPLE_ERROR
+    if lost >= MIN_LOST_MESSAGES and lost / expected > MIN_LOST_SHARE and is_multiple.mean() > MIN_MULTIPLE_SHARE:
         at = np.flatnonzero(short)
         begin, last = float(edges[at[0]]), float(edges[at[-1] + 1])
         inside = (times >= begin) & (times <= last)
@@ -138,14 +142,14 @@ def repeated_scans(scans: Scans) -> Mask:
     now, before = scans.ranges[1:], scans.ranges[:-1]
     finite = np.isfinite(now) & np.isfinite(before)
     equal = (now == before) | ~finite
-    same[1:] = equal.all(axis=1) & (finite.sum(axis=1) >= MIN_BEAMS_REPEATED)
+    same[1:] = equal.all(axis=1) & (finite.sum(axis=1) >= MIN_EQUAL_BEAMS)
     return same
 
 
 def stuck_scans(target: str, scans: Scans, end: float) -> Iterator[FoundFault]:
     """Yield the times in which a lidar repeated its last scan."""
     for window in windows(repeated_scans(scans), scans.times, max_gap=0.5 * scans.period):
-        if window.last - window.first + 1 < MIN_REPEATED:
+        if window.last - window.first + 1 < MIN_REPEATED_SCANS:
             continue
         begin = max(0.0, window.begin - 1.5 * scans.period)
         until_end = window.end >= end - 1.5 * scans.period

@@ -14,10 +14,13 @@ from simscen.reconstruction.evidence import Evidence, FoundFault, Window, window
 
 MIN_DISTANCE_M, MIN_TURN_RAD = 1.0, 1.5
 """Minimum motion for the estimate of a scale."""
-MIN_SCALE_ERROR, MIN_TURN_SCALE_ERROR, MIN_TURN_PER_METER = 0.02, 0.03, 0.008
+MIN_SCALE_ERROR, MIN_TURN_SCALE_ERROR, MIN_TURN_RAD_PER_M = 0.02, 0.03, 0.008
+"""Smallest differences from 1 of the scales of distances and turns, and smallest turn per meter, that are reported."""
 MIN_DRIFT_M_S, MIN_DRIFT_RAD_S = 0.01, 0.01
-MIN_SLIP, MIN_SLIP_STEP_M, MIN_SLIP_S = 0.08, 0.02, 1.0
-MIN_NOISE, MIN_TURN_NOISE = 0.05, 0.05
+"""Smallest velocities of the odometry at rest that are reported."""
+MIN_SLIP_SHARE, MIN_SLIP_STEP_M, MIN_SLIP_S = 0.08, 0.02, 1.0
+"""Smallest slip that is reported: the share of the distance that is lost, the distance lost in a step, and the time."""
+MIN_NOISE_M, MIN_TURN_NOISE_RAD = 0.05, 0.05
 """Standard deviations after one meter, and after one radian, that are reported. Good odometry has 0.01."""
 MIN_EXCESS_SLIP, MIN_ROLLED_M = 0.06, 0.3
 """Share of the distance that must be lost beyond that in the rest of the drive, if the wheels rolled this far then."""
@@ -26,6 +29,7 @@ REST_M, REST_RAD, MIN_REST_STEPS = 0.002, 0.002, 4
 LONG_SHARE = 0.75
 """Share of the drive from which on a difference lasts the whole drive."""
 CONFIDENCE_SIGMAS = 4.0
+"""Smallest estimate that is reported, in its standard deviations."""
 
 
 def odometry_faults(steps: MotionSteps, separation: float, skids: bool = False) -> Iterator[FoundFault]:
@@ -46,7 +50,7 @@ def _slip(steps: MotionSteps, separation: float) -> Iterator[FoundFault]:
     """Yield the times in which the wheels rolled further than the robot drove."""
     measured, true = _wheels(steps.measured, separation), _wheels(steps.true, separation)
     lost = np.abs(measured) - np.abs(true)
-    slips = ((lost > MIN_SLIP * np.abs(measured)) & (lost > MIN_SLIP_STEP_M)).any(axis=1)
+    slips = ((lost > MIN_SLIP_SHARE * np.abs(measured)) & (lost > MIN_SLIP_STEP_M)).any(axis=1)
     for window in windows(np.asarray(slips), steps.times, max_gap=2.2 * STEP_S):
         whole = window.length > LONG_SHARE * float(np.ptp(steps.times))
         if whole or window.length < MIN_SLIP_S:
@@ -82,7 +86,7 @@ def _slip_values(measured: Array, true: Array) -> dict[str, object]:
     rolled = np.abs(measured).sum(axis=0)
     shares = 1.0 - (true * np.sign(measured)).sum(axis=0) / np.maximum(rolled, 1e-6)
     shares = np.clip(np.where(rolled > 0.1, shares, 0.0), 0.0, 0.95)
-    if float(shares.max()) < MIN_SLIP:
+    if float(shares.max()) < MIN_SLIP_SHARE:
         return {}
     return {"left": f"{100 * shares[0]:.0f} %", "right": f"{100 * shares[1]:.0f} %"}
 
@@ -90,7 +94,7 @@ def _slip_values(measured: Array, true: Array) -> dict[str, object]:
 def _follows_commands(steps: MotionSteps, window: Window) -> bool:
     """Return whether the robot moved as commanded, so that only the odometry was wrong."""
     commanded = float(np.abs(steps.commanded[window.samples][:, 0]).sum())
-    true, measured = (float(np.abs(one[window.samples][:, 0]).sum()) for one in (steps.true, steps.measured))
+    true, measured = (float(np.abs(motion[window.samples][:, 0]).sum()) for motion in (steps.true, steps.measured))
     return commanded > 0.1 and abs(true - commanded) < abs(measured - commanded)
 
 
@@ -105,7 +109,7 @@ def _systematic(steps: MotionSteps, skids: bool) -> Iterator[FoundFault]:
     per_meter = turn[0][1] if distance > MIN_DISTANCE_M else 0.0
     is_linear = abs(linear) > max(MIN_SCALE_ERROR, CONFIDENCE_SIGMAS * forward[1][0])
     is_angular = abs(angular) > max(MIN_TURN_SCALE_ERROR, CONFIDENCE_SIGMAS * turn[1][0])
-    is_curved = abs(per_meter) > max(MIN_TURN_PER_METER, CONFIDENCE_SIGMAS * turn[1][1])
+    is_curved = abs(per_meter) > max(MIN_TURN_RAD_PER_M, CONFIDENCE_SIGMAS * turn[1][1])
     drive = float(steps.times[0]), float(steps.times[-1]) + STEP_S
     if is_linear and is_angular and abs(linear - angular) < 0.3 * abs(linear) and not is_curved:
         text = f"the odometry reports {100 * (1 + linear):.1f} % of the motion"
@@ -165,10 +169,10 @@ def _noise(
     moved, rotated = np.abs(distance) > 0.05, np.abs(turned) > 0.05
     if moved.sum() >= 8:
         linear = float(np.std((forward - forward_fit)[moved] / np.sqrt(np.abs(distance[moved]))))
-        values |= {"linear": f"{100 * linear:.1f} cm"} if linear > MIN_NOISE else {}
+        values |= {"linear": f"{100 * linear:.1f} cm"} if linear > MIN_NOISE_M else {}
     if rotated.sum() >= 8:
         angular = float(np.std((turn - turn_fit)[rotated] / np.sqrt(np.abs(turned[rotated]))))
-        values |= {"angular": f"{math.degrees(angular):.1f} deg"} if angular > MIN_TURN_NOISE else {}
+        values |= {"angular": f"{math.degrees(angular):.1f} deg"} if angular > MIN_TURN_NOISE_RAD else {}
     if values:
         text = "the steps of the odometry scatter about the true motion"
         yield FoundFault("odom", "noise", values, evidence=Evidence(text, *drive, "low"))

@@ -12,8 +12,9 @@ from simscen.reconstruction.scans.scan_model import ScanModel
 from simscen.reconstruction.scans.surroundings import Surroundings, beam_ends
 from simscen.worlds.geometry.triangulation import merge_solids
 
-MIN_SHARE, MIN_BEAMS = 0.3, 30
-REACH_M = 0.05
+MIN_PASSING_SHARE, MIN_PASSING_BEAMS = 0.3, 30
+"""Share and number of beams through a wall from which on it counts as transparent."""
+MAX_SURFACE_DISTANCE_M = 0.05
 """Distance from a solid within which an expected beam ends at it."""
 
 
@@ -22,7 +23,7 @@ def glass_fault(model: ScanModel, world: Surroundings, usable: Mask) -> FoundFau
     rows = np.flatnonzero(usable)
     # A beam without any return may have been lost; only one that ends behind the wall has passed through it.
     through = model.passes_through[rows] & model.is_hit[rows]
-    if int(through.sum()) < MIN_BEAMS:
+    if int(through.sum()) < MIN_PASSING_BEAMS:
         return None
     ends = beam_ends(model.poses[rows], model.scans.angles, model.expected[rows])
     decided = through | model.is_explained[rows]
@@ -31,7 +32,11 @@ def glass_fault(model: ScanModel, world: Surroundings, usable: Mask) -> FoundFau
         through[decided & np.isfinite(model.expected[rows])],
     )
     shares = _shares(world.world.solids, points, passed)
-    names = [name for name, (count, share) in shares.items() if share > MIN_SHARE and count * share >= MIN_BEAMS]
+    names = [
+        name
+        for name, (count, share) in shares.items()
+        if share > MIN_PASSING_SHARE and count * share >= MIN_PASSING_BEAMS
+    ]
     if not names:
         return None
     total = sum(shares[name][0] for name in names)
@@ -56,10 +61,10 @@ def _shares(solids: tuple[Solid, ...], points: Array, passed: Mask) -> dict[str,
 
 
 def _near(solid: Solid, points: Array) -> Mask:
-    """Return which points (n, 2) are within REACH_M of the convex hull of a solid, seen from above."""
+    """Return which points (n, 2) are within MAX_SURFACE_DISTANCE_M of the convex hull of a solid, seen from above."""
     from scipy.spatial import ConvexHull
 
     corners = merge_solids((solid,)).vertices[:, :2]
     hull = ConvexHull(corners)
-    result: Mask = (points @ hull.equations[:, :2].T + hull.equations[:, 2] <= REACH_M).all(axis=1)
+    result: Mask = (points @ hull.equations[:, :2].T + hull.equations[:, 2] <= MAX_SURFACE_DISTANCE_M).all(axis=1)
     return result

@@ -15,13 +15,14 @@ from simscen.reconstruction.faults.message_stream import repeated_scans
 from simscen.reconstruction.scans.scan_model import ScanModel
 from simscen.reconstruction.scans.surroundings import Surroundings
 
-MIN_HITS = 3
-MAX_SKIPPED_BEAMS = 2
+MIN_HITS, MAX_SKIPPED_BEAMS = 3, 2
+"""Smallest number of hits of a cluster, and largest number of beams between two of them that do not show the object."""
 MAX_GAP_M, MAX_GAP_BEAMS = 0.25, 3.0
 """Distance between neighbor hits of one object: in m, and as a multiple of the distance of two beams."""
-MIN_WALL_DISTANCE_M, WALL_DISTANCE_PER_M = 0.12, 0.0
+TRUE_WALL_DISTANCE_M = 0.12
 BELIEVED_WALL_DISTANCE_M, BELIEVED_WALL_DISTANCE_PER_M = 0.2, 0.02
-"""Distance from a wall on the map, fixed and per meter of range, within which a hit belongs to the wall."""
+"""Distance from a wall on the map within which a hit belongs to the wall: with true poses, and with believed poses,
+whose heading errors add a distance per meter of range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +60,8 @@ def scan_clusters(model: ScanModel, world: Surroundings, has_true_poses: bool) -
         unexplained[:, first : last + 1] = False
     rows, beams = np.nonzero(unexplained)
     if len(rows):
-        fixed = MIN_WALL_DISTANCE_M if has_true_poses else BELIEVED_WALL_DISTANCE_M
-        growth = WALL_DISTANCE_PER_M if has_true_poses else BELIEVED_WALL_DISTANCE_PER_M
+        fixed = TRUE_WALL_DISTANCE_M if has_true_poses else BELIEVED_WALL_DISTANCE_M
+        growth = 0.0 if has_true_poses else BELIEVED_WALL_DISTANCE_PER_M
         limit = fixed + growth * model.scans.ranges[rows, beams]
         near = world.distance_to_walls(model.ends[rows, beams]) < limit
         unexplained[rows[near], beams[near]] = False
@@ -99,11 +100,13 @@ def _clusters(model: ScanModel, row: int, beams: Indices) -> Iterator[ScanCluste
         yield ScanCluster(row, time, points[group], lidar, (span + 1) * step, is_whole)
 
 
-FREE_MARGIN_M = 0.25
+FREE_MARGIN_M, MIN_VISIBLE_SHARE = 0.25, 0.3
+"""Distance behind a point at which a beam must end to show that the point is free, and the smallest share of the points
+that must be visible."""
 
 
 def share_seen_free(model: ScanModel, points: Array, rows: Indices) -> Array:
-    """Return for each of `rows` (k,) the share of the points (m, 2) that beams pass, nan if all points are hidden."""
+    """Return for each of `rows` (k,) the share of the points (m, 2) that beams pass, nan if most points are hidden."""
     offsets = points[None, :, :] - model.poses[rows, None, :2]
     distance = np.hypot(offsets[..., 0], offsets[..., 1])
     direction = np.arctan2(offsets[..., 1], offsets[..., 0]) - model.poses[rows, None, 2]
@@ -116,5 +119,5 @@ def share_seen_free(model: ScanModel, points: Array, rows: Indices) -> Array:
         free = inside & (measured > distance + FREE_MARGIN_M)
         hidden = ~inside | np.isnan(measured) | (measured < distance - FREE_MARGIN_M)
     visible = (~hidden).sum(axis=1)
-    enough = visible >= max(2, 0.3 * len(points))
+    enough = visible >= max(2, MIN_VISIBLE_SHARE * len(points))
     return np.where(enough, free.sum(axis=1) / np.maximum(visible, 1), np.nan)

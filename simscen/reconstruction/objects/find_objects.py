@@ -23,15 +23,19 @@ MIN_DISPLACEMENT_M = 0.4
 MIN_FREED_SHARE = 0.5
 """Share of an earlier outline that must be seen free later, or of a later one that was free earlier."""
 SEEN_FREE_SHARE = 0.6
-ENDS = 5
+"""Share of the points of an object that beams must pass to show that it is not there."""
+COMPARED_CLUSTERS = 5
 """Number of clusters at the start and at the end of a track that are compared."""
-KEYFRAME_TOLERANCE_M, KEYFRAME_TOLERANCE_RAD = 0.05, math.radians(10)
+KEYFRAME_TOLERANCE_M, KEYFRAME_TOLERANCE_RAD, MAX_KEYFRAMES = 0.05, math.radians(10), 400
+"""Largest distance and turn between a track and its keyframes, and largest number of keyframes."""
 MERGE_DISTANCE_M = 0.3
+"""Distance between the hits of two tracks below which they may be of the same standing object."""
 MIN_CLUSTERS_STANDING = 10
+"""Number of clusters that a standing object needs."""
 PART_MARGIN_M, PART_SHARE = 0.15, 0.5
 """A track belongs to a moving object if this share of its clusters is within this distance of it."""
 MIN_SIZE_M = 0.06
-MAX_KEYFRAMES = 400
+"""Longest side, or radius, below which an object is ignored."""
 MAX_OBJECT_SPEED_M_S = 4.0
 """Keyframes that an object would reach only at a higher speed are errors of its track."""
 
@@ -81,14 +85,14 @@ def _moves(model: ScanModel, track: ObjectTrack, usable: Indices) -> bool:
     """Return whether an object moved, and not only the part of it that was visible."""
     shape = fit_shape(track.clusters, moves=True)
     centers = shape.poses[:, :2]
-    start = np.median(centers[:ENDS], axis=0)
+    start = np.median(centers[:COMPARED_CLUSTERS], axis=0)
     away = np.hypot(*(centers - start).T)
     far = int(np.argmax(median_of_three(away)))
     if float(median_of_three(away)[far]) < MIN_DISPLACEMENT_M:
         return False
-    first = np.concatenate([cluster.points for cluster in track.clusters[:ENDS]])
-    near = max(0, far - ENDS // 2)
-    last = np.concatenate([cluster.points for cluster in track.clusters[near : near + ENDS]])
+    first = np.concatenate([cluster.points for cluster in track.clusters[:COMPARED_CLUSTERS]])
+    near = max(0, far - COMPARED_CLUSTERS // 2)
+    last = np.concatenate([cluster.points for cluster in track.clusters[near : near + COMPARED_CLUSTERS]])
     rows_late = usable[(usable >= track.clusters[far].scan - 2) & (usable <= track.clusters[far].scan + 20)]
     rows_early = usable[(usable >= track.clusters[0].scan - 5) & (usable <= track.clusters[0].scan + 3)]
     freed, was_free = (
@@ -114,7 +118,7 @@ def _merged(tracks: list[ObjectTrack], model: ScanModel, usable: Indices) -> lis
     """Return the tracks of standing objects, with those of one object joined."""
     merged: list[ObjectTrack] = []
     for track in tracks:
-        same = next((one for one in merged if _is_same(one, track, model, usable)), None)
+        same = next((earlier for earlier in merged if _is_same(earlier, track, model, usable)), None)
         if same is None:
             merged.append(ObjectTrack([*track.clusters]))
         else:
@@ -122,13 +126,13 @@ def _merged(tracks: list[ObjectTrack], model: ScanModel, usable: Indices) -> lis
     return merged
 
 
-def _is_same(one: ObjectTrack, other: ObjectTrack, model: ScanModel, usable: Indices) -> bool:
+def _is_same(earlier: ObjectTrack, later: ObjectTrack, model: ScanModel, usable: Indices) -> bool:
     """Return whether two tracks of standing objects touch, and the place was not free in between."""
-    a, b = (np.concatenate([cluster.points for cluster in track.clusters]) for track in (one, other))
+    a, b = (np.concatenate([cluster.points for cluster in track.clusters]) for track in (earlier, later))
     a, b = a[:: max(1, len(a) // 200)], b[:: max(1, len(b) // 200)]
     if float(np.hypot(*(a[:, None] - b[None]).transpose(2, 0, 1)).min()) > MERGE_DISTANCE_M:
         return False
-    first, last = one.clusters[-1].scan, other.clusters[0].scan
+    first, last = earlier.clusters[-1].scan, later.clusters[0].scan
     between = usable[(usable > first) & (usable < last)]
     return not len(between) or _largest(share_seen_free(model, b, between)) < SEEN_FREE_SHARE
 

@@ -17,28 +17,36 @@ from simscen.reconstruction.objects.found_object import FoundObject, FoundWalk
 from simscen.reconstruction.objects.walk_trial import WalkTrial
 
 MIN_CYLINDER_RADIUS_M, MAX_CYLINDER_RADIUS_M = 0.15, 0.4
+"""Radii of a round object that may be a person."""
 MAX_LEGS_SIDE_M = 0.7
 """Longest side of a box around two legs."""
 MIN_BODY_RADIUS_M, MAX_BODY_RADIUS_M, LEGS_BODY_RADIUS_M = 0.2, 0.35, 0.25
+"""Limits of the radius of a pedestrian, and its radius if the lidar saw legs."""
 MIN_WALK_M = 1.0
+"""Shortest track that a pedestrian reproduces."""
 MAX_PEOPLE = 4
 """Number of people above which none becomes a pedestrian, because small differences grow too fast in a crowd."""
 MIN_WALKING_SPEED_M_S, MAX_WALKING_SPEED_M_S = 0.3, 2.2
+"""Usual speeds of a person who walks."""
 MAX_RMSE_M, MAX_TIME_SHIFT_S = 0.3, 0.5
 """Largest difference between a track and the pedestrian that replaces it."""
 TRIED_SHIFTS_S = np.round(np.arange(-1.0, 1.01, 0.05), 2)
+"""Time shifts at which a track is compared with a pedestrian."""
 STEP_S, SMOOTHING_STEPS = 0.1, 5
+"""Time between two positions of a track, and number of steps to each side over which its speed is measured."""
 MOVING_SPEED_M_S, MIN_STOP_S = 0.2, 1.5
+"""Speed below which a person stands, and the shortest stop that is a reaction."""
 PATH_TOLERANCES_M = (math.inf, 0.6, 0.3)
 """Distances that the straight lines between goals may have from the track: first only the end is a goal."""
 MEETING_DISTANCE_M, SURPRISE_DISTANCE_M = 3.0, 4.0
 """Distance from the robot within which a person would evade it, or stop and look at it."""
-BETTER_M = 0.05
+MIN_RMSE_DECREASE_M = 0.05
 """Amount by which the RMSE of a more complex explanation must be smaller."""
 GOOD_RMSE_M, HOPELESS_RMSE_M, LOST_M = 0.12, 0.6, 1.2
 """RMSE below which nothing else is tried, RMSE above which no other speed is tried, and distance from the track beyond
 which a simulation ends."""
 SPEED_FACTORS = (0.93, 1.07)
+"""Factors of the measured speed that are tried as well."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +65,8 @@ def with_walks(objects: Sequence[FoundObject], trial: WalkTrial) -> list[FoundOb
         return [*objects]
     others = [thing for thing in objects if thing not in people]
     walks = {
-        thing.name: _fitted_walk(thing, [one for one in people if one is not thing], others, trial) for thing in people
+        thing.name: _fitted_walk(thing, [person for person in people if person is not thing], others, trial)
+        for thing in people
     }
     found = [replace(thing, walk=walks.get(thing.name)) for thing in objects]
     while any(thing.walk for thing in found):
@@ -146,19 +155,19 @@ def _fitted_walk(
         if best is not None and best.rmse < GOOD_RMSE_M:
             break
         for begin, walker in _walkers(thing, track, reaction, trial):
-            best = _better(best, tried(begin, walker), BETTER_M)
+            best = _better(best, tried(begin, walker), MIN_RMSE_DECREASE_M)
             if best.rmse < GOOD_RMSE_M:
                 break
     if best is None or best.rmse > HOPELESS_RMSE_M:
         return None
     for factor in SPEED_FACTORS:
         faster = replace(best.walker, speed=round(factor * track.speed, 2))
-        best = _better(best, tried(best.begin, faster), BETTER_M / 2)
+        best = _better(best, tried(best.begin, faster), MIN_RMSE_DECREASE_M / 2)
     return replace(best, meets_robot=meets)
 
 
-def _better(one: FoundWalk | None, other: FoundWalk, margin: float) -> FoundWalk:
-    return other if one is None or other.rmse < one.rmse - margin else one
+def _better(simple: FoundWalk | None, other: FoundWalk, margin: float) -> FoundWalk:
+    return other if simple is None or other.rmse < simple.rmse - margin else simple
 
 
 def _reactions(track: _Track, distances: Array, meets: bool) -> Iterator[_Reaction]:

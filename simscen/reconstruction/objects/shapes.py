@@ -15,15 +15,19 @@ from simscen.reconstruction.objects.clusters import ScanCluster
 
 MAX_ROUND_RADIUS_M, MAX_ROUND_ERROR_M = 0.6, 0.035
 """An object is round if its radius is at most this, and its hits are this close to a circle."""
-STEEPEST_RAD = math.radians(80.0)
+MAX_HALF_ANGLE_RAD = math.radians(80.0)
+"""Half of the largest angle, seen from the lidar, from which a radius is computed."""
 MIN_SIDE_M = 0.1
+"""Shortest side of a box."""
 SIZE_PERCENTILE = 90.0
+"""Percentile of the extents in single scans that is the size of a moving box."""
 HEADING_SPEED_M_S, HEADING_SPAN_S = 0.25, 0.8
 """Speed from which on the direction of motion is the heading, and half the time over which it is measured."""
 MIN_STAND_S = 1.5
 """Time below the speed from which on an object stands."""
 SMOOTHING_SCANS = 5
-ANGLES = np.radians(np.arange(0.0, 90.0, 2.0))
+"""Number of scans over which positions are smoothed."""
+TRIED_ANGLES_RAD = np.radians(np.arange(0.0, 90.0, 2.0))
 """Orientations that are tried for the rectangle around an object that stands."""
 
 
@@ -67,7 +71,7 @@ def _radius(clusters: list[ScanCluster]) -> tuple[float, float]:
 
 def _radius_of(cluster: ScanCluster) -> float:
     near = float(np.hypot(*(cluster.points - cluster.lidar).T).min())
-    sine = math.sin(min(cluster.angle / 2, STEEPEST_RAD))
+    sine = math.sin(min(cluster.angle / 2, MAX_HALF_ANGLE_RAD))
     return near * sine / (1.0 - sine)
 
 
@@ -131,10 +135,10 @@ def _orientation(points: Array) -> float:
     Source: Zhang, Xu, Dong and Dolan, Efficient L-shape fitting for vehicle detection using laser scanners (2017).
     """
     best, found = -math.inf, 0.0
-    for angle in ANGLES.tolist():
+    for angle in TRIED_ANGLES_RAD.tolist():
         along = points @ np.array([math.cos(angle), math.sin(angle)])
         across = points @ np.array([-math.sin(angle), math.cos(angle)])
-        edges = [np.minimum(one - np.percentile(one, 1), np.percentile(one, 99) - one) for one in (along, across)]
+        edges = [np.minimum(side - np.percentile(side, 1), np.percentile(side, 99) - side) for side in (along, across)]
         closeness = float(np.sum(1.0 / np.maximum(np.minimum(np.abs(edges[0]), np.abs(edges[1])), 0.03)))
         if closeness > best + 1e-9:
             best, found = closeness, angle

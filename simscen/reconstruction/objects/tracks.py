@@ -10,15 +10,19 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.objects.clusters import ScanCluster
 
 MAX_CENTER_DISTANCE_M = 2.5
+"""Distance of the centers beyond which a cluster is not compared with a track."""
 GATE_M, GATE_M_S = 0.25, 0.8
 """Maximum distance between the predicted and the measured hits of an object: fixed, and per second unseen."""
 MAX_UNSEEN_S = 2.0
+"""Time without a cluster after which a track ends."""
 CENTER_WEIGHT = 0.3
 """Weight of the distance of the centers, which depends on the visible part, beside that of the hits."""
 VELOCITY_CLUSTERS, MAX_SPEED_M_S = 6, 2.5
 """Number of clusters from which the velocity is computed, and the largest possible speed."""
 MOVING_SPEED_M_S = 0.3
+"""Speed below which a hidden object may also have stopped where it was."""
 MIN_CLUSTERS, MIN_TRACK_S = 6, 0.6
+"""Number of clusters, and duration, that a track needs."""
 MAX_LINK_S, LINK_M, LINK_M_S = 6.0, 0.5, 0.5
 """Time for which an object may be hidden, and how far from its predicted place it may reappear."""
 
@@ -45,9 +49,9 @@ class ObjectTrack:
         self.clusters.append(cluster)
         recent = self.clusters[-VELOCITY_CLUSTERS:]
         if len(recent) >= 3:
-            times = np.array([one.time for one in recent])
+            times = np.array([cluster.time for cluster in recent])
             offsets = times - times.mean()
-            centers = np.array([one.center for one in recent])
+            centers = np.array([cluster.center for cluster in recent])
             velocity = offsets @ centers / max(float(offsets @ offsets), 1e-6)
             speed = float(np.hypot(*velocity))
             self.velocity = velocity * min(1.0, MAX_SPEED_M_S / max(speed, 1e-6))
@@ -109,7 +113,7 @@ def _linked(tracks: list[ObjectTrack]) -> list[ObjectTrack]:
     """Return the tracks, with those joined that one object made before and after it was hidden."""
     linked: list[ObjectTrack] = []
     for track in tracks:
-        before = [(gap, one) for one in linked if (gap := _link_distance(one, track)) is not None]
+        before = [(gap, earlier) for earlier in linked if (gap := _link_distance(earlier, track)) is not None]
         if before:
             nearest = min(before, key=lambda pair: pair[0])[1]
             nearest.clusters += track.clusters

@@ -11,6 +11,7 @@ from simscen.reconstruction.drive.recorded_drive import Indices, Mask, RecordedD
 from simscen.reconstruction.scans.surroundings import beam_ends, lidar_poses
 
 RESOLUTION_M = 0.05
+"""Size of a cell."""
 MARGIN_M = 1.0
 """Free margin around everything that was measured."""
 MAX_SCANS = 1500
@@ -20,8 +21,12 @@ BODY_RADIUS_M = 0.15
 MAX_RANGE_M = 15.0
 """Range beyond which errors of the heading blur the map."""
 HIT_LOG_ODDS, PASS_LOG_ODDS, MAX_LOG_ODDS = 0.85, -0.4, 20.0
+"""Change of the log odds of a cell at a hit, and where a beam passes, and their largest magnitude.
+
+Source: Thrun, Burgard, Fox: Probabilistic Robotics, table 9.1.
+"""
 MIN_OCCUPIED_LOG_ODDS, MAX_FREE_LOG_ODDS = 0.8, -0.4
-"""Thrun, Burgard, Fox: Probabilistic Robotics, table 9.1, with the limits of each cell's belief."""
+"""Log odds above which a cell is occupied, and below which it is free."""
 
 
 def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:

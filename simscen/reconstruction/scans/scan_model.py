@@ -16,7 +16,7 @@ TRUE_POSE_TOLERANCE_M, BELIEVED_POSE_TOLERANCE_M = 0.12, 0.25
 BELIEVED_POSE_TOLERANCE_PER_M = 0.02
 """The same per meter of range, because of errors of the heading."""
 NOISE_SIGMAS = 4.0
-MAX_BEAM_DEVIATIONS = 6.0
+"""Difference between a range and the world that noise explains, in standard deviations."""
 MAD_TO_STD = 1.4826
 """Factor from the median absolute deviation to the standard deviation of a normal distribution."""
 SMOOTH_STEP_M = 0.1

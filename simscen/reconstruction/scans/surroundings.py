@@ -16,15 +16,16 @@ from simscen.worlds.maps.occupancy_map import draw_map, walls_from_map
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 MAP_WALL_HEIGHT_M = 1.0
-FAR_M = 1e3
-"""Distance from walls outside of the map."""
+"""Height of the walls of a map."""
+UNMAPPED_DISTANCE_M = 1e3
+"""Distance from walls that counts outside of the map."""
 
 
 class Surroundings:
     """Static world at the height of the lidar, without anything that the reconstruction has to find."""
 
     def __init__(self, world: World, height: float) -> None:
-        """Take the world; its objects and doors count at their initial poses."""
+        """Take the world, with its objects and doors at their initial poses, and the `height` of the lidar in m."""
         bodies = [replace(solid, pose=body.pose.compose(solid.pose)) for body in world.bodies for solid in body.solids]
         self.world, self.height = world, height
         mesh = merge_solids((*world.solids, *bodies))
@@ -34,19 +35,25 @@ class Surroundings:
         distances = distance_transform_edt(self.grid.cells != OCCUPIED)
         self._distances: Array = np.asarray(distances) * self.grid.resolution
 
-    def ranges_from(self, poses: Array, angles: Array, reach: float) -> Array:
-        """Return the distances (n, beams) to the world from lidar poses (n, 3); inf beyond `reach`."""
+    def ranges_from(self, poses: Array, angles: Array, max_range: float) -> Array:
+        """Return the ranges (n, beams) in m at lidar poses (n, 3) in the map frame; inf beyond `max_range` m.
+
+        `angles` (beams,) are the directions of the beams in rad in the frame of the lidar.
+        """
         directions = poses[:, 2:3] + angles[None, :]
         flat = directions.ravel()
         rays = np.column_stack((np.cos(flat), np.sin(flat), np.zeros(len(flat))))
         origins = np.column_stack((np.repeat(poses[:, :2], len(angles), axis=0), np.full(len(flat), self.height)))
-        return self._scene.cast(origins, rays, reach).reshape(len(poses), len(angles))
+        return self._scene.cast(origins, rays, max_range).reshape(len(poses), len(angles))
 
     def distance_to_walls(self, points: Array) -> Array:
-        """Return the distance (n,) in m of points (n, 2) to the nearest occupied cell; FAR_M outside of the map."""
+        """Return the distance (n,) in m of points (n, 2) to the nearest occupied cell.
+
+        It is UNMAPPED_DISTANCE_M outside of the map.
+        """
         cells = self.grid.cell_of(points)
         inside = self.grid.inside(cells)
-        result = np.full(len(points), FAR_M)
+        result = np.full(len(points), UNMAPPED_DISTANCE_M)
         result[inside] = self._distances[cells[inside, 0], cells[inside, 1]]
         return result
 

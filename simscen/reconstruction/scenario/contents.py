@@ -26,8 +26,11 @@ MAX_REFUSAL_S = 1.0
 MIN_WAIT_S = 0.3
 """Minimum time between a result and the next goal that counts as a wait at the goal."""
 MIN_TIMEOUT_S, TIMEOUT_FACTOR = 30.0, 2.0
+"""Shortest timeout of a goal, and its ratio to the time that the robot took."""
 UNFINISHED_TIMEOUT_FACTOR = 1.1
+"""The same ratio for a goal that was active when the log ended."""
 MAX_TIME_LIMIT_S = 8000.0
+"""Longest time limit of a scenario."""
 RADIUS_STEP_M = 0.05
 """Step to which the distance at which goals count as passed is rounded up."""
 NEAR_TRUTH_M, NEAR_TRUTH_RAD = 0.15, math.radians(6)

@@ -15,14 +15,16 @@ from simscen.reconstruction.scenario.incidents import LOST_ERROR_M, STUCK_S, Inc
 
 TIME_MARGIN, PATH_MARGIN, ERROR_MARGIN = 1.25, 1.25, 1.5
 """Factors between a measured value and the limit that a criterion allows."""
-MIN_ERROR_LIMIT_M = 0.25
-MIN_TIME_LIMIT_S = 10.0
+MIN_ERROR_LIMIT_M, MIN_TIME_LIMIT_S = 0.25, 10.0
+"""Smallest limits of the localization error and of the time to the goal."""
 MIN_STEP_M = 0.01
 """Minimum move that counts for the length of a path, as in the criterion path_length."""
 SPEED_PERCENTILE, SPEED_MARGIN = 99.5, 1.25
 """Percentile of the speeds that is the observed limit, because odometry is noisy, and factor to the limit."""
 STOP_TIME_FACTOR, MAX_STOP_S = 1.5, 3.0
+"""Factor between the measured time to stop and its limit, and the longest time that is a reaction to a fault."""
 REST_SPEED_M_S = 0.01
+"""Speed below which the robot rests."""
 NO_SENSORS = ("cmd_vel", "wheels", "localizer")
 """Targets of faults after which a stop is not required."""
 

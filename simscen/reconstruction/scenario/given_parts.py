@@ -31,6 +31,7 @@ from simscen.worlds.maps.ros_map import save_map
 from simscen.worlds.world_file import world_from_spec
 
 DEFAULT_LIDAR_HEIGHT_M = 0.2
+"""Height at which the world is cut for a log without scans."""
 WALL_MARGIN_M = 0.05
 """Distance that a wall can be nearer than the center of its cell."""
 MAX_NOISE_SCANS = 100
@@ -124,9 +125,9 @@ def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldCh
 def _world_of_file(file: Path, out: Path, evidence: Evidence) -> WorldChoice:
     root = default_root([file])
     loaded = load_world_file(file, root)
-    home = default_root([out])
+    out_root = default_root([out])
     written, copies = relative(file, out), list[Path]()
-    if not file.resolve().is_relative_to(home.resolve()):
+    if not file.resolve().is_relative_to(out_root.resolve()):
         copy = out.with_name(f"{_stem(out)}{''.join(file.suffixes[-2:])}")
         if loaded.map is not None:
             save_map(load_map(loaded.map), copy)

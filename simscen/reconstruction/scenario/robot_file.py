@@ -17,13 +17,21 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans, Ti
 TICK_RATE_HZ = 240
 """Default tick rate of scenarios, which the rates of sensors must divide."""
 DEFAULT_RADIUS_M, MIN_RADIUS_M = 0.22, 0.1
-DEFAULT_MASS_KG, DEFAULT_ACCELERATION, DEFAULT_TURN_ACCELERATION = 5.0, 1.0, 3.2
+"""Radius of a robot whose footprint is unknown, and the smallest one, for a robot that drove close to walls."""
+DEFAULT_MASS_KG, DEFAULT_ACCELERATION_M_S2, DEFAULT_TURN_ACCELERATION_RAD_S2 = 5.0, 1.0, 3.2
+"""Mass and accelerations that a log does not show."""
 BODY_TOP_M, BODY_BOTTOM_M, MIN_LIDAR_HEIGHT_M = 0.12, 0.03, 0.15
+"""Heights of the body, and smallest height of a lidar, which must be above the body."""
 WHEEL_RADIUS_M, SEPARATION_PER_RADIUS = 0.033, 1.3
+"""Radius of the wheels, and ratio of their separation to half the width of the robot."""
 VELOCITY_STEP_S = 0.25
+"""Time over which velocities are averaged, if only poses are known."""
 SPEED_PERCENTILE, SPEED_MARGIN = 99.0, 1.05
+"""Percentile of the speeds that is the observed limit, because odometry is noisy, and factor to the limit."""
 MIN_SPEED_M_S, MIN_TURN_RATE_RAD_S = 0.1, 0.5
+"""Smallest limits, for a robot that hardly moves."""
 MAX_BEAMS = 4096
+"""Largest number of beams of a lidar in a robot file."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +75,8 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clear
         "limits": {
             "linear": speed,
             "angular": turn_rate,
-            "linear_acceleration": DEFAULT_ACCELERATION,
-            "angular_acceleration": DEFAULT_TURN_ACCELERATION,
+            "linear_acceleration": DEFAULT_ACCELERATION_M_S2,
+            "angular_acceleration": DEFAULT_TURN_ACCELERATION_RAD_S2,
         },
         "sensors": _sensors(drive, lidar_noise),
     }

@@ -19,17 +19,20 @@ from simscen.reconstruction.objects.pedestrians import is_person
 from simscen.reconstruction.scenario.criteria import ProposedCriterion
 
 MAX_COLUMNS = 118
-OBJECT_HEIGHT_M = 1.0
-PERSON_HEIGHT_M = 1.7
-GLUE = "\x00"
-"""Stands for a space at which no line is broken."""
+OBJECT_HEIGHT_M, PERSON_HEIGHT_M = 1.0, 1.7
+"""Heights of objects and people, which a planar lidar does not see."""
+NO_BREAK_SPACE = "\x00"
+"""Placeholder for a space at which no line is broken."""
 _PLAIN = re.compile(r"[\w./ %-]+")
 """Scalars that need no quotes in flow style."""
 
 
 @dataclass(frozen=True)
 class ScenarioGoal:
-    """Goal of the reconstructed scenario."""
+    """Goal of the reconstructed scenario: `pose` in the map frame; `timeout` and `wait`, at the goal, in s.
+
+    `expect` is the error code with which the goal is expected to fail, "" if it must be reached.
+    """
 
     name: str
     pose: Pose2
@@ -55,7 +58,13 @@ class ScenarioContents:
         estimate: Initial estimate with standard deviations x, y, yaw; None for the default, "unknown" for anywhere.
         stack: Configuration of the stack.
         passing_radius: Distance in m at which a pose counts as passed; None if the robot stops at each goal.
+        goals: Goals in their order.
+        stops_at_failure: Whether the drive ends at the first failed goal.
         time_limit: Time limit in s.
+        objects: Objects and pedestrians that the scenario spawns.
+        kidnaps: Time in s, new pose in the map frame, and evidence of each kidnapping.
+        faults: Faults of sensors, commands, and localizer.
+        criteria: Pass criteria.
         evidence: Evidence by key of the scenario.
         unknowns: What the log does not show.
     """
@@ -219,9 +228,9 @@ def _pedestrian(walk: FoundWalk) -> Iterator[str]:
     yield f"    when: {{time: {walk.begin:.2f} s}}"
     yield "    do:"
     yield "      pedestrian:"
-    glued = ", ".join(key.replace(" ", GLUE) for key in keys)
+    glued = ", ".join(key.replace(" ", NO_BREAK_SPACE) for key in keys)
     lines = textwrap.wrap(f"{{{glued}}}", MAX_COLUMNS, initial_indent=" " * 8, subsequent_indent=" " * 9)
-    yield from (line.replace(GLUE, " ") for line in lines)
+    yield from (line.replace(NO_BREAK_SPACE, " ") for line in lines)
 
 
 def _scripted_object(thing: FoundObject) -> Iterator[str]:

@@ -17,6 +17,7 @@ from simscen.reconstruction.scenario_from_log import Reconstruction
 from simscen.record.log_file import attached_result
 
 STEP_S = 0.1
+"""Time between two compared positions."""
 SAME_PLACE_M = 0.3
 """Maximum distance between both robots at which their scans are compared."""
 SAME_RANGE_M = 0.2
@@ -115,8 +116,8 @@ def compare_incidents(
     left = [*repeated]
     compared = []
     for incident in recorded:
-        same = [one for one in left if one.kind == incident.kind]
-        nearest = min(same, key=lambda one: abs(one.time - incident.time), default=None)
+        same = [candidate for candidate in left if candidate.kind == incident.kind]
+        nearest = min(same, key=lambda candidate: abs(candidate.time - incident.time), default=None)
         if nearest is not None:
             left.remove(nearest)
         compared.append(ComparedIncident(incident, nearest))
@@ -132,7 +133,7 @@ def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator
         yield ComparedQuantity("distance at the same time", "", "", f"{rms:.2f} m RMS, at most {apart.max():.2f} m")
     off = distances_to_path(repeated.poses.values[:, :2], recorded.poses.values[:, :2])
     yield ComparedQuantity("distance from the log's path", "", "", f"at most {float(off.max()):.2f} m")
-    lengths = [path_length(one.poses.values[:, :2]) for one in (recorded, repeated)]
+    lengths = [path_length(drive.poses.values[:, :2]) for drive in (recorded, repeated)]
     yield _numbers("path length", lengths[0], lengths[1], "m")
     yield _numbers("duration", recorded.duration, repeated.duration, "s")
     for number, goal in enumerate(recorded.goals):
@@ -156,10 +157,10 @@ def _numbers(name: str, log: float, run: float, unit: str) -> ComparedQuantity:
 
 
 def _goal(number: int, recorded: RecordedDrive, repeated: RecordedDrive) -> ComparedQuantity:
-    one, other = recorded.goals[number], repeated.goals[number]
-    name = f"goal {one.name or f'goal-{number + 1}'}"
-    difference = "" if one.ended is None or other.ended is None else f"{other.ended - one.ended:+.2f} s"
-    return ComparedQuantity(name, _outcome(one), _outcome(other), difference)
+    first, second = recorded.goals[number], repeated.goals[number]
+    name = f"goal {first.name or f'goal-{number + 1}'}"
+    difference = "" if first.ended is None or second.ended is None else f"{second.ended - first.ended:+.2f} s"
+    return ComparedQuantity(name, _outcome(first), _outcome(second), difference)
 
 
 def _outcome(goal: RecordedGoal) -> str:

@@ -23,8 +23,8 @@ WALL, UNSEEN, NEW_HIT = (112, 117, 128, 255), (128, 133, 144, 60), (219, 39, 119
 """Colors of occupied and unknown cells, and of cells in which the lidar measured something that is not on the map."""
 WALL_DISTANCE_M = 0.15
 """Distance from a wall up to which a return belongs to the wall."""
-MAX_SCANS = 300
-MAX_POINTS = 600
+MAX_SCANS, MAX_POINTS = 300, 600
+"""Largest number of scans, and of points of a line, that are drawn."""
 MAX_TIME_MARKS, MIN_MARK_DISTANCE = 12, 0.06
 """Number of time marks on a path, and their distance as a share of the drawing."""
 MARGIN_M, MIN_ASPECT = 1.0, 0.45
@@ -32,7 +32,8 @@ MARGIN_M, MIN_ASPECT = 1.0, 0.45
 FONT_SHARE = 0.026
 """Height of the text in a map as a share of the larger side."""
 CHART_WIDTH, CHART_HEIGHT, LEFT, BOTTOM = 420.0, 150.0, 40.0, 18.0
-STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+"""Size of a chart, and of its margins with labels, in units of the SVG."""
+TICK_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 
 
 def text(value: str) -> str:
@@ -116,7 +117,7 @@ def _label(x: float, y: float, label: str, box: Box, kind: str = "") -> str:
 
 def _time_marks(drive: RecordedDrive, name: str, box: Box) -> Iterator[str]:
     """Yield dots on the path with their times, a dot for the start, and an arrow for the end."""
-    step = next((step for step in STEPS if drive.duration / step <= MAX_TIME_MARKS), STEPS[-1])
+    step = next((step for step in TICK_STEPS if drive.duration / step <= MAX_TIME_MARKS), TICK_STEPS[-1])
     step = max(step, 1.0)
     times = np.append(np.arange(0.0, drive.duration, step), drive.duration)
     poses = drive.poses.poses_at(times)
@@ -216,5 +217,5 @@ def chart(label: str, series: Sequence[Series], unit: str) -> str:
 
 def _ticks(top: float, count: int) -> list[float]:
     """Return at most `count` round values from 0 to `top`."""
-    step = next((step for step in STEPS if top / step <= count - 1), top)
+    step = next((step for step in TICK_STEPS if top / step <= count - 1), top)
     return [round(step * number, 3) for number in range(int(top / step + 1e-9) + 1)]

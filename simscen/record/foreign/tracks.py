@@ -22,7 +22,7 @@ from simscen.record.messages.decode import NO_COVARIANCE, CheckedReader, Stamped
 
 DIFFERENCE_WINDOW_S = 0.2
 """Time over which velocities are computed from poses. Poses of motion capture have a noise of some millimeters."""
-MIN_MOTION = 0.1
+MIN_MOTION_M_RAD = 0.1
 """Motion in m or rad from which an odometry with zero twists counts as one without twists."""
 
 _POSE_DECODERS = {name: partial(decode_checked, decoder) for name, decoder in decode.POSE_DECODERS.items()}
@@ -171,4 +171,4 @@ def is_twist_missing(twists: Array, poses: Array) -> bool:
     """Return whether the twists of an odometry were never set: always zero although the robot moved."""
     moved = float(np.ptp(poses[:, 0]) + np.ptp(poses[:, 1])) if len(poses) else 0.0
     turned = float(np.abs(wrap_array(poses[:, 2] - poses[0, 2])).max()) if len(poses) else 0.0
-    return not twists.any() and (moved > MIN_MOTION or turned > MIN_MOTION)
+    return not twists.any() and (moved > MIN_MOTION_M_RAD or turned > MIN_MOTION_M_RAD)

@@ -135,7 +135,7 @@ def _label_distance(canvas: Canvas, outline: Array) -> float:
 
 
 _EARLIER_POSE_COUNT = 6
-_MIN_MOTION = 0.02
+_MIN_MOTION_M_RAD = 0.02
 """Minimum motion in m or rad for drawing a path."""
 
 
@@ -183,7 +183,7 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 def _object_path(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines) -> None:
     """Draw the path of a moving object as a dotted line, and its earlier poses."""
     for segment in split_at_jumps(samples, scene.trace.tick_rate):
-        if np.ptp(segment.values[:, :2], axis=0).max() > _MIN_MOTION:
+        if np.ptp(segment.values[:, :2], axis=0).max() > _MIN_MOTION_M_RAD:
             canvas.dashes(segment.values[:, :2], palette.PLACE, 1.0, 2.5)
     for k in _earlier_poses(samples):
         color = palette.time_color(int(samples.ticks[k]) / max(scene.trace.end, 1))
@@ -211,7 +211,7 @@ def _earlier_poses(samples: Samples) -> list[int]:
     steps = np.diff(samples.values[:, :3], axis=0)
     distances = np.hypot(steps[:, 0], steps[:, 1]) + 0.3 * np.abs(np.angle(np.exp(1j * steps[:, 2])))
     lengths = np.concatenate(([0.0], np.cumsum(distances)))
-    if lengths[-1] < _MIN_MOTION:
+    if lengths[-1] < _MIN_MOTION_M_RAD:
         return []
     indices = np.searchsorted(lengths, np.linspace(0, lengths[-1], _EARLIER_POSE_COUNT)[:-1], side="right") - 1
     return sorted(set(indices.tolist()))

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 CELL_M = 0.05
 """Size of the cells of masks for robots without a map."""
-SPEED_STEP = 0.01
+SPEED_STEP_M_S = 0.01
 """Finest difference in m/s between two speed limits of a mask."""
 
 
@@ -105,7 +105,7 @@ class _SpeedMask:
         fastest = max((limit for _, limit in zones), default=0.0)
         self._percent = file is not None and file.percent
         self._base = 0.0 if file is None else file.base
-        self._multiplier = max(SPEED_STEP, fastest / OCCUPIED) if file is None else file.multiplier
+        self._multiplier = max(SPEED_STEP_M_S, fastest / OCCUPIED) if file is None else file.multiplier
 
     @property
     def scale(self) -> dict[str, Any]:

@@ -43,7 +43,7 @@ from simscen.worlds.sdf.shapes import ShapeReader
 
 DEFAULT_FRICTION = 1.0
 """Coefficient of friction of rubber wheels on dry concrete."""
-WATER_DENSITY = 1000.0
+WATER_DENSITY_KG_M3 = 1000.0
 """Density in kg/m³ that SDF assumes for `<inertial auto="true">`."""
 DEFAULT_MASS_KG = 1.0
 """SDF's default mass of a link."""
@@ -159,7 +159,7 @@ def _link_mass(inertial: Element | None, collisions: Sequence[tuple[Element, Seq
 
 def _density(collision: Element, inertial: Element) -> float:
     owner = next((owner for owner in (collision, inertial) if owner.child("density")), None)
-    return read_positive(owner, "density") if owner else WATER_DENSITY
+    return read_positive(owner, "density") if owner else WATER_DENSITY_KG_M3
 
 
 def _volume(shape: Shape) -> float:

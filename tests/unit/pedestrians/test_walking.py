@@ -22,7 +22,7 @@ def test_pedestrian_stops_where_wall_force_equals_driving_force():
     """a exp(-gap/b) = v0/τ, so the gap is b ln(a τ / v0); the way on leads through the wall."""
     crowd = people(walker("anna", 0.0, 0.0, (50.0, 0.0), speed=1.3), around=walls([[5.0, -9.0], [5.0, 9.0]]))
     tracks, _ = walk(crowd, 20.0)
-    gap = forces.WALL_RANGE_M * math.log(forces.WALL_STRENGTH * forces.RELAXATION_TIME_S / 1.3)
+    gap = forces.WALL_RANGE_M * math.log(forces.WALL_STRENGTH_M_S2 * forces.RELAXATION_TIME_S / 1.3)
     assert 5.0 - tracks["anna"][-1, 0] - 0.25 == pytest.approx(gap, abs=1e-3)
 
 

@@ -22,7 +22,7 @@ from simscen.model.world import WorldSpec
 from simscen.stack.checked_components import CheckedLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
-from simscen.testing.synthetic_room import ROBOT, TICK_RATE
+from simscen.testing.synthetic_room import ROBOT, TICK_RATE_HZ
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
@@ -211,7 +211,7 @@ class Case:
 
     def localizer(self) -> Localizer:
         """The localizer at its start."""
-        given = Surroundings(ROBOT, self.map, TICK_RATE)
+        given = Surroundings(ROBOT, self.map, TICK_RATE_HZ)
         setting = Setting(given, "localizer", Streams(self.seed), estimate=self.estimate)
         return CheckedLocalizer(self.spec, setting)
 

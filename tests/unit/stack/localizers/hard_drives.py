@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simscen.testing.synthetic_room import BEAMS, BOXES, READINGS_PER_SCAN, SCAN_PERIOD, TICK_RATE, Drive, cast
+from simscen.testing.synthetic_room import BEAMS, BOXES, READINGS_PER_SCAN, SCAN_PERIOD, TICK_RATE_HZ, Drive, cast
 
 
 def kidnapped(before: Drive, after: Drive) -> Drive:
@@ -35,7 +35,7 @@ def crowded(way: Drive, seed: int, people: int = 8) -> Drive:
     for row, (seen, yaw) in enumerate(zip(ranges, way.truth[::READINGS_PER_SCAN, 2], strict=True)):
         bearing += rng.normal(0, 0.05, people)
         distance = np.clip(distance + rng.normal(0, 0.05, people), 0.5, 3)
-        here = np.sin(2 * np.pi * row * SCAN_PERIOD / TICK_RATE / period + phase) > 0
+        here = np.sin(2 * np.pi * row * SCAN_PERIOD / TICK_RATE_HZ / period + phase) > 0
         for towards, far in zip(bearing[here], distance[here], strict=True):
             off = np.abs((angles - towards + yaw + np.pi) % (2 * np.pi) - np.pi)
             np.minimum(seen, far, out=seen, where=off < np.arctan(0.3 / far))
