@@ -54,8 +54,8 @@ def simulate(
     from simscen.run.preparation import prepare
     from simscen.run.simulate import simulate as run
 
-    home = None if root is None else Path(root)
-    loaded = load_with(stack, Path(scenario), home, [Path(folder) for folder in world_path], variation)
+    root_folder = None if root is None else Path(root)
+    loaded = load_with(stack, Path(scenario), root_folder, [Path(folder) for folder in world_path], variation)
     return run(prepare(loaded), seed, log=None if log is None else Path(log))
 
 
@@ -77,8 +77,8 @@ def variations(
     from simscen.loading.scenario import try_variations
 
     file = Path(scenario)
-    home = default_root([file]) if root is None else Path(root)
-    found = try_variations(file, home, [Path(folder) for folder in world_path])
+    root_folder = default_root([file]) if root is None else Path(root)
+    found = try_variations(file, root_folder, [Path(folder) for folder in world_path])
     if isinstance(found, list):
         raise InvalidInput(found)
     return [one.variation for one in found]

@@ -75,7 +75,10 @@ _SHIPPED_ROOTS = (PACKAGE / "data" / "library", PACKAGE.parent)
 
 def shipped_scenarios() -> dict[str, Path]:
     """Return the files by id, such as "navigation/goal"; empty if the installation does not contain them."""
-    home = next((root / "scenarios" for root in _SHIPPED_ROOTS if (root / "scenarios").is_dir()), None)
-    if home is None:
+    scenario_folder = next((root / "scenarios" for root in _SHIPPED_ROOTS if (root / "scenarios").is_dir()), None)
+    if scenario_folder is None:
         return {}
-    return {path.relative_to(home).as_posix().removesuffix(SUFFIX): path for path in sorted(home.rglob(f"*{SUFFIX}"))}
+    return {
+        path.relative_to(scenario_folder).as_posix().removesuffix(SUFFIX): path
+        for path in sorted(scenario_folder.rglob(f"*{SUFFIX}"))
+    }

@@ -30,9 +30,9 @@ _TOKEN = re.compile(rf"""'(?:[^']|'')*'|"(?:[^"\\]|\\.)*"|-(?=\s)|{_WORD}(?: +{_
 _WORKFLOW_COMMAND = re.compile(r"^(\s*):(?=:)", re.MULTILINE)
 
 
-def from_here(problems: Iterable[Problem], root: Path) -> list[Problem]:
+def relative_to_working_folder(problems: Iterable[Problem], root: Path) -> list[Problem]:
     """Return the problems with paths relative to the working directory, so that terminals and editors can open them."""
-    return [replace(problem, path=_from_here(problem.path, root)) for problem in problems]
+    return [replace(problem, path=_relative_path(problem.path, root)) for problem in problems]
 
 
 def as_text(problems: Sequence[Problem]) -> str:
@@ -124,7 +124,7 @@ def _property(text: str) -> str:
     return _data(text).replace(":", "%3A").replace(",", "%2C")
 
 
-def _from_here(path: str, root: Path) -> str:
+def _relative_path(path: str, root: Path) -> str:
     """Return the shorter of the relative and the absolute path; a path that does not exist is returned unchanged."""
     absolute = str(root.absolute() / path)
     return min(os.path.relpath(absolute), absolute, key=len) if os.path.lexists(absolute) else path

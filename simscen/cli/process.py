@@ -97,5 +97,5 @@ def caller_environment() -> dict[str, str]:
 
 def config_file() -> Path:
     """Return the user's configuration file: simscen/config.yaml in $XDG_CONFIG_HOME or ~/.config."""
-    home = Path(os.environ.get("XDG_CONFIG_HOME", ""))
-    return (home if home.is_absolute() else Path("~/.config").expanduser()) / "simscen" / "config.yaml"
+    config_home = Path(os.environ.get("XDG_CONFIG_HOME", ""))
+    return (config_home if config_home.is_absolute() else Path("~/.config").expanduser()) / "simscen" / "config.yaml"

@@ -14,6 +14,7 @@ from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, at_least, undecided
 from simscen.criteria.timeline import NEVER_SWITCHED, clip_samples, enabled_spans
+from simscen.criteria.trace_signals.distances import POINT
 from simscen.criteria.trace_signals.ground_truth import Flags, truth
 from simscen.spec.base import Spec
 from simscen.spec.places import MaskFile, RegionName
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 
 RESOLUTION_M = 0.005
 """Resolution in m of the search for the smallest distance between two samples."""
-POINT = ((0.0, 0.0),)
-"""Footprint of a robot that only has an inscribed radius."""
 
 
 class Keepout(Spec, Criterion):

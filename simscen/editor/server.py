@@ -1,4 +1,4 @@
-"""The local web server of the editor. It answers only requests that know the secret part of its address."""
+"""Local web server of the editor. It answers only requests whose address contains its secret token."""
 
 import json
 import re
@@ -16,27 +16,27 @@ from simscen.editor.session import EditorSession, RequestRefused
 from simscen.report.picture.palette import css_variables
 
 ADDRESS = "127.0.0.1"
-FOLDER = PACKAGE / "data" / "editor"
+PAGE_FOLDER = PACKAGE / "data" / "editor"
 REPLAY_FOLDER = PACKAGE / "data" / "replay"
 SHARED_MODULES = ("camera.js", "dom.js")
 """Modules of the replay page that this page uses as well."""
 MAX_REQUEST_BYTES = 4 << 20
-TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
-POLICY = (
+CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
+CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; frame-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
 )
-_REPLAY = re.compile(r"runs/([0-9]{1,6})/replay\.html")
-_PAGE_POLICY = re.compile(r'http-equiv="Content-Security-Policy" content="([^"]*)"')
+_REPLAY_PATH = re.compile(r"runs/([0-9]{1,6})/replay\.html")
+_POLICY_OF_PAGE = re.compile(r'http-equiv="Content-Security-Policy" content="([^"]*)"')
 
 
-class Answer(NamedTuple):
-    """An answer of the server; `policy` is its Content-Security-Policy."""
+class Response(NamedTuple):
+    """HTTP response; `policy` is its Content-Security-Policy."""
 
     body: bytes
     content_type: str
     status: int = 200
-    policy: str = POLICY
+    policy: str = CONTENT_SECURITY_POLICY
 
 
 class EditorServer(ThreadingHTTPServer):
@@ -49,7 +49,7 @@ class EditorServer(ThreadingHTTPServer):
         super().__init__((ADDRESS, port), _Handler)
         self.open_files, self.token = OpenFiles(session), secrets.token_urlsafe(24)
         self.hosts = {f"{name}:{self.server_port}" for name in (ADDRESS, "localhost")}
-        self.files = {file.name: file for file in FOLDER.iterdir() if file.suffix in TYPES}
+        self.files = {file.name: file for file in PAGE_FOLDER.iterdir() if file.suffix in CONTENT_TYPES}
         self.files |= {name: REPLAY_FOLDER / name for name in SHARED_MODULES}
 
     @property
@@ -79,26 +79,26 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = 60
 
     def do_GET(self) -> None:
-        """Answer with a file of the page, or the replay page of a run."""
-        if (requested := self._allowed()) is not None:
+        """Response with a file of the page, or the replay page of a run."""
+        if (requested := self._authorized()) is not None:
             self._send(self._file(*requested))
 
     def do_POST(self) -> None:
-        """Answer a request of the page."""
+        """Response a request of the page."""
         body = self._body()
-        if (requested := self._allowed()) is None:
+        if (requested := self._authorized()) is None:
             return
         if body is None:
             self._send(_error("the request is too large, or has no length", HTTPStatus.REQUEST_ENTITY_TOO_LARGE))
         elif self.headers.get_content_type() != "application/json":
             self._send(_error("requests must be JSON", HTTPStatus.UNSUPPORTED_MEDIA_TYPE))
         else:
-            self._send(_answer(*requested, body))
+            self._send(_response(*requested, body))
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing: the address contains the token."""
 
-    def _allowed(self) -> tuple[EditorSession, str] | None:
+    def _authorized(self) -> tuple[EditorSession, str] | None:
         """Return the session of a request and the path within it; if it is not allowed, answer, and return None."""
         origin, host = self.headers.get("Origin"), self.headers.get("Host", "")
         if host not in self.server.hosts:
@@ -126,8 +126,8 @@ class _Handler(BaseHTTPRequestHandler):
             return None
         return self.rfile.read(int(length))
 
-    def _file(self, session: EditorSession, name: str) -> Answer:
-        if match := _REPLAY.fullmatch(name):
+    def _file(self, session: EditorSession, name: str) -> Response:
+        if match := _REPLAY_PATH.fullmatch(name):
             return _replay(session, int(match[1]))
         file = self.server.files.get(name or "page.html")
         if file is None:
@@ -135,9 +135,9 @@ class _Handler(BaseHTTPRequestHandler):
         data = file.read_bytes()
         if file.name == "page.css":
             data = css_variables().encode() + data
-        return Answer(data, TYPES[file.suffix])
+        return Response(data, CONTENT_TYPES[file.suffix])
 
-    def _send(self, answer: Answer) -> None:
+    def _send(self, answer: Response) -> None:
         self.send_response(answer.status)
         headers = {
             "Content-Type": f"{answer.content_type}; charset=utf-8",
@@ -155,17 +155,17 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(answer.body)
 
 
-def _replay(session: EditorSession, number: int) -> Answer:
+def _replay(session: EditorSession, number: int) -> Response:
     trial = session.runs.trial(number)
     if trial is None or not trial.replay.is_file():
         return _error("there is no such replay", HTTPStatus.NOT_FOUND)
     page = trial.replay.read_bytes()
-    own = _PAGE_POLICY.search(page[:4096].decode(errors="replace"))
+    own = _POLICY_OF_PAGE.search(page[:4096].decode(errors="replace"))
     policy = unescape(own[1]) if own else "default-src 'none'"
-    return Answer(page, "text/html", policy=f"{policy}; frame-ancestors 'self'")
+    return Response(page, "text/html", policy=f"{policy}; frame-ancestors 'self'")
 
 
-def _answer(session: EditorSession, name: str, body: bytes) -> Answer:
+def _response(session: EditorSession, name: str, body: bytes) -> Response:
     handler = session.requests.get(name.removeprefix("api/")) if name.startswith("api/") else None
     if handler is None:
         return _error("no such request", HTTPStatus.NOT_FOUND)
@@ -184,17 +184,17 @@ def _answer(session: EditorSession, name: str, body: bytes) -> Answer:
         return _internal_error()
 
 
-def _json(data: Any, status: int = 200) -> Answer:
-    return Answer(
+def _json(data: Any, status: int = 200) -> Response:
+    return Response(
         json.dumps(data, ensure_ascii=False, allow_nan=False).encode(errors="replace"), "application/json", status
     )
 
 
-def _error(message: str, status: HTTPStatus) -> Answer:
+def _error(message: str, status: HTTPStatus) -> Response:
     return _json({"error": message}, status)
 
 
-def _internal_error() -> Answer:
+def _internal_error() -> Response:
     """Print the traceback for a report, and tell the page."""
     traceback.print_exc()
     return _error(

@@ -184,23 +184,23 @@ class _LimitedCommands(Disturbance):
 
     def _within_speeds(self, command: Twist) -> Twist:
         spec, separation = self._spec, self._setting.separation
-        vx, vy = _shorten((command.vx, command.vy), spec.linear)
-        (wz,) = _shorten((command.wz,), spec.angular)
+        vx, vy = _limit_length((command.vx, command.vy), spec.linear)
+        (wz,) = _limit_length((command.wz,), spec.angular)
         limited = Twist(vx, vy, wz)
         if not separation or (spec.left is None and spec.right is None):
             return limited
         left, right = side_speeds(limited, separation)
-        (left,), (right,) = _shorten((left,), spec.left), _shorten((right,), spec.right)
+        (left,), (right,) = _limit_length((left,), spec.left), _limit_length((right,), spec.right)
         return twist_from_sides(left, right, limited.vy, separation)
 
     def _within_accelerations(self, previous: Twist, command: Twist, seconds: float) -> Twist:
         spec = self._spec
-        vx, vy = _shorten((command.vx - previous.vx, command.vy - previous.vy), spec.linear_acceleration, seconds)
-        (wz,) = _shorten((command.wz - previous.wz,), spec.angular_acceleration, seconds)
+        vx, vy = _limit_length((command.vx - previous.vx, command.vy - previous.vy), spec.linear_acceleration, seconds)
+        (wz,) = _limit_length((command.wz - previous.wz,), spec.angular_acceleration, seconds)
         return Twist(previous.vx + vx, previous.vy + vy, previous.wz + wz)
 
 
-def _shorten(vector: tuple[float, ...], limit: float | None, seconds: float = 1.0) -> tuple[float, ...]:
+def _limit_length(vector: tuple[float, ...], limit: float | None, seconds: float = 1.0) -> tuple[float, ...]:
     """Return the vector with its length limited to `limit * seconds`."""
     length = math.hypot(*vector)
     if limit is None or length <= limit * seconds:

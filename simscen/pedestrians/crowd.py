@@ -25,11 +25,11 @@ from simscen.pedestrians.surroundings import (
 INTERACTION_RANGE_M = 10.0
 """Distance beyond which pedestrians do not react to each other (HuNavSim's max_dist_view)."""
 MIN_SOCIAL_FORCE_M_S2 = 0.05
-"""m/s²; weaker social forces count as 0, so that a new pedestrian does not change others far away."""
+"""Weaker social forces count as 0, so that a new pedestrian does not change others far away."""
 VIEW_CHECK_STEPS = 20
 """Number of steps between two checks whether the next corner of a path is still in view."""
 MIN_SPEED_M_S = 0.01
-"""m/s; pedestrians that would walk more slowly stand still."""
+"""Pedestrians that would walk more slowly stand still."""
 REFERENCE_RADIUS_M = 0.25
 """Radius of the pedestrians with whom the parameters of the model were determined."""
 

@@ -24,21 +24,21 @@ MAX_SPEED_RATIO = 1.3
 """Ratio of the maximum speed to the preferred speed [HM95]."""
 
 SOCIAL_STRENGTH_M_S2 = 4.5
-"""A in m/s² [M09]."""
+"""Largest social force, A [M09]."""
 VELOCITY_WEIGHT_S_PER_M = 2.0
-"""λ in s/m: weight of the relative velocity relative to the direction to the other [M09]."""
+"""Weight of the relative velocity relative to the direction to the other, λ [M09]."""
 RANGE_PER_INTERACTION_M = 0.35
-"""γ in m: range of the interaction, B = γ|D| [M09]."""
+"""Range of the interaction relative to its vector D: B = γ|D| [M09]."""
 TURN_DECAY_PER_M, BRAKE_DECAY_PER_M = 2.0, 3.0
-"""n and n′ in 1/m: angular decay of the turning and of the braking force [M09]."""
+"""Angular decay of the turning and of the braking force, n and n′ [M09]."""
 HEAD_ON_BIAS_RAD_PER_M = 0.005
-"""ε in rad/m: bias that makes pedestrians who meet exactly head-on evade to the right [M09]."""
+"""Bias that makes pedestrians who meet exactly head-on evade to the right, ε [M09]."""
 
 WALL_STRENGTH_M_S2, WALL_RANGE_M = 3.0, 0.1
-"""a in m/s² and b in m [M09]."""
+"""Force of a wall at contact, a, and distance over which it decays, b [M09]."""
 
 GAZE_WEIGHT_PER_RAD_S, COHERENCE_M_S2, REPULSION_M_S2 = 4.0, 3.0, 1.0
-"""β₁ in 1/(rad s), β₂ and β₃ in m/s² [M10]."""
+"""Weights in a group: turning the head β₁, moving to the center β₂, and keeping a distance β₃ [M10]."""
 HALF_VISION_RAD = math.pi / 2
 """Angle to each side in which a pedestrian sees its group without turning the head [M10]."""
 MIN_GROUP_GAP_M = 0.8

@@ -15,17 +15,17 @@ CORNER_RADIUS_M = 0.5
 HALF_FIELD_OF_VIEW_RAD = math.pi / 2 + 0.17
 """Field of view to each side (HuNavSim's lineOfSight)."""
 MAX_TURN_RATE_RAD_S = math.pi
-"""Maximum turn rate in rad/s (HuNavSim's max_ang_vel)."""
+"""Maximum turn rate (HuNavSim's max_ang_vel)."""
 MIN_TURNING_SPEED_M_S = 0.1
-"""Speed in m/s above which a pedestrian turns to its direction of motion."""
+"""Speed above which a pedestrian turns to its direction of motion."""
 LOST_RANGE_RATIO = 1.5
 """Hysteresis: a reaction ends at this multiple of the distance at which it begins."""
 CURIOUS_SPEED_M_S, CURIOUS_DISTANCE_M = 1.8, 1.5
-"""Speed in m/s at which curious pedestrians approach, slower when nearer, and distance at which they stop."""
+"""Speed at which curious pedestrians approach, slower when nearer, and distance at which they stop."""
 SCARED_SPEED_M_S, SCARED_FORCE_M2_S2 = 0.6, 4.0
-"""Maximum speed in m/s of scared pedestrians, and repelling force times the gap, in m²/s² (20 x 0.2)."""
+"""Maximum speed of scared pedestrians, and their repelling force times the gap to the robot (20 x 0.2)."""
 THREATENING_SPEED_M_S, BLOCKING_DISTANCE_M, STARING_RANGE_M = 2.0, 1.1, 1.2
-"""Maximum speed in m/s of threatening pedestrians, their distance in front of the robot, and the distance within which
+"""Maximum speed of threatening pedestrians, their distance in front of the robot, and the distance within which
 they look at it."""
 STOPPING_DISTANCE_M = 0.05
 """Distance from the place to stand within which a pedestrian stops walking."""

@@ -86,8 +86,8 @@ def _folder(config: pytest.Config) -> Path:
     controller_folder = getattr(config, "workerinput", {}).get(OUT_OPTION)
     if controller_folder is not None:
         return Path(controller_folder)
-    home = Path(config.getoption("--simscen-out") or config.getini(OUT_OPTION) or DEFAULT_FOLDER)
-    return home / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}-pytest"
+    out_folder = Path(config.getoption("--simscen-out") or config.getini(OUT_OPTION) or DEFAULT_FOLDER)
+    return out_folder / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}-pytest"
 
 
 class Simscen:

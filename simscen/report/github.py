@@ -14,7 +14,13 @@ from simscen.report.comparison_markup import as_markdown, markdown_cell
 from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import relative, relative_to_checkout
 from simscen.report.text_reporters import Reporter
-from simscen.report.violations import error_summary, excuse_text, reported_violations, scenario_file, short_run_name
+from simscen.report.violations import (
+    error_summary,
+    reason_without_failure,
+    reported_violations,
+    scenario_file,
+    short_run_name,
+)
 
 MAX_PICTURES = 10
 MAX_ROWS = 1000
@@ -63,7 +69,7 @@ class _GitHub:
 def annotations(run: RunFinished) -> list[str]:
     """Return the workflow commands for one run."""
     name = short_run_name(run.key)
-    if excuse := excuse_text(run):
+    if excuse := reason_without_failure(run):
         line = next((each.line for each in reported_violations(run) if not each.warning), 0)
         return [_command("notice", run, line, name, excuse)]
     lines = [
@@ -117,7 +123,7 @@ def _reason_cell(run: RunFinished) -> str:
     """Return a table cell with one line per violated criterion, or with the tightest margin if the run passed."""
     if run.outcome is Outcome.ERROR:
         return markdown_cell(error_summary(run))
-    if excuse := excuse_text(run):
+    if excuse := reason_without_failure(run):
         return markdown_cell(excuse)
     messages = [markdown_cell(violation.message) for violation in reported_violations(run)]
     tightest = tightest_margin(run.result.verdicts)

@@ -9,13 +9,13 @@ from simscen.core.records.verdict import Status, Verdict
 from simscen.judge.finding_text import tightest_margin
 from simscen.report.display_text import StyledLine, StyledText, one_line
 from simscen.report.session_lines import SYMBOLS, violation_lines
-from simscen.report.violations import error_summary, excuse_text, first_violation
+from simscen.report.violations import error_summary, first_violation, reason_without_failure
 
 
 def full_log_lines(run: RunFinished, name: str) -> Iterator[StyledLine]:
     """Yield the length and outcome of a log, then all violations."""
     tightest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
-    note = f"tightest: {one_line(tightest)}" if tightest else excuse_text(run)
+    note = f"tightest: {one_line(tightest)}" if tightest else reason_without_failure(run)
     yield (*_head(run.result, name), *((StyledText(f"   {note}", "quiet"),) if note else ()))
     yield from violation_lines(run)
 
@@ -24,7 +24,7 @@ def short_log_line(run: RunFinished, name: str) -> StyledLine:
     """Return a line with the length of a log, and its tightest margin or the first reason for the failure."""
     if run.outcome is Outcome.ERROR:
         return (*_head(run.result, name), StyledText(f"   {error_summary(run)}", "warning"))
-    if excuse := excuse_text(run):
+    if excuse := reason_without_failure(run):
         return (*_head(run.result, name), StyledText(f"   {excuse}", "quiet"))
     tightest = one_line(tightest_margin(run.result.verdicts))
     reason = first_violation(run) or (f"tightest: {tightest}" if tightest else "")

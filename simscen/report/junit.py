@@ -22,8 +22,8 @@ from simscen.report.study import claim_text, claim_title
 from simscen.report.violations import (
     Violation,
     error_details,
-    excuse_text,
     first_violation,
+    reason_without_failure,
     reported_violations,
     scenario_file,
     source_location,
@@ -95,7 +95,7 @@ class SuiteCounts:
         self.tests += 1
         self.failures += run.outcome is Outcome.FAILED
         self.errors += run.outcome is Outcome.ERROR
-        self.skipped += bool(excuse_text(run))
+        self.skipped += bool(reason_without_failure(run))
         self.seconds += run.wall
 
     def add(self, other: "SuiteCounts") -> None:
@@ -182,7 +182,7 @@ def _add_case(suite: Element, run: RunFinished, name: str, family: Family) -> No
         case Outcome.SKIPPED:
             SubElement(case, "skipped", {"type": "simscen.skip", "message": escape_control(run.result.reason)})
         case Outcome.FAILED_AS_EXPECTED:  # as pytest reports xfail
-            SubElement(case, "skipped", {"type": "simscen.expected-failure", "message": excuse_text(run)})
+            SubElement(case, "skipped", {"type": "simscen.expected-failure", "message": reason_without_failure(run)})
         case Outcome.PASSED:
             pass
     if output := _output(run):

@@ -11,8 +11,8 @@ from simscen.report.display_text import Role, StyledLine, StyledText, one_line, 
 from simscen.report.violations import (
     error_details,
     error_summary,
-    excuse_text,
     first_violation,
+    reason_without_failure,
     reported_violations,
     scenario_file,
     short_run_name,
@@ -163,12 +163,12 @@ def _timing_and_junit(session: SessionFinished) -> Iterator[StyledText]:
 
 def _summary(run: RunFinished) -> tuple[StyledText, ...]:
     if run.outcome is Outcome.SKIPPED:
-        return (StyledText(excuse_text(run), "quiet"),)
+        return (StyledText(reason_without_failure(run), "quiet"),)
     if run.outcome is Outcome.ERROR and not run.result.simulated:
         return (StyledText(f"{error_details(run)[0]} after {run.wall:.2f} s", "quiet"),)
     times = f"{run.result.simulated:6.1f} s simulated in {run.wall:.2f} s{', kept' if run.resumed else ''}"
     if run.outcome is Outcome.FAILED_AS_EXPECTED:
-        return (StyledText(f"{times}   {excuse_text(run)}", "quiet"),)
+        return (StyledText(f"{times}   {reason_without_failure(run)}", "quiet"),)
     tightest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
     return (
         StyledText(times, "quiet"),

@@ -72,7 +72,7 @@ def first_violation(run: RunFinished, more: str = " (and {} more)") -> str:
     return messages[0] + (more.format(len(messages) - 1) if len(messages) > 1 else "") if messages else ""
 
 
-def excuse_text(run: RunFinished) -> str:
+def reason_without_failure(run: RunFinished) -> str:
     """Return why a skipped or expectedly failed run is not a failure, or "" for other runs."""
     match run.outcome:
         case Outcome.SKIPPED:

@@ -26,7 +26,7 @@ from simscen.run.preparation import PreparedScenario
 from simscen.run.robot_interface import sensor_frames, sensor_kinds
 from simscen.sim.body.outline import convex_hull, footprint, outlines_in_band
 from simscen.sim.urdf.writer import to_urdf
-from simscen.worlds.routes.shortest_paths import Z_RANGE
+from simscen.worlds.routes.shortest_paths import Z_RANGE_M
 
 _CACHE: WeakKeyDictionary[PreparedScenario, LogHeader] = WeakKeyDictionary()
 
@@ -85,7 +85,7 @@ def world_scenery(prepared: PreparedScenario) -> Scenery:
 
 
 def _movable_object(body: Body, world: World) -> MovableObject:
-    outlines = outlines_in_band(body.solids, Z_RANGE) or ([footprint(body.solids)] if body.solids else [])
+    outlines = outlines_in_band(body.solids, Z_RANGE_M) or ([footprint(body.solids)] if body.solids else [])
     rounded = tuple(tuple((round(x, DECIMALS), round(y, DECIMALS)) for x, y in outline) for outline in outlines)
     closed, opened = world.doors.get(body.name, (None, None))
     return MovableObject(body.name, body.pose.plane, rounded, closed, opened, body.mass)

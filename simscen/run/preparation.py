@@ -14,7 +14,7 @@ from simscen.core.errors import Problem
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Estimate, Goal
-from simscen.core.records.case import CLEARANCE_RANGE, ROBOT_NAME, Case
+from simscen.core.records.case import CLEARANCE_RANGE_M, ROBOT_NAME, Case
 from simscen.criteria.base import Criterion
 from simscen.loading.builders import (
     load_criterion_masks,
@@ -182,7 +182,7 @@ def _clearance_range(spec: ScenarioSpec) -> float:
     ranges = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
     near = (test.clearance_below for trigger in spec.triggers for test in trigger.parts())
     ranges += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]
-    return max([CLEARANCE_RANGE, *ranges])
+    return max([CLEARANCE_RANGE_M, *ranges])
 
 
 def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | None:

@@ -1,11 +1,10 @@
 """Inertial measurement unit."""
 
+from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry import Pose3, Vector, rotated
 from simscen.core.messages.sensor_data import Imu
 from simscen.model.robot import InertialUnit
 from simscen.sensors.sensor import NormalStream, SensorSetting
-
-GRAVITY = 9.81  # m/s²
 
 
 class ImuSensor:
@@ -36,7 +35,9 @@ class ImuSensor:
         self._velocity = vx, vy, vz = linear
         seconds, base_from_world = self._seconds, (-i, -j, -k, w)
         p, q, r = rotated(base_from_world, angular)
-        x, y, z = rotated(base_from_world, ((vx - px) / seconds, (vy - py) / seconds, (vz - pz) / seconds + GRAVITY))
+        x, y, z = rotated(
+            base_from_world, ((vx - px) / seconds, (vy - py) / seconds, (vz - pz) / seconds + GRAVITY_M_S2)
+        )
         gyro, force, (bp, bq, br) = self._gyro_std, self._force_std, self._bias
         np, nq, nr, nx, ny, nz = self._normals.take(6)
         return Imu(

@@ -12,7 +12,7 @@ import pybullet
 from simscen.core.environment.world_model import Patch
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, MotionPath, TriangleMesh
-from simscen.core.records.case import CLEARANCE_RANGE
+from simscen.core.records.case import CLEARANCE_RANGE_M
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import engine
 from simscen.sim.bullet.client_pool import CLIENT_POOL
@@ -55,7 +55,7 @@ class Simulation:
         triangulate: engine.Triangulate,
         tick_rate: int = 240,
         solver_iterations: int = 10,
-        clearance_range: float = CLEARANCE_RANGE,
+        clearance_range: float = CLEARANCE_RANGE_M,
         has_images: bool = True,
     ) -> None:
         """Build the world with the robots at rest at their initial poses.

@@ -8,7 +8,7 @@ import numpy as np
 from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.messages.navigation import Goal, Path
-from simscen.core.records.case import CLEARANCE_RANGE, Case, Passage
+from simscen.core.records.case import CLEARANCE_RANGE_M, Case, Passage
 from simscen.core.records.events import Disturbance, Event, EventKind
 from simscen.core.records.trace import Samples, Ticks, Trace
 
@@ -125,7 +125,7 @@ def synthetic_case(description: Mapping[str, Any]) -> Case:
         footprint=tuple((x, y) for x, y in description.get("footprint", [])),
         inscribed_radius=description.get("inscribed_radius", 0.2),
         time_limit=description.get("time_limit", 60.0),
-        clearance_range=description.get("clearance_range", CLEARANCE_RANGE),
+        clearance_range=description.get("clearance_range", CLEARANCE_RANGE_M),
         passages=tuple(
             Passage(goal, ((ax, ay), (bx, by)), (one, other))
             for goal, (ax, ay), (bx, by), one, other in description.get("passages", [])

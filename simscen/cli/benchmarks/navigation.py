@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simscen.cli.diagnostics import as_text as problems_as_text
-from simscen.cli.diagnostics import escaped, from_here, print_text
+from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
 from simscen.core.errors import Exit, NothingSelected
 from simscen.report.display_text import detect_style
 
@@ -130,7 +130,7 @@ def with_stack(file: Path, experiments: list["Experiment"], generated: Path, pro
 
     choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
     if choice.notes:
-        print_text(problems_as_text(from_here(choice.notes, project)), sys.stderr)
+        print_text(problems_as_text(relative_to_working_folder(choice.notes, project)), sys.stderr)
     parameters = choice.section.plain if choice.section else {}
     return [
         with_stack_parameters(

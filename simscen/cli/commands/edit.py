@@ -109,8 +109,8 @@ def _edited_file(
     if not file.is_file():
         what = "it is not a regular file" if file.exists() else "no such file"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", what, "start a new one with --new --map office.yaml")])
-    home = root if root is not None else default_root([file])
-    return _file_of_kind(file, home, world_path), ""
+    root_folder = root if root is not None else default_root([file])
+    return _file_of_kind(file, root_folder, world_path), ""
 
 
 def _new_file(
@@ -126,9 +126,9 @@ def _new_file(
         raise UsageError(f"{target} already exists; edit it without --new, or choose another name")
     if not target.absolute().parent.is_dir():
         raise UsageError(f"{target.parent} is not a folder; create it first")
-    home = root if root is not None else default_root([target, map_])
-    text = new_scenario_text(target, map_, home, world_path, lenient)
-    return _inside(EditedFile(_real(target), "scenario", _real_folder(home), world_path), target), text
+    root_folder = root if root is not None else default_root([target, map_])
+    text = new_scenario_text(target, map_, root_folder, world_path, lenient)
+    return _inside(EditedFile(_real(target), "scenario", _real_folder(root_folder), world_path), target), text
 
 
 def _file_of_kind(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":

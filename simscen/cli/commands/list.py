@@ -33,8 +33,8 @@ def command(
     Prints one line for each scenario and variation: id, name, tags, external stack, and why it is skipped or expected
     to fail. Exit code 0: listed; 2: a scenario is invalid; 5: nothing is selected.
     """
-    home = root if root is not None else default_root(paths)
-    tried = [try_variations(file, home, world_path or ()) for file in discover(paths, home)]
+    root_folder = root if root is not None else default_root(paths)
+    tried = [try_variations(file, root_folder, world_path or ()) for file in discover(paths, root_folder)]
     if problems := [problem for found in tried if isinstance(found, list) for problem in found]:
         raise InvalidInput(problems)
     chosen = select([one for found in tried if isinstance(found, tuple) for one in found], keyword, tag or ())

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from simscen.bench.localization.recorded_drive import Errors, Localized, compare_with_reference, localize
-from simscen.cli.diagnostics import escaped, from_here, print_text
+from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
 from simscen.cli.session.output_files import save
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import InvalidInput, Problem, UsageError
@@ -92,29 +92,29 @@ def _load_inputs(
 
     spec = StackSpec()
     if scenario is not None:
-        home = root if root is not None else default_root([scenario])
+        root_folder = root if root is not None else default_root([scenario])
         try:
-            criteria = load_criteria(scenario, home)
+            criteria = load_criteria(scenario, root_folder)
         except InvalidInput as error:
-            raise InvalidInput(from_here(error.problems, home)) from error
+            raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
         if not isinstance(criteria.spec.stack, StackSpec):
-            raise InvalidInput(from_here([_missing_localizer_problem(criteria)], home))
+            raise InvalidInput(relative_to_working_folder([_missing_localizer_problem(criteria)], root_folder))
         spec = criteria.spec.stack
-    home = root if root is not None else default_root([map_])
+    root_folder = root if root is not None else default_root([map_])
     try:
-        world = load_world_file(map_, home)
+        world = load_world_file(map_, root_folder)
     except InvalidInput as error:
-        raise InvalidInput(from_here(error.problems, home)) from error
+        raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
     if world.map is None:
         raise InvalidInput(
             [Problem(str(map_), 0, 0, "SC320", "not a ROS map", "see `simscen world --help` for how to make one")]
         )
-    home = root if root is not None else (default_root([Path(robot)]) if Path(robot).exists() else Path.cwd())
+    root_folder = root if root is not None else (default_root([Path(robot)]) if Path(robot).exists() else Path.cwd())
     try:
-        file = load_robot_file(robot, home)
+        file = load_robot_file(robot, root_folder)
         body = robot_from_file(file.robot, file.roots)[1]
     except InvalidInput as error:
-        raise InvalidInput(from_here(error.problems, home)) from error
+        raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
     return spec, load_map(world.map), robot_model(body)
 
 

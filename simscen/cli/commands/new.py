@@ -135,11 +135,11 @@ def _starter(file: Path, kind: str) -> list[Path]:
 
 def _schema_comment(file: Path, kind: str) -> str:
     """Return the comment that points editors to the schema, or "" if no folder `schemas` above the file has it."""
-    home = file.absolute().parent
+    root_folder = file.absolute().parent
     root = default_root([file])
-    ancestors = [folder for folder in (home, *home.parents) if folder.is_relative_to(root)]
+    ancestors = [folder for folder in (root_folder, *root_folder.parents) if folder.is_relative_to(root)]
     schema = next((one for folder in ancestors if (one := folder / "schemas" / f"{kind}.schema.json").is_file()), None)
-    return "" if schema is None else f"# yaml-language-server: $schema={os.path.relpath(schema, home)}\n"
+    return "" if schema is None else f"# yaml-language-server: $schema={os.path.relpath(schema, root_folder)}\n"
 
 
 def _copy(like: str, file: Path) -> list[Path]:

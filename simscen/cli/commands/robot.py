@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from simscen.cli.diagnostics import as_json as problems_as_json
-from simscen.cli.diagnostics import as_text, escaped, from_here, print_text
+from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_working_folder
 from simscen.cli.session.output_files import save
 from simscen.core.errors import Exit, InvalidInput
 from simscen.loading.files.discovery import default_root
@@ -47,11 +47,13 @@ def check(
     Exit code 0: all checks passed; 1: a check failed; 2: the robot is unusable.
     """
     file = load_robot_file(robot, root or default_root([Path(robot)]), world_path or ())
-    home = file.library.sandbox.root
+    root_folder = file.library.sandbox.root
     try:
         failed = _check_and_print(file, robot, picture, as_json)
     except InvalidInput as error:
-        raise InvalidInput(from_here(file.library.with_source_where_missing(error.problems), home)) from error
+        raise InvalidInput(
+            relative_to_working_folder(file.library.with_source_where_missing(error.problems), root_folder)
+        ) from error
     if failed:
         sys.exit(Exit.FAILED)
 
@@ -65,7 +67,7 @@ def _check_and_print(file: RobotFile, argument: str, picture: Path | None, as_js
     spec, body = robot_from_file(file.robot, file.roots)
     library = file.library
     notes = library.with_source_where_missing(geometry_warnings(file.robot, spec, body, file.roots))
-    notes = from_here(notes, library.sandbox.root)
+    notes = relative_to_working_folder(notes, library.sandbox.root)
     with engine_output_on_stderr():
         checked = check_robot(body)
     if as_json:

@@ -13,7 +13,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from simscen.cli.diagnostics import as_text, from_here, print_text
+from simscen.cli.diagnostics import as_text, print_text, relative_to_working_folder
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.loading.nav2.parameter_file import Nav2Parameters, read_nav2_parameters
 from simscen.ros2.nav2_parameters import Offer
@@ -128,7 +128,7 @@ def command(
 def _read(params: Path) -> Nav2Parameters:
     parameters = read_nav2_parameters(params)
     if isinstance(parameters, list):
-        raise InvalidInput(from_here(parameters, Path.cwd()))
+        raise InvalidInput(relative_to_working_folder(parameters, Path.cwd()))
     return parameters
 
 

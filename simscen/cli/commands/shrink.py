@@ -87,15 +87,17 @@ def command(
     not fail; 3: the run could not be completed.
     """
     chosen = _chosen_run(run, seed, variation, stack)
-    home = root if root is not None else default_root([chosen.file])
-    stacks = stacks_of([] if chosen.stack is None else [chosen.stack], home, world_path or ())
-    scenario = ChangedScenario(chosen.file, home, world_path or (), next(iter(stacks.chosen), None), chosen.variation)
+    root_folder = root if root is not None else default_root([chosen.file])
+    stacks = stacks_of([] if chosen.stack is None else [chosen.stack], root_folder, world_path or ())
+    scenario = ChangedScenario(
+        chosen.file, root_folder, world_path or (), next(iter(stacks.chosen), None), chosen.variation
+    )
     target = out or sibling(chosen.file, "minimal")
     if target.exists():
         raise UsageError(f"{target} exists already; choose another file with --out")
     workers, cluster = workers_and_cluster(workers, backend, address)
     options = SessionOptions(workers, wall_limit=wall_limit, cluster=cluster)
-    checks = Checks(home, world_path or (), lenient, stacks=stacks)
+    checks = Checks(root_folder, world_path or (), lenient, stacks=stacks)
     own_seed = child(scenario.tree, "seed")
     first_seed = chosen.seed or (own_seed.plain if own_seed is not None and isinstance(own_seed.plain, int) else 1)
     try:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, print_text
+from simscen.cli.diagnostics import as_github, as_json, as_text, print_text, relative_to_working_folder
 from simscen.cli.session.selection import Checks
 from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import Exit, Problem
@@ -55,13 +55,13 @@ def command(
 
     Exit code 0: all files are valid; 2: a file is invalid; 5: no files found.
     """
-    home = root if root is not None else default_root(paths)
-    stacks = stacks_of(stack or [], home, world_path or [])
-    checks = Checks(home, world_path or [], lenient, fast, picture, stacks=stacks, runs=bool(stack))
+    root_folder = root if root is not None else default_root(paths)
+    stacks = stacks_of(stack or [], root_folder, world_path or [])
+    checks = Checks(root_folder, world_path or [], lenient, fast, picture, stacks=stacks, runs=bool(stack))
     checked = _Checked()
-    for file in discover(paths, home, SUFFIXES):
-        kind = file_kind(file, home)
-        checked.add(kind, from_here(_problems(kind, file, checks), home))
+    for file in discover(paths, root_folder, SUFFIXES):
+        kind = file_kind(file, root_folder)
+        checked.add(kind, relative_to_working_folder(_problems(kind, file, checks), root_folder))
     _PRINT[format_](checked)
     if checked.invalid_files:
         sys.exit(Exit.USAGE)

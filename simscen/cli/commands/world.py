@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from pydantic import ValidationError
 
-from simscen.cli.diagnostics import as_text, escaped, from_here, print_text
+from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_working_folder
 from simscen.cli.session.output_files import save
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem
@@ -33,6 +33,7 @@ WorldPath = Annotated[list[Path] | None, typer.Option(help="Additional folder wi
 Lenient = Annotated[bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")]
 Height = Annotated[float, typer.Option(min=0.0, max=100.0, help="Height of the lidar in meters.")]
 LIDAR_HEIGHT_M = 0.2
+"""Default height of the cross-section: that of the lidar of a small robot."""
 
 
 @app.callback()
@@ -57,15 +58,15 @@ def inspect(
     """
     from simscen.worlds.built_world import build_world_and_map, inspect_world
 
-    home = root or default_root([path])
-    source = load_world_file(path, home, world_path or ())
-    built = build_world_and_map(_build(source, home, world_path or [], lenient), height)
+    root_folder = root or default_root([path])
+    source = load_world_file(path, root_folder, world_path or ())
+    built = build_world_and_map(_build(source, root_folder, world_path or [], lenient), height)
     summary = inspect_world(built)
     if as_json:
         print(json.dumps(asdict(summary), indent=2))
     else:
         print_text("\n".join([escaped(f"{summary.name} · {path}"), *summary_lines(summary, height, everything)]))
-        warnings = from_here(world_reader_notes(built.world, source, home), home)
+        warnings = relative_to_working_folder(world_reader_notes(built.world, source, root_folder), root_folder)
         if warnings:
             print_text(as_text(warnings))
     if png is not None:
@@ -92,9 +93,9 @@ def export(
     from simscen.worlds.built_world import build_world_and_map
     from simscen.worlds.maps.ros_map import save_map
 
-    home = root or default_root([path])
-    source = load_world_file(path, home, world_path or ())
-    grid = build_world_and_map(_build(source, home, world_path or [], lenient), height, resolution).map
+    root_folder = root or default_root([path])
+    source = load_world_file(path, root_folder, world_path or ())
+    grid = build_world_and_map(_build(source, root_folder, world_path or [], lenient), height, resolution).map
     save(map_, lambda file: save_map(grid, file), [path])
     rows, columns = grid.shape
     print_text(f"{escaped(str(map_))}: {columns} x {rows} cells of {grid.resolution:g} m")
@@ -115,9 +116,9 @@ def convert(
     cross-section at lidar height. Each change is printed. A ROS map is not copied; the world refers to its file. Exit
     code 0; 2: the world is unusable or cannot be written.
     """
-    home = root or default_root([path])
-    source = load_world_file(path, home, world_path or ())
-    spec, changes = _convert(source, home, world_path or [], lenient, height)
+    root_folder = root or default_root([path])
+    source = load_world_file(path, root_folder, world_path or ())
+    spec, changes = _convert(source, root_folder, world_path or [], lenient, height)
     if source.map is not None:
         spec = spec.model_copy(update={"map": _relative(source.map.path, out)})
     content = world_text(spec).encode()
@@ -129,14 +130,14 @@ def convert(
 
 
 def _convert(
-    source: LoadedWorld, home: Path, world_path: list[Path], lenient: bool, height: float
+    source: LoadedWorld, root_folder: Path, world_path: list[Path], lenient: bool, height: float
 ) -> tuple[WorldSpec, list[str]]:
     spec = source.spec or WorldSpec(simscen=1, name=source.name)
     if source.sdf is None:
         return spec, []
     from simscen.worlds.conversion import convert_world
 
-    world = _build(replace(source, spec=None, map=None), home, world_path, lenient)
+    world = _build(replace(source, spec=None, map=None), root_folder, world_path, lenient)
     try:
         conversion = convert_world(world, height)
         return conversion.merged_into(spec), [*conversion.changes, *world.notes]
@@ -146,11 +147,11 @@ def _convert(
         raise InvalidInput([Problem(str(source.path), 0, 0, "SC312", message)]) from None
 
 
-def _build(source: LoadedWorld, home: Path, world_path: list[Path], lenient: bool) -> World:
+def _build(source: LoadedWorld, root_folder: Path, world_path: list[Path], lenient: bool) -> World:
     try:
-        return world_from_file(source, home, world_path, lenient)
+        return world_from_file(source, root_folder, world_path, lenient)
     except InvalidInput as error:
-        raise InvalidInput(from_here(error.problems, home)) from error
+        raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
 
 
 def _relative(file: Path, out: Path) -> str:
@@ -159,7 +160,9 @@ def _relative(file: Path, out: Path) -> str:
 
 
 MAX_SOLIDS = 20
+"""Number of solids that are listed without --all."""
 MAX_NAME_LENGTH = 44
+"""Number of characters of a name; the end of a longer one is shown."""
 
 
 def summary_lines(summary: "WorldSummary", height: float, everything: bool) -> Iterator[str]:

@@ -97,15 +97,15 @@ class Falsification:
     def __init__(self, request: FalsifyRequest) -> None:
         """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
         self._request = request
-        home = request.root if request.root is not None else default_root([request.file])
-        stacks = stacks_of([] if request.stack is None else [request.stack], home, request.world_path)
+        root_folder = request.root if request.root is not None else default_root([request.file])
+        stacks = stacks_of([] if request.stack is None else [request.stack], root_folder, request.world_path)
         choice = next(iter(stacks.chosen), None)
-        self._scenario = ChangedScenario(request.file, home, request.world_path, choice, None)
+        self._scenario = ChangedScenario(request.file, root_folder, request.world_path, choice, None)
         space = search_space(self._scenario.whole_tree)
         if not isinstance(space, SearchSpace):
             raise InvalidInput(space)
         self._space = space
-        self._checks = Checks(home, request.world_path, request.lenient, stacks=stacks)
+        self._checks = Checks(root_folder, request.world_path, request.lenient, stacks=stacks)
         self._search: Search = make_search(request.method, space.choices, request.search_seed)
         self._variations: dict[str, Variation] = {}
         self._planned: list[PlannedRun] = []

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.cli.diagnostics import escaped, from_here, print_text
+from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
 from simscen.cli.session.new_file import create_file
 from simscen.cli.shared_options import parse_topics
 from simscen.core.errors import InvalidInput, Problem
@@ -62,4 +62,4 @@ def _reconstructed(options: FromLogOptions) -> Reconstruction:
         try:
             return scenario_from_log(options.log, options.out, reading_options)
         except InvalidInput as error:
-            raise InvalidInput(from_here(error.problems, default_root([options.out]))) from error
+            raise InvalidInput(relative_to_working_folder(error.problems, default_root([options.out]))) from error

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from simscen.cli.diagnostics import from_here
+from simscen.cli.diagnostics import relative_to_working_folder
 from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, recorded_result
 from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.errors import InvalidInput, Problem
@@ -32,7 +32,8 @@ from simscen.run.sessions.output_folder import run_folder
 class LogJudge:
     """Evaluates logs with the criteria of `scenario`, or each with its own.
 
-    `notes` collects remarks about the logs. `foreign` counts the logs that simscen did not write.
+    `notes` collects remarks about the logs. `foreign` counts the logs that simscen did not write. `options` apply to
+    these logs, `root` and `world_path` to the files of the scenario.
     """
 
     def __init__(
@@ -45,24 +46,24 @@ class LogJudge:
         self._file_masks: Mapping[str, MaskBlocks] | None = None
         self._criteria: LoadedCriteria | None = None
         if scenario is not None:
-            home = root if root is not None else default_root([scenario])
+            root_folder = root if root is not None else default_root([scenario])
             try:
-                self._criteria = load_criteria(scenario, home, world_path)
+                self._criteria = load_criteria(scenario, root_folder, world_path)
             except InvalidInput as error:
-                raise InvalidInput(from_here(error.problems, home)) from error
+                raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
 
     def judge(self, log: Path, is_only_log: bool) -> RunFinished:
         """Evaluate a log. An unusable one raises InvalidInput if `is_only_log`; otherwise its result is an error."""
         try:
             return (
-                self._judge_own_log(log)
+                self._judge_simscen_log(log)
                 if _may_be_simscen_log(log) and is_simscen_log(log)
                 else self._judge_foreign(log)
             )
         except InvalidInput as error:
             if is_only_log or isinstance(error, UnusableScenario):
                 raise
-            reason = "; ".join(": ".join(filter(None, (one.message, one.hint))) for one in error.problems)
+            reason = "; ".join(": ".join(filter(None, (problem.message, problem.hint))) for problem in error.problems)
             return _not_judged(log, RunFailure("invalid", reason))
         except Exception as error:  # a defect of simscen must not lose the verdicts of the other logs
             if is_only_log:
@@ -74,7 +75,7 @@ class LogJudge:
         """Return a log with all data for a replay, and its result. Raises InvalidInput."""
         if _may_be_simscen_log(log) and is_simscen_log(log):
             read = read_run(log, with_sensors=True)
-            return read, recorded_result(read, log) if self._criteria is None else self._judge_own_log(log).result
+            return read, recorded_result(read, log) if self._criteria is None else self._judge_simscen_log(log).result
         self.foreign += 1
         if self._criteria is None:
             foreign, case = read_foreign_log(log, self._options, with_sensors=True), Case(Pose2(0.0, 0.0), ())
@@ -90,12 +91,12 @@ class LogJudge:
         header = LogHeader(log.stem, 0, case, text, foreign.map)
         return Log(header, foreign.trace, "", complete=True, sensors=foreign.sensors), result
 
-    def _judge_own_log(self, log: Path) -> RunFinished:
+    def _judge_simscen_log(self, log: Path) -> RunFinished:
         read = read_run(log)
         if not read.robots:
             return self._judge_robot(log, read, "")
-        runs = {name: self._judge_robot(log, one, name) for name, one in read.robots.items()}
-        traces = {name: one.trace for name, one in read.robots.items()}
+        runs = {name: self._judge_robot(log, robot_log, name) for name, robot_log in read.robots.items()}
+        traces = {name: robot_log.trace for name, robot_log in read.robots.items()}
         recorded = criteria_of_text(read.header.scenario, str(log), read.header.facts)
         expected = expected_failure(recorded if self._criteria is None else self._criteria.spec)
         result = combine_robots({name: run.result for name, run in runs.items()}, traces, expected)
@@ -113,7 +114,7 @@ class LogJudge:
         with _scenario_errors(self._criteria):
             criteria = self._criteria.for_robot(robot)
         # The disturbances are in the scenario of the log, at lines that the criteria file does not have.
-        case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
+        case = replace(case, disturbances=tuple(replace(disturbance, line=0) for disturbance in case.disturbances))
         case = replace(case, masks={**case.masks, **self._masks(criteria)})
         return self._judge_by_file(log, key, read.trace, case, read.coverage, criteria)
 
@@ -191,7 +192,7 @@ def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
     try:
         yield
     except InvalidInput as error:
-        raise UnusableScenario(from_here(error.problems, criteria.library.sandbox.root)) from error
+        raise UnusableScenario(relative_to_working_folder(error.problems, criteria.library.sandbox.root)) from error
 
 
 def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:

@@ -15,13 +15,16 @@ from simscen.loading.yaml.textfile import os_error_reason
 from simscen.record.log_reader.read import Log
 
 COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
+"""Names of the log in the folder of a run that was completed, and of one that was aborted."""
 BAG_METADATA = "metadata.yaml"
-SUFFIXES = (".mcap", ".db3", ".bag")
+LOG_SUFFIXES = (".mcap", ".db3", ".bag")
 
 
 def find_logs(paths: Sequence[Path]) -> list[Path]:
-    """Return all logs without duplicates, sorted within a folder. Raises InvalidInput, and NothingSelected if there are
-    none."""
+    """Return all logs without duplicates, sorted within a folder.
+
+    Raises InvalidInput for an unusable path, and NothingSelected if there are no logs.
+    """
     found: dict[Path, None] = {}
     for path in paths:
         try:
@@ -45,7 +48,7 @@ def _logs(path: Path) -> Iterator[Path]:
             yield current
             continue
         subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
-        logs = sorted(name for name in names if name.endswith(SUFFIXES))
+        logs = sorted(name for name in names if name.endswith(LOG_SUFFIXES))
         yield from (current / name for name in logs if not (name == PARTIAL_LOG and COMPLETE_LOG in logs))
 
 
@@ -54,17 +57,14 @@ def is_bag(names: Sequence[str]) -> bool:
     return BAG_METADATA in names and any(name.endswith((".db3", ".mcap", ".db3.zstd", ".mcap.zstd")) for name in names)
 
 
-LOGS = ("run.mcap", "run.partial.mcap")
-
-
 def log_file(run: Path) -> Path:
     """Return the log in the folder of a run, or the file itself. Raises InvalidInput if the folder contains no log."""
     if not run.is_dir():
         return run
-    found = [run / name for name in LOGS if (run / name).is_file()]
+    found = [run / name for name in (COMPLETE_LOG, PARTIAL_LOG) if (run / name).is_file()]
     if not found:
         hint = "name the folder of one run, e.g. simscen-out/latest/runs/SCENARIO/seed-1"
-        raise InvalidInput([Problem(str(run), 0, 0, "SC800", f"there is no {LOGS[0]} in it", hint)])
+        raise InvalidInput([Problem(str(run), 0, 0, "SC800", f"there is no {COMPLETE_LOG} in it", hint)])
     return found[0]
 
 
@@ -72,8 +72,8 @@ def recorded_result(log: Log, file: Path) -> RunResult:
     """Return the result in a log; for an incomplete log, the result of its criteria for the recorded part."""
     if log.result:
         return from_json(log.result)
-    results = {name: _evaluate(one, file, name) for name, one in (log.robots or {"": log}).items()}
-    traces = {name: one.trace for name, one in log.robots.items()}
+    results = {name: _evaluate(robot_log, file, name) for name, robot_log in (log.robots or {"": log}).items()}
+    traces = {name: robot_log.trace for name, robot_log in log.robots.items()}
     return combine_robots(results, traces) if traces else results[""]
 
 

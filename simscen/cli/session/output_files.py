@@ -184,9 +184,9 @@ def require_writable(junit: Path | None, folder: Path | None, inputs: Iterable[P
 def _require_free_name(junit: Path, folder: Path | None) -> None:
     """Raise OSError if simscen writes another file with this name in the folder of this or another session."""
     real = Path(os.path.realpath(junit))
-    for home in real.parents:
-        is_output = home == (folder and Path(os.path.realpath(folder))) or (home / JOURNAL_FILE).exists()
-        if is_output and real.relative_to(home).parts[0] in RESERVED_NAMES:
+    for parent in real.parents:
+        is_output = parent == (folder and Path(os.path.realpath(folder))) or (parent / JOURNAL_FILE).exists()
+        if is_output and real.relative_to(parent).parts[0] in RESERVED_NAMES:
             raise OSError(errno.EINVAL, "simscen writes another file with this name there")
 
 

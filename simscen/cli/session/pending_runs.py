@@ -145,10 +145,10 @@ def failed_runs(
     Returns None if there is no such session or nothing failed; then everything runs, as with pytest. Sessions are
     searched in the parent of the output folder `out`. A failed run keeps its seed unless the options set seeds.
     """
-    home = DEFAULT_FOLDER if out is None else out.absolute().parent
-    last = last_failed(home)
+    sessions_folder = DEFAULT_FOLDER if out is None else out.absolute().parent
+    last = last_failed(sessions_folder)
     if last is None:
-        return None, f"there is no earlier session in {home}: {RUN_ALL}"
+        return None, f"there is no earlier session in {sessions_folder}: {RUN_ALL}"
     if not last.runs:
         return None, f"nothing failed in the last session, {last.folder}: {RUN_ALL}"
     selected = {(one.title, one.stack_name): one for one in scenarios if one.spec.skip is None}

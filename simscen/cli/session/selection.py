@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-from simscen.cli.diagnostics import escaped, from_here
+from simscen.cli.diagnostics import escaped, relative_to_working_folder
 from simscen.cli.session.stacks import Stacks, stacks_of
 from simscen.core.errors import InvalidInput, NothingSelected, Problem, UsageError
 from simscen.core.files import collect_read_files
@@ -144,14 +144,14 @@ def load_all(
     `paths`, it is invalid. Raises InvalidInput with the problems of all files, whether selected or not, and
     NothingSelected.
     """
-    home = root if root is not None else default_root(paths)
-    checks = Checks(home, world_path, lenient, stacks=stacks_of(stacks, home, world_path))
+    root_folder = root if root is not None else default_root(paths)
+    checks = Checks(root_folder, world_path, lenient, stacks=stacks_of(stacks, root_folder, world_path))
     choices = checks.choices
     loaded: dict[str, list[LoadedScenario]] = {}
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
     named = {path.absolute() for path in paths if not is_folder(path)}
-    for file, choice in product(discover(paths, home), choices):
+    for file, choice in product(discover(paths, root_folder), choices):
         variations, found = checks.scenario(file, choice, selection.numbers)
         if choice is not None and file not in named and (reason := impossible_with(choice, found)):
             variations, found = checks.scenario(file, None, selection.numbers)
@@ -161,11 +161,13 @@ def load_all(
             warnings.setdefault(scenario.id, []).extend(found)
         problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):
-        raise InvalidInput(from_here(problems, home))
+        raise InvalidInput(relative_to_working_folder(problems, root_folder))
     unique = select_variations([with_stacks[0] for with_stacks in loaded.values()], selection.variations)
     selected = share_of_scenarios(select(unique, selection.keyword, selection.tags), *selection.shard, selection.times)
     relevant = dict.fromkeys(warning for one in selected for warning in warnings[one.id])
-    return [scenario for one in selected for scenario in loaded[one.title]], from_here(relevant, home)
+    return [scenario for one in selected for scenario in loaded[one.title]], relative_to_working_folder(
+        relevant, root_folder
+    )
 
 
 def impossible_with(choice: StackChoice, problems: Sequence[Problem]) -> str:

@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.cli.diagnostics import escaped, from_here
+from simscen.cli.diagnostics import escaped, relative_to_working_folder
 from simscen.cli.process import caller_environment, config_file
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.external_command import ExternalCommand
@@ -106,10 +106,10 @@ def load_with(
 
     Raises InvalidInput, and UsageError if the variation does not exist or is missing.
     """
-    home = root or default_root([file])
-    stacks = stacks_of([] if stack is None else [stack], home, world_path)
+    root_folder = root or default_root([file])
+    stacks = stacks_of([] if stack is None else [stack], root_folder, world_path)
     chosen = next(iter(stacks.chosen), None)
-    loaded, problems = stacks.with_command(load_scenario(file, home, world_path, chosen, variation))
+    loaded, problems = stacks.with_command(load_scenario(file, root_folder, world_path, chosen, variation))
     if problems:
         raise InvalidInput(problems)
     return loaded
@@ -147,7 +147,7 @@ def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Sta
         try:
             return load_stack_file(name, value, Path(value), root, world_path)
         except InvalidInput as error:
-            raise InvalidInput(from_here(error.problems, root)) from error
+            raise InvalidInput(relative_to_working_folder(error.problems, root)) from error
     return StackChoice(name, value, external_command=_command(text, value, bool(equals), stacks))
 
 

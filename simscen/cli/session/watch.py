@@ -158,15 +158,15 @@ def watch_session(request: SessionRequest) -> int:
         raise UsageError("--watch and --open exclude each other: each session has its own page")
     if request.selection.shard != (1, 1):
         raise UsageError("--watch and --shard exclude each other")
-    home = request.root or default_root(request.paths)
-    state = WatchState(lambda: discover(request.paths, home), request.paths)
-    code, seen = _run_in_child(replace(request, root=home), state)
+    root_folder = request.root or default_root(request.paths)
+    state = WatchState(lambda: discover(request.paths, root_folder), request.paths)
+    code, seen = _run_in_child(replace(request, root=root_folder), state)
     while code not in STOPPED:
         _print_status(state)
         files = _wait_for_changes(state, seen)
         if files is None:
             break
-        next_request = replace(request, paths=files, root=home, last_failed=False)
+        next_request = replace(request, paths=files, root=root_folder, last_failed=False)
         code, seen = _run_in_child(next_request, state)
     return code
 

@@ -13,6 +13,9 @@ from simscen.core.geometry.shapes import Body, Solid, TriangleMesh
 
 Polygon = tuple[tuple[float, float], ...]
 
+GRAVITY_M_S2 = 9.81
+"""Gravitational acceleration, downwards."""
+
 
 @dataclass(frozen=True)
 class World:

@@ -123,7 +123,9 @@ def distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[flo
 
 def polygon_contains(corners: Sequence[tuple[float, float]], point: tuple[float, float]) -> bool:
     """Return whether a point is inside a polygon. Points on an edge may count either way."""
-    return sum(_is_left_of(point, a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)) % 2 == 1
+    return (
+        sum(_ray_crosses_edge(point, a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)) % 2 == 1
+    )
 
 
 def segments_cross(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
@@ -134,7 +136,7 @@ def segments_cross(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
     )
 
 
-def _is_left_of(point: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> bool:
+def _ray_crosses_edge(point: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> bool:
     """Return whether a ray from the point along +x crosses the edge (half-open, so that corners count once)."""
     if (a[1] > point[1]) == (b[1] > point[1]):
         return False

@@ -51,7 +51,7 @@ class Passage:
 
 ROBOT_NAME = ""
 """Name of a single robot."""
-CLEARANCE_RANGE = 2.0
+CLEARANCE_RANGE_M = 2.0
 """Distance in m around the robot within which clearance is always measured."""
 
 
@@ -77,7 +77,7 @@ class Case:
     footprint: Polygon = ()
     inscribed_radius: float = 0.0
     time_limit: float = 0.0
-    clearance_range: float = CLEARANCE_RANGE
+    clearance_range: float = CLEARANCE_RANGE_M
     disturbances: tuple[Disturbance, ...] = ()
     sent: tuple[Goal, ...] = ()
     passages: tuple[Passage, ...] = ()

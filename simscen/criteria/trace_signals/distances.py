@@ -133,7 +133,7 @@ def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
 
 
 POINT = ((0.0, 0.0),)
-"""Outline of an object without extent: only its position counts."""
+"""Outline of a body without extent: only its position counts."""
 INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6
 """Gaps in m below which the robot is in the intimate, personal, or social space of a person (Hall 1966, HuNavSim)."""
 

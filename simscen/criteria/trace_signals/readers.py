@@ -45,47 +45,47 @@ LOCALIZED_STD_M = 0.5
 
 
 def clearance(query: SignalQuery) -> Array:
-    """Return the distance to the nearest surface; infinite where nothing is near."""
+    """Return the distance in m to the nearest surface; infinite where nothing is near."""
     return hold(query.trace, hull_clearance(query.trace), "clearance")[:, 0]
 
 
 def ground_speed(query: SignalQuery) -> Array:
-    """Return the true speed over ground."""
+    """Return the true speed over ground in m/s."""
     return hold(query.trace, speed(query.trace), "velocity")[:, 0]
 
 
 def forward_speed(query: SignalQuery) -> Array:
-    """Return the true speed along the robot's x axis."""
+    """Return the true speed along the robot's x axis in m/s."""
     return _velocity(query.trace)[:, 0]
 
 
 def turn_rate(query: SignalQuery) -> Array:
-    """Return the magnitude of the true turn rate."""
+    """Return the magnitude of the true turn rate in rad/s."""
     return hold(query.trace, unsigned_turn_rate(query.trace), "velocity")[:, 0]
 
 
 def yaw_rate(query: SignalQuery) -> Array:
-    """Return the true turn rate."""
+    """Return the true turn rate in rad/s, positive to the left."""
     return _velocity(query.trace)[:, 2]
 
 
 def acceleration(query: SignalQuery) -> Array:
-    """Return the change of the speed over ground since the previous sample, divided by the time."""
+    """Return the change of the speed over ground since the previous sample, in m/s²."""
     return _differences(query.trace, ground_speed(query), 1)
 
 
 def angular_acceleration(query: SignalQuery) -> Array:
-    """Return the change of the yaw rate since the previous sample, divided by the time."""
+    """Return the change of the yaw rate since the previous sample, in rad/s²."""
     return _differences(query.trace, yaw_rate(query), 1)
 
 
 def jerk(query: SignalQuery) -> Array:
-    """Return |v[k+1] - 2 v[k] + v[k-1]| / dt^2 of the speed over ground."""
+    """Return |v[k+1] - 2 v[k] + v[k-1]| / dt² of the speed over ground in m/s³."""
     return np.abs(_differences(query.trace, ground_speed(query), 2))
 
 
 def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
-    """Return the true speed over ground at even samples, and their rate in Hz.
+    """Return the true speed over ground in m/s at evenly spaced times, and their rate in Hz.
 
     Raises SignalUnavailable if there is no velocity, or if the samples are too rare for SPARC and LDLJ.
     """
@@ -99,17 +99,17 @@ def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
 
 
 def localization_error(query: SignalQuery) -> Array:
-    """Return the distance between believed and true position."""
+    """Return the distance in m between believed and true position."""
     return hold(query.trace, pose_error(query.trace), "belief")[:, 0]
 
 
 def localization_yaw_error(query: SignalQuery) -> Array:
-    """Return the angle between believed and true heading."""
+    """Return the angle in rad between believed and true heading."""
     return hold(query.trace, pose_error(query.trace), "belief")[:, 1]
 
 
 def position_std(query: SignalQuery) -> Array:
-    """Return the root of the larger eigenvalue of the covariance of x and y."""
+    """Return the square root in m of the larger eigenvalue of the covariance of x and y."""
     xx, xy, _, yy, _, _ = _covariance(query.trace).T
     spread = np.hypot((xx - yy) / 2, xy)
     std: Array = np.sqrt(np.maximum((xx + yy) / 2 + spread, 0.0))
@@ -117,7 +117,7 @@ def position_std(query: SignalQuery) -> Array:
 
 
 def yaw_std(query: SignalQuery) -> Array:
-    """Return the root of the variance of the heading."""
+    """Return the square root in rad of the variance of the heading."""
     return np.sqrt(np.maximum(_covariance(query.trace)[:, 5], 0.0))
 
 
@@ -127,12 +127,12 @@ def nees(query: SignalQuery) -> Array:
 
 
 def belief_age(query: SignalQuery) -> Array:
-    """Return the time since the newest belief was published."""
+    """Return the time in s since the newest belief was published."""
     return _age(query.trace, query.trace.belief.ticks)
 
 
 def scan_age(query: SignalQuery) -> Array:
-    """Return the time since the newest scan was received."""
+    """Return the time in s since the newest scan was received."""
     return _age(query.trace, query.trace.scans)
 
 
@@ -146,35 +146,35 @@ def localized(query: SignalQuery) -> Array:
 
 
 def goal_distance(query: SignalQuery) -> Array:
-    """Return the true distance to the current goal."""
+    """Return the true distance in m to the current goal."""
     goals, poses = _current_goals(query.trace, query.case), poses_of(query.trace)
     return np.hypot(poses[:, 0] - goals[:, 0], poses[:, 1] - goals[:, 1])
 
 
 def goal_heading_error(query: SignalQuery) -> Array:
-    """Return the angle between the true heading and that of the current goal."""
+    """Return the angle in rad between the true heading and that of the current goal."""
     return np.abs(wrap_array(poses_of(query.trace)[:, 2] - _current_goals(query.trace, query.case)[:, 2]))
 
 
 def travelled(query: SignalQuery) -> Array:
-    """Return the distance driven so far, as path_length measures it."""
+    """Return the distance in m driven so far, as path_length measures it."""
     path, clock = drive(query.trace), sample_ticks(query.trace)
     return path.travelled[np.searchsorted(path.ticks, clock, side="right") - 1]
 
 
 def time(query: SignalQuery) -> Array:
-    """Return the simulated time."""
+    """Return the simulated time in s."""
     return sample_ticks(query.trace) / query.trace.tick_rate
 
 
 def command_speed(query: SignalQuery) -> Array:
-    """Return the commanded speed; 0 before the first command."""
+    """Return the commanded speed in m/s; 0 before the first command."""
     command = _commanded(query.trace)
     return np.hypot(command[:, 0], command[:, 1])
 
 
 def command_turn_rate(query: SignalQuery) -> Array:
-    """Return the magnitude of the commanded turn rate; 0 before the first command."""
+    """Return the magnitude of the commanded turn rate in rad/s; 0 before the first command."""
     return np.abs(_commanded(query.trace)[:, 2])
 
 
@@ -242,7 +242,7 @@ def recovery_count(query: SignalQuery) -> Array:
 
 
 def poses_of(trace: Trace) -> Array:
-    """Return x, y, yaw of the robot at each truth sample, (n, 3)."""
+    """Return x and y in m and yaw in rad of the robot in the world frame at each truth sample, (n, 3)."""
     sample_ticks(trace)
     return truth(trace).values
 

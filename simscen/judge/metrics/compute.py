@@ -9,7 +9,7 @@ from itertools import accumulate
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.records.case import CLEARANCE_RANGE, Case
+from simscen.core.records.case import CLEARANCE_RANGE_M, Case
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import COMPLETE_COVERAGE, Evidence, LogCoverage, Status
@@ -189,7 +189,7 @@ def _smoothness(trace: Trace, speeds: Array) -> Values:
 
 
 def _clearance(trace: Trace) -> Values:
-    distances = np.minimum(clearance(trace).values[:, 0], CLEARANCE_RANGE)
+    distances = np.minimum(clearance(trace).values[:, 0], CLEARANCE_RANGE_M)
     if not len(distances):
         return dict.fromkeys(_CLEARANCE, "the clearance was not recorded")
     return {"min_clearance": float(distances.min()), "mean_clearance": float(distances.mean())}

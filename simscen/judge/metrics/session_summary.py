@@ -54,10 +54,10 @@ class SessionFigures:
 
     def summary(self) -> SessionSummary:
         """Return the statistics. The order in which runs were added does not matter."""
-        measured = [figures for _, figures in sorted(self._runs, key=lambda one: one[0]) if figures is not None]
+        measured = [figures for _, figures in sorted(self._runs, key=lambda run: run[0]) if figures is not None]
         successes = sum(figures.success for figures in measured)
-        spl = [value for one in measured for value in one.spl]
-        soft_spl = [value for one in measured for value in one.soft_spl]
+        spl = [value for figures in measured for value in figures.spl]
+        soft_spl = [value for figures in measured for value in figures.soft_spl]
         runs = len(self._runs)
         return SessionSummary(
             runs=runs,
@@ -66,9 +66,9 @@ class SessionFigures:
             spl=_mean(spl),
             soft_spl=_mean(soft_spl),
             spl_runs=len(spl),
-            collisions=round(sum(value for one in measured for value in one.collisions)),
-            kilometers=sum(value for one in measured for value in one.path_lengths) / 1000.0,
-            hours=sum(one.robot_seconds for one in measured) / 3600.0,
+            collisions=round(sum(value for figures in measured for value in figures.collisions)),
+            kilometers=sum(value for figures in measured for value in figures.path_lengths) / 1000.0,
+            hours=sum(figures.robot_seconds for figures in measured) / 3600.0,
             measured_runs=len(measured),
         )
 
@@ -86,7 +86,7 @@ class RunFigures(NamedTuple):
     @classmethod
     def of(cls, run: RunResult) -> "RunFigures":
         """Return the figures of a run."""
-        robots = max(1, sum(_is(metric, "path_length") for metric in run.metrics))
+        robots = max(1, sum(_is_metric(metric, "path_length") for metric in run.metrics))
         return cls(
             run.metrics.get("success") == 1.0,
             _known(run, "spl"),
@@ -138,10 +138,10 @@ def _runs(number: int) -> str:
 
 def _known(run: RunResult, name: str) -> tuple[float, ...]:
     """Return the values of a metric, including those of each of several robots (`a/collisions`)."""
-    return tuple(value for metric, value in run.metrics.items() if _is(metric, name) and value is not None)
+    return tuple(value for metric, value in run.metrics.items() if _is_metric(metric, name) and value is not None)
 
 
-def _is(metric: str, name: str) -> bool:
+def _is_metric(metric: str, name: str) -> bool:
     return metric.rpartition("/")[2] == name
 
 

@@ -16,8 +16,8 @@ from simscen.loading.checks.registry import CheckFinding, Keys
 from simscen.loading.checks.scene import WORLD, Scene, expects_start_failure
 from simscen.loading.schema.messages import quoted
 
-Forbids = Callable[[Pose2, float], bool]
-"""Predicate: does a zone contain a pose and all positions around it within a distance in m?"""
+ZoneTest = Callable[[Pose2, float], bool]
+"""Function of a pose and a distance in m: whether a zone contains all positions within the distance of the pose."""
 
 MIN_DEPTH_M = 0.1
 """Depth in m inside a zone from which a goal is forbidden, however the costmap rounds the zone to cells."""
@@ -40,7 +40,7 @@ def criterion_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
 def check_stack_zones(scene: Scene) -> Iterator[CheckFinding]:
     """Find goals, and starts (a warning), in zones that the stack keeps out of."""
     regions = scene.world.regions
-    zones: list[tuple[Keys, str, Forbids]] = [
+    zones: list[tuple[Keys, str, ZoneTest]] = [
         (("stack", "keepout", index), f"in `{region}`", _inside_region(regions[region]))
         for index, region in enumerate(scene.loaded.spec.stack.keepout)
     ]
@@ -57,12 +57,12 @@ def check_stack_zones(scene: Scene) -> Iterator[CheckFinding]:
             yield CheckFinding(keys, message, hint % "START_OCCUPIED", warning=True)
 
 
-def _inside_region(corners: Polygon) -> Forbids:
+def _inside_region(corners: Polygon) -> ZoneTest:
     return lambda pose, within: depth_inside_polygon(pose, corners) > within
 
 
-def forbidden_test(mask: OccupancyGrid) -> Forbids:
-    """Return a predicate: does the keepout mask forbid a pose and all positions around it within a distance in m?"""
+def forbidden_test(mask: OccupancyGrid) -> ZoneTest:
+    """Return a test whether the keepout mask forbids all positions within a distance of a pose."""
 
     def forbids(pose: Pose2, within: float) -> bool:
         steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, MIN_DEPTH_M))) + 1)

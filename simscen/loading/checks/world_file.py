@@ -17,7 +17,7 @@ def _spec(world: LoadedWorld) -> WorldSpec:
 def shared_names(world: LoadedWorld) -> Iterator[CheckFinding]:
     """Find obstacles and walls with the name of an object or a door, or obstacles that share a name (a warning)."""
     spec = _spec(world)
-    moving = {thing.name for thing in spec.objects} | {door.name for door in spec.doors}
+    moving = {world_object.name for world_object in spec.objects} | {door.name for door in spec.doors}
     seen: set[str] = set()
     for index, obstacle in enumerate(spec.obstacles):
         keys: Keys = ("obstacles", index, "name")
@@ -35,7 +35,7 @@ def shared_names(world: LoadedWorld) -> Iterator[CheckFinding]:
 
 
 @WORLD_FILE.check("SC313")
-def no_extent(world: LoadedWorld) -> Iterator[CheckFinding]:
+def zero_extents(world: LoadedWorld) -> Iterator[CheckFinding]:
     """Find walls, ramps and doors of zero size, and motions that end where they start (a warning)."""
     spec = _spec(world)
     for index, wall in enumerate(spec.walls):
@@ -47,9 +47,9 @@ def no_extent(world: LoadedWorld) -> Iterator[CheckFinding]:
     for index, door in enumerate(spec.doors):
         if door.points[0] == door.points[1]:
             yield CheckFinding(("doors", index, "points"), "the door has no width: both points are the same")
-    for index, thing in enumerate(spec.objects):
-        if thing.move is not None and len(set(thing.move.path(thing.pose.pose).poses)) == 1:
-            key = "through" if thing.move.keyframes is None else "keyframes"
+    for index, world_object in enumerate(spec.objects):
+        if world_object.move is not None and len(set(world_object.move.path(world_object.pose.pose).poses)) == 1:
+            key = "through" if world_object.move.keyframes is None else "keyframes"
             yield CheckFinding(("objects", index, "move", key), "the motion leads nowhere", warning=True)
 
 
@@ -57,15 +57,24 @@ def no_extent(world: LoadedWorld) -> Iterator[CheckFinding]:
 def duplicate_shapes(world: LoadedWorld) -> Iterator[CheckFinding]:
     """Find the same shape at the same pose under another name."""
     spec = _spec(world)
-    things: list[tuple[Keys, WorldObject]] = [(("obstacles", k), thing) for k, thing in enumerate(spec.obstacles)]
-    things += [(("objects", k), thing) for k, thing in enumerate(spec.objects)]
+    things: list[tuple[Keys, WorldObject]] = [
+        (("obstacles", k), world_object) for k, world_object in enumerate(spec.obstacles)
+    ]
+    things += [(("objects", k), world_object) for k, world_object in enumerate(spec.objects)]
     seen: list[tuple[object, str]] = []
-    for keys, thing in things:
-        shape = (thing.box, thing.cylinder, thing.polygon, thing.height, thing.z, thing.pose.pose)
+    for keys, world_object in things:
+        shape = (
+            world_object.box,
+            world_object.cylinder,
+            world_object.polygon,
+            world_object.height,
+            world_object.z,
+            world_object.pose.pose,
+        )
         same = next((name for other, name in seen if other == shape), None)
         if same is not None:
             yield CheckFinding(keys, f"{quoted(same)} has the same shape and pose", at_key=True)
-        seen.append((shape, thing.name))
+        seen.append((shape, world_object.name))
 
 
 @WORLD_FILE.check("SC030")

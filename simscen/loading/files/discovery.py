@@ -38,8 +38,8 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
         where = ", ".join(quoted(str(path)) for path in paths)
         raise NothingSelected(f"no scenarios found in {where}; folders are searched for *{suffixes[0]}")
     files = sorted(found, key=lambda file: file.parts)
-    home = Path(os.path.realpath(root))
-    if problems := [*_output_folder_conflicts(files, home), *_duplicate_ids(files, home)]:
+    root_folder = Path(os.path.realpath(root))
+    if problems := [*_output_folder_conflicts(files, root_folder), *_duplicate_ids(files, root_folder)]:
         raise InvalidInput(sorted(problems))
     return files
 

@@ -63,9 +63,9 @@ class RandomOptions(Sequence[Option]):
 
 def value_node(distribution: Node, value: object) -> Node:
     """Return the node of a drawn value: one of the choices, or a new node at the position of its distribution."""
-    from simscen.loading.variations.sampling import Pick
+    from simscen.loading.variations.sampling import ChoiceIndex
 
-    if isinstance(value, Pick):
+    if isinstance(value, ChoiceIndex):
         chosen = node_at(distribution, ("choice", value.number))
         assert chosen is not None
         return chosen

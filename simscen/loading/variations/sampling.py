@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 from simscen.model.variations import Draw, Integer, LogUniform, Normal, OneOf, Sampled, Uniform
 from simscen.spec.quantities import Amount, to_common_unit
 
-_DIGITS = 6
+_SIGNIFICANT_DIGITS = 6
+"""Significant digits to which drawn numbers are rounded."""
 
 
-class Pick(NamedTuple):
+class ChoiceIndex(NamedTuple):
     """Index of the chosen value in the list of choices."""
 
     number: int
@@ -81,7 +82,7 @@ def value_at(draw: Draw, u: float) -> Any:
                 raise ValueError(f"the range is empty: {first} is greater than {last}")
             return first + math.floor(u * (last - first + 1))
         case OneOf(root=values):
-            return Pick(math.floor(u * len(values)))
+            return ChoiceIndex(math.floor(u * len(values)))
         case Normal() as normal:
             return _normal(normal, u)
     raise AssertionError(draw.kind)
@@ -115,5 +116,5 @@ def _normal(normal: Normal, u: float) -> Any:
 
 
 def _with_unit(number: float, unit: str) -> Any:
-    rounded = float(f"{number:.{_DIGITS}g}")
+    rounded = float(f"{number:.{_SIGNIFICANT_DIGITS}g}")
     return f"{rounded!r} {unit}" if unit else rounded

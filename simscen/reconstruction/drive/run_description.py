@@ -88,11 +88,11 @@ def _others(recorded: Log, robot: str) -> Iterator[tuple[str, Polygon, Array, Ar
 
 
 def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) -> RunDescription:
-    home = root / Path(header.name).parent
+    scenario_folder = root / Path(header.name).parent
     notes: list[str] = []
     world, named = written.get("world"), written.get("robot", {}).get("model", "turtlebot")
     if isinstance(world, str):
-        file = (home / world).resolve()
+        file = (scenario_folder / world).resolve()
         if not file.is_file():
             notes.append(f"the world `{world}` of the run is not below {root}; use --root or --world")
         world = file if file.is_file() else None
@@ -100,7 +100,7 @@ def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) ->
         world = {key: value for key, value in world.items() if key not in OBJECT_KEYS}
     model: str | Path = named
     if named.endswith((".yaml", ".yml", ".urdf", ".xacro")):
-        model = file = (home / named).resolve()
+        model = file = (scenario_folder / named).resolve()
         if not file.is_file():
             notes.append(f"the robot `{named}` of the run is not below {root}; use --root or --robot")
             return _described(header, world, None, written, notes)

@@ -20,7 +20,13 @@ from simscen.report.display_text import escape_control, plain_text, shell_comman
 from simscen.report.session_lines import violation_lines
 from simscen.report.suite.elements import anchor, html_text, link, outcome_badge, outcome_marks, sparkline
 from simscen.report.suite.history import PastOutcome
-from simscen.report.violations import error_details, error_summary, excuse_text, first_violation, source_location
+from simscen.report.violations import (
+    error_details,
+    error_summary,
+    first_violation,
+    reason_without_failure,
+    source_location,
+)
 
 _FILES = (("scenario.yaml", "scenario"), ("worker.log", "worker's log"), ("stack.log", "stack's log"))
 
@@ -99,7 +105,7 @@ def _headline(run: RunFinished) -> str:
         case Outcome.ERROR:
             return error_summary(run)
         case Outcome.FAILED_AS_EXPECTED | Outcome.SKIPPED:
-            return excuse_text(run)
+            return reason_without_failure(run)
 
 
 def _error_section(run: RunFinished) -> str:

@@ -25,7 +25,7 @@ from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
 from simscen.stack.checked_stack import CheckedStack
 from simscen.stack.protocols import Stack
-from simscen.worlds.routes.shortest_paths import Z_RANGE
+from simscen.worlds.routes.shortest_paths import Z_RANGE_M
 
 
 class LiveStage:
@@ -319,7 +319,7 @@ def body_data(body: Body) -> dict[str, Value]:
     pose = body.pose.plane
     fields: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
     outlines: list[Value] = [
-        [[round(x, 3), round(y, 3)] for x, y in outline] for outline in outlines_in_band(body.solids, Z_RANGE)
+        [[round(x, 3), round(y, 3)] for x, y in outline] for outline in outlines_in_band(body.solids, Z_RANGE_M)
     ]
     return {**fields, **_shape_data(body.solids[0].shape), "parts": outlines}
 

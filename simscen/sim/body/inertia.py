@@ -10,8 +10,6 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 
 Vector = tuple[float, float, float]
-GRAVITY = 9.81
-"""Gravitational acceleration in m/s², downwards."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.environment.world_model import Polygon
+from simscen.core.environment.world_model import GRAVITY_M_S2, Polygon
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.model.robot import Drive, Limits, Omnidirectional, RobotSpec
-from simscen.sim.body.inertia import GRAVITY, MassProperties, combine
+from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import circle, convex_hull, footprint, hull_points, radius_and_height
 from simscen.sim.body.undercarriage import Wheel, add_casters, add_motors, caster_gap, compliant_casters, wheel_guards
 
@@ -168,7 +168,7 @@ def compute_climb_limits(body: RobotBody, friction: float = 1.0) -> ClimbLimits:
     wheels = [wheel for wheel in body.wheels if wheel.driven and wheel.torque > 0]
     if not wheels:
         return ClimbLimits(0.0, 0.0)
-    pull = sum(wheel.torque / wheel.radius for wheel in wheels) / (body.mass * GRAVITY)
+    pull = sum(wheel.torque / wheel.radius for wheel in wheels) / (body.mass * GRAVITY_M_S2)
     slope = min(approach_angle(body), grip_angle(body, friction), math.asin(min(1.0, pull)))
     return ClimbLimits(slope, min(wheel.radius for wheel in wheels) * (1 - 1 / math.hypot(1.0, friction)))
 

@@ -4,11 +4,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from simscen.core.environment.world_model import Polygon
+from simscen.core.environment.world_model import GRAVITY_M_S2, Polygon
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Solid, Sphere
 from simscen.model.robot import Ackermann, Differential, Drive, Mecanum, Omnidirectional, SkidSteer
-from simscen.sim.body.inertia import GRAVITY, MassProperties, inertia_of_shape
+from simscen.sim.body.inertia import MassProperties, inertia_of_shape
 from simscen.sim.body.outline import footprint
 
 WHEEL_MASS_SHARE = 0.03
@@ -99,7 +99,7 @@ def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wh
     """Return the wheels with motors for a robot of this mass in kg; a planar base has its own motors."""
     if isinstance(drive, Mecanum):
         return wheels
-    grip = mass * GRAVITY / max(1, sum(wheel.driven for wheel in wheels))
+    grip = mass * GRAVITY_M_S2 / max(1, sum(wheel.driven for wheel in wheels))
     return tuple(
         replace(
             wheel,

@@ -11,20 +11,21 @@ MAX_COORDINATE_M = 1e5
 """Largest valid coordinate in m; worlds extend to 10 km."""
 
 
-def divergence_reason(what: str, x: float, y: float, z: float, others: float) -> str | None:
+def divergence_reason(body_name: str, x: float, y: float, z: float, finite_sum: float) -> str | None:
     """Return why the position of the center of a body is invalid, or None.
 
-    `others` is the sum of further numbers that must be finite, such as its velocity: it is finite only if all are.
+    `finite_sum` is the sum of further numbers, such as its velocity: it is finite only if all of them are finite.
+    `body_name` is the name of the body in the result.
     """
     if (
         -MAX_SUNK_DEPTH_M <= z <= MAX_COORDINATE_M
         and -MAX_COORDINATE_M <= x <= MAX_COORDINATE_M
         and -MAX_COORDINATE_M <= y <= MAX_COORDINATE_M
-        and math.isfinite(others)
+        and math.isfinite(finite_sum)
     ):
         return None
-    if not math.isfinite(x + y + z + others):
-        return f"{what} has a pose that is not finite"
+    if not math.isfinite(x + y + z + finite_sum):
+        return f"{body_name} has a pose that is not finite"
     if z < -MAX_SUNK_DEPTH_M:
-        return f"{what} is below the floor, at z = {z:.2f} m"
-    return f"{what} has left the world, to ({x:.4g}, {y:.4g}, {z:.4g})"
+        return f"{body_name} is below the floor, at z = {z:.2f} m"
+    return f"{body_name} has left the world, to ({x:.4g}, {y:.4g}, {z:.4g})"

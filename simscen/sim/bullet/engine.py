@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
+from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, submesh
 from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
-from simscen.sim.body.inertia import GRAVITY
 from simscen.sim.body.outline import hull_points
 from simscen.sim.bullet.hull_vertices import reduce_hull_vertices
 
@@ -73,7 +73,7 @@ def set_physics_parameters(
         enableSAT=0,
         physicsClientId=client,
     )
-    pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=client)
+    pybullet.setGravity(0, 0, -GRAVITY_M_S2, physicsClientId=client)
 
 
 def set_collision_filter(client: int, body: int, link: int, group: int, others: int) -> None:

@@ -14,7 +14,7 @@ import pybullet
 
 from simscen.core.geometry import Pose3, Vector
 from simscen.core.geometry.shapes import TriangleMesh
-from simscen.core.records.case import CLEARANCE_RANGE
+from simscen.core.records.case import CLEARANCE_RANGE_M
 from simscen.core.records.trace import Truth
 from simscen.sim.body.outline import hull_points, radius_and_height
 from simscen.sim.body.robot_body import RobotBody
@@ -74,7 +74,7 @@ class Clearance:
         self._extent = math.hypot(self._radius, self._height)
         self.size = SHAPE_MARGIN_M + self._extent
         """Radius in m of the robot's bounding sphere around its base frame."""
-        self.contact_radius = self.size + CLEARANCE_RANGE
+        self.contact_radius = self.size + CLEARANCE_RANGE_M
         """Radius in m around its base frame within which actors collide, regardless of what is measured."""
         self.query_radius = max(self.contact_radius, self.size + max_range)
         """Radius in m around its base frame within which actors affect the clearance or the sensors."""

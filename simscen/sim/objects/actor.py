@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import pybullet
 
+from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry import Pose3, Vector, wrap
 from simscen.core.geometry.motion_paths import MAX_STEP_M, PathSampler, SweptSegment
 from simscen.core.geometry.scripted_poses import BatchPathSampler, PosesAtTick, PredictedPoses
 from simscen.core.geometry.shapes import Body, Mesh, MotionPath
-from simscen.sim.body.inertia import GRAVITY
 
-FALL_SPEED_M_S = 0.1 * GRAVITY
+FALL_SPEED_M_S = 0.1 * GRAVITY_M_S2
 """Speed that a resting object can gain by falling for 0.1 s."""
 PRECOMPUTED_S = 4
 """Simulated seconds for which scripted poses are computed in one batch."""

@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pybullet
 
+from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.kinematics import STOP, MecanumWheels, Twist
 from simscen.model.robot import Mecanum
-from simscen.sim.body.inertia import GRAVITY, MassProperties, combine
+from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import engine
 from simscen.sim.robots.robot_state import RobotState
@@ -97,7 +98,7 @@ class PlanarBase:
 
     def set_motors(self, velocity: Twist) -> None:
         """Set the motors to a velocity along the world axes, with at most the force that the wheels can transmit."""
-        max_force = min(MAX_FORCE_PER_WEIGHT * self._power, self._floor_friction) * self._mass * GRAVITY
+        max_force = min(MAX_FORCE_PER_WEIGHT * self._power, self._floor_friction) * self._mass * GRAVITY_M_S2
         pybullet.setJointMotorControlArray(
             self.id,
             self.joints,

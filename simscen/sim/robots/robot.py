@@ -75,7 +75,7 @@ class Scene:
         self.pushes.append(TimedPush(push, (impulse[0] / ticks, impulse[1] / ticks), tick, tick + ticks))
 
     def on_push(self) -> None:
-        """Note that something is pushed during the next step."""
+        """Discard predictions that assume that nothing is pushed during the next step."""
         self.actors.on_push(self.tick)
         for robot in self.robots.values():
             robot.on_push()
@@ -279,7 +279,7 @@ class Robot:
         self._drive.rest()
 
     def on_push(self) -> None:
-        """Note that something is pushed during the next step."""
+        """Discard predictions that assume that nothing is pushed during the next step."""
         self.clearance.on_push(self._scene.tick)
 
     def on_change(self) -> None:

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 import pybullet
 
+from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Ackermann, Differential, Limits, SkidSteer
-from simscen.sim.body.inertia import GRAVITY
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.robots.wheeled_base import WheeledBase
 
@@ -169,7 +169,7 @@ class AckermannDrive:
         self._left, self._right, self._torques = driven_joints(body, vehicle)
         # Left before right, like the angles in _set_steering.
         self._knuckles = [joint for wheel, joint in sorted(wheels, key=lambda w: -w[0].y) if wheel.steered]
-        self._servo_torque = 0.5 * body.mass * GRAVITY * body.drive.wheel_radius
+        self._servo_torque = 0.5 * body.mass * GRAVITY_M_S2 * body.drive.wheel_radius
         # The front wheels roll freely.
         rolling = [joint + 1 for joint in self._knuckles]
         pybullet.setJointMotorControlArray(

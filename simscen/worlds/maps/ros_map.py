@@ -22,23 +22,25 @@ from simscen.model.world import RosMapSpec
 if TYPE_CHECKING:
     from PIL import Image
 
-Bytes8 = npt.NDArray[np.uint8]
-Quanta = npt.NDArray[np.uint16]
+Grays8 = npt.NDArray[np.uint8]
+Grays16 = npt.NDArray[np.uint16]
 
-MAX_PIXELS = 16 * 2**20
-MAX_BYTES = 64 * 2**20
-CODE = "SC320"
+MAX_PIXELS, MAX_BYTES = 16 * 2**20, 64 * 2**20
+"""Limits on the size of an image, and of its file."""
+PROBLEM_CODE = "SC320"
 
-_GAP = rb"(?:\s|#[^\r\n]*[\r\n])+"
-_PNM_HEADER = re.compile(rb"(P[25])" + _GAP + rb"(\d{1,10})" + _GAP + rb"(\d{1,10})" + _GAP + rb"(\d{1,10})\s")
+_PNM_SEPARATOR = rb"(?:\s|#[^\r\n]*[\r\n])+"
+_PNM_HEADER = re.compile(
+    rb"(P[25])" + _PNM_SEPARATOR + rb"(\d{1,10})" + _PNM_SEPARATOR + rb"(\d{1,10})" + _PNM_SEPARATOR + rb"(\d{1,10})\s"
+)
 
 
 @dataclass(frozen=True, eq=False)
 class MapImage:
     """Pixels as nav2_map_server reads them with GraphicsMagick: `gray` (h, w), top row first; `alpha` if it has one."""
 
-    gray: Bytes8
-    alpha: Bytes8 | None = None
+    gray: Grays8
+    alpha: Grays8 | None = None
 
 
 class UnreadableImage(Exception):
@@ -50,10 +52,10 @@ def read_image(path: Path) -> MapImage:
     try:
         data = _read_bytes(path)
         if data[:2] in (b"P2", b"P5"):
-            return MapImage(_eight_bits(_decode_pgm(data)))
+            return MapImage(_to_8_bits(_decode_pgm(data)))
         return _decode_png_or_bmp(data)
     except UnreadableImage as error:
-        raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from None
+        raise InvalidInput([Problem(str(path), 0, 0, PROBLEM_CODE, str(error))]) from None
 
 
 def _read_bytes(path: Path) -> bytes:
@@ -77,7 +79,7 @@ def _check_size(width: int, height: int) -> None:
         raise UnreadableImage(f"map too large: {width} x {height} pixels, more than {MAX_PIXELS}")
 
 
-def _decode_pgm(data: bytes) -> Quanta:
+def _decode_pgm(data: bytes) -> Grays16:
     """Return a PGM as 16-bit grays (h, w). Source: netpbm's pgm(5); samples of two bytes are big-endian."""
     match = _PNM_HEADER.match(data)
     if match is None:
@@ -94,7 +96,7 @@ def _decode_pgm(data: bytes) -> Quanta:
     if values.max() > maximum:
         raise UnreadableImage(f"a pixel is {values.max()}, above the maxval of {maximum}")
     scale = np.round(np.arange(maximum + 1) * (65535 / maximum)).astype(np.uint16)
-    quanta: Quanta = scale[values]
+    quanta: Grays16 = scale[values]
     return quanta
 
 
@@ -144,15 +146,15 @@ def _bmp_size(data: bytes) -> tuple[int, int]:
 def _gray_and_alpha(image: "Image.Image") -> MapImage:
     """Return 8-bit grays, computed as by GraphicsMagick: 0.299 R + 0.587 G + 0.114 B (Rec. 601), in integers."""
     if image.mode.startswith("I"):
-        return MapImage(_eight_bits(np.clip(np.asarray(image), 0, 65535).astype(np.uint16)))
+        return MapImage(_to_8_bits(np.clip(np.asarray(image), 0, 65535).astype(np.uint16)))
     transparent = image.mode in ("LA", "PA", "RGBA") or "transparency" in image.info
     red, green, blue, *alpha = np.moveaxis(np.asarray(image.convert("RGBA" if transparent else "RGB")), 2, 0)
     quanta = [color.astype(np.uint32) * 257 for color in (red, green, blue)]
     luma = (306 * quanta[0] + 601 * quanta[1] + 117 * quanta[2]) >> 10
-    return MapImage(_eight_bits(luma.astype(np.uint16)), alpha[0] if transparent else None)
+    return MapImage(_to_8_bits(luma.astype(np.uint16)), alpha[0] if transparent else None)
 
 
-def _eight_bits(quanta: Quanta) -> Bytes8:
+def _to_8_bits(quanta: Grays16) -> Grays8:
     return (quanta // 257).astype(np.uint8)
 
 
@@ -186,7 +188,7 @@ def _check_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path)
         size = " x ".join(str(count) for count in pixels)
         message = f"map too large: {size} pixels of {spec.resolution:g} m extend to {distance:g} m"
         message += f", farther than {MAX_DISTANCE_M:g} m"
-        raise InvalidInput([Problem(str(image_path), 0, 0, CODE, message, "check the map's `resolution`")])
+        raise InvalidInput([Problem(str(image_path), 0, 0, PROBLEM_CODE, message, "check the map's `resolution`")])
 
 
 def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:

@@ -19,7 +19,7 @@ from simscen.worlds.routes.clearance import HALF_DIAGONAL_CELLS, ClearanceField,
 from simscen.worlds.routes.narrow_gaps import narrowest_gap_in
 from simscen.worlds.routes.passages import find_passages, passage_between
 
-Z_RANGE = (0.03, 0.4)
+Z_RANGE_M = (0.03, 0.4)
 """Heights in m between which solids block a robot: lower ones are sills to drive over, higher ones leave room below."""
 MIN_RESOLUTION_M = 0.05
 """Size of the grid cells of the search."""
@@ -48,7 +48,7 @@ class ShortestPaths:
         mesh: TriangleMesh,
         bounds: tuple[float, float, float, float],
         radius: float,
-        z_range: tuple[float, float] = Z_RANGE,
+        z_range: tuple[float, float] = Z_RANGE_M,
         min_resolution: float = MIN_RESOLUTION_M,
     ) -> None:
         """Prepare the search with cells of `min_resolution` m, or larger ones in a large world."""
@@ -160,7 +160,7 @@ def shortest_paths_in(
     built: BuiltWorld,
     stops: Sequence[Pose2],
     radius: float,
-    z_range: tuple[float, float] = Z_RANGE,
+    z_range: tuple[float, float] = Z_RANGE_M,
     min_resolution: float = MIN_RESOLUTION_M,
 ) -> ShortestPaths:
     """Return the shortest paths of a disc in a built world, extended to contain all `stops`."""
@@ -168,7 +168,7 @@ def shortest_paths_in(
 
 
 def legs_between(
-    built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float, z_range: tuple[float, float] = Z_RANGE
+    built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float, z_range: tuple[float, float] = Z_RANGE_M
 ) -> list[Leg]:
     """Return the shortest path of a disc from each pose to its goal. Repeated pairs are searched once."""
     stops = [pose for start, goal in ends for pose in (start, goal.pose)]

@@ -66,56 +66,56 @@ class FrameScope:
         """Return `scope_from_frame`; raises UnusableElement for unknown frames and for cycles."""
         key = id(frame)
         if key not in self._poses:
-            user = frame.pose or frame.element
+            referrer = frame.pose or frame.element
             if key in self._open_frames:
-                raise user.unusable(f"the pose of {frame.name!r} depends on itself")
+                raise referrer.unusable(f"the pose of {frame.name!r} depends on itself")
             self._open_frames.append(key)
             try:
-                self._poses[key] = self._compute_pose(frame, user)
+                self._poses[key] = self._compute_pose(frame, referrer)
             finally:
                 self._open_frames.pop()
         return self._poses[key]
 
-    def _compute_pose(self, frame: Frame, user: Element) -> Pose3:
-        reference = self.pose_of_name(reference_frame(frame.pose) or frame.default_reference, user)
+    def _compute_pose(self, frame: Frame, referrer: Element) -> Pose3:
+        reference = self.pose_of_name(reference_frame(frame.pose) or frame.default_reference, referrer)
         pose = reference.compose(read_pose(frame.pose))
         if frame.model_scope is not None and frame.placement_frame:
-            pose = pose.compose(frame.model_scope.pose_of_name(frame.placement_frame, user).inverse())
+            pose = pose.compose(frame.model_scope.pose_of_name(frame.placement_frame, referrer).inverse())
         return pose
 
-    def pose_of_name(self, name: str, user: Element) -> Pose3:
-        """Return `scope_from_name` for a frame name; raises UnusableElement at `user` if there is no such frame."""
+    def pose_of_name(self, name: str, referrer: Element) -> Pose3:
+        """Return `scope_from_name` for a frame name; raises UnusableElement at `referrer` if there is no such frame."""
         if name in ("", self.implicit_frame):
             return Pose3()
         if name in self.frames:
             return self.pose_of(self.frames[name])
         model, rest = self._model_with_frame(name)
         if model is None or model.model_scope is None:
-            raise user.unusable(f"unknown frame {name[:80]!r}")
-        return self.pose_of(model).compose(model.model_scope.pose_of_name(rest, user))
+            raise referrer.unusable(f"unknown frame {name[:80]!r}")
+        return self.pose_of(model).compose(model.model_scope.pose_of_name(rest, referrer))
 
-    def link_of_frame(self, name: str, user: Element, visited: tuple[Frame, ...] = ()) -> Frame | None:
+    def link_of_frame(self, name: str, referrer: Element, visited: tuple[Frame, ...] = ()) -> Frame | None:
         """Return the link that the frame `name` moves with, or None for the world.
 
-        Raises UnusableElement at `user` if there is no such frame.
+        Raises UnusableElement at `referrer` if there is no such frame.
         """
         if name == WORLD_FRAME:
             return None
         if name in ("", self.implicit_frame):
-            return self.link_of_frame(self.canonical, user, visited) if self.canonical else None
+            return self.link_of_frame(self.canonical, referrer, visited) if self.canonical else None
         frame = self.frames.get(name)
         if frame is None:
             model, rest = self._model_with_frame(name)
             if model is None or model.model_scope is None:
-                raise user.unusable(f"unknown link or frame {name[:80]!r}")
-            return model.model_scope.link_of_frame(rest, user)
+                raise referrer.unusable(f"unknown link or frame {name[:80]!r}")
+            return model.model_scope.link_of_frame(rest, referrer)
         if frame in visited:
-            raise user.unusable(f"frame {name!r} is attached to itself")
+            raise referrer.unusable(f"frame {name!r} is attached to itself")
         if frame.model_scope is not None:
-            return frame.model_scope.link_of_frame(MODEL_FRAME, user)
+            return frame.model_scope.link_of_frame(MODEL_FRAME, referrer)
         if frame.element.tag == "link":
             return frame
-        return self.link_of_frame(frame.attached_to, user, (*visited, frame))
+        return self.link_of_frame(frame.attached_to, referrer, (*visited, frame))
 
     def _model_with_frame(self, name: str) -> tuple[Frame | None, str]:
         """Return the nested or merged model that has the frame `name`, and the frame's name in that model."""

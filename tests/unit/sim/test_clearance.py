@@ -10,14 +10,14 @@ from shapely.ops import unary_union
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, Box, Cylinder, Extrusion, MotionPath, Solid, Sphere
-from simscen.core.records.case import CLEARANCE_RANGE
+from simscen.core.records.case import CLEARANCE_RANGE_M
 
 RADIUS = 0.22  # of the turtlebot
 MILLIMETER = 1e-3
 
 
 def test_nothing_around_counts_as_the_reach_of_the_search(simulate):
-    assert simulate().truth().clearance == CLEARANCE_RANGE
+    assert simulate().truth().clearance == CLEARANCE_RANGE_M
 
 
 def test_the_search_reaches_as_far_as_it_is_asked_to(simulate):
@@ -60,7 +60,7 @@ def test_things_that_move_count_and_the_ground_does_not(simulate):
     simulation = simulate(bodies=[cart])
     assert simulation.truth().clearance == pytest.approx(0.8 - RADIUS, abs=MILLIMETER)
     simulation.remove("cart")
-    assert simulation.truth().clearance == CLEARANCE_RANGE
+    assert simulation.truth().clearance == CLEARANCE_RANGE_M
     simulation.spawn(Body("prism", (Solid(Extrusion(((-0.1, -1), (0.1, -1), (0.1, 1), (-0.1, 1)), 0.5)),), Pose3(0.7)))
     assert simulation.truth().clearance == pytest.approx(0.6 - RADIUS, abs=MILLIMETER)
 
@@ -77,11 +77,11 @@ def test_things_that_come_from_afar_or_wake_there_count_as_soon_as_they_are_near
         simulation.step(6)
         truth = simulation.truth()
         x, y = truth.objects["ball"].x, truth.objects["cart"].y
-        gap = min(x - 0.15 - RADIUS, y - 0.2 - RADIUS, CLEARANCE_RANGE)
+        gap = min(x - 0.15 - RADIUS, y - 0.2 - RADIUS, CLEARANCE_RANGE_M)
         nearest.append(gap)
         if gap > 0.3:
             assert truth.clearance == pytest.approx(gap, abs=5e-3)
-    assert min(nearest[: 40 * 6]) == CLEARANCE_RANGE
+    assert min(nearest[: 40 * 6]) == CLEARANCE_RANGE_M
     assert min(nearest) < 0.3
 
 
@@ -116,7 +116,7 @@ def test_clearance_along_a_drive_is_that_of_the_plane(simulate):
     for _ in range(320):
         simulation.step(6)
         truth = simulation.truth()
-        expected = min(CLEARANCE_RANGE, shapes.distance(Point(truth.pose.x, truth.pose.y)) - RADIUS)
+        expected = min(CLEARANCE_RANGE_M, shapes.distance(Point(truth.pose.x, truth.pose.y)) - RADIUS)
         assert truth.clearance == pytest.approx(expected, abs=MILLIMETER)
 
 

@@ -11,7 +11,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.sim.body.from_spec import build_robot_body
 
-TICKS, GRAVITY = 240, 9.81
+TICKS, GRAVITY_M_S2 = 240, 9.81
 
 
 def square(left, low, right, high):
@@ -32,7 +32,7 @@ def test_four_braked_wheels_slide_for_v_squared_over_2_mu_g(simulate, friction):
     simulation.step(5 * TICKS)
     slid = simulation.truth().pose.x - begin
     braking = speed**2 / (2 * 3.0)  # the firmware's own way to stop, which is all that odometry sees
-    assert slid == pytest.approx(speed**2 / (2 * friction * GRAVITY), rel=0.03)
+    assert slid == pytest.approx(speed**2 / (2 * friction * GRAVITY_M_S2), rel=0.03)
     assert (simulation.encoders()[0] - rolled) * 0.098 == pytest.approx(braking, rel=0.25)
     assert slid > 1.4 * braking
 
@@ -42,7 +42,7 @@ def test_spinning_wheels_drive_no_faster_than_mu_g_and_odometry_counts_what_they
     simulation.add_friction_patch("ice", Patch(EVERYWHERE, 0.05))
     simulation.drive(Twist(2.0, 0.0, 0.0))
     simulation.step(2 * TICKS)
-    assert simulation.truth().pose.x == pytest.approx(0.05 * GRAVITY * 2**2 / 2, rel=0.05)
+    assert simulation.truth().pose.x == pytest.approx(0.05 * GRAVITY_M_S2 * 2**2 / 2, rel=0.05)
     assert simulation.encoders()[0] * 0.098 > 2.5 * simulation.truth().pose.x
 
 
@@ -88,7 +88,7 @@ def test_hull_slides_along_wall_by_coulombs_law(simulate, share):
     wall = box("wall", 1.0, 0.0, 1.0, 20.0)
     simulation = simulate(body, solids=[wall], pose=Pose2(0.5 - reach - 0.001, 0.0, 0.0))
     simulation.add_friction_patch("ice", Patch(EVERYWHERE, 0.0))
-    pressing = 0.5 * body.mass * GRAVITY
+    pressing = 0.5 * body.mass * GRAVITY_M_S2
     along = share * body.hull_friction * pressing
 
     def press(ticks):

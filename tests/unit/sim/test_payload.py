@@ -11,7 +11,7 @@ from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.body.robot_body import add_payload, center_of_mass, compute_climb_limits, is_stable, scale_motor_torque
 from simscen.worlds.world_file import ramp_solid
 
-TICKS, GRAVITY = 240, 9.81
+TICKS, GRAVITY_M_S2 = 240, 9.81
 
 
 def inertial_mass(body, payload):
@@ -47,7 +47,7 @@ def test_weak_motors_accelerate_by_force_over_inertia(simulate):
 @pytest.mark.parametrize(("share", "climbs"), [(0.8, False), (1.3, True)])
 def test_weak_motors_climb_a_slope_whose_sine_is_their_force_over_the_weight(simulate, share, climbs):
     whole, slope = build_robot_body(shipped("turtlebot")), math.radians(5)
-    body = scale_motor_torque(whole, share * math.sin(slope) * whole.mass * GRAVITY / force(whole))
+    body = scale_motor_torque(whole, share * math.sin(slope) * whole.mass * GRAVITY_M_S2 / force(whole))
     assert (compute_climb_limits(body).slope > slope) == climbs
     simulation = simulate(body, [ramp_solid((0.5, 0), (4.5, 0), 2, 4 * math.tan(slope), "ramp")], pose=Pose2(2, 0, 0),
                           drive=(0.3, 0, 0))  # fmt: skip

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from simscen.loading.variations.sampling import Pick, draw_values
+from simscen.loading.variations.sampling import ChoiceIndex, draw_values
 from simscen.model.variations import Sampled
 
 
@@ -55,7 +55,7 @@ def test_normal_values_have_their_mean_and_spread_and_keep_their_bounds() -> Non
 
 def test_integers_and_choices_come_all() -> None:
     assert set(sampled({"integer": [1, 6]})) == {1, 2, 3, 4, 5, 6}
-    assert set(sampled({"choice": ["a", "b"]})) == {Pick(0), Pick(1)}
+    assert set(sampled({"choice": ["a", "b"]})) == {ChoiceIndex(0), ChoiceIndex(1)}
 
 
 @pytest.mark.parametrize("count", [1, 7, 200])
