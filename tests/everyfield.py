@@ -10,8 +10,8 @@ from pydantic.fields import FieldInfo
 from simscen.cli.catalog.json_schema import MODELS
 from simscen.model.scenario import CriteriaSpec
 from simscen.model.world import RosMapSpec
+from simscen.spec.base import LazySpec
 from simscen.spec.extensible_union import ExtensibleUnion
-from simscen.spec.lazy_spec import LazySpec
 
 
 class Written(NamedTuple):

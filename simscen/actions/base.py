@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar, cast
 
 from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.stage import Effect, Situation, Stage
+from simscen.spec.base import LazySpec
 from simscen.spec.choice import Choice
-from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.places import RobotName
 
 

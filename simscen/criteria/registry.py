@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, model_validator
 
 from simscen.criteria.base import Criterion
+from simscen.spec.base import LazySpec
 from simscen.spec.choice import Choice
-from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.places import Name
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from simscen.core.errors import InvalidInput, Problem
-from simscen.editor.files import EditedFile
+from simscen.editor.document import EditedFile
 from simscen.loading.builders import world_from_file
 from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.runner import check_world_file

@@ -7,8 +7,33 @@ from pathlib import Path
 from typing import NamedTuple
 
 from simscen.core.errors import InvalidInput, Problem, UsageError
+from simscen.loading.files.paths import PathSandbox
+from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.textfile import read_text
 from simscen.run.sessions.output_folder import write_atomically
+
+
+@dataclass(frozen=True)
+class EditedFile:
+    """A scenario or world file: absolute path, `kind` ("scenario" or "world"), root, and additional folders.
+
+    `shown` is its name in problems: the path relative to the root.
+    """
+
+    path: Path
+    kind: str
+    root: Path
+    world_path: tuple[Path, ...] = ()
+
+    @property
+    def display_name(self) -> str:
+        """Name of the file in problems."""
+        return PathSandbox.around(self.root, self.world_path).display_name(self.path)
+
+    def library(self, text: str) -> Library:
+        """Return a reader of files that has `text` in the place of the content of this file."""
+        return Library(PathSandbox.around(self.root, self.world_path), unsaved={self.path: text})
+
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 NEW = ""

@@ -8,8 +8,7 @@ from typing import Any
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.editor.checking import TextChecks
-from simscen.editor.document import NEW, ChangedMeanwhile, Content, Document
-from simscen.editor.files import EditedFile
+from simscen.editor.document import NEW, ChangedMeanwhile, Content, Document, EditedFile
 from simscen.editor.forms import form_data
 from simscen.editor.map_view.background import Backgrounds
 from simscen.editor.map_view.map_edits import edits_of

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
 
 from simscen.core.clock import Clock
 from simscen.core.records.events import FAULT_TARGET_KINDS
+from simscen.spec.base import LazySpec
 from simscen.spec.choice import Choice
-from simscen.spec.lazy_spec import LazySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence

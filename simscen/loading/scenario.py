@@ -13,10 +13,10 @@ from simscen.loading.files.assets import Assets, find_criterion_masks
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.known_names import places_of, resolve_places, unknown_places
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
-from simscen.loading.nav2.parameter_file import with_nav2_parameters
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import StackChoice
+from simscen.loading.stacks.nav2_parameters import with_nav2_parameters
 from simscen.loading.stacks.stackfile import not_a_scenario, recognize_stack_file
 from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
 from simscen.loading.variations.naming import VariationProblems, merge_problems, number_of

@@ -6,9 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from simscen.spec.base import Ranged, Spec, Typed, type_discriminator
+from simscen.spec.base import LazySpec, Ranged, Spec, Typed, type_discriminator
 from simscen.spec.extensible_union import ExtensibleUnion
-from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.quantities import (
     Frequency,
     Length,

@@ -5,8 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from simscen.core.messages.navigation import FAILED, Mode
-from simscen.spec.base import Spec
-from simscen.spec.lazy_spec import LazySpec
+from simscen.spec.base import LazySpec, Spec
 from simscen.spec.quantities import Duration, PositiveLength
 
 

@@ -4,9 +4,8 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag
 
-from simscen.spec.base import Typed
+from simscen.spec.base import LazySpec, Typed
 from simscen.spec.extensible_union import ExtensibleUnion
-from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.quantities import (
     Frequency,
     NonNegativeLength,

@@ -13,8 +13,7 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.model.navigation import Expectation, Navigation, OnReached
 from simscen.model.stack_files import AnyStack
 from simscen.model.world import WorldSpec
-from simscen.spec.base import LanguageVersion, Spec, by_default
-from simscen.spec.lazy_spec import LazySpec
+from simscen.spec.base import LanguageVersion, LazySpec, Spec, by_default
 from simscen.spec.places import (
     Name,
     PlaceAllowed,

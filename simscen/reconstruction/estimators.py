@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.reconstruction.drive.motion_steps import motion_steps
-from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, motion_steps
 from simscen.reconstruction.evidence import Evidence, FoundFault
 from simscen.reconstruction.faults.commands import command_faults
-from simscen.reconstruction.faults.false_returns import false_return_faults
+from simscen.reconstruction.faults.false_returns import false_return_faults, glass_fault
 from simscen.reconstruction.faults.gyroscope import gyroscope_faults
 from simscen.reconstruction.faults.lidar_calibration import mount_fault, range_error_faults, with_mount_error
 from simscen.reconstruction.faults.lidar_readings import (
@@ -24,18 +23,17 @@ from simscen.reconstruction.faults.lidar_readings import (
 from simscen.reconstruction.faults.localizer import localizer_faults
 from simscen.reconstruction.faults.message_stream import stream_faults, stuck_scans
 from simscen.reconstruction.faults.odometry import odometry_faults
-from simscen.reconstruction.faults.transparent_walls import glass_fault
 from simscen.reconstruction.objects.clusters import usable_scans
 from simscen.reconstruction.objects.find_objects import find_objects
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.objects.pedestrians import with_walks
 from simscen.reconstruction.objects.walk_trial import WalkTrial
-from simscen.reconstruction.scans.scan_model import scan_model
-from simscen.reconstruction.scans.surroundings import Surroundings
+from simscen.reconstruction.scan_model import scan_model
 from simscen.reconstruction.scenario.contents import Findings
 from simscen.reconstruction.scenario.incidents import incidents_of
-from simscen.reconstruction.scenario.robot_properties import UNKNOWN_ROBOT, KnownRobot
-from simscen.run.live_world.pedestrian_map import PedestrianMap
+from simscen.reconstruction.scenario.robot_file import UNKNOWN_ROBOT, KnownRobot
+from simscen.reconstruction.surroundings import Surroundings
+from simscen.run.live_world.pedestrians import PedestrianMap
 
 MAX_SCANS = 3000
 """Maximum number of scans that are compared with the world; of longer drives, every second, third, … scan is used."""

@@ -16,11 +16,11 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import choose_robot, read_description
 from simscen.reconstruction.estimators import find_all
 from simscen.reconstruction.objects.find_objects import object_along
-from simscen.reconstruction.scans.surroundings import Surroundings
 from simscen.reconstruction.scenario.contents import Findings, GivenParts, contents_of
 from simscen.reconstruction.scenario.given_parts import DEFAULT_LIDAR_HEIGHT_M, GivenFiles, choose_world, given_parts
-from simscen.reconstruction.scenario.robot_properties import known_robot
+from simscen.reconstruction.scenario.robot_file import known_robot
 from simscen.reconstruction.scenario.scenario_text import ScenarioContents, scenario_text
+from simscen.reconstruction.surroundings import Surroundings
 
 
 @dataclass(frozen=True)

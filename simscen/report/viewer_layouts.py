@@ -8,7 +8,7 @@ from typing import Any
 
 from simscen.record import frame_names, topics
 from simscen.record.frame_names import RobotFrames
-from simscen.record.log_reader.read import Log
+from simscen.record.log_reader import Log
 
 _SCAN, _ROBOT = "/scan", "robot"
 _SHARED_TOPICS = (topics.MAP.name, topics.GLOBAL_COSTMAP.name, topics.OBJECT_MARKERS.name)

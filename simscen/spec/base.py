@@ -5,21 +5,25 @@ import inspect
 import re
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
+from types import NoneType
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar, get_args
 
 from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     RootModel,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 
 class Spec(BaseModel):
@@ -154,3 +158,36 @@ class Typed(Component):
 
     type: str = ""
     """Name of the component."""
+
+
+@dataclass(frozen=True)
+class LazySpec:
+    """Annotation that stands for the specification class `name` of `module`."""
+
+    module: str
+    name: str
+
+    def load(self) -> type[BaseModel]:
+        """Import the module and return the specification."""
+        model: type[BaseModel] = getattr(import_module(self.module), self.name)
+        return model
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = core_schema.no_info_plain_validator_function(self._validate)
+        return core_schema.nullable_schema(schema) if NoneType in get_args(source) else schema
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        model = self.load()
+        model.model_rebuild()
+        # For a nullable schema the handler makes a reference to the model, for a model itself a copy.
+        generated = handler(core_schema.nullable_schema(model.__pydantic_core_schema__))
+        return generated if schema["type"] == "nullable" else generated["anyOf"][0]
+
+    def _validate(self, value: Any) -> BaseModel:
+        """Validate a value; pydantic reports errors of the model as errors of the field, with their positions."""
+        return self.load().model_validate(value, by_alias=True, by_name=False)
+
+
+def annotation_of(field: FieldInfo) -> Any:
+    """Return the type of a field: its annotation, or the specification of its LazySpec, which is loaded."""
+    return next((mark.load() for mark in field.metadata if isinstance(mark, LazySpec)), field.annotation)

@@ -11,8 +11,7 @@ from pydantic import BaseModel, Field, ModelWrapValidatorHandler, ValidationErro
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
-from simscen.spec.base import Spec
-from simscen.spec.lazy_spec import LazySpec
+from simscen.spec.base import LazySpec, Spec
 
 
 class Choice(Spec):

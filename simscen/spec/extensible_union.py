@@ -9,8 +9,7 @@ from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, ValidationError, core_schema
 
 from simscen.core.messages.navigation import RecoveryBehavior
-from simscen.spec.base import Typed
-from simscen.spec.lazy_spec import LazySpec
+from simscen.spec.base import LazySpec, Typed
 from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
 
 GROUP_KEY, NAMES_ALLOWED_KEY, MAPPINGS_ALLOWED_KEY = "simscen group", "simscen names", "simscen mappings"

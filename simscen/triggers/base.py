@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.errors import BROKEN_COMPONENT, RunError
+from simscen.spec.base import LazySpec
 from simscen.spec.choice import Choice
-from simscen.spec.lazy_spec import LazySpec
 from simscen.spec.places import RobotName
 from simscen.spec.quantities import Duration, PositiveDuration, Probability
 

@@ -7,7 +7,7 @@ from simscen.core.records.run_result import RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.evaluation import outcome_of_verdicts
 from simscen.record.log_header import LogHeader
-from simscen.record.log_reader.read import Log
+from simscen.record.log_reader import Log
 from simscen.testing.synthetic_trace import synthetic_trace
 
 EVIL = "</script><img src=x onerror=pwned()>\u202eevil\u2066 \x1b[31m{{data}}"

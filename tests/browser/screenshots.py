@@ -17,7 +17,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from simscen.judge.result_json import from_json
-from simscen.record.log_reader.read import read_run
+from simscen.record.log_reader import read_run
 from simscen.report.replay import write_replay
 from simscen.run.simulate import simulate_file
 

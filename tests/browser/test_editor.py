@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from rig import Opened, Opener
 
 from simscen.cli.session.backends import backend_of
-from simscen.editor.files import EditedFile
+from simscen.editor.document import EditedFile
 from simscen.editor.server import EditorServer
 from simscen.editor.session import EditorSession
 from simscen.run.sessions.run_session import SessionOptions

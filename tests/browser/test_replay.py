@@ -17,7 +17,7 @@ from rig import Opened, Opener
 
 from simscen.core.records.trace import Samples
 from simscen.judge.result_json import from_json
-from simscen.record.log_reader.read import read_run
+from simscen.record.log_reader import read_run
 from simscen.report.replay import write_replay
 
 ROOT = Path(__file__).parents[2]

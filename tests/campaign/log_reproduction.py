@@ -25,7 +25,7 @@ from simscen.core.records.verdict import Status
 from simscen.judge.run_result import judge_run
 from simscen.loading.scenario_text import spec_of_text
 from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
-from simscen.record.log_reader.read import Log, read_log
+from simscen.record.log_reader import Log, read_log
 
 ROOT = Path(__file__).parents[2]
 CAN_FAIL = ROOT / "tests" / "scenarios" / "can_fail"

@@ -19,7 +19,7 @@ from simscen.loading.scenario_text import spec_of_text
 from simscen.reconstruction.drive.reader import DriveOptions
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.scenario_from_log import Reconstruction, ReconstructionOptions, scenario_from_log
-from simscen.record.log_reader.read import Log, read_log
+from simscen.record.log_reader import Log, read_log
 
 ROOT = Path(__file__).parents[2]
 MAX_POSE_ERROR_M, MAX_OBJECT_RMSE_M, MAX_TIME_ERROR_S = 0.1, 0.3, 0.5

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.clock import Clock
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.record.recorder import Recorder
 
 SIMSCEN = str(Path(sys.executable).with_name("simscen"))

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import pytest
 from junitparser import JUnitXml
 
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.record.trace_difference import first_difference
 
 TELLING = Path(__file__).with_name("telling_zygote.py")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 
 SIMSCEN = str(Path(sys.executable).with_name("simscen"))
 TELLING = Path(__file__).with_name("telling_zygote.py")

@@ -6,7 +6,7 @@ import pytest
 
 import simscen
 from simscen.core.errors import InvalidInput
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 
 PLANNED = """\
 stack: {localizer: {type: scan_matching_amcl, max_particles: 500}, planner: {type: rrt_connect}}

@@ -10,8 +10,8 @@ from simscen.actions.base import AnyAction
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
 from simscen.model.robot import Bumper, Camera, InertialUnit, Lidar, WheelOdometry
+from simscen.spec.base import annotation_of
 from simscen.spec.choice import Choice
-from simscen.spec.lazy_spec import annotation_of
 from simscen.testing import Promise, promises_of
 from simscen.testing.targets import promises_of_target
 from simscen.triggers.base import Trigger

@@ -13,7 +13,7 @@ from simscen.cli.main import app
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
 from simscen.judge.result_json import verdict_data
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 
 ROOT = Path(__file__).parents[2]
 GUIDE = (ROOT / "docs" / "guides" / "temporal-criteria.md").read_text(encoding="utf-8")

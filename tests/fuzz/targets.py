@@ -16,7 +16,7 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.judge.evaluation import judge
 from simscen.loading.scenario_text import spec_of_text
 from simscen.record.log_file import RecordReader
-from simscen.record.log_reader.read import read_run, recover
+from simscen.record.log_reader import read_run, recover
 from simscen.record.mcap_writer import Channel, McapWriter, MessageType
 from simscen.run.preparation import prepare
 

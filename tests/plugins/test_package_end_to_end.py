@@ -13,7 +13,7 @@ import jsonschema
 import pytest
 import yaml
 
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 
 SIMSCEN = [sys.executable, "-c", "import sys; from simscen.cli.start import start; sys.exit(start())"]
 ROBOT = """\

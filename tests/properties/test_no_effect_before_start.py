@@ -18,8 +18,8 @@ from simscen.loading.checks.registry import NameScope
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
+from simscen.spec.base import annotation_of
 from simscen.spec.choice import Choice
-from simscen.spec.lazy_spec import annotation_of
 
 ROBOT = """\
 simscen: 1

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.record.log_reader.read import read_run
+from simscen.record.log_reader import read_run
 
 ROOT = Path(__file__).parents[2]
 NODES = Path(__file__).with_name("nodes")

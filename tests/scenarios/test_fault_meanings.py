@@ -15,7 +15,7 @@ from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run
 from simscen.loading.scenario import load_scenario
 from simscen.loading.scenario_text import spec_of_text
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.record.trace_difference import first_difference
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate

@@ -6,7 +6,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 

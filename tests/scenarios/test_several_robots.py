@@ -15,7 +15,7 @@ from simscen.judge.result_json import from_json, to_json
 from simscen.judge.run_result import combine_robots, judge_run
 from simscen.loading.scenario import load_scenario
 from simscen.loading.scenario_text import criteria_of_text
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 

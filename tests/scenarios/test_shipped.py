@@ -13,7 +13,7 @@ from simscen.judge import run_result
 from simscen.judge.result_json import read_result, to_json
 from simscen.judge.run_result import judge_run
 from simscen.loading.scenario_text import criteria_of_text, spec_of_text
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.record.trace_difference import first_difference
 
 ROOT = Path(__file__).parents[2]

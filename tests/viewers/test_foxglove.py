@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from simscen.core.records.events import EventKind
-from simscen.record.log_reader.read import Log, read_run
+from simscen.record.log_reader import Log, read_run
 from simscen.report.viewer_layouts import foxglove_layout, rviz_config
 from simscen.run.simulate import simulate_file
 

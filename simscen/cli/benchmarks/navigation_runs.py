@@ -19,7 +19,7 @@ from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.report.display_text import plain_text
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import UNDECIDED_KINDS

@@ -36,10 +36,9 @@ from simscen.model.disturbances import EventEntry, FaultEntry, StepEntry
 from simscen.model.stack_base import SpeedZone
 from simscen.model.world import RosMapSpec
 from simscen.spec import extensible_union, registry
-from simscen.spec.base import field_docs
+from simscen.spec.base import LazySpec, annotation_of, field_docs
 from simscen.spec.choice import Choice, installed_choices
 from simscen.spec.extensible_union import ExtensibleUnion
-from simscen.spec.lazy_spec import LazySpec, annotation_of
 from simscen.spec.places import PlaceAllowed, PlaceShorthand, PoseSpec, SpeedMask
 from simscen.spec.quantities import UNITS, Quantity
 from simscen.triggers.base import AnyCondition, Trigger

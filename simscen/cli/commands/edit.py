@@ -16,7 +16,7 @@ from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.loading.files.discovery import SCENARIO_SUFFIXES, STUDY_SUFFIXES, default_root
 
 if TYPE_CHECKING:
-    from simscen.editor.files import EditedFile
+    from simscen.editor.document import EditedFile
     from simscen.run.process.jobs import Backend
 
 SUFFIX = SCENARIO_SUFFIXES[0]
@@ -116,7 +116,7 @@ def _edited_file(
 def _new_file(
     file: Path | None, map_: Path, root: Path | None, world_path: tuple[Path, ...], lenient: bool
 ) -> tuple["EditedFile", str]:
-    from simscen.editor.files import EditedFile
+    from simscen.editor.document import EditedFile
     from simscen.editor.new_scenario import new_scenario_text
 
     target = file or Path(f"{map_.name.split('.')[0]}{SUFFIX}")
@@ -132,7 +132,7 @@ def _new_file(
 
 
 def _file_of_kind(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
-    from simscen.editor.files import EditedFile
+    from simscen.editor.document import EditedFile
     from simscen.loading.checks.files import file_kind
     from simscen.loading.files.assets import SDF_SUFFIXES
 

@@ -11,7 +11,7 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.output_files import save
 from simscen.core.errors import UsageError
-from simscen.record.log_reader.read import recover as recover_log
+from simscen.record.log_reader import recover as recover_log
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
 
@@ -55,7 +55,7 @@ def layout(
     speed and clearance, and the events. In Foxglove, choose Layouts, "Import from file…". Exit code 0: written; 2: the
     log is unusable, or the file cannot be written.
     """
-    from simscen.record.log_reader.read import read_log
+    from simscen.record.log_reader import read_log
     from simscen.report.viewer_layouts import foxglove_layout, rviz_config
 
     if rviz and log is not None:

@@ -12,7 +12,7 @@ from simscen.cli.session.output_files import save
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.record.log_header import scenery_from_header
-from simscen.record.log_reader.read import Log, invalid_log, read_run
+from simscen.record.log_reader import Log, invalid_log, read_run
 
 
 def command(

@@ -10,7 +10,7 @@ import typer
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.judging import LogJudge
-from simscen.cli.session.logs import LOGS, find_logs
+from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, find_logs
 from simscen.cli.session.output_files import save
 from simscen.cli.shared_options import (
     RootOption,
@@ -68,7 +68,7 @@ def command(
     if len(others) > 1:
         raise UsageError(f"--against takes one run, but {escaped(str(against))} contains {len(others)}")
     for file in files:
-        page = out or file.with_name(PAGE if file.name in LOGS else f"{file.stem}.{PAGE}")
+        page = out or file.with_name(PAGE if file.name in (COMPLETE_LOG, PARTIAL_LOG) else f"{file.stem}.{PAGE}")
         _write(judging, [file, *others], page)
         print_text(escaped(str(page)))
         if open_:

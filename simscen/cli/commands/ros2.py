@@ -15,7 +15,7 @@ import typer
 
 from simscen.cli.diagnostics import as_text, print_text, relative_to_working_folder
 from simscen.core.errors import InvalidInput, UsageError
-from simscen.loading.nav2.parameter_file import Nav2Parameters, read_nav2_parameters
+from simscen.loading.stacks.nav2_parameters import Nav2Parameters, read_nav2_parameters
 from simscen.ros2.nav2_parameters import Offer
 
 SOCKET = "SIMSCEN_STACK_FD"

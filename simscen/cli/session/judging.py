@@ -24,7 +24,7 @@ from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import is_simscen_log
 from simscen.record.foreign.read import ForeignLog, read_foreign_log
 from simscen.record.log_header import LogHeader
-from simscen.record.log_reader.read import Log, read_run
+from simscen.record.log_reader import Log, read_run
 from simscen.report.journal_reader import JOURNAL_FILE, read_journal
 from simscen.run.sessions.output_folder import run_folder
 

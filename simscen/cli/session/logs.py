@@ -12,7 +12,7 @@ from simscen.loading.files.paths import is_folder
 from simscen.loading.scenario_text import criteria_of_text
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
-from simscen.record.log_reader.read import Log
+from simscen.record.log_reader import Log
 
 COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
 """Names of the log in the folder of a run that was completed, and of one that was aborted."""

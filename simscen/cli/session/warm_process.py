@@ -19,7 +19,7 @@ from simscen.core.records.case import Run
 from simscen.model.localizers import LocalizerSpec
 from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec
-from simscen.record.log_reader.read import read_run
+from simscen.record.log_reader import read_run
 from simscen.report.picture.map_picture import write_picture
 from simscen.report.picture.scene import Scene, scene_with_robots
 from simscen.run.log_header import log_header, world_scenery

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from simscen.editor.schema_lookup import schema_of_kind
+from simscen.editor.forms import schema_of_kind
 from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import AddItem, Edit, RemovePart, SetValue
 from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at

@@ -4,11 +4,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from simscen.core.errors import InvalidInput
-from simscen.editor.files import EditedFile
+from simscen.editor.document import EditedFile
 from simscen.editor.map_view.background import Backgrounds
-from simscen.editor.map_view.map_objects import MAX_OBJECTS, Handle, Keys, MapObject, mapping
+from simscen.editor.map_view.map_objects import (
+    MAX_OBJECTS,
+    Handle,
+    Keys,
+    MapObject,
+    mapping,
+    world_objects,
+    world_places,
+)
 from simscen.editor.map_view.scenario_objects import scenario_objects
-from simscen.editor.map_view.world_objects import world_objects, world_places
 from simscen.loading.files.assets import Assets
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.validate import check

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from simscen.editor.text_editing.insertions import added_item, inserted_entry
-from simscen.editor.text_editing.removals import removed_part
+from simscen.editor.text_editing.insertions import added_item, inserted_entry, removed_part
 from simscen.editor.text_editing.splices import EditRefused, Splice, path_text, spliced
 from simscen.editor.text_editing.value_text import flow_text, replacing_text, same_value
 from simscen.loading.yaml.parser import parse_yaml

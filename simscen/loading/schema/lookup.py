@@ -12,9 +12,9 @@ from pydantic import BaseModel, RootModel, Tag
 from pydantic.fields import FieldInfo
 
 from simscen.loading.yaml.tree import Key
+from simscen.spec.base import LazySpec, annotation_of
 from simscen.spec.choice import Choice
 from simscen.spec.extensible_union import ExtensibleUnion, installed_specs
-from simscen.spec.lazy_spec import LazySpec, annotation_of
 
 
 def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel]]:

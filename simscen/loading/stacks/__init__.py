@@ -1,1 +1,1 @@
-"""Stack files, stacks chosen on the command line, and commands of external stacks."""
+"""Stacks: stack files, Nav2 parameter files, stacks chosen on the command line, and commands of external stacks."""

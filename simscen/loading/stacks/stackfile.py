@@ -5,9 +5,9 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.paths import PathSandbox
-from simscen.loading.nav2.parameter_file import NAV2_PARAMS, is_nav2_parameter_file, with_nav2_parameters
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import SCENARIO_KEYS, StackChoice
+from simscen.loading.stacks.nav2_parameters import NAV2_PARAMS, is_nav2_parameter_file, with_nav2_parameters
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.textfile import read_text
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child, key_position

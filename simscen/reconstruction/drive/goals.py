@@ -1,4 +1,7 @@
-"""Goals of a drive: from goal messages and results of actions, or from plans, or from where the robot stopped."""
+"""Goals of a drive, and the part of a recording in which the robot drives to them.
+
+Goals are found in goal messages and results of actions, or in plans, or where the robot stopped.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import path_corners
 from simscen.core.records.events import Event, EventKind
 from simscen.reconstruction.drive.log_messages import LogMessages
-from simscen.reconstruction.drive.recorded_drive import RecordedGoal, TimedValues
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, Scans, TimedValues
 from simscen.reconstruction.evidence import windows
 from simscen.record.foreign.trace_reader import goal_events
 from simscen.record.localization_logs.rosbag import planar_pose
@@ -140,3 +143,66 @@ def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
             sent = passed
         yield RecordedGoal("", pose, sent, begin, "reached", source=STOP_SOURCE)
         last, sent, since = pose, end, index
+
+
+MIN_IDLE_S = 1.0
+"""Shorter times before the first goal are kept."""
+LEAD_S = 0.5
+"""Time before the first motion that is kept if the goals are unknown."""
+
+
+def from_first_goal(drive: RecordedDrive) -> RecordedDrive:
+    """Return the drive without what the log holds before its first goal; times count from then."""
+    if not drive.goals:
+        return drive
+    begin = drive.goals[0].sent
+    if drive.goals[0].status == "reached" and not drive.goals[0].source.startswith("/"):
+        begin = _first_motion(drive.poses) - LEAD_S
+    begin = max(begin, float(drive.poses.times[0]))
+    if begin < MIN_IDLE_S:
+        return drive
+    note = f"what happened in the first {begin:.1f} s of the log, before the first goal"
+    goals = tuple(
+        replace(goal, sent=max(0.0, goal.sent - begin), ended=None if goal.ended is None else goal.ended - begin)
+        for goal in drive.goals
+    )
+    return replace(
+        drive,
+        duration=drive.duration - begin,
+        poses=_after(drive.poses, begin, keep_last=True),
+        belief=_after(drive.belief, begin, keep_last=True),
+        corrections=_after(drive.corrections, begin),
+        odometry=_after(drive.odometry, begin),
+        commands=_after(drive.commands, begin),
+        turn_rates=_after(drive.turn_rates, begin),
+        bumper=_after(drive.bumper, begin),
+        scans=None if drive.scans is None else _scans_after(drive.scans, begin),
+        goals=goals,
+        notes=(*drive.notes, note),
+        begin=begin,
+    )
+
+
+def _first_motion(poses: TimedValues) -> float:
+    moved = np.flatnonzero(np.hypot(*(poses.values[:, :2] - poses.values[0, :2]).T) > 0.05)
+    return float(poses.times[moved[0]]) if len(moved) else float(poses.times[0])
+
+
+def _after(signal: TimedValues, begin: float, keep_last: bool = False) -> TimedValues:
+    """Return the values from `begin` on; with `keep_last`, also the value that holds then."""
+    first = int(np.searchsorted(signal.times, begin))
+    if keep_last and first > 0 and (first == len(signal) or signal.times[first] > begin):
+        first -= 1
+    times = np.maximum(signal.times[first:] - begin, 0.0)
+    return TimedValues(times, signal.values[first:], np.maximum(signal.arrivals[first:] - begin, 0.0))
+
+
+def _scans_after(scans: Scans, begin: float) -> Scans:
+    first = int(np.searchsorted(scans.times, begin))
+    return replace(
+        scans,
+        times=scans.times[first:] - begin,
+        arrivals=scans.arrivals[first:] - begin,
+        ranges=scans.ranges[first:],
+        malformed=scans.malformed[first:],
+    )

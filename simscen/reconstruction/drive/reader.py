@@ -13,8 +13,7 @@ import numpy as np
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.reconstruction.drive.drive_window import from_first_goal
-from simscen.reconstruction.drive.goals import goals_of
+from simscen.reconstruction.drive.goals import from_first_goal, goals_of
 from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, collect_messages
 from simscen.reconstruction.drive.recorded_drive import Polygon, RecordedDrive, Scans, TimedValues, no_values
 from simscen.record import topics

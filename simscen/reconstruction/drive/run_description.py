@@ -18,7 +18,7 @@ from simscen.loading.yaml.tree import MappingNode
 from simscen.reconstruction.drive.recorded_drive import Polygon
 from simscen.record.foreign.raw_messages import is_simscen_log, recorded_robots
 from simscen.record.log_header import LogHeader
-from simscen.record.log_reader.read import Log, invalid_log, read_log
+from simscen.record.log_reader import Log, invalid_log, read_log
 from simscen.sim.body.outline import circle
 
 OBJECT_KEYS = ("objects",)

@@ -10,8 +10,8 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.reconstruction.evidence import Evidence, FoundFault
-from simscen.reconstruction.scans.scan_model import ScanModel
-from simscen.reconstruction.scans.surroundings import Surroundings
+from simscen.reconstruction.scan_model import ScanModel
+from simscen.reconstruction.surroundings import Surroundings
 
 MAX_SCANS = 40
 """Number of scans, evenly spread over the drive, that are compared."""

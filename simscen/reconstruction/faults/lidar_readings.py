@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.evidence import Evidence, FoundFault, Window, windows
-from simscen.reconstruction.scans.scan_model import ScanModel
+from simscen.reconstruction.scan_model import ScanModel
 
 LIDAR = "lidar"
 MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR = 0.012, 0.8

@@ -8,8 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.reconstruction.drive.motion_steps import STEP_S, MotionSteps
-from simscen.reconstruction.drive.recorded_drive import Mask
+from simscen.reconstruction.drive.recorded_drive import STEP_S, Mask, MotionSteps
 from simscen.reconstruction.evidence import Evidence, FoundFault, Window, windows
 
 MIN_DISTANCE_M, MIN_TURN_RAD = 1.0, 1.5

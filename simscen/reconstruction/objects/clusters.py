@@ -12,8 +12,8 @@ from simscen.reconstruction.drive.recorded_drive import Indices, Mask
 from simscen.reconstruction.faults.false_returns import ghost_beams, isolated_returns
 from simscen.reconstruction.faults.lidar_readings import invalid_scans
 from simscen.reconstruction.faults.message_stream import repeated_scans
-from simscen.reconstruction.scans.scan_model import ScanModel
-from simscen.reconstruction.scans.surroundings import Surroundings
+from simscen.reconstruction.scan_model import ScanModel
+from simscen.reconstruction.surroundings import Surroundings
 
 MIN_HITS, MAX_SKIPPED_BEAMS = 3, 2
 """Smallest number of hits of a cluster, and largest number of beams between two of them that do not show the object."""

@@ -15,8 +15,8 @@ from simscen.reconstruction.objects.clusters import scan_clusters, share_seen_fr
 from simscen.reconstruction.objects.found_object import FoundObject, Keyframe
 from simscen.reconstruction.objects.shapes import ObjectShape, fit_shape
 from simscen.reconstruction.objects.tracks import ObjectTrack, track_objects
-from simscen.reconstruction.scans.scan_model import ScanModel
-from simscen.reconstruction.scans.surroundings import Surroundings
+from simscen.reconstruction.scan_model import ScanModel
+from simscen.reconstruction.surroundings import Surroundings
 
 MIN_DISPLACEMENT_M = 0.4
 """Distance that an object must move to count as moving."""

@@ -12,7 +12,7 @@ from simscen.pedestrians.crowd import Crowd
 from simscen.pedestrians.surroundings import ObservedObject, ObservedRobot, Surroundings
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.objects.found_object import FoundObject
-from simscen.run.live_world.pedestrian_map import PedestrianMap
+from simscen.run.live_world.pedestrians import PedestrianMap
 from simscen.sim.body.outline import circle
 
 STEP_S = 0.05

@@ -21,12 +21,10 @@ from simscen.model.world import WorldSpec
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import RunDescription
 from simscen.reconstruction.evidence import Evidence
-from simscen.reconstruction.scans.grid_mapping import map_from_scans
-from simscen.reconstruction.scans.scan_model import scan_model
-from simscen.reconstruction.scans.surroundings import Surroundings, world_from_map
+from simscen.reconstruction.scan_model import scan_model
 from simscen.reconstruction.scenario.contents import GivenParts
-from simscen.reconstruction.scenario.robot_file import observed_limits, write_robot_file
-from simscen.reconstruction.scenario.robot_properties import UNKNOWN_ROBOT
+from simscen.reconstruction.scenario.robot_file import UNKNOWN_ROBOT, observed_limits, write_robot_file
+from simscen.reconstruction.surroundings import Surroundings, map_from_scans, world_from_map
 from simscen.worlds.maps.ros_map import save_map
 from simscen.worlds.world_file import world_from_spec
 

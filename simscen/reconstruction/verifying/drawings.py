@@ -16,8 +16,8 @@ from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.objects.found_object import FoundObject
-from simscen.reconstruction.scans.surroundings import Surroundings, beam_ends, lidar_poses
 from simscen.reconstruction.scenario.incidents import Incident
+from simscen.reconstruction.surroundings import Surroundings, beam_ends, lidar_poses
 
 WALL, UNSEEN, NEW_HIT = (112, 117, 128, 255), (128, 133, 144, 60), (219, 39, 119, 255)
 """Colors of occupied and unknown cells, and of cells in which the lidar measured something that is not on the map."""

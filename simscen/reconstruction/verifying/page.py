@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Iterator, Sequence
 
 from simscen.reconstruction.objects.found_object import FoundObject
-from simscen.reconstruction.scans.surroundings import Surroundings
+from simscen.reconstruction.surroundings import Surroundings
 from simscen.reconstruction.verifying.comparison import (
     Verification,
     common_times,

@@ -11,7 +11,7 @@ from mcap import records
 
 from simscen.record.log_file import RecordReader, open_log
 from simscen.record.log_header import ROBOTS
-from simscen.record.log_reader.read import LOG_READ_ERRORS, invalid_log
+from simscen.record.log_reader import LOG_READ_ERRORS, invalid_log
 from simscen.record.mcap_writer import MAGIC
 
 

@@ -20,7 +20,7 @@ from simscen.record.foreign.timebase import Timebase
 from simscen.record.foreign.trace_reader import ForeignTraceReader
 from simscen.record.foreign.tracks import DecodedMessages, decode_messages, topic_roles
 from simscen.record.foreign.transforms import lidar_mount
-from simscen.record.log_reader.sensor_messages import SensorMessages
+from simscen.record.sensor_messages import SensorMessages
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.localization_logs.rosbag import read_rosbag_rows
 from simscen.record.localization_logs.rows import TICK_RATE_HZ, LocalizationRows, ScanRow
 from simscen.record.localization_logs.text_logs import read_carmen_rows, read_csv_rows
-from simscen.record.log_reader.read import LOG_READ_ERRORS, invalid_log
+from simscen.record.log_reader import LOG_READ_ERRORS, invalid_log
 
 
 @dataclass(frozen=True, eq=False)

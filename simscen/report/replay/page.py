@@ -21,7 +21,7 @@ from simscen.core.records.events import Event, EventKind
 from simscen.core.records.run_result import RunResult
 from simscen.core.version import PACKAGE
 from simscen.record.log_header import scenery_from_header
-from simscen.record.log_reader.read import Log
+from simscen.record.log_reader import Log
 from simscen.report.display_text import escape_control, one_line
 from simscen.report.picture.palette import css_variables
 from simscen.report.replay.packed_columns import PackedColumns

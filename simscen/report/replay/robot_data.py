@@ -13,8 +13,8 @@ from simscen.core.records.trace import Samples, Trace
 from simscen.core.records.verdict import Verdict
 from simscen.model.scenario import ScenarioSpec
 from simscen.record import frame_names
-from simscen.record.log_reader.read import Log
-from simscen.record.log_reader.sensor_messages import LoggedMessages, SensorMessages
+from simscen.record.log_reader import Log
+from simscen.record.sensor_messages import LoggedMessages, SensorMessages
 from simscen.report.display_text import one_line
 from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, spaced_in_time
 from simscen.report.replay.signal_plots import signal_limits, signal_plots

@@ -22,7 +22,7 @@ from simscen.core.records.events import BELIEF, COMMAND, WHEELS, Event, EventKin
 from simscen.faults.base import Disturbance, FaultSetting
 from simscen.model.disturbances import FaultEntry
 from simscen.run.faults.interfaces import CommandLink
-from simscen.run.random_streams import stream_names
+from simscen.run.stream_names import stream_names
 from simscen.stack.localizers.ground_truth import TRUTH
 
 ROUNDING = 1e-9

@@ -12,7 +12,7 @@ from simscen.core.records.events import KIND_BY_INSTANCE, MAP
 from simscen.faults.base import FaultSetting
 from simscen.model.disturbances import FaultEntry
 from simscen.run.preparation import PreparedScenario
-from simscen.run.random_streams import stream_names
+from simscen.run.stream_names import stream_names
 
 
 def apply_map_faults(prepared: PreparedScenario, seed: int) -> PreparedScenario:

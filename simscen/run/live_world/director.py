@@ -10,7 +10,7 @@ from simscen.core.stage import Situation
 from simscen.model.disturbances import FaultEntry, SequenceStep
 from simscen.run.faults.injector import FaultInjector
 from simscen.run.live_world.stage import LiveStage
-from simscen.run.random_streams import stream_names
+from simscen.run.stream_names import stream_names
 from simscen.triggers.base import AnyCondition, Trigger
 from simscen.triggers.timing import Time
 

@@ -151,7 +151,7 @@ def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
         return run
     if filecmp.cmp(run.artifacts.mcap, twin.artifacts.mcap, shallow=False):
         return run
-    from simscen.record.log_reader.read import read_log
+    from simscen.record.log_reader import read_log
     from simscen.record.trace_difference import first_difference
 
     logs = [read_log(Path(path)) for path in (twin.artifacts.mcap, run.artifacts.mcap)]
@@ -202,7 +202,7 @@ def _folder(run: RunFinished, earlier: Path) -> Path:
 
 def _disagreement(new_path: Path, earlier_path: Path) -> str | None:
     """Describe the first difference of two logs, or return None. Raises InvalidInput for an unreadable log."""
-    from simscen.record.log_reader.read import read_log
+    from simscen.record.log_reader import read_log
     from simscen.record.trace_difference import first_disagreement
 
     new_log, earlier_log = read_log(new_path), read_log(earlier_path)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simscen.record.log_reader.read import read_run
+from simscen.record.log_reader import read_run
 
 SCENARIO = """\
 simscen: 1

@@ -11,7 +11,7 @@ import pytest
 
 from simscen import simulate
 from simscen.core.errors import InvalidInput, UsageError
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 
 COMMAND = [sys.executable, "-c", "import sys; from simscen.cli.start import start; sys.exit(start())"]
 SHORT = """\

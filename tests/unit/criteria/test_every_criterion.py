@@ -15,7 +15,7 @@ from simscen.core.records.verdict import Status
 from simscen.criteria.findings import InvalidTrace, at_least, at_most, counted
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.evaluation import judge
-from simscen.spec.lazy_spec import annotation_of
+from simscen.spec.base import annotation_of
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 CHOICES = AnyCriterion.choices()

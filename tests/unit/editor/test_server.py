@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from simscen.editor.files import EditedFile
+from simscen.editor.document import EditedFile
 from simscen.editor.server import MAX_REQUEST_BYTES, EditorServer
 from simscen.editor.session import EditorSession
 from simscen.run.process.jobs import Backend

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.cli.session.stacks import Stacks
 from simscen.core.external_command import ExternalCommand
-from simscen.editor.files import EditedFile
+from simscen.editor.document import EditedFile
 from simscen.editor.session import EditorSession, RequestRefused
 from simscen.editor.trial_run import Trial
 from simscen.loading.loaded import LoadedScenario

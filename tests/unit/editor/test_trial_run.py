@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from simscen.editor.checking import TextChecks
-from simscen.editor.files import EditedFile
+from simscen.editor.document import EditedFile
 from simscen.editor.trial_run import Trial, TrialRuns
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.process.jobs import Job, JobUpdate, Progressed, Started, always

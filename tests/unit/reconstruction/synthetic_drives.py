@@ -10,8 +10,8 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, Box, Cylinder, Solid
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans, TimedValues
-from simscen.reconstruction.scans.scan_model import ScanModel, scan_model
-from simscen.reconstruction.scans.surroundings import Surroundings
+from simscen.reconstruction.scan_model import ScanModel, scan_model
+from simscen.reconstruction.surroundings import Surroundings
 
 HEIGHT = 0.2
 BEAMS = 360

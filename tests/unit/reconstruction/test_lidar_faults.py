@@ -8,12 +8,12 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2
 from simscen.reconstruction.drive.recorded_drive import no_values
 from simscen.reconstruction.estimators import find_all
+from simscen.reconstruction.faults.false_returns import glass_fault
 from simscen.reconstruction.faults.lidar_calibration import mount_error, range_error_faults
 from simscen.reconstruction.faults.lidar_readings import blind_sector
-from simscen.reconstruction.faults.transparent_walls import glass_fault
 from simscen.reconstruction.objects.clusters import usable_scans
-from simscen.reconstruction.scans.surroundings import Surroundings
-from simscen.reconstruction.scenario.robot_properties import KnownRobot
+from simscen.reconstruction.scenario.robot_file import KnownRobot
+from simscen.reconstruction.surroundings import Surroundings
 
 
 def number(fault, key):

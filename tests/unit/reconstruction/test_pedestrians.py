@@ -10,7 +10,7 @@ from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.objects.pedestrians import is_person, with_walks
 from simscen.reconstruction.objects.walk_trial import WalkTrial
 from simscen.reconstruction.scenario.scenario_text import _object
-from simscen.run.live_world.pedestrian_map import PedestrianMap
+from simscen.run.live_world.pedestrians import PedestrianMap
 
 
 def thing(path, size=(0.25,), name="moving object 1", begin=1.0, end=9.0):

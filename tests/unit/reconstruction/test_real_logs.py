@@ -23,10 +23,9 @@ from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE, ends_of
 from simscen.reconstruction.drive.reader import DriveOptions, read_drive
 from simscen.reconstruction.drive.recorded_drive import no_values
 from simscen.reconstruction.evidence import Evidence, FoundFault
-from simscen.reconstruction.scans.grid_mapping import map_from_scans
-from simscen.reconstruction.scans.surroundings import Surroundings, world_from_map
 from simscen.reconstruction.scenario.robot_file import observed_limits, write_robot_file
 from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
+from simscen.reconstruction.surroundings import Surroundings, map_from_scans, world_from_map
 from simscen.worlds.maps.ros_map import save_map
 
 LIDAR_SILENT = (8.0, 9.5)

@@ -21,7 +21,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.records.trace import Trace
 from simscen.record import log_file
 from simscen.record.log_file import RecordReader
-from simscen.record.log_reader.read import Log, read_log
+from simscen.record.log_reader import Log, read_log
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
 

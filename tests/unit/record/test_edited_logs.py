@@ -19,9 +19,9 @@ from simscen.core.records.trace import Decision, Moment
 from simscen.core.records.verdict import Evidence, Status
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
+from simscen.record.log_contents import LogContents
 from simscen.record.log_header import case_to_json
-from simscen.record.log_reader.contents import LogContents
-from simscen.record.log_reader.read import Log, read_log
+from simscen.record.log_reader import Log, read_log
 from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader
 from simscen.record.recorder import Recorder

@@ -9,7 +9,7 @@ from mcap.reader import make_reader
 from moments import CLOCK, about, moments
 
 from simscen.core.errors import InvalidInput
-from simscen.record.log_reader.read import read_log, recover
+from simscen.record.log_reader import read_log, recover
 from simscen.record.recorder import MOMENT_DELAY_S, MomentBuffer, Recorder
 
 

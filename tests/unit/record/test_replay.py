@@ -12,7 +12,7 @@ from moments import CASE, CLOCK, about, moments
 
 from simscen.core.messages.navigation import Path as Plan
 from simscen.core.records.trace import Moment, Samples, Trace
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
 

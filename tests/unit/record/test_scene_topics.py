@@ -17,7 +17,7 @@ from simscen.core.geometry.kinematics import STOP
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Decision, Moment
 from simscen.record.log_header import SCENERY_FILE, scenery_to_json
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.record.recorder import Recorder
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))

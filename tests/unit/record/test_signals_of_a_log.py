@@ -6,7 +6,7 @@ from moments import CASE, CLOCK, about, moments
 from simscen.core.records.trace import Trace
 from simscen.criteria.trace_signals.catalog import SIGNALS, read_signal
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
 

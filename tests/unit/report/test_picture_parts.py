@@ -15,7 +15,7 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
 from simscen.loading.scenario import load_scenario
 from simscen.record.log_header import scenery_from_header
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.report.picture import map_picture, sidebar
 from simscen.report.picture.canvas import LABEL_CELL_PX
 from simscen.report.picture.map_picture import draw_map_picture, drawn_parts

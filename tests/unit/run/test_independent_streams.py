@@ -13,7 +13,7 @@ from simscen.faults.base import FaultSetting
 from simscen.model.disturbances import EventEntry, FaultEntry
 from simscen.run.faults.injector import FaultInjector
 from simscen.run.faults.interfaces import CommandLink
-from simscen.run.random_streams import stream_names
+from simscen.run.stream_names import stream_names
 
 FAULTS = [
     "{sensor: lidar, noise: {std: 5 cm}%s}",

@@ -8,7 +8,7 @@ import pytest
 from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
 from simscen.record.log_header import SCENERY_FILE, scenery_from_header
-from simscen.record.log_reader.read import read_log
+from simscen.record.log_reader import read_log
 from simscen.run.log_header import world_scenery as scenery_in
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate

@@ -9,8 +9,7 @@ from simscen.actions.base import AnyAction
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
 from simscen.model.world import Wall
-from simscen.spec.base import Spec
-from simscen.spec.lazy_spec import LazySpec, annotation_of
+from simscen.spec.base import LazySpec, Spec, annotation_of
 from simscen.triggers.base import AnyCondition as AnyTest
 
 

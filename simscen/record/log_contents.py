@@ -13,9 +13,9 @@ from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Evidence, LogCoverage
 from simscen.record import frame_names, log_header, topics
 from simscen.record.log_header import LogHeader
-from simscen.record.log_reader.sensor_messages import SensorMessages
 from simscen.record.messages import decode, event_text
 from simscen.record.messages.decode import MessageReader
+from simscen.record.sensor_messages import SensorMessages
 from simscen.record.trace_builder import TraceRows
 
 NO_COUNTS = "the log has no message counts: an older simscen wrote it, or its end was edited"

@@ -9,8 +9,8 @@ from pydantic import BaseModel
 
 from simscen.core.errors import Problem
 from simscen.loading.files.paths import PathProblem
-from simscen.loading.nav2.mapping import Known, Translation
-from simscen.loading.nav2.nodes import translate, unknown_nodes
+from simscen.loading.stacks.nav2_mapping import Known, Translation
+from simscen.loading.stacks.nav2_nodes import translate, unknown_nodes
 from simscen.loading.yaml.library import Library, merge_mappings
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.textfile import read_text

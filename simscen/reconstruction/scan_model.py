@@ -9,7 +9,7 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive, Scans
-from simscen.reconstruction.scans.surroundings import Surroundings, beam_ends, lidar_poses
+from simscen.reconstruction.surroundings import Surroundings, beam_ends, lidar_poses
 
 TRUE_POSE_TOLERANCE_M, BELIEVED_POSE_TOLERANCE_M = 0.12, 0.25
 """Difference between a range and the world that errors of the pose cause."""

@@ -14,11 +14,11 @@ from zstandard import ZstdError
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import COMPLETE_COVERAGE, LogCoverage
+from simscen.record.log_contents import LogContents, NotSimscenLog
 from simscen.record.log_file import PARTIAL_SUFFIX, RecordReader, open_log, write_error
 from simscen.record.log_header import LogHeader
-from simscen.record.log_reader.contents import LogContents, NotSimscenLog
-from simscen.record.log_reader.sensor_messages import SensorMessages
 from simscen.record.mcap_writer import MAGIC, Channel, McapWriter, MessageType
+from simscen.record.sensor_messages import SensorMessages
 
 LOG_READ_ERRORS = (
     McapError,

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from simscen.loading.nav2.mapping import (
+from simscen.loading.stacks.nav2_mapping import (
     CONTROLLERS,
     DWB_CRITICS,
     DWB_CRITICS_WITHOUT_WEIGHT,

@@ -1,1 +1,0 @@
-"""Translate Nav2 parameter files to parameters of the reference stack."""

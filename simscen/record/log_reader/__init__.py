@@ -1,1 +1,0 @@
-"""Reader of logs that simscen recorded."""
