@@ -41,7 +41,7 @@ class TextChecks:
         loaded = try_variations(file.path, file.root, file.world_path, self.stack, numbers, {file.path: text})
         if isinstance(loaded, list):
             return loaded
-        return tuple(one.with_changes(lenient=self.lenient) for one in loaded)
+        return tuple(scenario.with_changes(lenient=self.lenient) for scenario in loaded)
 
     def problems(self, text: str) -> list[Problem]:
         """Return all problems of a text, in the order of the file."""
@@ -55,7 +55,9 @@ class TextChecks:
         loaded = self.load(text)
         if isinstance(loaded, list):
             return loaded
-        checked = [VariationProblems(one.variation, one.set_by, self._in_world(one)) for one in loaded]
+        checked = [
+            VariationProblems(scenario.variation, scenario.set_by, self._in_world(scenario)) for scenario in loaded
+        ]
         return merge_problems(checked)
 
     def _in_world(self, loaded: LoadedScenario) -> list[Problem]:

@@ -94,9 +94,9 @@ def _merged(schema: Schema, branch: Schema, without: tuple[str, ...]) -> Schema:
 def _applying(root: Schema, schema: Schema, data: Any) -> Iterator[Schema]:
     """Yield the alternatives of a tagged union that fit the `type` in the data, and the first one if there is none."""
     unions = [one for key in ("allOf", "oneOf", "anyOf") for one in schema.get(key, []) if isinstance(one, dict)]
-    conditional = [one for one in unions if "if" in one and "then" in one]
+    conditional = [union for union in unions if "if" in union and "then" in union]
     yield from (one["then"] for one in conditional if _applies(one["if"], data))
-    plain = [one for one in unions if "$ref" in one]
+    plain = [union for union in unions if "$ref" in union]
     for one in plain:
         target = root["$defs"][one["$ref"].rpartition("/")[2]]
         kind = target.get("properties", {}).get("type", {})

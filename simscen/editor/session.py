@@ -166,7 +166,7 @@ class EditorSession:
             if isinstance(loaded, list):
                 raise RequestRefused(f"the scenario has problems: {_first_message(loaded)}", 422)
             problems = self._checks.problems(_text(request))
-        errors = [one for one in problems if one.severity == "error"]
+        errors = [problem for problem in problems if problem.severity == "error"]
         if errors:
             raise RequestRefused(f"the scenario has problems: {_first_message(errors)}", 422)
         scenario, undefined = self._with_command(loaded[0])

@@ -89,7 +89,9 @@ def roundings(tree: MappingNode, digits: int) -> list[Rounding]:
 
 def rounded_tree(tree: MappingNode, changes: Sequence[Rounding]) -> MappingNode:
     """Return the scenario with these rounded numbers."""
-    return with_values(tree, {one.keys: ScalarNode(node_at(tree, one.keys).position, one.value) for one in changes})
+    return with_values(
+        tree, {change.keys: ScalarNode(node_at(tree, change.keys).position, change.value) for change in changes}
+    )
 
 
 def with_seed(tree: MappingNode, seed: int) -> MappingNode:

@@ -15,9 +15,8 @@ from simscen.loading.known_names import places_of, resolve_places, unknown_place
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
-from simscen.loading.stacks.choice import StackChoice
+from simscen.loading.stacks.choice import StackChoice, not_a_scenario, recognize_stack_file
 from simscen.loading.stacks.nav2_parameters import with_nav2_parameters
-from simscen.loading.stacks.stackfile import not_a_scenario, recognize_stack_file
 from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
 from simscen.loading.variations.naming import VariationProblems, merge_problems, number_of
 from simscen.loading.variations.options import Change
@@ -45,9 +44,9 @@ def load_scenario(
     loaded = try_variations(path, root, world_path, choice, None if number is None else [number])
     if isinstance(loaded, list):
         raise InvalidInput(loaded)
-    if (found := next((one for one in loaded if one.variation == variation), None)) is not None:
+    if (found := next((scenario for scenario in loaded if scenario.variation == variation), None)) is not None:
         return found
-    names = [one.variation for one in loaded if one.variation]
+    names = [scenario.variation for scenario in loaded if scenario.variation]
     if not names:
         raise UsageError(f"{path} has no variations, so not {quoted(variation)} either")
     reason = f"has no variation {quoted(variation)}" if variation else f"has {len(names)} variations: choose one"
@@ -82,10 +81,10 @@ def try_variations(
         return read
     file, tree = read
     expanded = expand_variations(tree, numbers)
-    variations = [one for one in expanded if isinstance(one, Variation)]
-    if problems := [one for one in expanded if isinstance(one, Problem)]:
+    variations = [variation for variation in expanded if isinstance(variation, Variation)]
+    if problems := [problem for problem in expanded if isinstance(problem, Problem)]:
         return library.with_source(sorted(problems))
-    tried = [(one, _with_choice(one, library, file, choice)) for one in variations]
+    tried = [(variation, _with_choice(variation, library, file, choice)) for variation in variations]
     if any(isinstance(found, list) for _, found in tried):
         return merge_problems(
             [VariationProblems(one.name, one.set_by, found if isinstance(found, list) else ()) for one, found in tried]

@@ -128,7 +128,7 @@ class VariationBlock(Spec):
     def is_sampled_alone(self) -> bool:
         """Whether it has `sampled` and no other kind of values."""
         others = (self.grid, self.pairwise, self.pairs, self.list_)
-        return self.sampled is not None and all(one is None for one in others)
+        return self.sampled is not None and all(other is None for other in others)
 
 
 class Variations(

@@ -12,7 +12,6 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive, motion_st
 from simscen.reconstruction.evidence import Evidence, FoundFault
 from simscen.reconstruction.faults.commands import command_faults
 from simscen.reconstruction.faults.false_returns import false_return_faults, glass_fault
-from simscen.reconstruction.faults.gyroscope import gyroscope_faults
 from simscen.reconstruction.faults.lidar_calibration import mount_fault, range_error_faults, with_mount_error
 from simscen.reconstruction.faults.lidar_readings import (
     invalid_scan_faults,
@@ -22,7 +21,7 @@ from simscen.reconstruction.faults.lidar_readings import (
 )
 from simscen.reconstruction.faults.localizer import localizer_faults
 from simscen.reconstruction.faults.message_stream import stream_faults, stuck_scans
-from simscen.reconstruction.faults.odometry import odometry_faults
+from simscen.reconstruction.faults.odometry import gyroscope_faults, odometry_faults
 from simscen.reconstruction.objects.clusters import usable_scans
 from simscen.reconstruction.objects.find_objects import find_objects
 from simscen.reconstruction.objects.found_object import FoundObject

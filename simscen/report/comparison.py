@@ -52,7 +52,10 @@ def session_comparison_lines(comparison: Comparison, links: Links, is_worse: boo
 
 def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
     """Return the comparison without metrics that are equal in all pairs."""
-    return replace(against, differences=tuple(one for one in against.differences if one.equal < one.pairs))
+    return replace(
+        against,
+        differences=tuple(difference for difference in against.differences if difference.equal < difference.pairs),
+    )
 
 
 def session_verdict(against: BaselineComparison, is_worse: bool) -> str:
@@ -199,11 +202,11 @@ def _differences(baseline: str, against: BaselineComparison) -> Iterator[StyledL
     head = ("mean over pairs", *stacks, "difference", "95 % interval", "-/=/+")
     rows = [
         (
-            f"{one.metric}, {one.unit}".removesuffix(", "),
-            *difference_columns(one),
-            f"{one.lower}/{one.equal}/{one.higher}",
+            f"{difference.metric}, {difference.unit}".removesuffix(", "),
+            *difference_columns(difference),
+            f"{difference.lower}/{difference.equal}/{difference.higher}",
         )
-        for one in against.differences
+        for difference in against.differences
     ]
     columns = list(zip(head, *rows, strict=True))
     widths = [max(map(len, column)) for column in columns]

@@ -45,7 +45,7 @@ def as_html(comparison: Comparison) -> str:
     return (
         f'<section class="in"><h2>{_html_text(" and ".join(comparison.stacks))}</h2><p class="quiet">{EXPLANATION}</p>'
         f"<table><tr><th>passed</th>{names}</tr>{rows}{total_row}</table>"
-        f"{''.join(_against_html(comparison.baseline, one) for one in comparison.against)}</section>"
+        f"{''.join(_against_html(comparison.baseline, against) for against in comparison.against)}</section>"
     )
 
 
@@ -77,9 +77,11 @@ def as_markdown(comparison: Comparison, links: Links = NO_LINKS, changed_only: b
         lines += [f"- and {more} more, in the JSON results"] if more > 0 else []
         heads = [cell(head.format(comparison.baseline, against.stack)) for head in _HEAD]
         lines += ["", f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
-        lines += [f"| {' | '.join(_cells(one))} |" for one in against.differences]
+        lines += [f"| {' | '.join(_cells(difference))} |" for difference in against.differences]
         lines += ["", "Significant changes:", ""] if against.changes else []
-        lines += [f"- {change_verdict(one)}: {cell(change_text(one))}" for one in against.changes[:MAX_CHANGES]]
+        lines += [
+            f"- {change_verdict(change)}: {cell(change_text(change))}" for change in against.changes[:MAX_CHANGES]
+        ]
         more = len(against.changes) - MAX_CHANGES
         lines += [f"- and {more} more significant changes, in the JSON results"] if more > 0 else []
         lines += [f"\n{cell(note)}" for note in (unequal_progress_text(against), excluded_text(against)) if note]
@@ -115,11 +117,11 @@ def _against_html(baseline: str, against: BaselineComparison) -> str:
     )
     _, *headings = (_html_text(head.format(baseline, against.stack)) for head in _HEAD)
     heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in headings)
-    rows = "".join(_difference(one) for one in against.differences)
+    rows = "".join(_difference(difference) for difference in against.differences)
     changes = "".join(
-        f'<tr class="{"bad" if one.is_worse else ""}"><td>{change_verdict(one)}</td>'
-        f"<td>{_html_text(change_text(one))}</td></tr>"
-        for one in against.changes
+        f'<tr class="{"bad" if change.is_worse else ""}"><td>{change_verdict(change)}</td>'
+        f"<td>{_html_text(change_text(change))}</td></tr>"
+        for change in against.changes
     )
     notes = "".join(
         f'<p class="quiet">{_html_text(note)}</p>'

@@ -11,8 +11,9 @@ from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.finding_text import tightest_margin
 from simscen.report.comparison_markup import as_markdown, markdown_cell
+from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import relative, relative_to_checkout
-from simscen.report.text_reporters import Reporter, text_reporter
+from simscen.report.text_reporters import Reporter
 from simscen.report.violations import (
     error_summary,
     reason_without_failure,

@@ -57,9 +57,9 @@ def _effects(study: Study) -> str:
     if not effects:
         return '<p class="quiet">No parameter has a significant effect on a margin.</p>'
     rows = "".join(
-        f"<tr><td>{html_text(one.path)}</td><td>{html_text(one.criterion)}</td><td>{one.effect:+.2f}</td>"
-        f"<td>{one.p:.1g}</td><td>{effect_text(one)}</td></tr>"
-        for one in effects
+        f"<tr><td>{html_text(effect.path)}</td><td>{html_text(effect.criterion)}</td><td>{effect.effect:+.2f}</td>"
+        f"<td>{effect.p:.1g}</td><td>{effect_text(effect)}</td></tr>"
+        for effect in effects
     )
     return (
         "<h3>Effects on margins</h3><table><thead><tr><th>parameter</th><th>margin of</th>"
@@ -70,8 +70,8 @@ def _effects(study: Study) -> str:
 
 def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
     """Return a plot of margin against parameter for the strongest effects, one for each parameter."""
-    criterion_of = {one.path: one.criterion for one in reversed(study.effects) if one.is_ordered}
-    order = [path for path in dict.fromkeys(one.path for one in study.effects) if path in criterion_of]
+    criterion_of = {effect.path: effect.criterion for effect in reversed(study.effects) if effect.is_ordered}
+    order = [path for path in dict.fromkeys(effect.path for effect in study.effects) if path in criterion_of]
     plots = "".join(_plot(path, criterion_of[path], study, runs, folder) for path in order[:MAX_PLOTS])
     return f'<h3>Margins</h3><div class="plots">{plots}</div>' if plots else ""
 

@@ -1,8 +1,7 @@
 """Formatting of session events as console lines, and the reporter for plain text."""
 
-import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Protocol, TextIO
 
@@ -23,7 +22,6 @@ from simscen.report.display_text import (
     TerminalStyle,
     ascii_only,
     can_encode,
-    detect_style,
     escape_ci_commands,
     one_line,
     plain_text,
@@ -160,33 +158,3 @@ class PlainReporter:
     def _print(self, line: StyledLine) -> None:
         text = escape_ci_commands(plain_text(line))
         self._out.write(f"{ascii_only(text) if self._ascii else text}\n")
-
-
-def text_reporter(
-    out: TextIO, live: bool | None = None, slow: int | None = None, environ: Mapping[str, str] = os.environ
-) -> Reporter:
-    """Return a reporter with live progress on a terminal, plain lines elsewhere, and color where it is supported.
-
-    `live` overrides the detection for `out`. `slow` is the number of slowest runs to list at the end; 0 lists all.
-    """
-    style = detect_style(out, environ)
-    if live is not None:
-        style = TerminalStyle(live or style.color, live, style.terminal)
-    if style.live:
-        from simscen.report.live_console import LiveReporter  # rich is slow to import
-
-        return LiveReporter(out, style, slow)
-    return _line_reporter(out, style, slow)
-
-
-def print_lines(lines: Iterable[StyledLine], out: TextIO, environ: Mapping[str, str] = os.environ) -> None:
-    """Print lines, with color where it is supported, wrapped to the width of a terminal."""
-    _line_reporter(out, detect_style(out, environ)).print_lines(lines)
-
-
-def _line_reporter(out: TextIO, style: TerminalStyle, slow: int | None = None) -> PlainReporter:
-    if not style.color:
-        return PlainReporter(out, style, slow)
-    from simscen.report.live_console import ColorReporter
-
-    return ColorReporter(out, style, slow)

@@ -25,7 +25,7 @@ from simscen.loading.builders import (
     robot_from_file,
     world_from_file,
 )
-from simscen.loading.files.criteriafile import LoadedCriteria
+from simscen.loading.files.single_files import LoadedCriteria
 from simscen.loading.goals import event_goals, expected_failures, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of

@@ -126,7 +126,7 @@ def command(
 def with_stack(file: Path, experiments: list["Experiment"], generated: Path, project: Path) -> list["Experiment"]:
     """Return the same experiments with the parameters of a stack file. Raises InvalidInput."""
     from simscen.bench.navigation.experiments import with_stack_parameters
-    from simscen.loading.stacks.stackfile import load_stack_file
+    from simscen.loading.stacks.choice import load_stack_file
 
     choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
     if choice.notes:

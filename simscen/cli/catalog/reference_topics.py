@@ -156,7 +156,7 @@ def _arguments_sentence(signal: Signal) -> str:
 
 def signals_page() -> str:
     """Return the content of docs/reference/signals.md."""
-    head = "| signal | what | unit | about |\n|---|---|---|---|"
+    head = "| signal | meaning | unit | arguments |\n|---|---|---|---|"
     rows = [
         f"| `{name}` | {signal.text} | {signal.unit or signal.dimension} | {_arguments_text(signal)} |"
         for name, signal in SIGNALS.items()

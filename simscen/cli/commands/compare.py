@@ -15,9 +15,9 @@ from simscen.judge.metrics.comparison import compare_sessions, comparison_data, 
 from simscen.judge.statistical_tests import Significance
 from simscen.report.comparison import Links, session_comparison_lines
 from simscen.report.comparison_markup import session_comparison_markdown
+from simscen.report.console_reporter import print_lines
 from simscen.report.journal import require_free
 from simscen.report.journal_reader import JournaledSession, read_journal
-from simscen.report.text_reporters import print_lines
 
 BASELINE, CANDIDATE = "baseline", "candidate"
 

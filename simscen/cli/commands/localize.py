@@ -15,9 +15,8 @@ from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import MAX_SEED
-from simscen.loading.files.criteriafile import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
-from simscen.loading.files.single_files import load_robot_file, load_world_file
+from simscen.loading.files.single_files import LoadedCriteria, load_criteria, load_robot_file, load_world_file
 from simscen.loading.yaml.tree import value_position
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.read import LocalizationLog, read_localization_log
@@ -181,7 +180,7 @@ def _document(localized: Localized, errors: Errors | None, seed: int) -> dict[st
     over_time = [
         list(row) for row in zip(errors.times.tolist(), errors.distance.tolist(), errors.yaw.tolist(), strict=True)
     ]
-    lost = [{"since": one.since, "until": one.until} for one in errors.lost]
+    lost = [{"since": interval.since, "until": interval.until} for interval in errors.lost]
     return document | {
         "error": errors.figures(),
         "compared": errors.compared,

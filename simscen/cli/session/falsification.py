@@ -251,7 +251,7 @@ def signature(result: RunResult) -> Signature:
     place = None if finding is None or finding.place is None else finding.place
     square = None if place is None else (math.floor(place[0] / SQUARE_SIZE_M), math.floor(place[1] / SQUARE_SIZE_M))
     kinds = tuple(sorted({verdict.id for verdict in failed})) or ((result.error.kind,) if result.error else ())
-    happened = frozenset(one.disturbance.name for one in result.disturbances if one.fired)
+    happened = frozenset(disturbance.disturbance.name for disturbance in result.disturbances if disturbance.fired)
     return kinds, happened, square
 
 

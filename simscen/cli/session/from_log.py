@@ -1,30 +1,17 @@
-"""Reconstruction of a scenario from a log for `simscen new --from-log`, and its verification with `--verify`."""
+"""Reconstruction of a scenario from a log for `simscen new --from-log`."""
 
 from __future__ import annotations
 
-import shlex
-import shutil
-import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich import box
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
 from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
 from simscen.cli.session.new_file import create_file
-from simscen.cli.session.output_files import save
 from simscen.cli.shared_options import parse_topics
-from simscen.core.errors import Exit, InvalidInput, Problem, RunError
+from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.discovery import default_root
-from simscen.reconstruction.scenario_from_log import Reconstruction
-from simscen.reconstruction.verifying.comparison import Verification, compare_with_run
-from simscen.reconstruction.verifying.page import verification_page
 
 if TYPE_CHECKING:
     from simscen.reconstruction.scenario_from_log import Reconstruction
@@ -58,7 +45,7 @@ def write_scenario_from_log(options: FromLogOptions, verify: bool) -> None:
     for unknown in made.contents.unknowns:
         print_text(f"note: the log does not show: {escaped(unknown)}", sys.stderr)
     if verify:
-        from simscen.cli.session.from_log import verify_reconstruction
+        from simscen.cli.session.verification import verify_reconstruction
 
         verify_reconstruction(made)
 
@@ -76,61 +63,3 @@ def _reconstructed(options: FromLogOptions) -> Reconstruction:
             return scenario_from_log(options.log, options.out, reading_options)
         except InvalidInput as error:
             raise InvalidInput(relative_to_working_folder(error.problems, default_root([options.out]))) from error
-
-
-PAGE_SUFFIX = ".verified.html"
-MAX_COLUMNS = 100
-
-
-def verify_reconstruction(made: Reconstruction) -> None:
-    """Run the scenario, print how near the run comes to the log, and write a page with both.
-
-    Exits with code 1 if an incident of the log does not happen again.
-    """
-    name = made.file.name.partition(".")[0]
-    log = made.file.with_name(f"{name}.verified.mcap")
-    _run(made.file, log)
-    verified = compare_with_run(made, log)
-    _print_table(verified)
-    for incident in verified.incidents:
-        print_text(escaped(incident.sentence))
-    for new in verified.new_incidents:
-        print_text(escaped(f"only in the run: {new.kind} at {new.time:.2f} s ({new.detail})"))
-    if not verified.incidents and not verified.new_incidents:
-        print_text("neither the log nor the run has an incident")
-    failed = ", ".join(verified.failed)
-    print_text(escaped(f"criteria that fail in the run: {failed}" if failed else "all criteria hold in the run"))
-    page = made.file.with_name(f"{name}{PAGE_SUFFIX}")
-    text = verification_page(made.contents.name, made.surroundings, made.findings.objects, verified)
-    save(page, lambda path: _write(path, text), [made.file, made.log])
-    recorded, run = (escaped(shlex.quote(str(file))) for file in (made.log, log))
-    print_text(f"log of the run: {run}; to play both: simscen replay {run} --against {recorded}")
-    print_text(f"page: {escaped(str(page))}")
-    if not verified.reproduces:
-        sys.exit(Exit.FAILED)
-
-
-def _run(scenario: Path, log: Path) -> None:
-    """Run a scenario in a process of its own and keep its log. Raises RunError if the run is not completed."""
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "out"
-        command = [sys.executable, "-m", "simscen", "run", str(scenario), "--out", str(out), "-j", "1"]
-        done = subprocess.run(command, check=False, capture_output=True, text=True)
-        logs = sorted(out.glob("**/run.mcap"))
-        if not logs:
-            raise RunError("crashed", f"the run of {scenario} was not completed", tail=done.stdout + done.stderr)
-        shutil.copyfile(logs[0], log)
-
-
-def _print_table(verified: Verification) -> None:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ("quantity", "log", "run", "difference"):
-        table.add_column(column)
-    for row in verified.quantities:
-        table.add_row(*(Text(escaped(cell)) for cell in (row.name, row.log, row.run, row.difference)))
-    console = Console(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else MAX_COLUMNS)
-    console.print(table)
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")

@@ -151,7 +151,7 @@ def failed_runs(
         return None, f"there is no earlier session in {sessions_folder}: {RUN_ALL}"
     if not last.runs:
         return None, f"nothing failed in the last session, {last.folder}: {RUN_ALL}"
-    selected = {(one.title, one.stack_name): one for one in scenarios if one.spec.skip is None}
+    selected = {(scenario.title, scenario.stack_name): scenario for scenario in scenarios if scenario.spec.skip is None}
     found = frozenset(key for key in last.runs if _is_selected(key, selected.get((key.test, key.stack_name)), options))
     missing = len(last.runs) - len(found)
     if not found:

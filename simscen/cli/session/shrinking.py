@@ -166,7 +166,11 @@ class Failure:
             return result.error is not None and result.error.by_stack
         if result.outcome is not Outcome.FAILED:
             return False
-        failed = [one for one in result.verdicts if one.criterion == self.criterion and one.status is Status.FAIL]
+        failed = [
+            verdict
+            for verdict in result.verdicts
+            if verdict.criterion == self.criterion and verdict.status is Status.FAIL
+        ]
         margins = [smallest_margin(one) for one in failed]
         if self.max_margin is None:
             return bool(failed)
@@ -227,9 +231,9 @@ class Shrinking:
             def build(
                 exact: Sequence[Keys], changes: Sequence[Rounding] = tuple(changes), tree: MappingNode = before
             ) -> MappingNode:
-                return rounded_tree(tree, [one for one in changes if one.keys not in exact])
+                return rounded_tree(tree, [change for change in changes if change.keys not in exact])
 
-            self.tree = build(self._minimize([one.keys for one in changes], build))
+            self.tree = build(self._minimize([change.keys for change in changes], build))
 
     def _minimize(self, parts: Sequence[Part], build: Callable[[Sequence[Part]], MappingNode]) -> list[Part]:
         """Return the parts that the failure needs. `build` returns the scenario with only some of them."""
@@ -248,7 +252,7 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
     """
     if result.error is not None and result.error.by_stack and not criterion:
         return Failure("", "")
-    failed = [one for one in result.verdicts if one.status is Status.FAIL]
+    failed = [verdict for verdict in result.verdicts if verdict.status is Status.FAIL]
     chosen = next((one for one in failed if criterion in ("", one.id, one.criterion)), None)
     if result.outcome is not Outcome.FAILED or chosen is None:
         names = ", ".join(one.id for one in failed)
@@ -260,7 +264,9 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
 
 def smallest_margin(verdict: Verdict) -> float | None:
     """Return the smallest margin of the findings that failed; None if they have none."""
-    margins = [one.margin for one in verdict.findings if one.status is Status.FAIL and one.margin is not None]
+    margins = [
+        finding.margin for finding in verdict.findings if finding.status is Status.FAIL and finding.margin is not None
+    ]
     return min(margins, default=None)
 
 

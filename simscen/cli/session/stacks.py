@@ -142,7 +142,7 @@ def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Sta
     if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):
         return StackChoice(name, value, type=value)
     if value.endswith(STACK_SUFFIXES) or (value.endswith(YAML) and Path(value).is_file()):
-        from simscen.loading.stacks.stackfile import load_stack_file
+        from simscen.loading.stacks.choice import load_stack_file
 
         try:
             return load_stack_file(name, value, Path(value), root, world_path)

@@ -14,9 +14,10 @@ import typer
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.session_events import SessionEvent
+from simscen.report.console_reporter import text_reporter
 from simscen.report.github import github_reporter
 from simscen.report.results_json import json_reporter
-from simscen.report.text_reporters import Reporter, text_reporter
+from simscen.report.text_reporters import Reporter
 from simscen.run.sessions.output_folder import probe_writable
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"

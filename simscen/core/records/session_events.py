@@ -111,7 +111,9 @@ class Comparison:
     def total(self, stack: str) -> OutcomeCounts:
         """Return the outcomes of a stack over all scenarios."""
         counts = [row[stack] for row in self.outcomes.values()]
-        return OutcomeCounts(*(sum(getattr(one, name) for one in counts) for name in ("passed", "failed", "errors")))
+        return OutcomeCounts(
+            *(sum(getattr(count, name) for count in counts) for name in ("passed", "failed", "errors"))
+        )
 
 
 @dataclass(frozen=True)

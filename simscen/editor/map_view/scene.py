@@ -86,11 +86,11 @@ def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
     display_name = parts.file.display_name
     return {
         "kind": parts.file.kind,
-        "objects": [_object_data(one, parts, own) for one in map_objects(parts)],
+        "objects": [_object_data(map_object, parts, own) for map_object in map_objects(parts)],
         "regions": {
-            name: [[handle.x, handle.y] for handle in one.handles]
-            for one in world_objects(parts.world_data, (), {})
-            if one.kind == "region" and (name := one.label)
+            name: [[handle.x, handle.y] for handle in world_object.handles]
+            for world_object in world_objects(parts.world_data, (), {})
+            if world_object.kind == "region" and (name := world_object.label)
         },
         "places": sorted(world_places(parts.world_data)),
         "inline": parts.is_inline,

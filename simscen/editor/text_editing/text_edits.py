@@ -66,7 +66,7 @@ def apply_edits(text: str, edits: Sequence[Edit]) -> EditedText:
         taken = len(splices)
         if not splices:
             splices, taken = [_splice(text, source, remaining[0])], 1
-        splices = [one for one in splices if text[one.start : one.end] != one.text]
+        splices = [splice for splice in splices if text[splice.start : splice.end] != splice.text]
         new = spliced(text, splices)
         _require_meaning(text, new, remaining[:taken])
         done += splices

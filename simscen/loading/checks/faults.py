@@ -125,7 +125,9 @@ def resampling_after_delay(scope: NameScope) -> Iterator[CheckFinding]:
     loaded = scope.loaded
     faults = loaded.spec.faults
     for index, entry, instance in _listed_faults(loaded):
-        before = [one.label for one in faults[:index] if one.sensor == entry.sensor and one.kind in ("delay", "stuck")]
+        before = [
+            fault.label for fault in faults[:index] if fault.sensor == entry.sensor and fault.kind in ("delay", "stuck")
+        ]
         resamples = entry.kind in RESAMPLING_FAULTS and instance is not None and instance.kind in ("Scan", "Image")
         if resamples and before:
             message = f"`{entry.label}` has no effect: `{before[0]}` before it holds the measurements back"

@@ -17,7 +17,7 @@ from simscen.loading.files.discovery import (
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.validate import check_partial
-from simscen.loading.stacks.stackfile import NAV2_FILE_KIND, STACK_FILE_KIND, recognize_stack_file
+from simscen.loading.stacks.choice import NAV2_FILE_KIND, STACK_FILE_KIND, recognize_stack_file
 from simscen.loading.variations.naming import VariationProblems, merge_problems
 from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, node_at, value_position
@@ -49,12 +49,14 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
         loaded = try_variations(file, root, world_path, numbers=CHECKED_DRAWS if kind == "study" else None)
         if isinstance(loaded, list):
             return loaded
-        return merge_problems([VariationProblems(one.variation, one.set_by, one.notes) for one in loaded])
+        return merge_problems(
+            [VariationProblems(scenario.variation, scenario.set_by, scenario.notes) for scenario in loaded]
+        )
     library = Library(PathSandbox.around(root, world_path))
     if isinstance(path := library.sandbox.resolve_argument(file), Problem):
         return [path]
     if kind in STACK_KINDS:
-        from simscen.loading.stacks.stackfile import read_stack_file
+        from simscen.loading.stacks.choice import read_stack_file
 
         return found if isinstance(found := read_stack_file(path, library), list) else found[1]
     if kind == "base":

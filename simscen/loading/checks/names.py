@@ -214,6 +214,6 @@ def unknown_expected_verdicts(scenario: WrittenScenario) -> Iterator[CheckFindin
     for number, expected in enumerate(spec.expected.criteria if spec.expected else ()):
         if expected not in known:
             matches = [one for one in known if one.partition("/")[2] == expected]
-            hint = f"write {' or '.join(f'`{one}`' for one in matches)}" if matches else suggestion(expected, known)
+            hint = f"write {' or '.join(f'`{match}`' for match in matches)}" if matches else suggestion(expected, known)
             message = f"no criterion, event or fault is called {quoted(expected)}"
             yield CheckFinding(("expected", "criteria", number), message, hint)

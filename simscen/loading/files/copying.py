@@ -27,7 +27,7 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
     text, tree = _text_of(loaded)
     named = {leaf: _file_of(leaf, loaded) for leaf in _leaves(tree)}
     files = {leaf: file for leaf, file in named.items() if file is not None}
-    needed = sorted({one for file in files.values() for one in _with_dependencies(file)})
+    needed = sorted({dependency for file in files.values() for dependency in _with_dependencies(file)})
     same_root = root == loaded.root
     common_folder = Path(commonpath([file.parent for file in needed])) if needed else loaded.root
     folder = target.parent / target.name.partition(".")[0]

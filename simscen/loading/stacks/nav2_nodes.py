@@ -255,9 +255,9 @@ def translate(nodes: Mapping[str, Parameters], known: Known) -> Iterator[Transla
         if translator is None:
             continue
         translations = list(translator(node, parameters, known))
-        yield from (one for one in translations if one.path or one.note)
-        translated = {one.parameter for one in translations}
-        covered = tuple(one.covers for one in translations if one.covers)
+        yield from (translation for translation in translations if translation.path or translation.note)
+        translated = {translation.parameter for translation in translations}
+        covered = tuple(translation.covers for translation in translations if translation.covers)
         for name, value in parameters.items():
             if name not in translated and not name.startswith(covered) and _matters(name, value):
                 yield Translation(node, name, (), value, SCENARIO_PARAMETERS.get(name.partition(".")[0], ""))

@@ -162,9 +162,9 @@ def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree
     profile = MappingNode(position, {"profile": Entry(position, ScalarNode(position, "nav2"))})
     translations = list(translate(parameters.nodes, _known_parameters()))
     below = profile
-    for one in translations:
-        if one.path:
-            below = merge_mappings(below, _nested(one, parameters))
+    for translation in translations:
+        if translation.path:
+            below = merge_mappings(below, _nested(translation, parameters))
     result.notes += sorted({*parameters.notes, *_notes(translations, parameters)})
     return merge_mappings(stack, below)
 
@@ -186,18 +186,26 @@ def _node(value: Any, position: Position) -> Node:
 
 def _notes(translations: Sequence[Translation], parameters: Nav2Parameters) -> Iterator[Problem]:
     """Yield notes on unused parameters: one for each with a reason, one per node for all others."""
-    for one in translations:
-        if one.note:
-            yield _note(parameters.positions[one.node, one.parameter], f"{one.node}: `{one.parameter}`: {one.note}")
-    used = {parameters.positions[one.node, one.parameter] for one in translations if one.path}
+    for translation in translations:
+        if translation.note:
+            yield _note(
+                parameters.positions[translation.node, translation.parameter],
+                f"{translation.node}: `{translation.parameter}`: {translation.note}",
+            )
+    used = {
+        parameters.positions[translation.node, translation.parameter]
+        for translation in translations
+        if translation.path
+    }
     for node in parameters.nodes:
         positions = [
-            (parameters.positions[node, one.parameter], one.parameter)
-            for one in translations
-            if one.node == node
-            and not one.path
-            and not one.note
-            and parameters.positions[node, one.parameter] not in used  # parameters of `/**` may be used by another node
+            (parameters.positions[node, translation.parameter], translation.parameter)
+            for translation in translations
+            if translation.node == node
+            and not translation.path
+            and not translation.note
+            and parameters.positions[node, translation.parameter]
+            not in used  # parameters of `/**` may be used by another node
         ]
         if positions:
             names = ", ".join(f"{name} ({position.line})" for position, name in sorted(positions))

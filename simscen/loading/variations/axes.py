@@ -64,7 +64,7 @@ class AxisBuilder:
         return found
 
     def _pairwise(self, node: Node | None, conditions: Sequence[Condition]) -> list[Option]:
-        from simscen.loading.variations.pairwise import Row, covering_array
+        from simscen.loading.variations.sampling import Row, covering_array
 
         columns = self._columns(node, True)
         if self.problems or not columns:
@@ -74,7 +74,7 @@ class AxisBuilder:
             return Option(tuple(column[value] for column, value in zip(columns, row, strict=True)))
 
         paths = {column[0].target.path for column in columns}
-        relevant = [one for one in conditions if paths.issuperset(set(one.paths) & set(self.targets))]
+        relevant = [condition for condition in conditions if paths.issuperset(set(condition.paths) & set(self.targets))]
 
         def is_allowed(row: Row) -> bool:
             return all_hold(relevant, plain_values(self.tree, relevant, option(row).changes))

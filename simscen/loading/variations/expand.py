@@ -123,7 +123,7 @@ class VariationSpace:
         values = [
             {change.target.path: change.value.plain for o in options for change in o.changes} for options in chosen
         ]
-        differ = {path for path in self.targets if any(one.get(path) != values[0].get(path) for one in values)}
+        differ = {path for path in self.targets if any(value.get(path) != values[0].get(path) for value in values)}
         all_targets = list(self.targets.values())
         named_targets = [target for target in all_targets if target.keys[0] not in _DESCRIPTIVE_KEYS] or all_targets
         keys = short_names([target for target in named_targets if target.path in differ] or named_targets)

@@ -125,9 +125,9 @@ def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
     if len(variations) == 1 and not variations[0].name:
         return list(dict.fromkeys(variations[0].problems))
     variations_by_problem: dict[Problem, list[VariationProblems]] = {}
-    for one in variations:
-        for problem in dict.fromkeys(one.problems):
-            variations_by_problem.setdefault(problem, []).append(one)
+    for variation in variations:
+        for problem in dict.fromkeys(variation.problems):
+            variations_by_problem.setdefault(problem, []).append(variation)
     return sorted(
         _with_variation_names(problem, affected, len(variations)) for problem, affected in variations_by_problem.items()
     )

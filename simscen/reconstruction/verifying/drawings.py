@@ -190,9 +190,9 @@ class Series:
 
 def chart(label: str, series: Sequence[Series], unit: str) -> str:
     """Return an SVG chart of values over time, from 0."""
-    series = [one for one in series if len(one.times)]
-    end = max((float(one.times[-1]) for one in series), default=1.0) or 1.0
-    top = max(0.1, *(float(np.max(one.values)) for one in series)) if series else 1.0
+    series = [line for line in series if len(line.times)]
+    end = max((float(line.times[-1]) for line in series), default=1.0) or 1.0
+    top = max(0.1, *(float(np.max(line.values)) for line in series)) if series else 1.0
     across, up = CHART_WIDTH - LEFT - 10.0, CHART_HEIGHT - BOTTOM - 8.0
     parts = []
     for value in _ticks(top, 5):
@@ -204,13 +204,13 @@ def chart(label: str, series: Sequence[Series], unit: str) -> str:
     for value in _ticks(end, 7):
         x = LEFT + across * value / end
         parts.append(f'<text x="{x:.1f}" y="{CHART_HEIGHT - 4:g}" font-size="11">{value:g} s</text>')
-    for one in series:
-        step = max(1, len(one.times) // MAX_POINTS)
+    for line in series:
+        step = max(1, len(line.times) // MAX_POINTS)
         points = " ".join(
             f"{LEFT + across * time / end:.1f},{CHART_HEIGHT - BOTTOM - up * value / top:.1f}"
-            for time, value in zip(one.times[::step].tolist(), one.values[::step].tolist(), strict=True)
+            for time, value in zip(line.times[::step].tolist(), line.values[::step].tolist(), strict=True)
         )
-        parts.append(f'<polyline class="path line {one.name}" points="{points}"/>')
+        parts.append(f'<polyline class="path line {line.name}" points="{points}"/>')
     view = f"0 -4 {CHART_WIDTH:g} {CHART_HEIGHT + 4:g}"
     return f'<svg role="img" aria-label="{text(label)}" viewBox="{view}">{"".join(parts)}</svg>'
 

@@ -146,10 +146,12 @@ def _criterion_row(run: RunFinished, verdict: Verdict, finding: Finding, line: i
 def _disturbance_table(run: RunFinished) -> str:
     """Return a table of events and faults with their times and effects."""
     rows = "".join(
-        f'<tr class="{"bad" if one.missing else ""}"><td>{"happened" if one.happened else "did not happen"}</td>'
-        f"<td>{html_text(one.disturbance.name)}</td><td>{html_text(one.disturbance.trigger)}</td>"
-        f"<td>{html_text(disturbance_times(one, run.result.tick_rate))}</td><td>{html_text(one.effect)}</td></tr>"
-        for one in run.result.disturbances
+        f'<tr class="{"bad" if outcome.missing else ""}">'
+        f"<td>{'happened' if outcome.happened else 'did not happen'}</td>"
+        f"<td>{html_text(outcome.disturbance.name)}</td><td>{html_text(outcome.disturbance.trigger)}</td>"
+        f"<td>{html_text(disturbance_times(outcome, run.result.tick_rate))}</td>"
+        f"<td>{html_text(outcome.effect)}</td></tr>"
+        for outcome in run.result.disturbances
     )
     head = "".join(f'<th scope="col">{name}</th>' for name in ("", "event or fault", "trigger", "started", "effect"))
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>' if rows else ""

@@ -109,7 +109,9 @@ class FaultInjector:
                 self._map_faults.remove(active.index)
                 self._count(active)
             late = self._delayed_readings(active)
-            disturbed = (self._disturb_reading(active, one) if active.affects(one) else one for one in readings)
+            disturbed = (
+                self._disturb_reading(active, reading) if active.affects(reading) else reading for reading in readings
+            )
             readings = (*late, *(one for one in disturbed if one is not None))
         return readings
 

@@ -1,4 +1,4 @@
-"""A movable object, and precomputed poses of scripted objects."""
+"""A movable object, its creation in the engine, and precomputed poses of scripted objects."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,11 +8,25 @@ import numpy as np
 import pybullet
 
 from simscen.core.environment.world_model import GRAVITY_M_S2
+from simscen.core.errors import RunError
 from simscen.core.geometry import Pose3, Vector, wrap
-from simscen.core.geometry.motion_paths import MAX_STEP_M, PathSampler, SweptSegment
+from simscen.core.geometry.motion_paths import (
+    MAX_STEP_M,
+    PathSampler,
+    SweptSegment,
+    largest_step,
+    swept_segments,
+    too_fast,
+    top_speed,
+)
 from simscen.core.geometry.scripted_poses import BatchPathSampler, PosesAtTick, PredictedPoses
 from simscen.core.geometry.shapes import Body, Mesh, MotionPath
+from simscen.sim.body.inertia import inertia_of_solids
+from simscen.sim.body.outline import radius_and_height
+from simscen.sim.bullet import engine
 
+FRICTION = 0.6
+"""Friction of movable objects on the ground: about that of wood or cardboard on concrete."""
 FALL_SPEED_M_S = 0.1 * GRAVITY_M_S2
 """Speed that a resting object can gain by falling for 0.1 s."""
 PRECOMPUTED_S = 4
@@ -131,6 +145,65 @@ class Actor:
             return FALL_SPEED_M_S
         linear, angular = pybullet.getBaseVelocity(self.id, physicsClientId=client)
         return math.hypot(*linear) + math.hypot(*angular) * self.size + FALL_SPEED_M_S
+
+
+class ActorBuilder:
+    """Creates actors, and their bodies in the engine with and without collisions."""
+
+    def __init__(self, client: int, tick_rate: int, triangulate: engine.Triangulate, visual_shape: int) -> None:
+        """Take the engine's client, and the shape that the renderer shows of all actors."""
+        self._client, self._tick_rate = client, tick_rate
+        self._triangulate, self._visual_shape = triangulate, visual_shape
+
+    def make_actor(self, body: Body, tick: int, is_steered: bool = False) -> Actor:
+        """Return the actor of a body, which is not in the engine yet. Raises RunError for a path that is too fast."""
+        radius, height = radius_and_height(body.solids)
+        if body.path is not None and (step := largest_step(body.path, 1 / self._tick_rate, radius)) > MAX_STEP_M:
+            raise RunError("invalid", too_fast(body.name, step))
+        segments, speed = [SweptSegment(body.pose.x, body.pose.y, body.pose.x, body.pose.y)], 0.0
+        if body.path is not None:
+            segments, speed = swept_segments(body.path), top_speed(body.path, radius)
+        is_hollow = engine.is_hollow(body.solids, body.mass > 0 and body.path is None)
+        shell = engine.fuse_surfaces(body.solids, self._triangulate) if is_hollow else None
+        size = math.hypot(radius, height)
+        return Actor(body, body.path, tick, segments, speed, size, radius, shell, is_steered)
+
+    def make_tangible(self, actor: Actor, tick: int) -> None:
+        """Let an actor collide; Bullet then sorts its contacts after those of all that already collide."""
+        if actor.is_tangible:
+            return
+        if actor.body_id is None:
+            self._create(actor, tick)
+        else:
+            engine.enable_collisions(self._client, actor.id)
+            if actor.path is not None:
+                actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
+        actor.is_tangible = True
+
+    def make_measurable(self, actor: Actor, tick: int) -> None:
+        """Create an actor in the engine without collisions."""
+        if actor.body_id is None:
+            self._create(actor, tick)
+            engine.disable_collisions(self._client, actor.id)
+
+    def _create(self, actor: Actor, tick: int) -> None:
+        client, body, visual = self._client, actor.body, self._visual_shape
+        shape = engine.body_shape(client, body.solids, actor.is_pushable, self._triangulate)
+        if actor.is_pushable:
+            frame = inertia_of_solids(body.solids, body.mass).principal()
+            actor.center_from_base = frame[1].inverse()
+            actor.body_id = engine.create_rigid_body(client, body.mass, shape, body.pose, frame, FRICTION, visual)
+        elif actor.path is None:
+            actor.body_id = engine.create_static_body(client, shape, visual, body.pose, FRICTION)
+        else:
+            actor.body_id = engine.create_rigid_body(
+                client, 0.0, shape, body.pose, ((0.0, 0.0, 0.0), Pose3()), FRICTION, visual
+            )
+        if actor.path is None:
+            actor.engine_pose = body.pose
+        else:
+            # Setting the pose again makes it bit-identical to that of an actor that has been there before.
+            actor.set_engine_pose(client, actor.path_pose(tick, self._tick_rate))
 
 
 class ScheduledPoses:

@@ -7,28 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
-from simscen.core.errors import RunError
 from simscen.core.geometry import Pose2, Pose3, Vector
-from simscen.core.geometry.motion_paths import (
-    MAX_STEP_M,
-    SweptSegment,
-    largest_step,
-    swept_segments,
-    too_fast,
-    top_speed,
-)
 from simscen.core.geometry.shapes import Body, MotionPath
-from simscen.sim.body.inertia import inertia_of_solids
-from simscen.sim.body.outline import radius_and_height
 from simscen.sim.bullet import engine
 from simscen.sim.bullet.divergence import divergence_reason
 from simscen.sim.contact.static_distance import encloses
-from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ScheduledPoses
+from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ActorBuilder, ScheduledPoses
 from simscen.sim.objects.idle_objects import BroadPhase, RestDetector, RestPoses
 from simscen.sim.objects.proximity import DeferredActors, NearbyActors, ProximityQuery, find_nearby
 
-FRICTION = 0.6
-"""Friction of pushable objects on the ground: about that of wood or cardboard on concrete."""
 NEVER = 2**62
 """A tick after the end of every run."""
 
@@ -53,7 +40,7 @@ class Actors:
     ) -> None:
         """Begin without actors; `visual_shape` is what the renderer shows of all of them if `is_rendered`."""
         self._client, self._tick_rate = client, tick_rate
-        self._triangulate, self._visual_shape = triangulate, visual_shape
+        self._builder = ActorBuilder(client, tick_rate, triangulate, visual_shape)
         self._is_rendered = is_rendered
         self._actors: dict[str, Actor] = {}
         self._deferred: DeferredActors | None = None
@@ -83,25 +70,13 @@ class Actors:
     def add(self, body: Body, tick: int, is_steered: bool = False) -> None:
         """Add a body, which replaces one of the same name; with `is_steered`, `follow` can change its path."""
         self.remove(body.name)
-        self._actors[body.name] = self._make_actor(body, tick, is_steered)
+        self._actors[body.name] = self._builder.make_actor(body, tick, is_steered)
         self._update_engine(tick)
 
     def add_all(self, bodies: Iterable[Body], tick: int) -> None:
         """Add bodies with new names."""
-        self._actors.update((body.name, self._make_actor(body, tick)) for body in bodies)
+        self._actors.update((body.name, self._builder.make_actor(body, tick)) for body in bodies)
         self._update_engine(tick)
-
-    def _make_actor(self, body: Body, tick: int, is_steered: bool = False) -> Actor:
-        radius, height = radius_and_height(body.solids)
-        if body.path is not None and (step := largest_step(body.path, 1 / self._tick_rate, radius)) > MAX_STEP_M:
-            raise RunError("invalid", too_fast(body.name, step))
-        segments, speed = [SweptSegment(body.pose.x, body.pose.y, body.pose.x, body.pose.y)], 0.0
-        if body.path is not None:
-            segments, speed = swept_segments(body.path), top_speed(body.path, radius)
-        is_hollow = engine.is_hollow(body.solids, body.mass > 0 and body.path is None)
-        shell = engine.fuse_surfaces(body.solids, self._triangulate) if is_hollow else None
-        size = math.hypot(radius, height)
-        return Actor(body, body.path, tick, segments, speed, size, radius, shell, is_steered)
 
     def _update_engine(self, tick: int) -> None:
         """Let all actors collide that cannot be deferred, and create the others if they are rendered."""
@@ -110,47 +85,10 @@ class Actors:
         none_deferred = any(actor.is_pushable for actor in actors)
         for actor in actors:
             if none_deferred or actor.is_steered:
-                self._make_tangible(actor, tick)
+                self._builder.make_tangible(actor, tick)
             elif self._is_rendered:
-                self._make_measurable(actor, tick)
+                self._builder.make_measurable(actor, tick)
         self._update_lists()
-
-    def _make_tangible(self, actor: Actor, tick: int) -> None:
-        """Let an actor collide; Bullet then sorts its contacts after those of all that already collide."""
-        if actor.is_tangible:
-            return
-        if actor.body_id is None:
-            self._create_in_engine(actor, tick)
-        else:
-            engine.enable_collisions(self._client, actor.id)
-            if actor.path is not None:
-                actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
-        actor.is_tangible = True
-
-    def _make_measurable(self, actor: Actor, tick: int) -> None:
-        """Create an actor in the engine without collisions."""
-        if actor.body_id is None:
-            self._create_in_engine(actor, tick)
-            engine.disable_collisions(self._client, actor.id)
-
-    def _create_in_engine(self, actor: Actor, tick: int) -> None:
-        client, body, visual = self._client, actor.body, self._visual_shape
-        shape = engine.body_shape(client, body.solids, actor.is_pushable, self._triangulate)
-        if actor.is_pushable:
-            frame = inertia_of_solids(body.solids, body.mass).principal()
-            actor.center_from_base = frame[1].inverse()
-            actor.body_id = engine.create_rigid_body(client, body.mass, shape, body.pose, frame, FRICTION, visual)
-        elif actor.path is None:
-            actor.body_id = engine.create_static_body(client, shape, visual, body.pose, FRICTION)
-        else:
-            actor.body_id = engine.create_rigid_body(
-                client, 0.0, shape, body.pose, ((0.0, 0.0, 0.0), Pose3()), FRICTION, visual
-            )
-        if actor.path is None:
-            actor.engine_pose = body.pose
-        else:
-            # Setting the pose again makes it bit-identical to that of an actor that has been there before.
-            actor.set_engine_pose(client, actor.path_pose(tick, self._tick_rate))
 
     @property
     def is_engine_complete(self) -> bool:
@@ -166,9 +104,9 @@ class Actors:
             self._deferred = DeferredActors([actor for actor in self._actors.values() if not actor.is_tangible])
         activated, measured = self._deferred.activate_near(queries)
         for actor in activated:
-            self._make_tangible(actor, tick)
+            self._builder.make_tangible(actor, tick)
         for actor in measured:
-            self._make_measurable(actor, tick)
+            self._builder.make_measurable(actor, tick)
         if activated:
             self._deferred_count -= len(activated)
             self._scripted_tangible = [actor for actor in self._scripted if actor.is_tangible]

@@ -7,9 +7,8 @@ import synthetic_drives as drives
 from simscen.core.geometry import Pose2
 from simscen.reconstruction.drive.recorded_drive import motion_steps
 from simscen.reconstruction.faults.commands import command_faults
-from simscen.reconstruction.faults.gyroscope import gyroscope_faults
 from simscen.reconstruction.faults.localizer import localizer_faults
-from simscen.reconstruction.faults.odometry import odometry_faults
+from simscen.reconstruction.faults.odometry import gyroscope_faults, odometry_faults
 
 
 def number(fault, key):

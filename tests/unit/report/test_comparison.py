@@ -16,11 +16,11 @@ from simscen.core.records.session_events import (
     SessionStarted,
 )
 from simscen.report.comparison import comparison_lines, difference_columns, shorten
+from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import plain_text
 from simscen.report.github import markdown
 from simscen.report.results_json import to_json
 from simscen.report.suite import Session, to_html
-from simscen.report.text_reporters import text_reporter
 
 FLIP = Flip("navigation/goal", 3, "ref", "mine", "clearance: 0.03 m < 0.05 m, at t = 4.10 s, (2.59, 4.42)")
 TIME = MetricDifference("time_to_goal", "s", 8, 25.341, 28.23, 2.889, (0.78, 4.954), 1, 0, 7, 0.070)

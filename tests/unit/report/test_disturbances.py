@@ -8,10 +8,10 @@ import pytest
 
 from simscen.core.records.events import Disturbance, DisturbanceOutcome
 from simscen.core.records.verdict import Finding, Status, Verdict
+from simscen.report.console_reporter import text_reporter
 from simscen.report.github import annotations
 from simscen.report.junit import to_xml
 from simscen.report.suite import Session, to_html
-from simscen.report.text_reporters import text_reporter
 
 FELL = DisturbanceOutcome(
     Disturbance("pallet falls", "event", "time: 3 s", line=7), (720,), True, "spawned pallet", 720

@@ -10,9 +10,10 @@ import pytest
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey
 from simscen.core.records.session_events import SessionFinished, SessionStarted, session_started
 from simscen.core.records.verdict import Finding, Status, Verdict
+from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import TerminalStyle, plain_text
 from simscen.report.live_console import ColorReporter, LiveReporter
-from simscen.report.text_reporters import SessionFormatter, text_reporter
+from simscen.report.text_reporters import SessionFormatter
 
 
 def of(run, **changes):

@@ -191,10 +191,10 @@ PARTS = [
 ELSEWHERE = {
     "Amcl.parameters": "tests/diagnostics/meaningless/deprecated_amcl_parameters.scenario.yaml",
     "StackSpec.keepout": "tests/scenarios/test_masks.py",
-    "StackSpec.speed_zones": "tests/unit/run/test_filters.py",
+    "StackSpec.speed_zones": "tests/unit/run/test_costmap_filters.py",
     "StackSpec.keepout_mask": "tests/scenarios/test_masks.py",
     "StackSpec.speed_mask": "tests/scenarios/test_masks.py",
-    "StackSpec.nav2_params": "tests/unit/loading/nav2/test_nav2_parameters.py",
+    "StackSpec.nav2_params": "tests/unit/loading/stacks/test_nav2_parameters.py",
     "StackSpec.latency": "tests/unit/run/test_latency.py",  # `robot` is what the robot's file says
     "OmplPlanner.gap_clearance": "tests/unit/stack/planners/test_ompl_planner.py",
     "Recovery.clear_entirely": "tests/unit/advanced/test_costmap_clearing.py",

@@ -8,8 +8,7 @@ from simscen.core.errors import InvalidInput
 from simscen.loading.known_names import resolve_places
 from simscen.loading.scenario import load_scenario
 from simscen.loading.scenario_text import resolved_text, spec_of_text
-from simscen.loading.stacks.choice import StackChoice
-from simscen.loading.stacks.stackfile import load_stack_file
+from simscen.loading.stacks.choice import StackChoice, load_stack_file
 from simscen.model.stack import StackSpec
 
 ZONES = "stack: {keepout: [hall], speed_zones: [{region: hall, speed_limit: 0.2}], costmap: {inflation_radius: 1}}\n"

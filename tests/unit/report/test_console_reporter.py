@@ -11,9 +11,9 @@ from simscen.cli.diagnostics import as_github
 from simscen.core.errors import Problem
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import SessionStarted
+from simscen.report.console_reporter import text_reporter
 from simscen.report.github import annotations, github_reporter, markdown
 from simscen.report.results_json import json_reporter, to_json
-from simscen.report.text_reporters import text_reporter
 
 EXPECTED = """\
 simscen 0.1.0 · 3 scenarios · 2 workers

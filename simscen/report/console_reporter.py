@@ -1,0 +1,38 @@
+"""Choice of the reporter that prints a session on the console, and printing of single lines."""
+
+import os
+from collections.abc import Iterable, Mapping
+from typing import TextIO
+
+from simscen.report.display_text import StyledLine, TerminalStyle, detect_style
+from simscen.report.text_reporters import PlainReporter, Reporter
+
+
+def text_reporter(
+    out: TextIO, live: bool | None = None, slow: int | None = None, environ: Mapping[str, str] = os.environ
+) -> Reporter:
+    """Return a reporter with live progress on a terminal, plain lines elsewhere, and color where it is supported.
+
+    `live` overrides the detection for `out`. `slow` is the number of slowest runs to list at the end; 0 lists all.
+    """
+    style = detect_style(out, environ)
+    if live is not None:
+        style = TerminalStyle(live or style.color, live, style.terminal)
+    if style.live:
+        from simscen.report.live_console import LiveReporter  # rich is slow to import
+
+        return LiveReporter(out, style, slow)
+    return _line_reporter(out, style, slow)
+
+
+def print_lines(lines: Iterable[StyledLine], out: TextIO, environ: Mapping[str, str] = os.environ) -> None:
+    """Print lines, with color where it is supported, wrapped to the width of a terminal."""
+    _line_reporter(out, detect_style(out, environ)).print_lines(lines)
+
+
+def _line_reporter(out: TextIO, style: TerminalStyle, slow: int | None = None) -> PlainReporter:
+    if not style.color:
+        return PlainReporter(out, style, slow)
+    from simscen.report.live_console import ColorReporter
+
+    return ColorReporter(out, style, slow)
