@@ -1,4 +1,4 @@
-"""The file that is edited: read as text, and saved only if nobody changed it meanwhile."""
+"""File that is edited, with its kind and the folders that it may refer to; saved only if it has not changed since."""
 
 import hashlib
 import stat

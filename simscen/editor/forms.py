@@ -1,4 +1,4 @@
-"""Forms for the values of a file, made from its JSON Schema, with the help that `simscen explain` prints."""
+"""Forms for the values of a file, made from its JSON Schema, and lookup of the schema of a value."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Base classes of the specifications that users write in YAML."""
+"""Base classes of the specifications that users write in YAML, and imports of them at their first use."""
 
 import ast
 import inspect

@@ -1,4 +1,4 @@
-"""The things of a scenario or a world that a map can show: their handles, outlines, lines, circles, and regions.
+"""Objects that a map of a scenario or a world can show: their handles, outlines, lines, circles, and regions.
 
 They are read from plain data, not from a valid specification, so that the map also shows a file with problems. What
 cannot be read is left out.

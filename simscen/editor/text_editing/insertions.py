@@ -1,4 +1,4 @@
-"""Insert keys and items into a YAML text, with the indentation and the style of their siblings."""
+"""Insert keys and items into a YAML text in the style of their siblings, and remove them with their line breaks."""
 
 from collections.abc import Sequence
 from typing import Any

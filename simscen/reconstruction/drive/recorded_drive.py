@@ -1,4 +1,4 @@
-"""A recorded drive as arrays: poses, odometry, scans, commands, goals, and the map, with times in s since the start."""
+"""A recorded drive as arrays with times in s since the start, and its motion in short steps."""
 
 from __future__ import annotations
 

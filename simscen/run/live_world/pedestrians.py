@@ -1,4 +1,4 @@
-"""Simulate the pedestrians of a run."""
+"""Simulate the pedestrians of a run among the walls of the static world."""
 
 from collections.abc import Callable
 from functools import cached_property
