@@ -5,10 +5,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from simscen.record.log_reader.read import Log
-
 from simscen.core.clock import SimTime
 from simscen.peer.messages import BEHAVIOR_TREE_LOGGER, log, tree_change
+from simscen.record.log_reader import Log
 
 PARAMETERS: dict[str, dict[str, Any]] = {
     "/amcl": {"base_frame_id": "base_link", "laser_max_range": 100.0, "max_particles": 2000},

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 import yaml
 from mcap.reader import make_reader
-from simscen.record.log_reader.read import read_run
 
+from simscen.record.log_reader import read_run
 from simscen.report.replay.packed_columns import PackedColumns
 from simscen.report.replay.stack_report import parameters_of, tree_of
 

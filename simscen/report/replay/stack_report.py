@@ -7,7 +7,7 @@ from typing import Any
 
 from simscen.core.records.trace import LogLine
 from simscen.peer.messages import BEHAVIOR_TREE_LOGGER
-from simscen.record.log_reader.read import Log
+from simscen.record.log_reader import Log
 from simscen.report.display_text import escape_control, one_line
 from simscen.report.replay.packed_columns import PackedColumns
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from moments import CLOCK, about, moments
-from simscen.record.log_reader.read import read_log
 
 from simscen.core.errors import InvalidInput
 from simscen.core.records.trace import LogLine, Moment
 from simscen.record import log_header
+from simscen.record.log_reader import read_log
 from simscen.record.recorder import Recorder
 
 LINES = LogLine(30, "amcl", "no transform"), LogLine(20, "behavior_tree", "Spin: IDLE -> RUNNING")

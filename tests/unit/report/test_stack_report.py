@@ -11,15 +11,15 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "browser"))
 from nav2_report import ERROR, INFO, PARAMETERS, WARNING, with_nav2_report
-from simscen.record.log_reader.read import Log
-from simscen.record.log_reader.sensor_messages import SensorMessages
 
 from simscen.core.clock import SimTime
 from simscen.core.geometry import Pose2
 from simscen.core.records.case import Case
 from simscen.peer.messages import BEHAVIOR_TREE_LOGGER, log, tree_change
 from simscen.record.log_header import LogHeader
+from simscen.record.log_reader import Log
 from simscen.record.messages.event_text import EVENT_LOGGER
+from simscen.record.sensor_messages import SensorMessages
 from simscen.report.replay import stack_report
 from simscen.report.replay.packed_columns import PackedColumns
 from simscen.report.replay.stack_report import lines_of, parameters_of, tree_of
