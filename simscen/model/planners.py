@@ -9,6 +9,8 @@ from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import (
     Frequency,
     NonNegativeLength,
+    PositiveLength,
+    Quantity,
 )
 
 Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
@@ -46,6 +48,17 @@ class OmplParameters(PlannerSpec):
     state_space: StateSpace = "auto"
     """State space of the search. auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, otherwise
     holonomic."""
+    minimum_turning_radius: PositiveLength | None = None
+    """Turning radius of Dubins and Reeds-Shepp paths; default: 1.15 times that of the robot, so that the controller can
+    correct to both sides, and at least 0.2 m (nav2_smac_planner's parameter; its default is 0.4 m)."""
+    hull_clearance: Annotated[NonNegativeLength, Field(le=1)] = 0.10
+    """Clearance of the whole footprint on a path of poses. If there is no such path, half of it is tried, then none."""
+    cusp_penalty: NonNegativeLength = 1.0
+    """Length that each change between forward and backward adds to the cost of a path of poses: a car could drive this
+    far while it stops and steers."""
+    pose_searches: Annotated[int, Field(ge=1, le=100)] = 6
+    """Number of paths of poses that are planned, of which the cheapest is used: tree planners over poses make detours.
+    """
 
 
 class OmplPlanner(OmplParameters):
@@ -57,9 +70,26 @@ class OmplPlanner(OmplParameters):
     """Clearance on both sides of the robot's inscribed circle that a gap must have for the plan to lead through it, if
     there is another path, however long. Start and goal themselves may be closer to obstacles. 0 = any gap will do."""
     improving_iterations: Iterations = 500
-    """Number of iterations of planners that improve their path; `bit_star` uses two batches of 200 samples instead."""
+    """Number of iterations of planners that improve their path; `bit_star` has `max_batches` instead."""
+    samples_per_batch: Annotated[int, Field(ge=1, le=100_000)] = 200
+    """Number of samples per batch; `bit_star` only (OMPL: 100)."""
+    max_batches: Annotated[int, Field(ge=1, le=1000)] = 2
+    """Number of batches after which a path is good enough; `bit_star` only. OMPL continues until a time is over."""
+    rewire_factor: Annotated[float, Field(ge=0.1, le=10)] | None = None
+    """Factor on the distance, or on the number of neighbors, up to which samples are connected; `bit_star`, `rrt_star`,
+    and `informed_rrt_star` only. Default: 1.5 for `bit_star`, since OMPL's 1.1 makes more detours; otherwise 1.1."""
+    range: PositiveLength | None = None
+    """Longest motion added to a tree; all planners except `bit_star`. Default: 1 m in the plane, since the value that
+    OMPL chooses, a fifth of the map, mostly ends in a wall; over poses, the value that OMPL chooses."""
+    goal_bias: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 0.05
+    """Probability of drawing the goal as a sample; `rrt_star`, `informed_rrt_star`, and `kpiece` only."""
+    cost_threshold_ratio: Annotated[float, Field(ge=0, le=1000), Quantity("ratio")] = 1.01
+    """The search ends at a path that costs at most this value times the distance to the goal, which is a lower bound of
+    its cost (OMPL's cost threshold); `bit_star`, `rrt_star`, and `aorrtc` only. 0 = never."""
     simplify: bool = True
     """Whether OMPL shortens the path and moves it to cells of lower cost."""
+    simplify_steps: Annotated[int, Field(ge=2, le=100_000)] = 100
+    """Number of attempts of each pass of the simplification (`max_steps` of OMPL's PathSimplifier)."""
 
 
 class Navfn(PlannerSpec):

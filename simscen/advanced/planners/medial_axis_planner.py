@@ -19,9 +19,7 @@ from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.grid_graph import resample_polyline
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints
 from simscen.stack.planners.ompl_planner import (
-    CLEARANCE_M,
     FINE_CELLS,
-    LESS_CLEARANCE_M,
     Attempt,
     PosePlanner,
     state_space_for,
@@ -202,15 +200,15 @@ def _postprocessed(costs: TraversalCosts, points: Array) -> Array | None:
 
 
 ATTEMPTS = (
-    (0.15, CLEARANCE_M, 0.1, POSE_SPACING_M),
-    (0.3, CLEARANCE_M, 0.1, POSE_SPACING_M),
-    (0.15, LESS_CLEARANCE_M, 0.1, POSE_SPACING_M),
-    (0.3, LESS_CLEARANCE_M, 0.1, POSE_SPACING_M),
+    (0.15, 1.0, 0.1, POSE_SPACING_M),
+    (0.3, 1.0, 0.1, POSE_SPACING_M),
+    (0.15, 0.5, 0.1, POSE_SPACING_M),
+    (0.3, 0.5, 0.1, POSE_SPACING_M),
     (0.3, 0.0, 0.2, POSE_SPACING_M),
     (2.0, 0.0, 0.4, POSE_SPACING_M),
     (2.0, 0.0, 0.4, POSE_SPACING_M / 10),
 )
-"""Slack of the informed set as a ratio, clearance in m, share of the iterations, and spacing of checks in m.
+"""Slack of the informed set as a ratio, part of `hull_clearance`, share of the iterations, and spacing of checks in m.
 
 Cars need wider sets than discs because they swing out.
 """
@@ -222,8 +220,9 @@ class ConfinedPosePlanner(PosePlanner):
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
         """Yield the attempts, in increasingly wide informed sets."""
         informed = InformedSet(costs, (free_start.x, free_start.y), (goal.x, goal.y))
-        for slack, clearance, fraction, spacing in ATTEMPTS:
+        for slack, part, fraction, spacing in ATTEMPTS:
             informed.narrow(slack)
+            clearance = part * self._spec.hull_clearance
             yield Attempt(informed.bounds(), informed.contains, clearance, fraction, spacing)
 
 

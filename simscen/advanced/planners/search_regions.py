@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from simscen.advanced.planners.informed_set import InformedSet, cells_with_most_clearance, pool_blocks
 from simscen.core.geometry import Array
+from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.endpoints import Endpoints
 from simscen.stack.planners.ompl_planner import whole_problem
 from simscen.stack.planners.ompl_search import Motion, OmplSearch, Problem, StateValidity, Termination
@@ -111,7 +112,7 @@ class Leg:
     def search(self, seed: int, max_iterations: int) -> OmplSearch:
         """Return the search."""
         if self.samples is None:
-            return OmplSearch("bit_star", self.problem, seed, max_iterations, 0)
+            return OmplSearch(PlannerSpec(max_iterations=max_iterations), self.problem, seed)
         return SampledSearch(self.problem, self.samples, self.reach, seed, max_iterations)
 
 
@@ -198,10 +199,9 @@ class _SampledValidity(StateValidity):
 class SampledSearch(OmplSearch):
     """One batch of BIT* on `samples` (n, 2), of which two are connected if they are at most `reach` m apart."""
 
-    good_enough_ratio = 0.0  # the batch is always completed
-
     def __init__(self, problem: Problem, samples: Array, reach: float, seed: int, max_iterations: int) -> None:
-        super().__init__("bit_star", problem, seed, max_iterations, 0)
+        all_samples = PlannerSpec(max_iterations=max_iterations, cost_threshold_ratio=0.0)
+        super().__init__(all_samples, problem, seed)
         self._samples, self._reach = samples, reach
 
     def _make_validity(self) -> StateValidity:
@@ -214,12 +214,12 @@ class SampledSearch(OmplSearch):
 
     def _make_termination(self, planner: Any) -> Termination:
         """Return a condition that stops BIT* at its second batch, which is reduced to one sample beforehand."""
-        batches, remaining = planner.numBatches, self.max_iterations
+        batches, remaining = planner.numBatches, self.spec.max_iterations
 
         def should_stop() -> bool:
             nonlocal remaining
             remaining -= 1
-            if remaining == self.max_iterations - CHECKS_BEFORE_FIRST_BATCH:
+            if remaining == self.spec.max_iterations - CHECKS_BEFORE_FIRST_BATCH:
                 planner.setSamplesPerBatch(1)
             return remaining < 0 or batches() > 1
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import cusps
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints, near, reachable_bounds, reachable_cells
-from simscen.stack.planners.ompl_search import OmplSearch, Problem
+from simscen.stack.planners.ompl_search import OmplSearch, Problem, set_parameters
 from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, spaced, with_headings
 from simscen.stack.planners.planning_window import plan_in_windows
 from simscen.stack.planners.pose_search import POSE_SPACING_M, DistanceLookup, Space, Valid, escape_arcs, search_poses
@@ -28,16 +28,10 @@ MIN_RADIUS_M = 0.2
 """Radius of the arcs of a long robot that could turn in place, but should not have to."""
 RADIUS_RATIO = 1.15
 """Ratio of the planned turning radius of a car to its minimum, so that the controller can correct to both sides."""
-CLEARANCE_M, LESS_CLEARANCE_M = 0.10, 0.05
-"""Preferred clearances beyond the hull, because pose estimate and map can have such errors."""
-MAX_POSE_SEARCHES = 6
-"""Maximum number of searches, of which the cheapest path is taken, because tree planners over poses make detours."""
 FINAL_CHECKS = 50
 """Number of poses per step of the path at which the hull is finally checked."""
 MAX_DEEPER_M = 0.01
 """Distance by which a hull may penetrate an obstacle deeper while it escapes from it."""
-CUSP_M = 1.0
-"""Length that a change of direction costs: a car could drive this far while it stops and steers."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +59,7 @@ class PosePlanner:
         self._spec, self._robot, self._footprint, self._space = spec, robot, footprint, space
         self._inscribed = robot.inscribed_radius
         self._type = "rrt_connect" if spec.type in PLANE_ONLY else spec.type
-        self._turning_radius = max(RADIUS_RATIO * robot.turning_radius, MIN_RADIUS_M)
+        self._turning_radius = spec.minimum_turning_radius or max(RADIUS_RATIO * robot.turning_radius, MIN_RADIUS_M)
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """Return a path of poses in the map frame, 5 cm apart: the cheapest of a few searches."""
@@ -79,20 +73,31 @@ class PosePlanner:
             valid = self._validity_check(field, attempt, (free_start, goal))
             iterations = max(1, round(attempt.share * self._spec.max_iterations))
             found: list[Array] = []
-            for _ in range(MAX_POSE_SEARCHES):
+            for _ in range(self._spec.pose_searches):
                 seed += 1
                 poses = search_poses(
                     self._type, self._space, self._turning_radius, attempt.bounds, free_start, goal, valid, seed,
-                    iterations, attempt.spacing,
+                    iterations, attempt.spacing, self._configure,
                 )  # fmt: skip
                 if poses is None:
                     break
                 found.append(np.array(poses))
-            for cheapest in sorted(found, key=lambda poses: _cost(costs, poses)):
+            for cheapest in sorted(found, key=lambda poses: self._cost(costs, poses)):
                 if self._is_collision_free(costs, cheapest):
                     return Path(np.concatenate((escape[:-1], cheapest)))
         message = f"{self._type}: no path in {self._spec.max_iterations} iterations"
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
+
+    def _configure(self, planner: Any) -> None:
+        """Set the parameters of OMPL's planner."""
+        if isinstance(self._spec, PlannerSpec):
+            set_parameters(planner, self._spec)
+
+    def _cost(self, costs: TraversalCosts, poses: Array) -> float:
+        """Return the cost of a path, including that of changes of direction."""
+        steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+        midpoints = 0.5 * (poses[1:, :2] + poses[:-1, :2])
+        return float((steps * costs.at(midpoints)).sum()) + self._spec.cusp_penalty * int(cusps(poses).size)
 
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
         """Yield the attempts: with decreasing clearance, finally with finer checks."""
@@ -108,9 +113,10 @@ class PosePlanner:
             row, column = int((y - y0) / size), int((x - x0) / size)
             return 0 <= row < rows and 0 <= column < columns and bool(reachable[row, column])
 
+        preferred = self._spec.hull_clearance
         for clearance, share, spacing in (
-            (CLEARANCE_M, 0.2, POSE_SPACING_M),
-            (LESS_CLEARANCE_M, 0.2, POSE_SPACING_M),
+            (preferred, 0.2, POSE_SPACING_M),
+            (0.5 * preferred, 0.2, POSE_SPACING_M),
             (0.0, 0.3, POSE_SPACING_M),
             (0.0, 0.3, POSE_SPACING_M / 10),
         ):
@@ -179,13 +185,6 @@ class PosePlanner:
         return valid
 
 
-def _cost(costs: TraversalCosts, poses: Array) -> float:
-    """Return the cost of a path, including that of changes of direction."""
-    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    midpoints = 0.5 * (poses[1:, :2] + poses[:-1, :2])
-    return float((steps * costs.at(midpoints)).sum()) + CUSP_M * int(cusps(poses).size)
-
-
 FINE_CELLS = 0.125
 """Spacing of the collision checks of the next search, if the path of the first one is blocked between its checks."""
 SEARCHES = 4
@@ -222,8 +221,7 @@ class OmplPlanner:
         """Return the points (n, 2) of a path without blocked cells."""
         spec, problem = self._spec, whole_problem(costs, ends)
         for number in range(SEARCHES):
-            search = OmplSearch(spec.type, problem, seed + number, spec.max_iterations, spec.improving_iterations)
-            points = search.solve(simplify=spec.simplify)
+            points = OmplSearch(spec, problem, seed + number).solve(simplify=spec.simplify)
             if points is None:
                 continue
             path = avoid_cell_corners(costs, spaced(np.array(points), SPACING_M))

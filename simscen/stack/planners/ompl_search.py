@@ -13,6 +13,8 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
+from simscen.model.planners import OmplPlanner as PlannerSpec
+
 Point = tuple[float, float]
 Motion = Callable[[float, float, float, float], float]
 """Cost of a straight motion from (x, y) to (x, y), at least its length in m; inf if it is not possible."""
@@ -29,16 +31,10 @@ PLANNERS: dict[str, Callable[[Any], Any]] = {
 }
 FEASIBLE_ONLY = frozenset(("rrt_connect", "kpiece"))
 """Planners that stop at their first path. The others continue to improve it."""
-RANGE_M = 1.0
-"""Longest motion added to a tree. The default of OMPL, a fifth of the map, mostly ends in the walls of a building."""
-BATCH_SAMPLES, BATCHES = 200, 2
-"""Samples per batch of BIT*, and batches after which its path is good enough."""
-REWIRE_FACTOR = 1.5
-"""Factor of BIT* for the distance up to which samples are connected. With OMPL's 1.1, detours are more frequent."""
-GOOD_ENOUGH_RATIO = 1.01
-"""A path that costs at most this ratio of the distance to the goal, a lower bound of the cost, ends the search."""
-SIMPLIFY_STEPS = 100
-"""Attempts of each pass of the simplification. Counted, because OMPL's own simplify() stops by wall-clock time."""
+DEFAULT_RANGE_M = 1.0
+"""Default of the parameter `range` in the plane."""
+DEFAULT_BIT_STAR_REWIRE_FACTOR = 1.5
+"""Default of the parameter `rewire_factor` of BIT*."""
 PERTURBATIONS_M = (0.5, 0.15)
 """Distances by which states are moved to reduce the cost of the path, one pass each."""
 ou.setLogLevel(ou.LOG_NONE)
@@ -118,16 +114,13 @@ def _impossible(_ax: float, _ay: float, _bx: float, _by: float) -> float:
 class OmplSearch:
     """One search by one of OMPL's planners. Subclasses may change where it samples and when it stops."""
 
-    good_enough_ratio = GOOD_ENOUGH_RATIO
-
-    def __init__(self, kind: str, problem: Problem, seed: int, max_iterations: int, improving_iterations: int) -> None:
-        """Search with the planner of this `kind`, a key of PLANNERS.
+    def __init__(self, spec: PlannerSpec, problem: Problem, seed: int) -> None:
+        """Search with the planner and the parameters of a specification.
 
         A planner that improves its path does so until it has used `improving_iterations`; BIT*, until it has processed
-        BATCHES batches of samples.
+        `max_batches` batches of samples.
         """
-        self.kind, self.problem, self.seed = kind, problem, seed
-        self.max_iterations, self.improving_iterations = max_iterations, improving_iterations
+        self.spec, self.problem, self.seed = spec, problem, seed
         self._callbacks: list[Any] = []
 
     def solve(self, *, simplify: bool) -> list[Point] | None:
@@ -151,9 +144,7 @@ class OmplSearch:
         definition.setStartAndGoalStates(*ends)
         objective = self._make_objective(information)
         definition.setOptimizationObjective(objective)
-        planner = PLANNERS[self.kind](information)
-        if hasattr(planner, "setRange"):
-            planner.setRange(RANGE_M)
+        planner = PLANNERS[self.spec.type](information)
         self._configure(planner)
         planner.setProblemDefinition(definition)
         planner.setup()
@@ -162,28 +153,31 @@ class OmplSearch:
             return None
         path = definition.getSolutionPath()
         if simplify:
-            _simplify(og.PathSimplifier(information, definition.getGoal(), objective), path)
+            _simplify(og.PathSimplifier(information, definition.getGoal(), objective), path, self.spec.simplify_steps)
         return [(state[0], state[1]) for state in path.getStates()]
 
     def _configure(self, planner: Any) -> None:
         """Set the parameters of a planner."""
-        if self.kind == "bit_star":
+        if self.spec.type == "bit_star":
             planner.setUseKNearest(False)
-            planner.setSamplesPerBatch(BATCH_SAMPLES)
-            planner.setRewireFactor(REWIRE_FACTOR)
+            planner.setRewireFactor(DEFAULT_BIT_STAR_REWIRE_FACTOR)
+        elif hasattr(planner, "setRange"):
+            planner.setRange(DEFAULT_RANGE_M)
+        set_parameters(planner, self.spec)
 
     def _make_termination(self, planner: Any) -> Termination:
         """Return the termination condition of this planner."""
-        if self.kind in FEASIBLE_ONLY:
-            return stop_after(self.max_iterations)
+        spec = self.spec
+        if spec.type in FEASIBLE_ONLY:
+            return stop_after(spec.max_iterations)
 
         def is_solved() -> bool:
             return math.isfinite(planner.bestCost().value())
 
-        if self.kind == "bit_star":
+        if spec.type == "bit_star":
             batches = planner.numBatches
-            return stop_after(self.max_iterations, lambda: batches() > BATCHES and is_solved())
-        return stop_after(self.max_iterations, is_solved, self.improving_iterations)
+            return stop_after(spec.max_iterations, lambda: batches() > spec.max_batches and is_solved())
+        return stop_after(spec.max_iterations, is_solved, spec.improving_iterations)
 
     def _make_validity(self) -> StateValidity:
         return StateValidity(self.problem.motion)
@@ -205,7 +199,7 @@ class OmplSearch:
     def _make_objective(self, information: Any) -> Any:
         """Return the cost of a path as OMPL's own length, whose heuristic needs no Python, and the cost beyond it."""
         motion = self.problem.motion
-        if self.kind == "informed_rrt_star":
+        if self.spec.type == "informed_rrt_star":
             whole = _MotionCost(information, motion)
             self._callbacks.append(whole)
             return whole
@@ -214,16 +208,32 @@ class OmplSearch:
         total = ob.MultiOptimizationObjective(information)
         total.addObjective(ob.PathLengthOptimizationObjective(information), 1.0)
         total.addObjective(beyond, 1.0)
-        total.setCostThreshold(ob.Cost(self.good_enough_ratio * math.dist(self.problem.start, self.problem.goal)))
+        ratio = self.spec.cost_threshold_ratio
+        total.setCostThreshold(ob.Cost(ratio * math.dist(self.problem.start, self.problem.goal)))
         return total
 
 
-def _simplify(simplifier: Any, path: Any) -> None:
-    """Shorten a path and move its states where that reduces the cost."""
-    simplifier.partialShortcutPath(path, SIMPLIFY_STEPS, SIMPLIFY_STEPS // 2)
+def set_parameters(planner: Any, spec: PlannerSpec) -> None:
+    """Set the parameters of the specification that this planner of OMPL has; those without a value stay as they are."""
+    for setter, value in (
+        ("setSamplesPerBatch", spec.samples_per_batch),
+        ("setRewireFactor", spec.rewire_factor),
+        ("setRange", spec.range),
+        ("setGoalBias", spec.goal_bias),
+    ):
+        if value is not None and hasattr(planner, setter):
+            getattr(planner, setter)(value)
+
+
+def _simplify(simplifier: Any, path: Any, steps: int) -> None:
+    """Shorten a path and move its states where that reduces the cost.
+
+    The `steps` of a pass are counted, because OMPL's own simplify() stops by wall-clock time.
+    """
+    simplifier.partialShortcutPath(path, steps, steps // 2)
     for distance in PERTURBATIONS_M:
-        simplifier.perturbPath(path, distance, SIMPLIFY_STEPS, SIMPLIFY_STEPS // 2)
-    simplifier.partialShortcutPath(path, SIMPLIFY_STEPS, SIMPLIFY_STEPS // 2)
+        simplifier.perturbPath(path, distance, steps, steps // 2)
+    simplifier.partialShortcutPath(path, steps, steps // 2)
 
 
 def _state(information: Any, point: Point) -> Any:

@@ -38,10 +38,11 @@ def search_poses(
     seed: int,
     iterations: int,
     check_spacing: float = POSE_SPACING_M,
+    configure: Callable[[Any], None] = lambda _: None,
 ) -> list[Pose2] | None:
     """Return poses from start to goal, `POSE_SPACING_M` apart; None if the iterations did not suffice.
 
-    `valid` is evaluated every `check_spacing` m.
+    `valid` is evaluated every `check_spacing` m. `configure` sets the parameters of OMPL's planner.
 
     "dubins" drives forward only, "reeds_shepp" also backward, both on arcs of at least `turning_radius`; "se2" moves
     in any direction.
@@ -63,6 +64,7 @@ def search_poses(
     problem = ob.ProblemDefinition(information)
     problem.setStartAndGoalStates(*ends)
     planner = PLANNERS[kind](information)
+    configure(planner)
     planner.setProblemDefinition(problem)
     planner.setup()
     planner.solve(ob.PlannerTerminationCondition(stop_after(iterations)))

@@ -176,6 +176,8 @@ PARTS = [
         **of_planner("bit_star"),
         "max_iterations": ((planner(type="rrt_connect"), scenes.planned),),
         "improving_iterations": ((planner(type="rrt_star", improving_iterations=60), scenes.planned),),
+        "range": ((planner(type="rrt_connect"), scenes.planned),),
+        "goal_bias": ((planner(type="rrt_star", improving_iterations=60), scenes.planned),),
         "state_space": ((planner(), scenes.planned), (planner(state_space="se2"), scenes.planned)),
     }, {"max_iterations": [1, 3], "improving_iterations": [5, 30]}),
     Part(("planner",), MedialAxisPlanner, ((planner(type="medial_axis"), scenes.planned),), {
@@ -197,6 +199,11 @@ ELSEWHERE = {
     "StackSpec.nav2_params": "tests/unit/loading/stacks/test_nav2_parameters.py",
     "StackSpec.latency": "tests/unit/run/test_latency.py",  # `robot` is what the robot's file says
     "OmplPlanner.gap_clearance": "tests/unit/stack/planners/test_ompl_planner.py",
+    **{
+        f"{kind}.{name}": "tests/unit/stack/planners/test_pose_planner.py"
+        for kind in ("OmplPlanner", "MedialAxisPlanner")
+        for name in ("minimum_turning_radius", "cusp_penalty", "pose_searches", "hull_clearance")
+    },
     "Recovery.clear_entirely": "tests/unit/advanced/test_costmap_clearing.py",
     "ClearCostmap.clear_entirely": "tests/unit/stack/test_behaviors.py",
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",

@@ -11,6 +11,7 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as Spec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
+from simscen.stack.planners import ompl_planner as ompl_planner_module
 from simscen.stack.planners.ompl_planner import ompl_planner
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, setting
@@ -80,3 +81,62 @@ def test_without_allow_unknown_no_pose_lies_where_it_is_not_known() -> None:
     points = planned(view, Pose2(2.0, 3.0, 0.0), Pose2(7.0, 3.0, 0.0), allow_unknown=False)
     columns, rows = ((points[:, i] - view.origin[i]) / view.resolution for i in (0, 1))
     assert (view.costs[rows.astype(int), columns.astype(int)] != 255).all()
+
+
+BOX = (4.0, 0.0, 4.4, 3.0)
+ENDS = Pose2(1.5, 1.5, 0.0), Pose2(7.0, 1.5, 0.0)
+
+
+def tightest_turn(points: np.ndarray) -> float:
+    """Largest curvature of a path in 1/m, away from its cusps."""
+    steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    turns = np.abs(np.angle(np.exp(1j * np.diff(points[:, 2]))))
+    return float((turns[steps > 0.03] / steps[steps > 0.03]).max())
+
+
+def test_minimum_turning_radius_limits_the_curvature() -> None:
+    view = hall(BOX)
+    usual, wide = planned(view, *ENDS), planned(view, *ENDS, minimum_turning_radius=1.4)
+    assert tightest_turn(usual) == pytest.approx(1.0 / (1.15 * CAR.turning_radius), rel=0.02)
+    assert tightest_turn(wide) <= 1.02 / 1.4
+
+
+def test_pose_searches_and_cusp_penalty_decide_between_paths(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A path of 4.2 m without a cusp, then one of 4 m that drives past the goal and back."""
+    bend = np.concatenate((np.linspace((2.0, 3.0), (3.5, 4.5), 44), np.linspace((3.5, 4.5), (5.0, 3.0), 44)[1:]))
+    past = np.concatenate((np.linspace((2.0, 3.0), (5.5, 3.0), 71), np.linspace((5.5, 3.0), (5.0, 3.0), 11)[1:]))
+    yaw = np.arctan2(*np.diff(bend, axis=0)[:, ::-1].T)
+    bend = np.column_stack((bend, [0.0, *yaw[1:], 0.0]))
+    past = np.column_stack((past, np.zeros(len(past))))
+    found: list[np.ndarray] = []
+
+    def search(*_: object) -> list[Pose2]:
+        found.append((bend, past)[len(found) % 2])
+        return [Pose2(*pose) for pose in found[-1].tolist()]
+
+    monkeypatch.setattr(ompl_planner_module, "search_poses", search)
+    for searches, penalty, expected in ((1, 0.0, bend), (2, 0.0, past), (2, 0.1, past), (2, 1.0, bend)):
+        found.clear()
+        points = planned(hall(), Pose2(2, 3), Pose2(5, 3), pose_searches=searches, cusp_penalty=penalty)
+        assert len(found) == searches
+        assert np.allclose(points, expected)
+
+
+def test_hull_clearance_is_kept_where_possible() -> None:
+    view = hall((4.0, 0.0, 4.4, 2.6), (4.0, 4.6, 4.4, 6.0))
+    footprint = Footprint(CAR, view.resolution)
+
+    def clearance(required: float) -> float:
+        points = planned(view, Pose2(1.5, 3.0), Pose2(7.5, 3.0), hull_clearance=required, cost_travel_multiplier=0.0)
+        return float(footprint.clearance(view, points[np.abs(points[:, 0] - 4.2) < 1.0]).min())
+
+    assert clearance(0.0) < 0.3
+    assert clearance(0.5) > 0.5
+    assert clearance(1.0) > 0.5  # half of it fits
+
+
+def test_range_and_goal_bias_apply_to_poses() -> None:
+    view = hall(BOX)
+    usual = planned(view, *ENDS, type="kpiece", pose_searches=1)
+    assert not np.array_equal(usual, planned(view, *ENDS, type="kpiece", pose_searches=1, range=0.8))
+    assert not np.array_equal(usual, planned(view, *ENDS, type="kpiece", pose_searches=1, goal_bias=0.5))

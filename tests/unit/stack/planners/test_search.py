@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from simscen.advanced.planners.search_regions import SampledSearch
+from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.ompl_search import PLANNERS, OmplSearch, Point, Problem
 
 BOUNDS = (0.0, 0.0, 4.0, 4.0)
@@ -13,7 +14,8 @@ BOUNDS = (0.0, 0.0, 4.0, 4.0)
 def search(
     kind: str, problem: Problem, seed: int, iterations: int, improving: int, simplify: bool = False
 ) -> list[Point] | None:
-    return OmplSearch(kind, problem, seed, iterations, improving).solve(simplify=simplify)
+    spec = PlannerSpec(type=kind, max_iterations=iterations, improving_iterations=improving)
+    return OmplSearch(spec, problem, seed).solve(simplify=simplify)
 
 
 def left_half(ax: float, ay: float, bx: float, by: float) -> float:
@@ -34,7 +36,7 @@ def dear_below(ax: float, ay: float, bx: float, by: float) -> float:
 )
 def test_impossible_start_or_goal_is_reported_before_any_iteration(kind: str, start, goal) -> None:
     """OMPL would sleep 5 ms an iteration in wait for better ones: for ever, with so many."""
-    assert search(kind, Problem(start, goal, BOUNDS, left_half), 1, 10**9, 1) is None
+    assert search(kind, Problem(start, goal, BOUNDS, left_half), 1, 10**6, 1) is None
 
 
 PROBLEM = Problem((0.5, 1.9), (3.5, 1.9), BOUNDS, dear_below)
