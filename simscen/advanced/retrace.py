@@ -10,7 +10,6 @@ from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model import recovery as model
-from simscen.stack.behaviors import TIME_ALLOWANCE_S
 from simscen.stack.footprint import Mask, distance_at, lethal_near
 from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
@@ -267,7 +266,7 @@ class Retrace:
             return None
         if follower.driven >= self._spec.backup_dist and self._may_turn(pose, costmap):
             return None
-        if seconds > max(TIME_ALLOWANCE_S, TIME_ALLOWANCE_RATIO * self._spec.retrace_dist / follower.speed):
+        if seconds > max(self._spec.time_allowance, TIME_ALLOWANCE_RATIO * self._spec.retrace_dist / follower.speed):
             raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "driving back along the trail took too long")
         command = follower.command(pose, costmap)
         if command is None and follower.footprint_moved < costmap.resolution:

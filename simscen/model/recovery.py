@@ -10,7 +10,9 @@ from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import (
     Angle,
     Duration,
+    NonNegativeAngularSpeed,
     NonNegativeLength,
+    PositiveAngularAcceleration,
     PositiveAngularSpeed,
     PositiveDuration,
     PositiveSpeed,
@@ -45,8 +47,14 @@ class Spin(BehaviorSpec):
     """Angle of the turn."""
     max_rotational_vel: PositiveAngularSpeed = 1.0
     """Maximum turn rate."""
+    min_rotational_vel: NonNegativeAngularSpeed = 0.4
+    """Minimum turn rate, unless `max_rotational_vel` is lower."""
+    rotational_acc_lim: PositiveAngularAcceleration | None = None
+    """Angular deceleration at the end of the turn; default: the limit of the robot (Nav2: 3.2 rad/s²)."""
     simulate_ahead_time: PositiveDuration = 2.0
     """Time for which the motion is checked for collisions."""
+    time_allowance: PositiveDuration = 10.0
+    """Time after which the behavior fails with SPIN_TIMEOUT."""
 
 
 class Wait(BehaviorSpec):
@@ -69,6 +77,8 @@ class BackUp(BehaviorSpec):
     """Speed."""
     simulate_ahead_time: PositiveDuration = 2.0
     """Time for which the motion is checked for collisions."""
+    time_allowance: PositiveDuration = 10.0
+    """Time after which the behavior fails with BACKUP_TIMEOUT."""
     backup_partial: bool = False
     """Whether to back up a shorter distance if there is not enough room. Nav2 fails instead."""
 
@@ -87,6 +97,9 @@ class Retrace(BehaviorSpec):
     """Maximum distance to drive back. After `backup_dist`, the behavior ends once there is room to turn in place."""
     backup_speed: PositiveSpeed = 0.15
     """Speed."""
+    time_allowance: PositiveDuration = 10.0
+    """Time after which the behavior fails with BACKUP_TIMEOUT, or 1.5 times that which `retrace_dist` takes, if longer.
+    """
 
 
 class ClearCostmap(BehaviorSpec):
@@ -160,6 +173,12 @@ class Recovery(Spec):
     """Time for which the motions of `spin` and `backup` are checked for collisions."""
     max_rotational_vel: PositiveAngularSpeed = 1.0
     """Maximum turn rate of `spin`."""
+    min_rotational_vel: NonNegativeAngularSpeed = 0.4
+    """Minimum turn rate of `spin`, unless `max_rotational_vel` is lower."""
+    rotational_acc_lim: PositiveAngularAcceleration | None = None
+    """Angular deceleration at the end of `spin`; default: the limit of the robot (Nav2: 3.2 rad/s²)."""
+    time_allowance: PositiveDuration = 10.0
+    """Time after which `spin`, `backup`, or `retrace` fails; `retrace` may take longer if `retrace_dist` does."""
 
     @property
     def names(self) -> list[str]:

@@ -13,10 +13,8 @@ from simscen.stack.controllers.collision_checker import time_to_collision
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
-TIME_ALLOWANCE_S = 10.0
-"""Nav2's default time_allowance of every behavior."""
-MIN_ROTATIONAL_VEL_RAD_S = 0.4
-"""Nav2's default of min_rotational_vel."""
+SPIN_TOLERANCE_RAD = 0.01
+"""Rest of a turn that counts as done: a fraction of a degree, which odometry measures no better."""
 
 
 class Spin:
@@ -26,6 +24,7 @@ class Spin:
 
     def __init__(self, spec: model.Spin, setting: Setting) -> None:
         self._spec, self._robot, self._footprint = spec, setting.robot, setting.footprint
+        self._deceleration = spec.rotational_acc_lim or setting.robot.angular_acceleration
         self._turned, self._yaw = 0.0, 0.0
 
     def start(self, pose: Pose2) -> None:
@@ -37,15 +36,14 @@ class Spin:
         self._turned += wrap(pose.yaw - self._yaw)
         self._yaw = pose.yaw
         remaining = abs(self._spec.spin_dist) - math.copysign(1.0, self._spec.spin_dist) * self._turned
-        if remaining <= 0.01 or self._robot.turning_radius > 0.0:
+        if remaining <= SPIN_TOLERANCE_RAD or self._robot.turning_radius > 0.0:
             return None
-        if seconds > TIME_ALLOWANCE_S:
+        if seconds > self._spec.time_allowance:
             raise NavigationFailure(ErrorCode.SPIN_TIMEOUT, "spinning took too long")
-        stopping_rate = math.sqrt(2.0 * self._robot.angular_acceleration * remaining)
+        stopping_rate = math.sqrt(2.0 * self._deceleration * remaining)
         max_rate = min(self._spec.max_rotational_vel, self._robot.max_angular)
-        command = Twist(
-            0.0, 0.0, math.copysign(min(max(stopping_rate, MIN_ROTATIONAL_VEL_RAD_S), max_rate), self._spec.spin_dist)
-        )
+        turn_rate = min(max(stopping_rate, self._spec.min_rotational_vel), max_rate)
+        command = Twist(0.0, 0.0, math.copysign(turn_rate, self._spec.spin_dist))
         horizon = min(self._spec.simulate_ahead_time, remaining / abs(command.wz))
         if time_to_collision(self._footprint, costmap, pose, command, horizon) < horizon:
             raise NavigationFailure(ErrorCode.SPIN_COLLISION_AHEAD, "no room to spin")
@@ -80,7 +78,7 @@ class BackUp:
             return None
         if speed <= 0.0:
             raise NavigationFailure(ErrorCode.BACKUP_INVALID_INPUT, "the robot cannot drive backward")
-        if seconds > TIME_ALLOWANCE_S:
+        if seconds > self._spec.time_allowance:
             raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "backing up took too long")
         command = Twist(-speed, 0.0, 0.0)
         horizon = min(self._spec.simulate_ahead_time, remaining / speed)

@@ -165,3 +165,16 @@ def test_a_round_robot_retraces_too() -> None:
     assert min(end.distance(came) for came in way) < 0.03
     assert end.yaw == pytest.approx(-0.6, abs=0.1)
     assert math.hypot(end.x, end.y) == pytest.approx(0.30, abs=0.03)
+
+
+def test_time_allowance_is_the_time_after_which_retrace_fails() -> None:
+    view = view_of(LONG, Flatland())
+    for allowance, seconds, fails in ((10.0, 10.05, True), (10.0, 9.9, False), (30.0, 20.0, False), (1.0, 9.9, False)):
+        retrace = behavior(LONG, IN, time_allowance=allowance, retrace_dist=1.0, backup_speed=0.15)
+        retrace.start(Pose2(0.0, 0.0))
+        if not fails:
+            assert retrace.step(Pose2(0.0, 0.0), view, seconds) is not None
+            continue
+        with pytest.raises(NavigationFailure) as failed:
+            retrace.step(Pose2(0.0, 0.0), view, seconds)
+        assert failed.value.code is ErrorCode.BACKUP_TIMEOUT

@@ -115,3 +115,66 @@ def test_a_spin_that_does_not_turn_times_out() -> None:
     with pytest.raises(NavigationFailure) as failed:
         spin.step(Pose2(0, 0), view_of(ROUND), 10.1)
     assert failed.value.code == ErrorCode.SPIN_TIMEOUT
+
+
+def test_min_rotational_vel_ends_a_turn_faster() -> None:
+    rates, times = {}, {}
+    for least in (None, 0.1):
+        given = {} if least is None else {"min_rotational_vel": least}
+        _, times[least], commands = run(
+            Spin(model.Spin(rotational_acc_lim=0.5, **given), setting(ROUND)), view_of(ROUND)
+        )
+        rates[least] = min(command.wz for command in commands)
+    assert rates[None] == pytest.approx(0.4, abs=1e-9)
+    assert 0.1 <= rates[0.1] < 0.4
+    assert times[0.1] > times[None]
+
+
+def test_a_lower_max_rotational_vel_wins() -> None:
+    _, _, commands = run(Spin(model.Spin(max_rotational_vel=0.2), setting(ROUND)), view_of(ROUND))
+    assert {command.wz for command in commands} == {0.2}
+
+
+def test_rotational_acc_lim_is_the_deceleration_at_the_end_of_a_turn() -> None:
+    given = model.Spin(rotational_acc_lim=0.5, min_rotational_vel=0.0)
+    pose, behavior = Pose2(0, 0), Spin(given, setting(ROUND))
+    behavior.start(pose)
+    for _ in range(60):
+        command = behavior.step(pose, view_of(ROUND), 0.0)
+        if command is None:
+            break
+        assert command.wz == pytest.approx(min(1.0, math.sqrt(2 * 0.5 * (1.57 - pose.yaw))))
+        pose = Pose2(0, 0, pose.yaw + 0.05 * command.wz)
+    unlimited = Spin(model.Spin(rotational_acc_lim=100.0), setting(ROUND))
+    unlimited.start(Pose2(0, 0))
+    near_end = unlimited.step(Pose2(0, 0, 1.5), view_of(ROUND), 0.0)
+    assert near_end is not None and near_end.wz == 1.0
+
+
+@pytest.mark.parametrize(
+    ("behavior", "code"),
+    [(Spin(model.Spin(time_allowance=1.0), setting(ROUND)), ErrorCode.SPIN_TIMEOUT),
+     (BackUp(model.BackUp(time_allowance=1.0), setting(ROUND)), ErrorCode.BACKUP_TIMEOUT)],
+    ids=["spin", "backup"],
+)  # fmt: skip
+def test_a_behavior_fails_after_its_time_allowance(behavior: Behavior, code: ErrorCode) -> None:
+    behavior.start(Pose2(0, 0))
+    assert behavior.step(Pose2(0, 0), view_of(ROUND), 1.0) is not None
+    with pytest.raises(NavigationFailure) as failed:
+        behavior.step(Pose2(0, 0), view_of(ROUND), 1.05)
+    assert failed.value.code is code
+
+
+def test_recovery_passes_its_parameters_to_behaviors_that_do_not_set_them() -> None:
+    entries = ["spin", {"type": "backup", "time_allowance": 3.0}, "retrace"]
+    spin, backup, retrace = model.Recovery(
+        behaviors=entries, time_allowance=7.0, min_rotational_vel=0.2, rotational_acc_lim=2.0
+    ).chosen()
+    assert isinstance(spin, model.Spin) and isinstance(backup, model.BackUp) and isinstance(retrace, model.Retrace)
+    assert (spin.time_allowance, spin.min_rotational_vel, spin.rotational_acc_lim) == (7.0, 0.2, 2.0)
+    assert (backup.time_allowance, retrace.time_allowance) == (3.0, 7.0)
+
+
+def test_the_default_values_are_those_of_nav2() -> None:
+    recovery = model.Recovery()
+    assert (recovery.time_allowance, recovery.min_rotational_vel, recovery.max_rotational_vel) == (10.0, 0.4, 1.0)
