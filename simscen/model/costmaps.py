@@ -10,7 +10,10 @@ from simscen.spec.quantities import (
     NonNegativeAngle,
     NonNegativeLength,
     PositiveLength,
+    Quantity,
 )
+
+PublishFrequency = Annotated[float, Field(ge=0, le=1000), Quantity("frequency")]
 
 
 class DenoiseLayer(Spec):
@@ -35,6 +38,13 @@ class Costmap(Ranged):
     """Exponential decay of the cost with the distance from an obstacle, per meter."""
     update_frequency: Frequency = 5.0
     """Rate of the updates with sensor data."""
+    publish_frequency: PublishFrequency = 0.5
+    """Maximum rate at which the costmap is written to the log, if it has changed; lower for large costmaps. 0 = never
+    (Nav2: 1 Hz)."""
+    lethal_cost_threshold: Annotated[int, Field(ge=1, le=100)] = 65
+    """Minimum occupancy, in percent, of map cells that are obstacles (Nav2: 100). All values mean the same on a
+    map of the mode `trinary`, whose cells are free or occupied; cells of the modes `scale` and `raw` may be in between.
+    """
     obstacle_max_range: PositiveLength = 2.5
     """Maximum distance at which obstacles are marked."""
     obstacle_min_range: NonNegativeLength = 0.0
@@ -79,6 +89,8 @@ class LocalCostmap(Spec):
     """Exponential decay of the cost with the distance from an obstacle, per meter."""
     update_frequency: Frequency | None = None
     """Rate of the updates with sensor data."""
+    publish_frequency: PublishFrequency = 1.0
+    """Maximum rate at which the costmap is written to the log, if it has changed; 0 = never."""
     obstacle_max_range: PositiveLength | None = None
     """Maximum distance at which obstacles are marked."""
     obstacle_min_range: NonNegativeLength | None = None

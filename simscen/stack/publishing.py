@@ -13,14 +13,13 @@ from simscen.core.messages.navigation import Belief, Path
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import CostGrid
 from simscen.stack.costmap.costmaps import Costmaps
+from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.frames import Frames, transform_poses
 from simscen.stack.kinematics import LOCAL_PLAN_TIMES_S, arc_poses
-from simscen.stack.protocols import Controller, CostmapView, Localizer, SupportsArc
+from simscen.stack.protocols import Controller, Localizer, SupportsArc
 
 BELIEF_RATE, LOCAL_PLAN_RATE = 10.0, 5.0
 """Rates in Hz of beliefs without a scan, and of local plans."""
-GLOBAL_COSTMAP_RATE, LOCAL_COSTMAP_RATE = 0.5, 1.0
-"""Rates in Hz of costmaps, which are for display only: half of Nav2's, and lower for large costmaps."""
 MAX_CELLS_PER_SECOND = 125_000
 """Limit for each costmap; a larger one is published less often."""
 # Translation of costs as in nav2_costmap_2d's publisher: 1 … 252 become 1 … 98.
@@ -49,8 +48,8 @@ class Publisher:
         self._local_plan_due = self._local_plan_period
         self._arcs = controller if isinstance(controller, SupportsArc) else None
         self._plan: Path | None = None
-        self._global_costmap = _CostmapPublisher("global", "map", GLOBAL_COSTMAP_RATE)
-        self._local_costmap = _CostmapPublisher("local", local_frame, LOCAL_COSTMAP_RATE)
+        self._global_costmap = _CostmapPublisher("global", "map")
+        self._local_costmap = _CostmapPublisher("local", local_frame)
 
     def belief(self, tick: int) -> Belief:
         """Return the belief. Call it with each scan, and otherwise when `belief_due`."""
@@ -84,7 +83,7 @@ class Publisher:
     def _costmap_updates(self, tick: int, costmaps: Costmaps) -> tuple[CostGrid, ...]:
         """Return the costmaps that are due and have changed."""
         pairs = (self._global_costmap, costmaps.global_costmap), (self._local_costmap, costmaps.local_costmap)
-        grids = (each.update(tick, costmap.view, self._tick_rate) for each, costmap in pairs if tick >= each.due)
+        grids = (each.update(tick, costmap, self._tick_rate) for each, costmap in pairs if tick >= each.due)
         return tuple(grid for grid in grids if grid is not None)
 
 
@@ -94,13 +93,17 @@ class _CostmapPublisher:
 
     name: str
     frame: str
-    rate: float
-    due: int = 0
+    due: float = 0
     revision: int = -1
 
-    def update(self, tick: int, view: CostmapView, tick_rate: int) -> CostGrid | None:
-        """Return the costmap, or None if it has not changed."""
-        self.due = tick + math.ceil(tick_rate * max(1 / self.rate, view.costs.size / MAX_CELLS_PER_SECOND))
+    def update(self, tick: int, costmap: LayeredCostmap, tick_rate: int) -> CostGrid | None:
+        """Return the costmap, or None if it has not changed or is never published."""
+        if costmap.publish_frequency == 0.0:
+            self.due = math.inf
+            return None
+        view = costmap.view
+        period = max(1 / costmap.publish_frequency, view.costs.size / MAX_CELLS_PER_SECOND)
+        self.due = tick + math.ceil(tick_rate * period)
         if view.revision == self.revision:
             return None
         self.revision = view.revision

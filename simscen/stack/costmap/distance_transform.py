@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 ROWS_PER_BLOCK = 64
+"""Number of rows that are processed at once."""
 MAX_INT32_EDGE_CELLS = 30_000
 """Longest edge of a grid for which squared distances fit into 32 bits."""
 

@@ -96,8 +96,17 @@ class LayeredCostmap:
         self._unknown = layer.unknown.copy()
         grid = None if self._has_keepout else surroundings.map
         self._recompute(
-            None if grid is None else _costs(grid, self._inflation, self._margin_cells, self._tracks_unknown).copy()
+            None
+            if grid is None
+            else _costs(
+                grid, self._inflation, spec.lethal_cost_threshold, self._margin_cells, self._tracks_unknown
+            ).copy()
         )
+
+    @property
+    def publish_frequency(self) -> float:
+        """Maximum rate in Hz at which to publish the costmap; 0 = never."""
+        return self._spec.publish_frequency
 
     @property
     def view(self) -> CostmapView:
@@ -215,12 +224,12 @@ class LayeredCostmap:
     def _static_layer_in(self, window: GridFrame) -> StaticLayer:
         """Return the static layer in this window, or on the map if there is one."""
         grid, keepout, mask = self._surroundings.map, self._surroundings.keepout, self._surroundings.masks.keepout
-        unknown = self._tracks_unknown
+        unknown, threshold = self._tracks_unknown, self._spec.lethal_cost_threshold
         if grid is None:
             return empty_layer(window, keepout, mask, unknown)
         if not self._has_keepout:
-            return free_layer(grid, unknown)
-        return static_layer(grid, keepout, mask, unknown)
+            return free_layer(grid, threshold, unknown)
+        return static_layer(grid, threshold, keepout, mask, unknown)
 
     @property
     def _has_keepout(self) -> bool:
@@ -237,7 +246,7 @@ class LayeredCostmap:
         if grid is None:
             self._static_squared = squared_distances(layer.lethal, self._margin_cells)
         else:
-            self._static_squared = static_distances(grid, self._margin_cells)
+            self._static_squared = static_distances(grid, self._spec.lethal_cost_threshold, self._margin_cells)
         self._has_walls = bool(layer.lethal.any())
 
     def _recompute(self, costs: Costs | None = None) -> None:
@@ -338,15 +347,14 @@ def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
 def precompute(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
     """Compute the costs of a map in advance, for a robot without keepout zones."""
     tables, margin = _inflation(spec, robot, grid.resolution), _in_cells(_reach(spec, robot), grid.resolution)
-    _costs(grid, tables, margin, spec.track_unknown_space)
+    _costs(grid, tables, spec.lethal_cost_threshold, margin, spec.track_unknown_space)
 
 
 @cached_on_instance
-def _costs(grid: OccupancyGrid, tables: Inflation, margin: int, tracks_unknown: bool) -> Costs:
+def _costs(grid: OccupancyGrid, tables: Inflation, threshold: int, margin: int, tracks_unknown: bool) -> Costs:
     """Return the costs of the cells of a map without zones and readings, computed once for all runs."""
-    return tables.costs(
-        static_distances(grid, margin), free_layer(grid, tracks_unknown).unknown if tracks_unknown else None
-    )
+    unknown = free_layer(grid, threshold, tracks_unknown).unknown if tracks_unknown else None
+    return tables.costs(static_distances(grid, threshold, margin), unknown)
 
 
 def _inflation(spec: CostmapSpec, robot: RobotModel, resolution: float) -> Inflation:

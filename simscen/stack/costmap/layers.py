@@ -25,6 +25,7 @@ from simscen.stack.costmap.grid_frame import GridFrame
 from simscen.stack.protocols import Surroundings
 
 FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
+"""Costs of nav2_costmap_2d (cost_values.hpp)."""
 MAX_SQUARED_CELLS = OUT_OF_REACH
 """The largest squared distance: that of 256 cells, 12.8 m at 5 cm."""
 
@@ -79,8 +80,6 @@ class Inflation:
 
 
 Mask = npt.NDArray[np.bool_]
-OCCUPIED_THRESHOLD = 65
-"""nav2's lethal_cost_threshold is 100 on a trinary map; 65 also reads maps that were loaded in scale mode."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +92,16 @@ class StaticLayer:
 
 
 def static_layer(
-    grid: OccupancyGrid, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = True
+    grid: OccupancyGrid,
+    threshold: int,
+    keepout: tuple[Polygon, ...],
+    mask: OccupancyGrid | None = None,
+    unknown: bool = True,
 ) -> StaticLayer:
     """Return the layer of a map; a rotated map is sampled into an unrotated frame of the same resolution.
 
-    Without tracking of `unknown` space, unknown cells are free, as in Nav2.
+    Cells with an occupancy of at least `threshold` percent are lethal. Without tracking of `unknown` space, unknown
+    cells are free, as in Nav2.
     """
     if abs(grid.origin.yaw) < 1e-9:
         frame = GridFrame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
@@ -105,20 +109,20 @@ def static_layer(
     else:
         frame = _bounding_frame(grid)
         cells = grid.values_at(_all_centers(frame)).reshape(frame.shape)
-    lethal = np.ascontiguousarray(cells >= OCCUPIED_THRESHOLD) | _keepout_cells(frame, keepout, mask)
+    lethal = np.ascontiguousarray(cells >= threshold) | _keepout_cells(frame, keepout, mask)
     return StaticLayer(frame, lethal, (cells == UNKNOWN) & ~lethal & unknown)
 
 
 @cached_on_instance
-def free_layer(grid: OccupancyGrid, unknown: bool) -> StaticLayer:
+def free_layer(grid: OccupancyGrid, threshold: int, unknown: bool) -> StaticLayer:
     """Return the layer of a map without zones, computed once for all runs, which write into copies."""
-    return static_layer(grid, (), unknown=unknown)
+    return static_layer(grid, threshold, (), unknown=unknown)
 
 
 @cached_on_instance
-def static_distances(grid: OccupancyGrid, reach: int) -> Squared:
+def static_distances(grid: OccupancyGrid, threshold: int, reach: int) -> Squared:
     """Return the squared distances in a layer without zones, computed once for all runs."""
-    return squared_distances(free_layer(grid, True).lethal, reach)
+    return squared_distances(free_layer(grid, threshold, True).lethal, reach)
 
 
 def empty_layer(

@@ -348,3 +348,27 @@ def test_a_window_that_rolls_goes_on_knowing_what_it_knew() -> None:
     map_.update(Pose2(1.5, 0.0), scan_of(Flatland(), Pose2(1.5, 0.0)))
     assert at(map_, -1.0, 0.0)[0] == 0
     assert at(map_, 5.0, 0.0)[0] == 255
+
+
+@pytest.mark.parametrize(("threshold", "lethal"), [(None, (65, 100)), (100, (100,)), (30, (30, 64, 65, 100))])
+@pytest.mark.parametrize("keepout", [(), (((5.0, 5.0), (6.0, 5.0), (6.0, 6.0)),)], ids=["no zone", "a zone"])
+def test_lethal_cost_threshold_is_the_lowest_occupancy_of_an_obstacle(threshold, lethal, keepout) -> None:
+    cells = np.zeros((40, 40), dtype=np.int8)
+    occupancies = (1, 30, 64, 65, 100)
+    for number, occupancy in enumerate(occupancies):
+        cells[10, 5 + 5 * number] = occupancy
+    spec = Spec() if threshold is None else Spec(lethal_cost_threshold=threshold)
+    grid = OccupancyGrid(cells, 0.05)
+    for _ in range(2):  # the second one uses what the first one has cached
+        view = LayeredCostmap(spec, Surroundings(ROBOT, grid, RATE, keepout=keepout)).view
+        found = tuple(each for number, each in enumerate(occupancies) if view.costs[10, 5 + 5 * number] == 254)
+        assert found == lethal
+
+
+def test_costmaps_of_one_map_have_their_own_threshold() -> None:
+    grid = OccupancyGrid(np.full((20, 20), 50, dtype=np.int8), 0.05)
+    costs = [
+        LayeredCostmap(Spec(lethal_cost_threshold=value), Surroundings(ROBOT, grid, RATE)).view.costs[5, 5]
+        for value in (65, 50, 65)
+    ]
+    assert costs == [0, 254, 0]
