@@ -46,6 +46,9 @@ class CollisionMonitor(Spec):
     """Time without lidar data after which the robot stops (Nav2's default is 1 s)."""
     time_before_collision: PositiveDuration = 0.5
     """APPROACH: minimum time before a collision; the robot slows down to keep it."""
+    simulation_time_step: PositiveDuration | None = None
+    """APPROACH: maximum time between two poses that are compared with the scan; default: an eighth of
+    `time_before_collision` (Nav2: 0.1 s)."""
     stop_margin: NonNegativeLength = 0.02
     """STOP: minimum distance between the footprint and obstacles in the direction of travel. Nav2 has no such margin.
     """

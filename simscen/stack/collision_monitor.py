@@ -17,8 +17,12 @@ from simscen.stack.kinematics import poses_along
 from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import RobotModel
 
-SAMPLES = 8
-"""Number of times within the horizon at which the footprint is compared with the scan."""
+DEFAULT_STEPS = 8
+"""Number of time steps until `time_before_collision` without `simulation_time_step`."""
+STEP_ROUNDING = 1e-9
+"""Fraction of a time step by which rounding may exceed the horizon, so that it does not add a step."""
+MAX_STEPS = 1000
+"""Largest number of time steps, so that a tiny `simulation_time_step` cannot exhaust the memory."""
 ORIGIN = Pose2(0.0, 0.0)
 MIN_APPROACH_M = 0.005
 """Braking for a moving obstacle helps only if it would come closer by this much than to a stationary robot."""
@@ -52,7 +56,7 @@ class CollisionMonitor:
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
-        self._times = np.linspace(0.0, spec.time_before_collision, SAMPLES + 1)
+        self._times = np.linspace(0.0, spec.time_before_collision, _time_steps(spec) + 1)
         self._stop_radius = robot.circumscribed_radius + spec.stop_margin
         self._normal = normal / np.hypot(normal[:, 0], normal[:, 1])[:, None]
         self._offset = np.sum(self._normal * corners, axis=1)
@@ -186,6 +190,13 @@ class CollisionMonitor:
         body = np.stack((cosine * dx + sine * dy, cosine * dy - sine * dx), axis=-1)
         gaps: Array = (body @ self._normal.T - self._offset).max(axis=-1)
         return gaps
+
+
+def _time_steps(spec: MonitorSpec) -> int:
+    """Return the number of time steps until `time_before_collision`, none longer than `simulation_time_step`."""
+    if spec.simulation_time_step is None:
+        return DEFAULT_STEPS
+    return min(MAX_STEPS, math.ceil(spec.time_before_collision / spec.simulation_time_step - STEP_ROUNDING))
 
 
 def _miter_factor(normals: Array) -> float:

@@ -233,6 +233,7 @@ def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[T
 def _approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Translation]:
     for nav2_name, simscen_name, offset in (
         ("time_before_collision", "time_before_collision", 0),
+        ("simulation_time_step", "simulation_time_step", 0),
         ("max_points", "min_points", 1),  # Humble: the action starts at one point more
         ("min_points", "min_points", 0),
     ):

@@ -122,3 +122,17 @@ def test_the_monitor_brakes_for_what_moves_wherever_the_whole_look_at_the_hull_w
         spared += not hasty._may_meet_moving(wanted, MonitorSpec().time_before_collision)
     assert braked > 10
     assert spared > 100
+
+
+@pytest.mark.parametrize(
+    ("step", "free_time"),
+    [(None, 0.375), (0.0625, 0.375), (0.1, 0.3), (0.005, 0.395), (0.5, 0.0), (9.0, 0.0)],
+)
+def test_simulation_time_step_is_the_resolution_of_the_time_before_collision(
+    step: float | None, free_time: float
+) -> None:
+    """Contact after 0.4 s at 0.5 m/s: the last step before it counts."""
+    guard = monitor(**({} if step is None else {"simulation_time_step": step}))
+    guard.on_scan(scan((0.22 + 0.02 + 0.199, 0.0)), Pose2(0, 0))
+    allowed = guard.allow(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
+    assert allowed.vx == pytest.approx(0.5 * free_time / 0.5)
