@@ -27,6 +27,9 @@ class PlannerSpec(Typed):
     replanning_rate: Frequency | None = None
     """Rate of new plans, or of checks of the current plan; default: 1 Hz, with navigate_through_poses 0.333 Hz, as in
     Nav2's behavior trees."""
+    proximity_threshold: NonNegativeLength = 4.0
+    """With `replanning: rate`, a plan that is not blocked is kept once less than this is left of it (IsGoalNearby in
+    Nav2's behavior trees)."""
     cautious: bool = False
     """Whether to prefer paths with more clearance after the robot failed to follow a plan, as the advanced stack does.
     """

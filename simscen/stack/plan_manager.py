@@ -19,8 +19,6 @@ CHECK_EVERY_STEPS = 2
 """Steps between two checks of the plan: 10 Hz at the default controller rate."""
 TO_POSE_RATE_HZ, THROUGH_POSES_RATE_HZ = 1.0, 0.333
 """Replanning rates of Nav2's default trees."""
-GOAL_NEARBY_M = 4.0
-"""Nav2's trees (IsGoalNearby, ValidatePath) keep an unblocked plan once less than this is left of it."""
 PLAN_END_M = 0.1
 """An intermediate goal that is not reached this close to the end of the plan has been missed."""
 
@@ -159,7 +157,7 @@ class PlanManager:
             if self._is_blocked(plan):
                 return "blocked"
             return "window" if self._is_partial and self._costmap.view.origin != self._origin else ""
-        may_keep = plan.remaining() < GOAL_NEARBY_M and not self._is_partial
+        may_keep = plan.remaining() < self._spec.proximity_threshold and not self._is_partial
         return "" if may_keep and not self._is_blocked(plan) else "rate"
 
     def _optional_reason(self, now: float, goal: Goal, pose: Pose2, plan: FollowedPlan) -> str:
