@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from simscen.model.mppi import Mppi
-from simscen.model.stack_base import ControllerSpec, GoalTolerances, Weight
+from simscen.model.stack_base import ControllerSpec, GoalTolerances, PathFollowerSpec, Weight
 from simscen.spec.base import Ranged, Spec, Typed, type_discriminator
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import (
@@ -31,7 +31,7 @@ SidewaysDeceleration = Annotated[float, Field(ge=-1000, le=0), Quantity("acceler
 AngularDeceleration = Annotated[float, Field(ge=-1000, lt=0), Quantity("angular acceleration")]
 
 
-class RegulatedPurePursuit(Ranged, ControllerSpec):
+class RegulatedPurePursuit(Ranged, PathFollowerSpec):
     """nav2_regulated_pure_pursuit_controller (Macenski et al. 2023)."""
 
     component: ClassVar[str] = "simscen.stack.controllers.regulated_pure_pursuit:RegulatedPurePursuit"
@@ -68,6 +68,9 @@ class RegulatedPurePursuit(Ranged, ControllerSpec):
     """Whether to stop if the command would lead to a collision."""
     max_allowed_time_to_collision_up_to_carrot: PositiveDuration = 1.0
     """Time for which commands are checked for collisions, at most up to the point that is followed."""
+    min_slowed_speed: PositiveSpeed = 0.1
+    """Speed to which a command that would lead to a collision is slowed down before the controller fails with
+    NO_VALID_CONTROL. Nav2 fails at once."""
     use_regulated_linear_velocity_scaling: bool = True
     """Whether to slow down in tight curves."""
     regulated_linear_scaling_min_radius: PositiveLength = 0.9
@@ -100,7 +103,7 @@ class RegulatedPurePursuit(Ranged, ControllerSpec):
         return self.max_allowed_time_to_collision_up_to_carrot
 
 
-class DynamicWindow(ControllerSpec):
+class DynamicWindow(PathFollowerSpec):
     """Dynamic-window controller with DWB's critics (Fox et al. 1997; nav2_dwb_controller)."""
 
     component: ClassVar[str] = "simscen.stack.controllers.dwb.controller:DynamicWindowController"
@@ -166,6 +169,8 @@ class DynamicWindow(ControllerSpec):
     """Weight of the speed while the robot stops at the goal before it turns."""
     twirling_scale: Weight = 0.0
     """Weight of the turn rate, which keeps an omnidirectional base from spinning while it drives."""
+    preferred_clearance: NonNegativeLength = 0.05
+    """Clearance of the footprint that a trajectory must have if any trajectory has it. Nav2 has no such preference."""
     forward_point_distance: NonNegativeLength = 0.1
     """Distance from the center of the robot to its front, for the two alignment weights."""
     oscillation_reset_dist: NonNegativeLength = 0.05

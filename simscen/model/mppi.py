@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from simscen.model.stack_base import ControllerSpec, Weight
+from simscen.model.stack_base import PathFollowerSpec, Weight
 from simscen.spec.base import Spec, by_default
 from simscen.spec.quantities import (
     Duration,
@@ -197,7 +197,7 @@ class MppiTrajectoryValidator(Spec):
     """Whether to check the whole footprint instead of its inscribed circle; default: true (Nav2: false)."""
 
 
-class Mppi(ControllerSpec):
+class Mppi(PathFollowerSpec):
     """Model predictive path integral controller (Williams et al. 2017; nav2_mppi_controller)."""
 
     component: ClassVar[str] = "simscen.stack.controllers.mppi.controller:MppiController"
@@ -248,6 +248,13 @@ class Mppi(ControllerSpec):
     """Temperature of the weighting: lower values prefer the best samples more strongly."""
     gamma: Annotated[float, Field(ge=0, le=10)] = 0.015
     """Weight of the control effort relative to the cost of a sample."""
+    prune_distance: PositiveLength = 2.0
+    """Minimum length of the plan ahead that is considered; more if the samples reach farther (Nav2: always 1.5 m)."""
+    command_free_time: Annotated[PositiveDuration, Field(le=60)] = 0.5
+    """Time for which the command itself must be free of collisions; otherwise it is slowed down. Nav2 has no such
+    check."""
+    min_slowed_speed: PositiveSpeed = 0.1
+    """Speed to which such a command is slowed down before the controller fails with NO_VALID_CONTROL."""
     regenerate_noises: bool = False
     """Whether to draw new samples for each command."""
     retry_attempt_limit: Annotated[int, Field(ge=0, le=20)] = 1

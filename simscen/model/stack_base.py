@@ -6,7 +6,7 @@ from pydantic import Field
 
 from simscen.spec.base import Spec, Typed, by_default
 from simscen.spec.places import MaskFile, Name, RegionName, SpeedMask
-from simscen.spec.quantities import Duration, Frequency, PositiveAngle, PositiveLength, PositiveSpeed
+from simscen.spec.quantities import Duration, Frequency, PositiveAngle, PositiveLength, PositiveSpeed, Quantity
 
 
 class GoalTolerances(Spec):
@@ -61,6 +61,17 @@ class ControllerSpec(Typed):
     def lookahead_s(self) -> float:
         """Time horizon of the commands in seconds; the local costmap is large enough for it."""
         return 2.0
+
+
+class PathFollowerSpec(ControllerSpec):
+    """Base class of the specifications of the shipped controllers."""
+
+    goal_tolerance_ratio: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 0.45
+    """Fraction of the goal's `xy_goal_tolerance` at which the position counts as reached, and the robot turns to the
+    goal's heading. Nav2: 1, where a localization error of a centimeter causes a false success."""
+    max_robot_pose_search_dist: PositiveLength = 1.5
+    """Length of plan beyond the last position that is searched for the point nearest to the robot, so that a plan may
+    cross itself (Nav2: half the size of the local costmap)."""
 
 
 class Latency(Spec):

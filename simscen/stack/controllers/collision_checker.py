@@ -13,8 +13,6 @@ from simscen.stack.kinematics import MIN_YAW_RATE, poses_along
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
-MIN_SPEED_M_S = 0.1
-"""Speed below which a command is not slowed further: the path counts as blocked."""
 SPEED_FACTORS = (1.0, 0.75, 0.5, 0.25, 0.0)
 """Factors by which a command is slowed to let moving obstacles pass."""
 MAX_TIME_STEP_S, UNCERTAINTY_SIGMAS = 0.1, 0.5
@@ -26,8 +24,9 @@ APPROACH_TOLERANCE_M = 1e-4
 class CollisionChecker:
     """Checks the arc of a command for collisions, and slows the command down if a collision is too near."""
 
-    def __init__(self, footprint: Footprint) -> None:
-        self._footprint = footprint
+    def __init__(self, footprint: Footprint, min_speed: float) -> None:
+        """Take the footprint, and the speed in m/s below which a command is not slowed further."""
+        self._footprint, self._min_speed = footprint, min_speed
 
     def free_time(self, costmap: CostmapView, pose: Pose2, command: Twist, horizon: float) -> float:
         """Return how long the command can be driven without touching a static obstacle, in s, at most `horizon`."""
@@ -41,7 +40,7 @@ class CollisionChecker:
         if free_time >= horizon:
             return command
         scale = free_time / required
-        if max(abs(command.vx), abs(command.vy)) * scale < MIN_SPEED_M_S:
+        if max(abs(command.vx), abs(command.vy)) * scale < self._min_speed:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, f"collision ahead in {free_time:.2f} s")
         return Twist(command.vx * scale, command.vy * scale, command.wz * scale)
 

@@ -5,6 +5,7 @@ import math
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.model.stack_base import PathFollowerSpec
 from simscen.stack.controllers.path_handler import PathTracker
 from simscen.stack.protocols import NavigationFailure, RobotModel
 
@@ -17,7 +18,9 @@ SAME_GOAL_M = 0.1
 class PathFollower:
     """Base class of a controller that follows a path at a limited speed. Subclasses implement `command`."""
 
-    def __init__(self, max_speed: float | None, robot: RobotModel) -> None:
+    def __init__(self, spec: PathFollowerSpec, max_speed: float | None, robot: RobotModel) -> None:
+        """Take the parameters, the maximum speed in m/s (None: Nav2's default), and the robot."""
+        self._search_distance = spec.max_robot_pose_search_dist
         self._full_speed = min(max_speed or DEFAULT_SPEED_M_S, robot.max_linear)
         self._speed_limit: float | None = None
         self._tracker: PathTracker | None = None
@@ -30,7 +33,7 @@ class PathFollower:
         end = Pose2(*path.points[-1].tolist())
         if self._end is None or end.distance(self._end) > SAME_GOAL_M:
             self.begin()
-        self._end, self._tracker = end, PathTracker(path)
+        self._end, self._tracker = end, PathTracker(path, self._search_distance)
 
     def begin(self) -> None:
         """Reset the state for a path to another goal. A new path to the same goal does not reset it."""
@@ -62,8 +65,8 @@ class PathFollower:
         return self._tracker
 
 
-REACHED_TOLERANCE_RATIO, PASSED_TOLERANCE_RATIO = 0.45, 0.8
-"""Distances to the goal at which driving stops, relative to xy_goal_tolerance: ahead of the goal, and beyond it."""
+PASSED_TOLERANCE_RATIO = 0.8
+"""Distance beyond the goal at which driving stops, relative to xy_goal_tolerance: the robot could only come back."""
 STOPPED_SPEED_M_S, STOPPED_PATH_LENGTH_M = 0.01, 0.2
 """A robot that stands within the tolerance has arrived if its speed and the rest of its path are below these."""
 PASSED_PATH_LENGTH_M = 0.1
@@ -79,8 +82,14 @@ BRAKING_FACTOR = 1.6
 class GoalRotation:
     """Decides when the position of the goal is reached, and rotates the robot to the heading of the goal."""
 
-    def __init__(self, robot: RobotModel, max_turn_rate: float, acceleration: float, period: float) -> None:
-        """Take the limits in rad/s and rad/s², and the control period in s."""
+    def __init__(
+        self, robot: RobotModel, max_turn_rate: float, acceleration: float, period: float, tolerance_ratio: float
+    ) -> None:
+        """Take the limits in rad/s and rad/s², and the control period in s.
+
+        `tolerance_ratio` is the fraction of the goal's tolerance at which driving stops.
+        """
+        self._tolerance_ratio = tolerance_ratio
         self._can_turn = robot.turning_radius == 0.0
         self._max_turn_rate = min(max_turn_rate, robot.max_angular)
         self._acceleration, self._period = acceleration, period
@@ -103,7 +112,7 @@ class GoalRotation:
             return False
         dx, dy = goal.pose.x - pose.x, goal.pose.y - pose.y
         is_behind = dx * math.cos(pose.yaw) + dy * math.sin(pose.yaw) <= 0.0
-        is_near = distance <= REACHED_TOLERANCE_RATIO * goal.xy_tolerance
+        is_near = distance <= self._tolerance_ratio * goal.xy_tolerance
         has_stopped = abs(twist.vx) < STOPPED_SPEED_M_S and remaining < STOPPED_PATH_LENGTH_M
         has_passed = (
             distance <= PASSED_TOLERANCE_RATIO * goal.xy_tolerance and is_behind and remaining < PASSED_PATH_LENGTH_M

@@ -14,7 +14,7 @@ from simscen.core.messages.navigation import Path
 from simscen.stack.kinematics import direction_changes, forward_steps
 
 SEARCH_AHEAD_M = 1.5
-"""Length of path beyond the last position that is searched for the nearest point, so that a path may cross itself."""
+"""Default search distance, also of the plan manager. That of controllers is `max_robot_pose_search_dist`."""
 CUSP_REACHED_M = 0.03
 """Length of path before a cusp at which the cusp counts as reached."""
 CURVATURE_SPAN_M = 0.3
@@ -35,7 +35,9 @@ class PathTracker:
     the length of the step. So few points remain that scalars (points as x + iy) are faster than arrays.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, search_distance: float = SEARCH_AHEAD_M) -> None:
+        """Take a path, and the length of path in m beyond the last position that is searched for the nearest point."""
+        self._search_distance = search_distance
         self.points = np.ascontiguousarray(path.points)
         steps = np.diff(self.points[:, :2], axis=0)
         lengths = np.hypot(steps[:, 0], steps[:, 1])
@@ -79,7 +81,7 @@ class PathTracker:
     def _find_nearest(self, pose: Pose2) -> None:
         points, along, robot = self._complex_points, self._along, complex(pose.x, pose.y)
         index = nearest = self.index
-        end, search_end, shortest = self._segment_ends[0], along[index] + SEARCH_AHEAD_M, math.inf
+        end, search_end, shortest = self._segment_ends[0], along[index] + self._search_distance, math.inf
         while index <= end and along[index] <= search_end:
             distance = abs(points[index] - robot)
             if distance < shortest:

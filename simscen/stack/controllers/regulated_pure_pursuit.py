@@ -61,10 +61,13 @@ class RegulatedPurePursuit(PathFollower):
 
     def __init__(self, spec: RppSpec, setting: Setting) -> None:
         robot, footprint, period = setting.robot, setting.footprint, setting.control_period
-        super().__init__(spec.desired_linear_vel, robot)
+        super().__init__(spec, spec.desired_linear_vel, robot)
         self._spec, self._robot, self._is_car = spec, robot, robot.turning_radius > 0.0
-        self._goal_rotation = GoalRotation(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
-        self._collision_checker, self._rotation_clearance = CollisionChecker(footprint), RotationClearance(footprint)
+        self._goal_rotation = GoalRotation(
+            robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period, spec.goal_tolerance_ratio
+        )
+        self._collision_checker = CollisionChecker(footprint, spec.min_slowed_speed)
+        self._rotation_clearance = RotationClearance(footprint)
         self._speed_regulation = SpeedRegulation(spec, setting)
         self.arc: tuple[Pose2, Twist] | None = None
         """Pose and velocity of the last command."""

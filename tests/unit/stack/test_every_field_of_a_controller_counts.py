@@ -46,6 +46,8 @@ class Probe(NamedTuple):
 
 AHEAD, LEFT, RIGHT = ((0, 0), (4, 0)), ((0, 0), (0, 1), (4, 0)), ((0, 0), (0, -1), (4, 0))
 BEND = ((0, 0), (0.8, 0), (1.5, 0.7), (1.5, 3))
+RETURNING = ((0, 0), (1, 0), (1, 0.3), (0, 0.3), (0, 3))
+"""A path that passes its own start after 2.3 m."""
 FAR = Pose2(4.0, 0.0, 1.0)
 MOVING = Twist(0.3, 0.0, 0.2)
 
@@ -81,6 +83,8 @@ def common(robot: RobotModel) -> list[Probe]:
         following(robot, ((0, 0), (0.3, 0)), Pose2(0.27, 0.0, 0.5), twist=Twist(0.2)),
         Probe(robot, (), FAR, (Step(Pose2(0.27, 0.0), MOVING, ((0, 0), (0.3, 0))),)),
         following(robot, ((0, 0), (0.3, 0)), Pose2(0.0, 0.05, -2.0)),
+        following(robot, ((0, 0), (0.3, 0)), Pose2(0.15, 0.0, 0.5), twist=Twist(0.2)),
+        following(robot, RETURNING, Pose2(0.0, 0.28, 0.1)),
     ]
 
 

@@ -28,14 +28,18 @@ class DynamicWindowController(PathFollower):
 
     def __init__(self, spec: DwbSpec, setting: Setting) -> None:
         robot = setting.robot
-        super().__init__(spec.max_vel_x, robot)
+        super().__init__(spec, spec.max_vel_x, robot)
         self._spec, self._robot = spec, robot
         self._kinematics = kinematics_of(spec, robot, self._full_speed)
         self._sample_counts = (spec.vx_samples, spec.vy_samples, spec.vtheta_samples)
         self._goal_rotation = GoalRotation(
-            robot, spec.max_vel_theta, robot.angular_acceleration, setting.control_period
+            robot,
+            spec.max_vel_theta,
+            robot.angular_acceleration,
+            setting.control_period,
+            spec.goal_tolerance_ratio,
         )
-        self._obstacle_critic = ObstacleCritic(setting.footprint)
+        self._obstacle_critic = ObstacleCritic(setting.footprint, spec.preferred_clearance)
         self._rotate_to_goal = RotateToGoalCritic(spec.trans_stopped_velocity, spec.slowing_factor)
         self._oscillation = OscillationCritic(
             spec.oscillation_reset_dist, spec.oscillation_reset_angle, spec.x_only_threshold

@@ -23,8 +23,7 @@ from simscen.stack.protocols import CostmapView
 Cells = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 UNKNOWN = 255
-PREFERRED_CLEARANCE_M = 0.05
-"""Clearance that a trajectory must have if any trajectory has it."""
+"""Cost of an unknown cell in nav2_costmap_2d."""
 BATCH_TRAJECTORIES = 50
 """Number of trajectories that are checked together. Usually one of the first is free."""
 
@@ -143,8 +142,9 @@ class RotateToGoalCritic:
 class ObstacleCritic:
     """Selects the first trajectory without a collision (dwb_critics' ObstacleFootprint, including moving obstacles)."""
 
-    def __init__(self, footprint: Footprint) -> None:
-        self._footprint = footprint
+    def __init__(self, footprint: Footprint, preferred_clearance: float) -> None:
+        """Take the footprint, and the clearance in m that a trajectory must have if any trajectory has it."""
+        self._footprint, self._preferred_clearance = footprint, preferred_clearance
 
     def first_free(
         self, costmap: CostmapView, pose: Pose2, trajectories: Trajectories, order: npt.NDArray[np.intp]
@@ -162,7 +162,7 @@ class ObstacleCritic:
             batch = slice(start, start + BATCH_TRAJECTORIES)
             poses = np.moveaxis(trajectories.poses(order[batch]), -1, 0)
             clearance[:, batch] = self._footprint.discs.clearance(costmap, *poses)
-            has_clearance = (clearance[:, batch] > PREFERRED_CLEARANCE_M).all(axis=0)
+            has_clearance = (clearance[:, batch] > self._preferred_clearance).all(axis=0)
             if has_clearance.any():
                 return int(order[start + int(has_clearance.argmax())])
         free = (clearance > 0.0).all(axis=0)
@@ -178,7 +178,7 @@ class ObstacleCritic:
         """Return the times (k,) in s at which trajectories come too close to a moving obstacle; inf if they do not."""
         times = trajectories.times[:, trajectories.yaw_index[order]]
         gaps = self._footprint.gap(moving, trajectories.poses(order), times, UNCERTAINTY_SIGMAS)
-        too_close = (gaps < PREFERRED_CLEARANCE_M) & (gaps < gaps[0] - APPROACH_TOLERANCE_M)
+        too_close = (gaps < self._preferred_clearance) & (gaps < gaps[0] - APPROACH_TOLERANCE_M)
         return np.where(too_close.any(axis=0), times[too_close.argmax(axis=0), np.arange(len(order))], np.inf)
 
 

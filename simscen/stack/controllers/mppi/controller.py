@@ -117,11 +117,8 @@ def shift_sequence(sequence: Floats, steps: float) -> Floats:
     return np.stack([np.interp(index + steps, index, row) for row in sequence]).astype(np.float32)
 
 
-COMMAND_FREE_TIME_S = 0.5
-"""Time for which the command itself must be free of collisions."""
-MIN_PLAN_LENGTH_M, PLAN_MARGIN_M = 2.0, 1.0
-"""Minimum length of the local plan (Nav2's prune_distance), and its margin beyond the reach of the rollouts, which
-PathFollowCritic and PathAngleCritic need."""
+PLAN_MARGIN_M = 1.0
+"""Margin of the local plan beyond the reach of the rollouts, which PathFollowCritic and PathAngleCritic need."""
 SPEED_STD_RATIO = 0.5
 """Default standard deviation of the sampled speeds relative to the maximum speed. With Nav2's fixed 0.2 m/s, the robot
 settles at about 0.5 m/s regardless of its maximum speed."""
@@ -132,7 +129,7 @@ class MppiController(PathFollower):
 
     def __init__(self, spec: MppiSpec, setting: Setting) -> None:
         robot = setting.robot
-        super().__init__(spec.vx_max, robot)
+        super().__init__(spec, spec.vx_max, robot)
         self._spec, self._footprint, self._rng = spec, setting.footprint, setting.rng
         self._full_limits = mppi_limits(spec, robot, self._full_speed)
         model = spec.motion_model or ("Omni" if self._full_limits.high[1] > 0.0 else "DiffDrive")
@@ -147,10 +144,12 @@ class MppiController(PathFollower):
         self._delay_steps = tuple(math.floor(delay / spec.model_dt + 0.5) for delay in delays[: self._axes])
         self._critics = CriticManager(spec, omni=model == "Omni")
         self._period, self._shift_steps = setting.control_period, setting.control_period / spec.model_dt
-        self._goal_rotation = GoalRotation(robot, spec.wz_max, robot.angular_acceleration, setting.control_period)
-        self._collision_checker = CollisionChecker(setting.footprint)
+        self._goal_rotation = GoalRotation(
+            robot, spec.wz_max, robot.angular_acceleration, setting.control_period, spec.goal_tolerance_ratio
+        )
+        self._collision_checker = CollisionChecker(setting.footprint, spec.min_slowed_speed)
         reach = self._full_speed * spec.time_steps * spec.model_dt
-        self._plan_length = max(MIN_PLAN_LENGTH_M, reach + PLAN_MARGIN_M)
+        self._plan_length = max(spec.prune_distance, reach + PLAN_MARGIN_M)
         self._reset()
 
     def _reset(self) -> None:
@@ -188,8 +187,9 @@ class MppiController(PathFollower):
         else:
             plan = local_plan(tracker, self._plan_length)
             command = self._optimize(twist, lambda rollouts: self._critic_data(rollouts, plan, costmap, goal))
-        free_time = self._collision_checker.free_time(costmap, pose, command, COMMAND_FREE_TIME_S)
-        return self._collision_checker.slowed(command, free_time, COMMAND_FREE_TIME_S, COMMAND_FREE_TIME_S)
+        required = self._spec.command_free_time
+        free_time = self._collision_checker.free_time(costmap, pose, command, required)
+        return self._collision_checker.slowed(command, free_time, required, required)
 
     def _critic_data(self, rollouts: Rollouts, plan: LocalPlan, costmap: CostmapView, goal: Goal) -> CriticData:
         return CriticData(

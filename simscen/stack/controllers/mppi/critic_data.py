@@ -18,6 +18,7 @@ from simscen.stack.protocols import CostmapView
 Floats = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 INSCRIBED, UNKNOWN = 253, 255
+"""Costs of nav2_costmap_2d: of a cell that the inscribed circle must not enter, and of an unknown cell."""
 MOVING_CLEARANCE_M = 0.25
 """Clearance that rollouts keep from moving obstacles, in addition to a standard deviation of their position."""
 COLLISION_DECAY_S = 1.2

@@ -8,12 +8,13 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
+from simscen.core.messages.navigation import ErrorCode
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.controllers.collision_checker import time_to_collision
+from simscen.stack.controllers.collision_checker import CollisionChecker, time_to_collision
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import poses_along
-from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
+from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
 
 
@@ -105,3 +106,12 @@ def test_discs_cover_the_hull() -> None:
     near = np.hypot(inside[:, None, 0] - discs.offsets, inside[:, None, 1]).min(axis=1)
     assert near.max() <= discs.radius
     assert discs.radius < 0.25
+
+
+def test_commands_are_slowed_to_the_minimum_speed_and_no_further() -> None:
+    footprint, command = Footprint(round_robot(), 0.05), Twist(0.5, 0.0, 0.2)
+    assert CollisionChecker(footprint, 0.1).slowed(command, 0.2, 1.0, 1.0) == pytest.approx(Twist(0.1, 0.0, 0.04))
+    assert CollisionChecker(footprint, 0.04).slowed(command, 0.1, 1.0, 1.0).vx == pytest.approx(0.05)
+    with pytest.raises(NavigationFailure) as failed:
+        CollisionChecker(footprint, 0.1).slowed(command, 0.1, 1.0, 1.0)
+    assert failed.value.code is ErrorCode.NO_VALID_CONTROL

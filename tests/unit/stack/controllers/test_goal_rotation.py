@@ -15,7 +15,7 @@ PERIOD = 0.05
 
 def turned(angle: float, seconds: float, late: int) -> tuple[list[float], list[float]]:
     """Angles that are left and turn rates of a base that does what it was told so many periods ago."""
-    pose = GoalRotation(round_robot(), 1.9, 3.2, PERIOD)
+    pose = GoalRotation(round_robot(), 1.9, 3.2, PERIOD, 0.45)
     under_way, rate = deque([0.0] * late), 0.0
     left, rates = [angle], [0.0]
     for _ in range(round(seconds / PERIOD)):
@@ -39,8 +39,16 @@ def test_braking_starts_no_earlier() -> None:
 
 
 def test_goal_is_approached_again_after_leaving_it() -> None:
-    pose, goal = GoalRotation(round_robot(), 1.9, 3.2, PERIOD), Goal("g", Pose2(0.0, 0.0), xy_tolerance=0.2)
+    pose, goal = GoalRotation(round_robot(), 1.9, 3.2, PERIOD, 0.45), Goal("g", Pose2(0.0, 0.0), xy_tolerance=0.2)
     assert pose.reached(Pose2(0.05, 0.0), Twist(), goal, 0.05)
     assert pose.reached(Pose2(0.15, 0.0), Twist(0.2), goal, 0.5)
     assert not pose.reached(Pose2(0.25, 0.0), Twist(0.2), goal, 0.5)
     assert not pose.reached(Pose2(0.15, 0.0), Twist(0.2), goal, 0.5)
+
+
+@pytest.mark.parametrize("ratio", [0.2, 0.45, 1.0])
+def test_the_position_is_reached_at_the_ratio_of_the_tolerance(ratio: float) -> None:
+    goal = Goal("g", Pose2(0.0, 0.0), xy_tolerance=0.2)
+    for distance, expected in ((ratio * 0.2 + 0.005, False), (ratio * 0.2 - 0.005, True)):
+        rotation = GoalRotation(round_robot(), 1.9, 3.2, PERIOD, ratio)
+        assert rotation.reached(Pose2(-distance, 0.0), Twist(0.2), goal, distance) is expected

@@ -58,3 +58,16 @@ def test_nothing_beyond_a_cusp_is_looked_at_before_the_robot_is_there() -> None:
     assert track.forward
     assert track.carrot(Pose2(0.8, 0.0), 0.5) == pytest.approx((1.0, 0.0))
     assert track.to_cusp() == pytest.approx(0.2)
+
+
+def test_only_the_search_distance_ahead_is_searched_for_the_nearest_point() -> None:
+    """The path returns beside its start after 6 m."""
+    out = [(x, 0.0) for x in np.arange(0.0, 3.0, 0.05)]
+    back = [(x, 0.3) for x in np.arange(3.0, -0.01, -0.05)]
+    points = np.array([*out, *back])
+    yaw = np.arctan2(*np.diff(points, axis=0)[:, ::-1].T)
+    path = Path(np.column_stack((points, [*yaw, yaw[-1]])))
+    for distance, y in ((1.5, 0.0), (10.0, 0.3)):
+        track = PathTracker(path, distance)
+        track.locate(Pose2(0.0, 0.25))
+        assert track.points[track.index, 1] == y
