@@ -67,6 +67,7 @@ def of_planner(kind: str) -> dict[str, tuple[tuple[Said, Scene], ...]]:
         "tolerance": ((planner(**said), scenes.at_a_wall),),
         "replanning": ((planner(**said), scenes.long_way),),
         "replanning_rate": ((planner(**said, replanning="rate"), scenes.long_way),),
+        "proximity_threshold": ((planner(**said, replanning="rate"), scenes.long_way),),
         "cautious": ((impatient, scenes.two_ways),),
         "allow_unknown": (({**planner(**said), "costmap": {"raytrace_max_range": 1.0}}, scenes.half_known),),
     }
@@ -204,6 +205,24 @@ ELSEWHERE = {
         for kind in ("OmplPlanner", "MedialAxisPlanner")
         for name in ("minimum_turning_radius", "cusp_penalty", "pose_searches", "hull_clearance")
     },
+    **dict.fromkeys(
+        ("Costmap.publish_frequency", "LocalCostmap.publish_frequency"), "tests/unit/stack/test_publishing.py"
+    ),
+    "Costmap.lethal_cost_threshold": "tests/unit/stack/costmap/test_costmap.py",
+    **dict.fromkeys(
+        (
+            "Recovery.time_allowance",
+            "Recovery.rotational_acc_lim",
+            "Recovery.min_rotational_vel",
+            "Spin.time_allowance",
+            "Spin.rotational_acc_lim",
+            "Spin.min_rotational_vel",
+            "BackUp.time_allowance",
+        ),
+        "tests/unit/stack/test_behaviors.py",
+    ),
+    "Retrace.time_allowance": "tests/unit/advanced/test_retrace.py",
+    "CollisionMonitor.simulation_time_step": "tests/unit/stack/test_collision_monitor.py",
     "Recovery.clear_entirely": "tests/unit/advanced/test_costmap_clearing.py",
     "ClearCostmap.clear_entirely": "tests/unit/stack/test_behaviors.py",
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
