@@ -32,7 +32,9 @@ def systematic(weights: Array, count: int, rng: np.random.Generator) -> Indices:
 
 
 BIN_SIZE_M = 0.5
+"""Edge length of a bin of KLD sampling; not a parameter of nav2_amcl either (pf_kdtree.c)."""
 YAW_BINS = 36
+"""Number of bins of the heading: 10° each, as in pf_kdtree.c."""
 _OFFSET = 1 << 21
 """Number added to the x and y of a bin so that both are positive in its key."""
 Keys = npt.NDArray[np.int64]

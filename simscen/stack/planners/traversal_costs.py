@@ -13,6 +13,7 @@ from simscen.stack.costmap.distance_transform import squared_distances_within
 from simscen.stack.protocols import CostmapView, RobotModel
 
 MAX_NON_OBSTACLE, NO_INFORMATION = 252, 255
+"""Costs of nav2_costmap_2d: of the most expensive free cell, and of an unknown cell."""
 UNKNOWN_COSTS = 253
 """Cost of an unknown cell: a little more than that of the most expensive free cell, as in nav2_navfn_planner."""
 NO_ROTATION_COST_FACTOR = 4.0
