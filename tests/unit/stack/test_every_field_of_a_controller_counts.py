@@ -130,6 +130,7 @@ STARTS: dict[type[ControllerSpec], list[dict[str, Any]]] = {
         },
         {**SHORT, "CostCritic": {"near_collision_cost": 100, "near_goal_distance": 0.5}, "wz_max": 0.2},
         {**SHORT, "critics": ["ConstraintCritic", "PathFollowCritic"]},
+        {**SHORT, "command_free_time": 12.0},
         {
             **SHORT,
             "critics": ["PathFollowCritic", "VelocityDeadbandCritic"],
