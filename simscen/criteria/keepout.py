@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import model_validator
 
-from simscen.core.geometry.polygons import polygon_defect, separation, separation_from_boxes
+from simscen.core.geometry.polygons import POINT, polygon_defect, separation, separation_from_boxes
 from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, at_least, undecided
 from simscen.criteria.timeline import NEVER_SWITCHED, clip_samples, enabled_spans
-from simscen.criteria.trace_signals.distances import POINT
 from simscen.criteria.trace_signals.ground_truth import Flags, truth
 from simscen.spec.base import Spec
 from simscen.spec.places import MaskFile, RegionName

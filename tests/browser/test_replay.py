@@ -307,7 +307,8 @@ def test_rows_around_the_time_are_shown_of_a_long_log(open_page: Opener, logs: l
     marks = page.locator(".lanes .sign.stack")
     assert marks.count() == 2  # of 900 errors at one time there is one
     marks.first.dispatch_event("click")
-    assert "FollowPath failure" in lit_rows(opened)[0]
+    lit = "document.querySelector('#view-log li.lit')"
+    opened.until(f"({lit}?.innerText ?? '').replace(/\\s+/g, ' ').includes('FollowPath failure')")
 
 
 def test_parameters_of_the_stack_can_be_searched(open_page: Opener, nav2: Path) -> None:

@@ -18,6 +18,8 @@ Corner = tuple[float, float]
 
 MIN_WIDTH_M = 1e-6
 """Thinner polygons have no area."""
+POINT = ((0.0, 0.0),)
+"""Outline of a body without extent: only its position counts."""
 
 
 def distance_to_polygon(point: Pose2, corners: Sequence[tuple[float, float]]) -> float:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.geometry.polygons import separation
+from simscen.core.geometry.polygons import POINT, separation
 from simscen.core.records.events import EventKind
 from simscen.criteria.trace_signals.ground_truth import check_samples
 from simscen.criteria.trace_signals.readers import goal_distance, poses_of
@@ -132,8 +132,6 @@ def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
     return nearest
 
 
-POINT = ((0.0, 0.0),)
-"""Outline of a body without extent: only its position counts."""
 INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6
 """Gaps in m below which the robot is in the intimate, personal, or social space of a person (Hall 1966, HuNavSim)."""
 

@@ -38,6 +38,7 @@ PLAIN = {
     "ScanMatchingAmcl.lambda_short": "as for `Amcl`",
     "ScanMatchingAmcl.likelihood_exponent": "an exponent",
     "OmplPlanner.cost_travel_multiplier": "a factor of costs, as in every file of Nav2",
+    "OmplPlanner.rewire_factor": "a factor",
     "Smac2d.cost_travel_multiplier": "likewise",
     "MedialAxisPlanner.cost_travel_multiplier": "likewise",
     "Costmap.cost_scaling_factor": "an exponent for each meter, 3.0 in every file of Nav2",

@@ -1,6 +1,6 @@
 """The drive of scenarios/navigation/goal as a test of launch_testing, in real time, with Nav2's loopback simulator.
 
-    launch_test tests/nav2/goal.launch_test.py env:=ENV params:=PARAMS map:=MAP
+    launch_test tests/nav2/launch_testing_goal.py env:=ENV params:=PARAMS map:=MAP
 
 ENV and PARAMS are those of bringup.sh, and MAP comes from `simscen world export`. It is here to compare the wall time
 of both tools: the same nodes drive from the same pose to the same goal. The loopback simulator (nav2_loopback_sim)
