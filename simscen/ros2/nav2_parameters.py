@@ -18,11 +18,15 @@ class Finding(NamedTuple):
 
 
 class Offer(NamedTuple):
-    """Topics of scans and odometry in the user's graph, and the names of the robot's base frame."""
+    """Topics of scans and odometry in the user's graph, and the names of the robot's base frame.
+
+    Names of topics without a leading slash are relative to the robot's `namespace`, such as `/robot1`.
+    """
 
     scans: Sequence[str]
     odometry: str
     bases: Sequence[str]
+    namespace: str = ""
 
 
 Parameters = Mapping[str, Any]
@@ -87,7 +91,10 @@ class _Node:
 
     def topic(self, key: str, topics: Sequence[str], what: str) -> None:
         value = self.get(key)
-        if isinstance(value, str) and "/" + value.lstrip("/") not in topics:
+        if not isinstance(value, str):
+            return
+        absolute = value if value.startswith("/") else f"{self.offer.namespace}/{value}"
+        if absolute not in topics:
             available = ", ".join(topics) or "none"
             self.add_finding(key, f"is {value!r}, which no node publishes; simscen's {what}: {available}")
 

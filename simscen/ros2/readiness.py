@@ -189,6 +189,7 @@ class Nav2Readiness:
             [graph.names(topic.name) for topic in topics if topic.type == SCAN],
             odometry[0] if odometry else "",
             list(dict.fromkeys(("base_link", options.base_frame or "base_link"))),
+            graph.names.namespace,
         )
 
     def missing_nodes(self) -> List[str]:

@@ -108,6 +108,14 @@ def called(folder: Path, text: str, *options: str) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
+@pytest.mark.parametrize(
+    ("topic", "is_found"), [("scan", True), ("/robot1/scan", True), ("/scan", False), ("robot1/scan", False)]
+)
+def test_topics_without_a_slash_are_relative_to_the_namespace(topic: str, is_found: bool) -> None:
+    offer = Offer(["/robot1/scan"], "/robot1/odom", ["base_link"], "/robot1")
+    assert bool(check({"amcl": {"scan_topic": topic}}, offer)) is not is_found
+
+
 def test_a_correct_file_passes(tmp_path: Path) -> None:
     code, said = called(tmp_path, FITS)
     assert code == 0
