@@ -1,13 +1,17 @@
 """Load the servers of Nav2 into a running `component_container_isolated`, as a composed bringup does.
 
-    python compose.py CONTAINER
+    python compose.py CONTAINER PARAMS
 
-The parameters of the servers are those with which the container was started.
+Each server gets its parameters of the file PARAMS, because a container passes its own only to nodes that a server
+creates, such as costmaps.
 """
 
 import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 import rclpy
+import yaml
 from composition_interfaces.srv import LoadNode
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rclpy.parameter import Parameter as Value
@@ -37,10 +41,20 @@ def main() -> None:
         if not future.result().success:
             sys.exit(f"compose: {name}: {future.result().error_message}")
 
+    nodes = yaml.safe_load(Path(sys.argv[2]).read_text())
     for name, component in SERVERS.items():
-        load(name, *component)
+        load(name, *component, **dict(flattened(nodes[name]["ros__parameters"])))
     load("lifecycle_manager", *MANAGER, autostart=True, bond_timeout=0.0, node_names=[*SERVERS])
     rclpy.shutdown()
+
+
+def flattened(parameters: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Yield the parameters with dotted names."""
+    for key, value in parameters.items():
+        if isinstance(value, Mapping):
+            yield from flattened(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
 
 
 def parameter(name: str, value: object) -> Parameter:
