@@ -163,3 +163,10 @@ def test_the_witness_of_until_has_its_value_at_each_sample(values, window, ended
             assert sample <= witness.sample <= sample + window[1]
             signal = p if witness.comparison.signal == "clearance" else q
             assert witness.value == signal[witness.sample]
+
+
+def test_a_response_in_a_window_beyond_the_run_is_undecided():
+    premise, answer = ({"signal": name, "op": ">=", "value": 0.5} for name in ("clearance", "yaw_rate"))
+    formula = validated({"eventually": {"all": [{"whenever": premise, "then": answer}], "between": [10.0, 11.0]}})
+    found = robustness(formula, EvaluationContext(run([1.0] * 3, [1.0] * 3), CASE, over=True))
+    assert found.low[0] < 0 < found.high[0]
