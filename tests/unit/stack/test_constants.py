@@ -1,4 +1,4 @@
-"""Tests that each numeric constant of the reference stack states what it is, and why it is not a parameter."""
+"""Tests that each numeric constant of the reference stack states what it is."""
 
 import ast
 from collections.abc import Iterator
@@ -10,12 +10,6 @@ import pytest
 import simscen.stack
 
 ROOT = Path(simscen.stack.__file__).parent
-FORMER_CONSTANTS = {
-    "TIME_ALLOWANCE_S", "MIN_ROTATIONAL_VEL_RAD_S", "GOAL_NEARBY_M", "BATCH_SAMPLES", "BATCHES", "REWIRE_FACTOR",
-    "GOOD_ENOUGH_RATIO", "SIMPLIFY_STEPS", "CUSP_M", "MAX_POSE_SEARCHES", "REACHED_TOLERANCE_RATIO",
-    "PREFERRED_CLEARANCE_M", "COMMAND_FREE_TIME_S", "OCCUPIED_THRESHOLD", "GLOBAL_COSTMAP_RATE", "LOCAL_COSTMAP_RATE",
-}  # fmt: skip
-"""Constants that are parameters now."""
 
 
 class Constant(NamedTuple):
@@ -63,7 +57,3 @@ def test_the_constants_are_found() -> None:
 @pytest.mark.parametrize("constant", CONSTANTS, ids=lambda each: f"{each.module}:{each.names[0]}")
 def test_every_numeric_constant_is_documented(constant: Constant) -> None:
     assert len(constant.text) >= 15
-
-
-def test_constants_that_became_parameters_are_gone() -> None:
-    assert not FORMER_CONSTANTS.intersection(name for each in CONSTANTS for name in each.names)
