@@ -88,7 +88,7 @@ class OmplPlanner(OmplParameters):
     """Probability of drawing the goal as a sample; `rrt_star`, `informed_rrt_star`, and `kpiece` only."""
     cost_threshold_ratio: Annotated[float, Field(ge=0, le=1000), Quantity("ratio")] = 1.01
     """The search ends at a path that costs at most this value times the distance to the goal, which is a lower bound of
-    its cost (OMPL's cost threshold); `bit_star`, `rrt_star`, and `aorrtc` only. 0 = never."""
+    its cost (OMPL's cost threshold); `bit_star` and `rrt_star` only. 0 = never."""
     simplify: bool = True
     """Whether OMPL shortens the path and moves it to cells of lower cost."""
     simplify_steps: Annotated[int, Field(ge=2, le=100_000)] = 100

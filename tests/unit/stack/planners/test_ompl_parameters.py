@@ -104,8 +104,9 @@ def test_a_path_below_the_cost_threshold_ends_the_search(planners: list[Any]) ->
     assert planners[-1].numBatches() == 3
 
 
-def test_a_high_cost_threshold_accepts_the_first_path() -> None:
-    assert mean_length(cost_threshold_ratio=100.0) > mean_length()
+@pytest.mark.parametrize("kind", ["bit_star", "rrt_star"])
+def test_a_high_cost_threshold_accepts_the_first_path(kind: str) -> None:
+    assert mean_length(type=kind, cost_threshold_ratio=100.0) > mean_length(type=kind)
 
 
 @pytest.mark.parametrize("kind", ["rrt_connect", "rrt_star"])
