@@ -141,36 +141,27 @@ def with_world(folder: Path, with_scenario: Refused) -> Refused:
 
 
 MEASURED = """
-import sys, time
+import sys
 from simscen.cli.main import main
-begun = time.process_time()
 try:
     main()
 finally:
     (peak,) = [line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")]
-    print("measured", peak, time.process_time() - begun, file=sys.stderr)
+    print(peak, file=sys.stderr)
 """
 
 
 @pytest.fixture
-def cost(folder: Path) -> Callable[..., tuple[int, float, float, str]]:
-    """Exit code, peak memory in MiB, seconds of CPU time and output of a command in a process of its own."""
+def peak_memory(folder: Path) -> Callable[..., tuple[int, float, str]]:
+    """Runs a command in a process of its own; returns its exit code, peak memory in MiB, and output."""
 
-    def call(*arguments: object) -> tuple[int, float, float, str]:
+    def call(*arguments: object) -> tuple[int, float, str]:
         command = [sys.executable, "-c", MEASURED, *map(str, arguments)]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
-        *err, measured = done.stderr.splitlines()
-        _, peak, cpu = measured.split()
-        return done.returncode, int(peak) / 1024, float(cpu), done.stdout + "\n".join(err)
+        *err, peak = done.stderr.splitlines()
+        return done.returncode, int(peak) / 1024, done.stdout + "\n".join(err)
 
     return call
-
-
-@pytest.fixture
-def is_cheap(cost: Callable[..., tuple[int, float, float, str]]) -> Callable[[float], bool]:
-    """Whether a CPU time is of the order of that of a small valid scenario on this machine."""
-    _, _, usual, _ = cost("validate", "a.scenario.yaml")
-    return lambda cpu: cpu < 4.0 * usual
 
 
 def cases_of(nodeid: str) -> set[int]:

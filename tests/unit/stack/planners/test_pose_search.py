@@ -1,7 +1,6 @@
 """Tests of searches over poses."""
 
 import math
-import time
 
 import numpy as np
 import pytest
@@ -25,12 +24,17 @@ def test_any_heading_can_be_a_goal(yaw):
     assert wrap(poses[-1].yaw - yaw) == pytest.approx(0, abs=1e-6)
 
 
-def test_an_end_where_the_robot_cannot_be_is_no_path_at_once():
-    begin = time.process_time()
+def test_nothing_is_searched_if_the_robot_cannot_be_at_an_end():
+    asked = []
+
+    def is_free(x, y, yaw):
+        asked.append((x, y, yaw))
+        return x < 1
+
     for start, goal in ((Pose2(0, 0), Pose2(2, 2)), (Pose2(2, 2), Pose2(0, 0)), (Pose2(0, 0), Pose2(9, 0))):
-        free = search_poses("rrt_connect", "reeds_shepp", 0.8, BOUNDS, start, goal, lambda x, y, yaw: x < 1, 1, 20_000)
+        free = search_poses("rrt_connect", "reeds_shepp", 0.8, BOUNDS, start, goal, is_free, 1, 20_000)
         assert free is None
-    assert time.process_time() - begin < 0.5
+    assert len(asked) <= 6
 
 
 @pytest.mark.parametrize("space", ["dubins", "reeds_shepp"])
