@@ -18,18 +18,19 @@ from rclpy.clock import Clock, ClockType
 
 from simscen.peer.goals import Goal, Goals
 from simscen.ros2.filter_info import FilterInfo
+from simscen.ros2.frames import STATIC_TRANSFORMS, FrameNames
 from simscen.ros2.goal_sender import ACTIONS, ActionSender, Failed, GoalSender, GoalSenders, StackState
 from simscen.ros2.graph import CLOCK, LATCHED, Graph, Received, Topic
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.lockstep import Lockstep, Message, Paced
 from simscen.ros2.messages import NANOSECONDS, find_type, read_twist, write_twist
-from simscen.ros2.motion_actions import MotionActions
+from simscen.ros2.nav2_actions import MotionActions, Recoveries
 from simscen.ros2.nav2_report import Line, Nav2Report
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError, Options, TopicNames
 from simscen.ros2.pose_estimate import PLAN, PoseEstimate
 from simscen.ros2.readiness import COMMAND, MAP, SCAN, TWIST_STAMPED, Readiness
-from simscen.ros2.recoveries import Recoveries
+from simscen.ros2.user_transforms import UserTransforms
 
 SUBSCRIPTIONS = {
     "/plan": "nav_msgs/msg/Path",
@@ -41,7 +42,7 @@ SUBSCRIPTIONS = {
 }
 """Topics of the stack besides its commands."""
 THROUGH_POSES = "navigate_through_poses"
-BASE_FRAME, INITIAL_POSE = "base_link", "/initialpose"
+INITIAL_POSE = "/initialpose"
 STOP = (0.0,) * 6
 PREPARE_S = 10.0
 """Longest wait for a graph without sensor data."""
@@ -72,6 +73,7 @@ class Adapter:
             rclpy.init(args=[])
         self._options, self._goals, self._launched, self._period = options, goals, launched, period_s
         self._graph = Graph(TopicNames(options.namespace, options.remap), self._check_launched)
+        self._frames = FrameNames(options.frame, options.base_frame)
         self._estimate = PoseEstimate()
         self._senders = GoalSenders(self._graph, options.goals)
         self._sender: Optional[GoalSender] = None
@@ -91,7 +93,7 @@ class Adapter:
         offered = [topic for topic in offered if topic.name not in options.without]
         self._unavailable = [topic for topic in offered if not self._graph.advertise(topic.name, topic.type)]
         published = [topic for topic in offered if topic.name in self._graph.publishers]
-        self._readiness = Readiness(self._graph, self._barrier, published, self._senders, options)
+        self._readiness = Readiness(self._graph, self._barrier, published, self._senders, options, self._frames.bases)
         self._actions = MotionActions(self._graph, self._barrier)
         self._recoveries = Recoveries(self._graph, goals.report)
         self._report = Nav2Report(self._graph, self._barrier) if options.nav2 else None
@@ -246,7 +248,9 @@ class Adapter:
         messages, self._pending_infos = [*messages, *self._pending_infos], []
         for topic, data in messages:
             self._estimate.take_published(topic, data)
-        messages = [(topic, self._with_base_frame(topic, data)) for topic, data in messages]
+            if topic == STATIC_TRANSFORMS and topic in self._options.without:
+                self._readiness.user_transforms = UserTransforms(self._graph, self._frames, data)
+        messages = [(topic, self._with_frames(topic, data)) for topic, data in messages]
         self._initial_pose = next((m for m in messages if m[0] == INITIAL_POSE), self._initial_pose)
         messages = [message for message in messages if message[0] != INITIAL_POSE]
         warming_up = now < self._options.warm_up * NANOSECONDS or self._lacks_scan(now, messages)
@@ -375,19 +379,10 @@ class Adapter:
         message, self._initial_pose = self._initial_pose, None
         return [message]
 
-    def _with_base_frame(self, topic: str, data: bytes) -> bytes:
-        """Return the message; /tf_static also with the base frame under the name that the nodes use."""
-        if topic != "/tf_static" or self._options.base_frame in (None, BASE_FRAME):
-            return data
-        from rclpy.serialization import deserialize_message, serialize_message
-
-        message_type: Any = find_type("tf2_msgs/msg/TFMessage")
-        link_type: Any = find_type("geometry_msgs/msg/TransformStamped")
-        message, link = deserialize_message(data, message_type), link_type()
-        link.header.frame_id, link.child_frame_id = BASE_FRAME, self._options.base_frame
-        link.transform.rotation.w = 1.0
-        message.transforms.append(link)
-        return bytes(serialize_message(message))
+    def _with_frames(self, topic: str, data: bytes) -> bytes:
+        """Return the message with the names that frames have in the graph."""
+        publisher = self._graph.publishers.get(topic)
+        return data if publisher is None else self._frames.apply(topic, publisher.msg_type, data)
 
     def end(self) -> None:
         """Leave the graph and end the launched command."""

@@ -25,6 +25,7 @@ class Options(NamedTuple):
     remap: List[str] = []
     without: List[str] = []
     goals: str = "auto"
+    frame: List[str] = []
     base_frame: Optional[str] = None
     sync: str = "lockstep"
     factor: float = 1.0

@@ -1,6 +1,6 @@
 """Checks of the graph before a run: what is missing, what does not match, which nodes are not active yet."""
 
-from typing import Any, Dict, Iterable, List, Sequence, Set, Tuple
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Set, Tuple
 
 from simscen.ros2 import nav2_parameters
 from simscen.ros2.goal_sender import GOAL_POSE, GoalPoseSender, GoalSenders
@@ -9,6 +9,7 @@ from simscen.ros2.messages import find_type
 from simscen.ros2.node_barrier import POLL_S, NodeBarrier, ServicePoll
 from simscen.ros2.node_parameters import NodeParameters
 from simscen.ros2.options import Options
+from simscen.ros2.user_transforms import UserTransforms
 
 COMMAND = "/cmd_vel"
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
@@ -25,12 +26,20 @@ class Readiness:
     """Checks the graph repeatedly until nothing is missing. `topics` are those that simscen publishes."""
 
     def __init__(
-        self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], senders: GoalSenders, options: Options
+        self,
+        graph: Graph,
+        barrier: NodeBarrier,
+        topics: Sequence[Topic],
+        senders: GoalSenders,
+        options: Options,
+        bases: Sequence[str],
     ) -> None:
+        """`bases` are the names of the base frame in the graph."""
         self._graph, self._barrier, self._topics, self._senders = graph, barrier, list(topics), senders
         self._options = options
         self._states = ServicePoll(graph, STATE_SERVICE, "get_state") if find_type(STATE_SERVICE) else None
-        self._nav2 = Nav2Readiness(graph, barrier, topics, options)
+        self._nav2 = Nav2Readiness(graph, barrier, topics, options, bases)
+        self.user_transforms: Optional[UserTransforms] = None
         self.has_map = True
         """Whether simscen has published the map."""
         barrier.required = self.required_nodes
@@ -48,6 +57,7 @@ class Readiness:
         for topic in self._topics:
             found += self._subscribers(topic) + self._other_publishers(topic)
         found += self._unused_sensors()
+        found += self.user_transforms.missing() if self.user_transforms is not None else []
         if self._options.nav2:
             found += self._nav2.missing_nodes()
             found += [] if found else self._nav2.wrong_parameters()
@@ -181,14 +191,16 @@ class Readiness:
 class Nav2Readiness:
     """Checks the nodes of a running Nav2 and their parameters, and the parameter file if there is one."""
 
-    def __init__(self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], options: Options) -> None:
+    def __init__(
+        self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], options: Options, bases: Sequence[str]
+    ) -> None:
         self._graph, self._options = graph, options
         self._known = NodeParameters(graph, barrier)
         odometry = [graph.names(topic.name) for topic in topics if topic.type == ODOMETRY]
         self._offer = nav2_parameters.Offer(
             [graph.names(topic.name) for topic in topics if topic.type == SCAN],
             odometry[0] if odometry else "",
-            list(dict.fromkeys(("base_link", options.base_frame or "base_link"))),
+            bases,
             graph.names.namespace,
         )
 

@@ -5,7 +5,8 @@
 # Environment: J = number of parallel compilers (2). About 25 minutes on two cores; a second call builds what is missing.
 # Debian packages: libtinyxml2-dev libconsole-bridge-dev libeigen3-dev libyaml-cpp-dev liborocos-kdl-dev libzmq3-dev
 #   libgraphicsmagick++1-dev libsqlite3-dev nlohmann-json3-dev libboost-dev liblttng-ust-dev libpython3.11 pkg-config
-#   libompl-dev libboost-serialization-dev libboost-filesystem-dev libboost-system-dev libboost-program-options-dev (Smac) libxtensor-dev libxsimd-dev (MPPI)
+#   libxtensor-dev libxsimd-dev (MPPI) liburdfdom-dev liburdfdom-headers-dev (robot_state_publisher)
+#   libompl-dev libboost-serialization-dev libboost-filesystem-dev libboost-system-dev libboost-program-options-dev (Smac)
 set -eu
 source "$(dirname "$0")/cmake.sh"
 PREFIX=$(mkdir -p "$1" && cd "$1" && pwd)
@@ -54,6 +55,11 @@ if(NOT TARGET tinyxml2::tinyxml2)
 endif()'
 vendor tinyxml2_vendor "$tinyxml2"
 vendor TinyXML2 "$tinyxml2"
+vendor urdfdom_headers 'set(urdfdom_headers_VERSION 1.0.5)
+set(urdfdom_headers_INCLUDE_DIRS /usr/include)
+if(NOT TARGET urdfdom_headers::urdfdom_headers)
+  add_library(urdfdom_headers::urdfdom_headers INTERFACE IMPORTED)
+endif()'
 
 # 4. Sources.
 repository() { # OWNER+NAME
@@ -78,15 +84,42 @@ for name in class_loader pluginlib angles bond_core diagnostics; do export_sourc
 export_source ros-perception+laser_geometry ros2 laser_geometry
 export_source ros-planning+navigation_msgs ros2 navigation_msgs
 export_source ros-geographic-info+geographic_info ros2 geographic_info
+export_source cra-ros-pkg+robot_localization ros2 robot_localization srv/FromLL.srv
+export_source ros2+urdf ros2 urdf
+export_source ros+kdl_parser rolling kdl_parser
+export_source ros+robot_state_publisher rolling robot_state_publisher
 export_source BehaviorTree+BehaviorTree.CPP 4.7.3 behaviortree_cpp
 NAV2='nav2_common nav2_msgs nav2_util nav2_lifecycle_manager nav2_voxel_grid nav2_costmap_2d nav2_behavior_tree
   nav2_core nav2_navfn_planner nav2_planner nav2_regulated_pure_pursuit_controller nav2_dwb_controller/nav_2d_msgs
   nav2_dwb_controller/nav_2d_utils nav2_controller nav2_behaviors nav2_smoother nav2_velocity_smoother
   nav2_bt_navigator nav2_amcl nav2_map_server nav2_collision_monitor nav2_dwb_controller/dwb_msgs
   nav2_dwb_controller/costmap_queue nav2_dwb_controller/dwb_core nav2_dwb_controller/dwb_critics
-  nav2_dwb_controller/dwb_plugins nav2_mppi_controller nav2_smac_planner'
+  nav2_dwb_controller/dwb_plugins nav2_mppi_controller nav2_smac_planner nav2_waypoint_follower'
 for package in $NAV2; do export_source ros-navigation+navigation2 jazzy "nav2/$package" "$package"; done
 export_source ros-navigation+navigation2 jazzy nav2/nav2_bringup nav2_bringup/params
+# The waypoint follower needs one service of robot_localization, and OpenCV only for photos.
+cat > "$SRC/robot_localization/CMakeLists.txt" <<'C'
+cmake_minimum_required(VERSION 3.5)
+project(robot_localization)
+find_package(ament_cmake REQUIRED)
+find_package(geographic_msgs REQUIRED)
+find_package(geometry_msgs REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+rosidl_generate_interfaces(${PROJECT_NAME} srv/FromLL.srv DEPENDENCIES geographic_msgs geometry_msgs)
+ament_export_dependencies(rosidl_default_runtime)
+ament_package()
+C
+cat > "$SRC/robot_localization/package.xml" <<'X'
+<package format="3">
+  <name>robot_localization</name><version>0.0.0</version><description>FromLL</description>
+  <maintainer email="nobody@example.org">nobody</maintainer><license>BSD</license>
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <depend>geographic_msgs</depend><depend>geometry_msgs</depend>
+  <member_of_group>rosidl_interface_packages</member_of_group>
+</package>
+X
+sed -i -E '/^# Try for OpenCV/,/^message/d; /OpenCV|image_transport|cv_bridge|photo_at_waypoint SHARED|photo_at_waypoint \$\{dep/d; s/ photo_at_waypoint / /' \
+  "$SRC/nav2/nav2_waypoint_follower/nav2_waypoint_follower/CMakeLists.txt"
 
 # 5. Build in this order.
 build() { # PATH [CMAKE OPTION...]
@@ -101,7 +134,8 @@ for package in rcl_interfaces/statistics_msgs rcl_interfaces/composition_interfa
   rclcpp/rclcpp rclcpp/rclcpp_action rclcpp/rclcpp_lifecycle eigen3_cmake_module class_loader rclcpp/rclcpp_components \
   pluginlib/pluginlib angles/angles message_filters geometry2/tf2_msgs geometry2/tf2 geometry2/tf2_ros \
   geometry2/tf2_geometry_msgs geometry2/tf2_sensor_msgs geometry2/tf2_eigen laser_geometry navigation_msgs/map_msgs \
-  bond_core/bond bond_core/smclib bond_core/bondcpp diagnostics/diagnostic_updater geographic_info/geographic_msgs; do
+  bond_core/bond bond_core/smclib bond_core/bondcpp diagnostics/diagnostic_updater geographic_info/geographic_msgs robot_localization \
+  urdf/urdf_parser_plugin urdf/urdf kdl_parser/kdl_parser robot_state_publisher; do
   build "$package"
 done
 # Nav2 links to bondcpp::bondcpp, which this branch does not export.

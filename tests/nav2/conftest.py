@@ -26,12 +26,13 @@ CONTROLLER = {
 
 
 class Nav2(NamedTuple):
-    """An environment in which Nav2 runs, and nav2_bringup's parameters for it."""
+    """An environment in which Nav2 runs, and nav2_bringup's parameters, with changes for these tests and without."""
 
     environment: dict[str, str]
     script: Path
     python: Path
     params: Path
+    unchanged_params: Path
 
     @property
     def launch(self) -> str:
@@ -57,7 +58,7 @@ def nav2(tmp_path_factory: pytest.TempPathFactory) -> Nav2:
     environment = dict(line.partition("=")[::2] for line in printed.split("\0") if line)
     params = tmp_path_factory.mktemp("nav2") / "nav2_params.yaml"
     params.write_text(yaml.safe_dump(parameters(Path(made["params"]))))
-    return Nav2(environment, Path(made["env"]), Path(made["python"]), params)
+    return Nav2(environment, Path(made["env"]), Path(made["python"]), params, Path(made["params"]))
 
 
 def parameters(file: Path) -> dict[str, Any]:
@@ -82,9 +83,16 @@ class Ended(NamedTuple):
     @property
     def about(self) -> dict[str, Any]:
         """The stack's description in the log."""
+        return self._stack("about")
+
+    def about_of(self, robot: str) -> dict[str, Any]:
+        """Return the description of the stack of one of several robots."""
+        return self._stack(f"{robot}.about")
+
+    def _stack(self, key: str) -> dict[str, Any]:
         with next(self.out.rglob("run.mcap")).open("rb") as file:
             records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
-        about: dict[str, Any] = json.loads(records["simscen.stack"]["about"])
+        about: dict[str, Any] = json.loads(records["simscen.stack"][key])
         return about
 
     @property

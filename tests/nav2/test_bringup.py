@@ -62,6 +62,47 @@ def test_nav2_in_a_namespace(run, nav2: Nav2, tmp_path: Path) -> None:
     assert "/robot1/controller_server" in ended.about["nodes"]
 
 
+def test_commands_through_velocity_smoother_and_collision_monitor(run, nav2: Nav2) -> None:
+    ended = run(GOAL, launch=f"SMOOTHED=1 {nav2.launch}")
+    assert ended.code == 0, ended.said
+    assert {"/velocity_smoother", "/collision_monitor"} <= set(ended.about["nodes"])
+
+
+URDF = """<robot name="turtlebot">
+  <link name="base_footprint"/> <link name="base_link"/> <link name="base_scan"/>
+  <joint name="base_joint" type="fixed">
+    <parent link="base_footprint"/> <child link="base_link"/> <origin xyz="0 0 0.01"/>
+  </joint>
+  <joint name="scan_joint" type="fixed">
+    <parent link="base_link"/> <child link="base_scan"/> <origin xyz="0 0 0.17"/>
+  </joint>
+</robot>"""
+"""The frames of a TurtleBot 3, with the lidar of simscen's turtlebot."""
+
+
+def test_transforms_of_the_users_robot_state_publisher(run, nav2: Nav2, tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(
+        yaml.safe_dump({"/**": {"ros__parameters": {"use_sim_time": True, "robot_description": URDF}}})
+    )
+    start = f"source {shlex.quote(str(nav2.script))}; node robot_state_publisher robot_state_publisher"
+    publisher = f"bash -c {shlex.quote(f'{start} --ros-args --params-file {tmp_path}/robot.yaml')}"
+    frames = ["--without", "/robot_description", "--frame", "base_link:=base_footprint", "--frame", "lidar:=base_scan"]
+    ended = run(GOAL, "--without", "/tf_static", *frames, launch=f"{publisher} & {nav2.launch}")
+    assert ended.code == 0, ended.said
+    assert "/robot_state_publisher" in ended.about["nodes"]
+
+
+def test_two_robots_each_with_a_nav2(run, nav2: Nav2, tmp_path: Path) -> None:
+    """Each robot has its own parameters, in a file with its name."""
+    for robot in ("eastbound", "westbound"):
+        with_parameters(nav2, tmp_path, lambda nodes: None).params.rename(tmp_path / f"{robot}.yaml")
+    launch = nav2.launch.replace(str(nav2.params), f"{tmp_path}/$SIMSCEN_ROBOT.yaml")
+    ended = run("multi_robot/meet_in_corridor.scenario.yaml", "--ready", "100", launch=launch)
+    assert ended.code == 0, ended.said
+    for robot in ("eastbound", "westbound"):
+        assert "/controller_server" in ended.about_of(robot)["nodes"]
+
+
 def test_nav2_composed_in_one_process(run, nav2: Nav2) -> None:
     ended = run(GOAL, launch=nav2.composed_launch)
     assert ended.code == 0, ended.said
@@ -73,7 +114,7 @@ def test_a_launch_that_takes_half_a_minute(run, nav2: Nav2) -> None:
 
 
 def test_a_server_that_never_becomes_active_is_named(run, nav2: Nav2) -> None:
-    managed = "MANAGED=controller_server,smoother_server,planner_server,bt_navigator"
+    managed = "MANAGED=controller_server,smoother_server,planner_server,bt_navigator,waypoint_follower"
     ended = run(GOAL, "--ready", "30", launch=f"{managed} {nav2.launch}")
     assert ended.code == 3
     assert "the lifecycle node /behavior_server is unconfigured, not active" in ended.said

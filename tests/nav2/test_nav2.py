@@ -1,5 +1,6 @@
 """Tests of a real Nav2 with the parameters of nav2_bringup in shipped scenarios."""
 
+import json
 import os
 import shlex
 import signal
@@ -96,18 +97,23 @@ def test_recoveries_of_nav2_are_events(run) -> None:
     assert ended.code == 0, ended.said
 
 
-@pytest.mark.parametrize("plugins", ["dwb", "smac_2d"])
+@pytest.mark.parametrize("plugins", ["dwb", "mppi", "smac_2d"])
 def test_other_plugins_of_nav2_reach_the_goal(run, nav2, tmp_path: Path, plugins: str) -> None:
     params = tmp_path / "nav2_params.yaml"
-    params.write_text(yaml.safe_dump(with_plugins(yaml.safe_load(nav2.params.read_text()), plugins)))
+    params.write_text(yaml.safe_dump(with_plugins(nav2, plugins)))
     ended = run(GOAL, launch=nav2.launch.replace(str(nav2.params), shlex.quote(str(params))))
     assert ended.code == 0, ended.said
 
 
-def with_plugins(nodes: dict[str, Any], plugins: str) -> dict[str, Any]:
-    """Return parameters with the DWB controller, or with the Smac 2D planner."""
+def with_plugins(nav2: Any, plugins: str) -> dict[str, Any]:
+    """Return parameters with the DWB or MPPI controller, or with the Smac 2D planner."""
+    nodes: dict[str, Any] = yaml.safe_load(nav2.params.read_text())
+    controller = nodes["controller_server"]["ros__parameters"]
     if plugins == "dwb":
-        nodes["controller_server"]["ros__parameters"]["FollowPath"] = DWB
+        controller["FollowPath"] = DWB
+    elif plugins == "mppi":
+        unchanged = yaml.safe_load(nav2.unchanged_params.read_text())
+        controller["FollowPath"] = unchanged["controller_server"]["ros__parameters"]["FollowPath"]
     else:
         nodes["planner_server"]["ros__parameters"]["GridBased"] = {
             "plugin": "nav2_smac_planner::SmacPlanner2D",
@@ -115,6 +121,24 @@ def with_plugins(nodes: dict[str, Any], plugins: str) -> dict[str, Any]:
             "max_planning_time": 2.0,
         }
     return nodes
+
+
+def test_waypoints_are_visited_by_the_waypoint_follower(run, nav2, tmp_path: Path) -> None:
+    nodes = yaml.safe_load(nav2.params.read_text())
+    nodes["waypoint_follower"]["ros__parameters"]["wait_at_waypoint"]["waypoint_pause_duration"] = 0
+    params = tmp_path / "nav2_params.yaml"
+    params.write_text(yaml.safe_dump(nodes))
+    launch = nav2.launch.replace(str(nav2.params), shlex.quote(str(params)))
+    ended = run("navigation/waypoints_with_waits.scenario.yaml", launch=launch)
+    assert ended.about["goals"] == "/follow_waypoints"
+    verdicts = verdicts_of(ended)
+    assert verdicts["goals_reached"] == verdicts["result"] == "pass", ended.said
+
+
+def verdicts_of(ended: Any) -> dict[str, str]:
+    """Return the status of each criterion of the only run."""
+    results = json.loads((ended.out / "results.json").read_text())
+    return {verdict["criterion"]: verdict["status"] for verdict in results["runs"][0]["verdicts"]}
 
 
 def test_a_wrong_frame_is_named_with_its_node(run, nav2, tmp_path: Path) -> None:

@@ -42,6 +42,25 @@ def test_topics_types_qos_and_frames_match_nav2(with_interfaces, run, tmp_path: 
     assert seen["scans"] == ["lidar"]
 
 
+@pytest.mark.slow
+def test_frames_have_the_names_of_the_users_graph(with_interfaces, run, tmp_path: Path) -> None:
+    ros, file = with_interfaces, tmp_path / "probe.json"
+    names = ["--frame", "lidar:=base_scan", "--frame", "base_link:=chassis", "--base-frame", "base_footprint"]
+    ended = run(*names, "--launch", f"{ros.node('navigator')} & {ros.node('probe', file=file)}")
+    assert ended.code == 0, ended.said
+    seen = json.loads(file.read_text())
+    links = {("odom", "chassis"), ("chassis", "base_scan"), ("chassis", "base_footprint")}
+    assert set(map(tuple, seen["frames"])) >= links
+    assert seen["scans"] == ["base_scan"]
+
+
+@pytest.mark.slow
+def test_a_sensor_without_a_frame_is_named_with_the_option(with_interfaces, run) -> None:
+    ended = run("--ready", READY, "--without", "/tf_static", "--launch", with_interfaces.node("navigator"))
+    assert ended.code == 3
+    assert "no node publishes the frame lidar, and /tf_static of simscen is left out: --frame lidar:=NAME" in ended.said
+
+
 @pytest.mark.parametrize(
     "flaws",
     [

@@ -16,7 +16,9 @@ import typer
 from simscen.cli.diagnostics import as_text, print_text, relative_to_working_folder
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.loading.stacks.nav2_parameters import Nav2Parameters, read_nav2_parameters
+from simscen.ros2.frames import FrameNames
 from simscen.ros2.nav2_parameters import Offer
+from simscen.ros2.options import AdapterError
 
 SOCKET = "SIMSCEN_STACK_FD"
 _ADAPTER_START = Path(__file__).parents[2] / "ros2" / "start.py"
@@ -70,6 +72,10 @@ def command(
         list[str] | None, typer.Option(help="/from:=/to: other name of a topic in your graph; repeatable.")
     ] = None,
     without: Annotated[list[str] | None, typer.Option(help="Topic not to publish; repeatable.")] = None,
+    frame: Annotated[
+        list[str] | None,
+        typer.Option(help="FRAME:=NAME: other name of base_link or of a sensor's frame in your graph; repeatable."),
+    ] = None,
     base_frame: Annotated[str, typer.Option(help="Additional name of the base frame, e.g. base_footprint.")] = _BASE,
     domain: Annotated[
         int | None, typer.Option(min=0, max=232, help="ROS_DOMAIN_ID; default with --launch: an unused one.")
@@ -102,14 +108,18 @@ def command(
     Without a run, `simscen ros2 nav2 --params FILE` only checks the parameter file. Exit code 0: Nav2 can work with it;
     2: it cannot, or the command line is invalid.
     """
-    bases = [_BASE] if base_frame == _BASE else [_BASE, base_frame]
+    try:
+        bases = FrameNames(frame or [], base_frame).bases
+    except AdapterError as error:
+        raise UsageError(str(error)) from error
     parameters = _read(params) if params is not None else None
     if SOCKET not in os.environ:
         _check_parameters(what, parameters, bases)
         return
     options = {
         **{"launch": launch, "domain": domain, "namespace": namespace, "remap": remap or [], "without": without or []},
-        **{"goals": goals.value, "base_frame": base_frame, "sync": sync.value, "factor": factor, "rounds": rounds},
+        **{"frame": frame or [], "base_frame": base_frame},
+        **{"goals": goals.value, "sync": sync.value, "factor": factor, "rounds": rounds},
         **{
             "wait": wait,
             "warm_up": warm_up,

@@ -1,11 +1,13 @@
 """Check of Nav2's parameters against what simscen publishes."""
 
+import re
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
+from simscen.core.errors import UsageError
 from simscen.ros2.nav2_parameters import Finding, Offer, check, relevant_parameters
 
 OFFER = Offer(["/scan", "/rear/scan"], "/odom", ["base_link"])
@@ -139,6 +141,26 @@ def test_a_second_name_of_the_base_frame_is_accepted(tmp_path: Path) -> None:
     text = FITS.replace("base_link", "base_footprint")
     assert called(tmp_path, text)[0] == 2
     assert called(tmp_path, text, "--base-frame", "base_footprint")[0] == 0
+
+
+def test_another_name_of_the_base_frame_is_accepted(tmp_path: Path) -> None:
+    text = FITS.replace("base_link", "chassis")
+    assert called(tmp_path, text, "--frame", "base_link:=chassis")[0] == 0
+    assert called(tmp_path, FITS, "--frame", "base_link:=chassis")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("rename", "message"),
+    [
+        ("lidar=base_scan", "--frame lidar=base_scan: not of the form FRAME:=NAME"),
+        ("odom:=robot1/odom", "odom cannot be renamed, only base_link and frames of sensors"),
+    ],
+)
+def test_a_frame_that_cannot_be_renamed_is_a_usage_error(tmp_path: Path, rename: str, message: str) -> None:
+    (tmp_path / "nav2_params.yaml").write_text(FITS)
+    words = ["ros2", "nav2", "--params", str(tmp_path / "nav2_params.yaml"), "--frame", rename]
+    with pytest.raises(UsageError, match=re.escape(message)):
+        CliRunner().invoke(app, words, catch_exceptions=False)
 
 
 def test_a_file_without_parameters_of_nodes_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,65 @@
+"""Names of the robot's frames in the user's graph."""
+
+from typing import Any, Dict, Optional, Sequence
+
+from simscen.ros2.messages import find_type
+from simscen.ros2.options import AdapterError
+
+BASE_FRAME = "base_link"
+STATIC_TRANSFORMS = "/tf_static"
+SHARED_FRAMES = ("map", "odom")
+"""Frames that the nodes and simscen exchange in both directions, so that they have one name."""
+
+
+class FrameNames:
+    """Renames frames in the messages that simscen publishes, and gives the base frame a second name.
+
+    Args:
+        renames: `FRAME:=NAME`, with the names of simscen and of the user's graph, such as `lidar:=base_scan`.
+        second_base: An additional frame at the same pose as the base frame, such as base_footprint.
+
+    Raises AdapterError if a rename is not of this form, or names a frame that cannot be renamed.
+    """
+
+    def __init__(self, renames: Sequence[str], second_base: Optional[str]) -> None:
+        self._names: Dict[str, str] = {}
+        for text in renames:
+            frame, separator, name = text.partition(":=")
+            if not separator or not frame or not name:
+                raise AdapterError(f"--frame {text}: not of the form FRAME:=NAME")
+            if frame in SHARED_FRAMES:
+                raise AdapterError(f"--frame {text}: {frame} cannot be renamed, only base_link and frames of sensors")
+            self._names[frame] = name
+        base = self._names.get(BASE_FRAME, BASE_FRAME)
+        self.bases = [base] if second_base in (None, BASE_FRAME, base) else [base, str(second_base)]
+        """The names of the base frame in the user's graph."""
+
+    def apply(self, topic: str, message_type: Any, data: bytes) -> bytes:
+        """Return the serialized message of a topic with the names of the user's graph."""
+        has_second_base = topic == STATIC_TRANSFORMS and len(self.bases) > 1
+        if not has_second_base and not any(frame.encode() in data for frame in self._names):
+            return data
+        from rclpy.serialization import deserialize_message, serialize_message
+
+        message = deserialize_message(data, message_type)
+        parts = message.transforms if topic in ("/tf", STATIC_TRANSFORMS) else [message]
+        for part in parts:
+            self._rename(part)
+        if has_second_base:
+            parts.append(self._second_base())
+        return bytes(serialize_message(message))
+
+    def _rename(self, part: Any) -> None:
+        """Rename the frames of a message or a transform."""
+        if hasattr(part, "header"):
+            part.header.frame_id = self._names.get(part.header.frame_id, part.header.frame_id)
+        if hasattr(part, "child_frame_id"):
+            part.child_frame_id = self._names.get(part.child_frame_id, part.child_frame_id)
+
+    def _second_base(self) -> Any:
+        """Return the transform from the base frame to its second name, which is the identity."""
+        transform_type: Any = find_type("geometry_msgs/msg/TransformStamped")
+        transform = transform_type()
+        transform.header.frame_id, transform.child_frame_id = self.bases
+        transform.transform.rotation.w = 1.0
+        return transform

@@ -1,0 +1,157 @@
+"""Actions of Nav2's servers that the robot executes: commands that are overdue, and recoveries.
+
+A server whose action moves the robot must send commands while it executes it. The loops of Nav2 up to Jazzy run on wall
+time; without waiting for their commands, the simulation would run ahead of a controller that takes longer than a
+control period, for example MPPI on a slow machine.
+
+A recovery is a behavior that Nav2's behavior server executes, or the clearing of a costmap. A behavior is an action;
+its status shows when it starts and how it ends. Clearing a costmap is a service, whose calls are not visible; only the
+feedback of the navigation action counts it (`number_of_recoveries`, which also counts behaviors).
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, Callable, NamedTuple
+
+from simscen.ros2.messages import NANOSECONDS
+from simscen.ros2.node_parameters import NodeParameters
+
+if TYPE_CHECKING:
+    from simscen.ros2.graph import Graph
+    from simscen.ros2.node_barrier import NodeBarrier
+
+EXECUTING = 2
+"""GoalStatus.STATUS_EXECUTING."""
+RATE_PARAMETERS = {
+    "follow_path": "controller_frequency",
+    "spin": "cycle_frequency",
+    "backup": "cycle_frequency",
+    "drive_on_heading": "cycle_frequency",
+}
+"""Actions that move the robot, and the parameter of their server with the rate of its commands in Hz."""
+MISSING_LIMIT_NS = NANOSECONDS
+"""Simulated time that may pass without a due command, because the server may itself wait for simulated time.
+
+Nav2's controller server, for example, waits for a current costmap for `costmap_update_timeout`.
+"""
+NEXT_WAIT_S = 0.25
+"""Wall time to wait for a due command after one that did not arrive."""
+BEHAVIORS = ("spin", "backup", "wait")
+"""Actions of Nav2's behavior server that its behavior trees count as recoveries."""
+CLEARING = "clear_costmap"
+OUTCOMES = {4: "succeeded", 5: "canceled", 6: "failed"}
+"""GoalStatus.STATUS_…"""
+FEEDBACK_DELAY_NS = NANOSECONDS
+"""Simulated time after which a counted recovery without a behavior is reported, because the status can arrive later."""
+
+ReportEvent = Callable[..., None]
+"""Reports an event: `report("recovery.started", "spin")`."""
+
+
+class OverdueCommand(NamedTuple):
+    """A due command that was not received: the node that must send it, and the action that it executes."""
+
+    node: str
+    action: str
+
+
+class _Server(NamedTuple):
+    node: str
+    period_ns: float
+
+
+class MotionActions:
+    """Tracks which actions are being executed, by their status topics."""
+
+    def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
+        self._graph, self._parameters = graph, NodeParameters(graph, barrier)
+        self._servers: dict[str, _Server] = {}
+        self._executing: dict[str, bool] = {}
+        self._last_command: int | None = None
+        self._missing_since: int | None = None
+
+    def subscribe(self) -> None:
+        """Subscribe to the status of the actions that exist in the graph now."""
+        for action, parameter in RATE_PARAMETERS.items():
+            node = self._graph.follow_action(action, partial(self._process_status, action))
+            rate = 0.0 if node is None else self._parameters.values(node, [parameter]).get(parameter) or 0.0
+            if node is not None and rate > 0.0:
+                self._servers[action] = _Server(node, NANOSECONDS / rate)
+
+    def _process_status(self, action: str, message: Any) -> None:
+        self._executing[action] = any(goal.status == EXECUTING for goal in message.status_list)
+
+    def record_command(self, now: int) -> None:
+        """Record that a command was received at `now` nanoseconds."""
+        self._last_command, self._missing_since = now, None
+
+    def wait_s(self, limit_s: float) -> float:
+        """Return how long to wait for a due command: `limit_s`, but less after one that did not arrive."""
+        return limit_s if self._missing_since is None else min(limit_s, NEXT_WAIT_S)
+
+    def record_missing(self, now: int) -> OverdueCommand | None:
+        """Record that the due command did not arrive; return it if none has arrived for MISSING_LIMIT_NS."""
+        overdue = self.overdue_command(now)
+        self._missing_since = None if overdue is None else now if self._missing_since is None else self._missing_since
+        is_late = self._missing_since is not None and now - self._missing_since >= MISSING_LIMIT_NS
+        return overdue if is_late else None
+
+    def overdue_command(self, now: int) -> OverdueCommand | None:
+        """Return the command that is due at `now` nanoseconds, or None. Slower control loops are due less often."""
+        for action, server in self._servers.items():
+            since = server.period_ns if self._last_command is None else now - self._last_command
+            if self._executing.get(action) and since >= server.period_ns:
+                return OverdueCommand(server.node, action)
+        return None
+
+
+class Recoveries:
+    """Reports each recovery once."""
+
+    def __init__(self, graph: Graph, report: ReportEvent) -> None:
+        self._graph, self._report = graph, report
+        self._executing: dict[bytes, str] = {}
+        self._known: set[bytes] = set()
+        self._behavior_count = self._feedback_count = self._last_number = 0
+        self._excess_since: int | None = None
+
+    def subscribe(self) -> None:
+        """Subscribe to the status of the behaviors that exist in the graph now."""
+        for behavior in BEHAVIORS:
+            self._graph.follow_action(behavior, partial(self._process_statuses, behavior))
+
+    def _process_statuses(self, behavior: str, message: Any) -> None:
+        for goal in message.status_list:
+            self._process_status(behavior, bytes(goal.goal_info.goal_id.uuid), goal.status)
+
+    def _process_status(self, behavior: str, goal: bytes, status: int) -> None:
+        if goal not in self._known and (status == EXECUTING or status in OUTCOMES):
+            self._known.add(goal)
+            self._executing[goal] = behavior
+            self._behavior_count += 1
+            self._report("recovery.started", behavior)
+        if status in OUTCOMES and self._executing.pop(goal, None) is not None:
+            self._report("recovery.ended", behavior, outcome=OUTCOMES[status])
+
+    def update_count(self, number: int) -> None:
+        """Update the count from `number`, the recoveries since the navigation action began as in its feedback."""
+        self._feedback_count += max(0, number - self._last_number)
+        self._last_number = number
+
+    def begin_goal(self) -> None:
+        """Count from zero, as the feedback of a new navigation action does."""
+        self._last_number = 0
+
+    def report_clearing(self, now: int) -> None:
+        """Report counted recoveries without a behavior as costmap clearing; `now` in nanoseconds."""
+        if self._feedback_count <= self._behavior_count:
+            self._excess_since = None
+            return
+        if self._excess_since is None:
+            self._excess_since = now
+        if now - self._excess_since >= FEEDBACK_DELAY_NS:
+            for _ in range(self._feedback_count - self._behavior_count):
+                self._report("recovery.started", CLEARING)
+                self._report("recovery.ended", CLEARING, outcome="succeeded")
+            self._behavior_count, self._excess_since = self._feedback_count, None

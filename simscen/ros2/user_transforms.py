@@ -1,0 +1,45 @@
+"""The user's transforms of sensors, for example those of a robot_state_publisher, in place of simscen's /tf_static."""
+
+from typing import Any, List, Set
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+
+from simscen.ros2.frames import SHARED_FRAMES, STATIC_TRANSFORMS, FrameNames
+from simscen.ros2.graph import Graph
+from simscen.ros2.messages import TRANSFORMS, find_type
+
+PROFILES = {
+    STATIC_TRANSFORMS: QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+    "/tf": QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT),
+}
+
+
+class UserTransforms:
+    """Finds out whether the user's nodes publish all frames that simscen would publish on /tf_static."""
+
+    def __init__(self, graph: Graph, names: FrameNames, replaced: bytes) -> None:
+        """Subscribe to the transforms; `replaced` is simscen's message on /tf_static, which is not published."""
+        self._required: List[str] = []
+        self._published: Set[str] = set()
+        message_type: Any = find_type(TRANSFORMS)
+        if message_type is None:
+            return
+        message = deserialize_message(names.apply(STATIC_TRANSFORMS, message_type, replaced), message_type)
+        self._required = [link.child_frame_id for link in message.transforms]
+        for topic, profile in PROFILES.items():
+            graph.node.create_subscription(message_type, graph.names(topic), self._take, profile)
+
+    def _take(self, message: Any) -> None:
+        for link in message.transforms:
+            self._published |= {link.header.frame_id, link.child_frame_id}
+
+    def missing(self) -> List[str]:
+        """Return the frames that no node publishes, one sentence each."""
+        known = ", ".join(sorted(self._published - set(SHARED_FRAMES))) or "no other"
+        return [
+            f"no node publishes the frame {frame}, and {STATIC_TRANSFORMS} of simscen is left out: "
+            f"--frame {frame}:=NAME uses the name of your URDF (your nodes publish {known})"
+            for frame in self._required
+            if frame not in self._published
+        ]
