@@ -7,14 +7,12 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
-import pybullet
-
 from simscen.core.environment.world_model import Patch
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, MotionPath, TriangleMesh
 from simscen.core.records.case import CLEARANCE_RANGE_M
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.contact.collisions import PreStepMotion
 from simscen.sim.objects.actors import Actors

@@ -1,1 +1,31 @@
-"""PyBullet clients, collision shapes and rigid bodies."""
+"""PyBullet clients, collision shapes and rigid bodies. Other modules import PyBullet itself from here, too."""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+__all__ = ["pybullet"]
+
+
+@contextmanager
+def _discarded_stderr() -> Iterator[None]:
+    """Discard what is written to file descriptor 2, also by C code."""
+    try:
+        saved = os.dup(2)
+    except OSError:  # stderr is closed
+        yield
+        return
+    sys.stderr.flush()
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 2)
+    try:
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(null)
+
+
+with _discarded_stderr():  # PyBullet prints its build time
+    import pybullet

@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-import pybullet
 
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.meshes import submesh
 from simscen.core.geometry.shapes import Solid, TriangleMesh
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import engine, pybullet
 from simscen.sim.robots.wheeled_base import WheeledBase
 
 

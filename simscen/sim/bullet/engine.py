@@ -4,13 +4,13 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
-import pybullet
 
 from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, submesh
 from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
 from simscen.sim.body.outline import hull_points
+from simscen.sim.bullet import pybullet
 from simscen.sim.bullet.hull_vertices import reduce_hull_vertices
 
 MAX_FACES_PER_SHAPE = 40_000

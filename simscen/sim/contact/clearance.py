@@ -10,14 +10,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-import pybullet
-
 from simscen.core.geometry import Pose3, Vector
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.records.case import CLEARANCE_RANGE_M
 from simscen.core.records.trace import Truth
 from simscen.sim.body.outline import hull_points, radius_and_height
 from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.bullet import pybullet
 from simscen.sim.contact.static_distance import StaticDistance, max_displacement
 from simscen.sim.objects.actors import NEVER, Actors
 from simscen.sim.robots.drive_factory import Base

@@ -5,10 +5,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import pybullet
-
 from simscen.core.geometry import Vector
 from simscen.core.records.events import Event, EventKind
+from simscen.sim.bullet import pybullet
 
 END_DELAY_S = 0.1
 """Time without contact after which a collision has ended, so that a bouncing robot collides once."""

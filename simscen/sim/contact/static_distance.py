@@ -12,14 +12,13 @@ from heapq import heappop, heappush, heapreplace
 
 import numpy as np
 import numpy.typing as npt
-import pybullet
 
 from simscen.core.geometry import Array, Pose3, Vector
 from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, is_convex, submesh
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.sim.body import outline
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.scene.walls import parts_of
 

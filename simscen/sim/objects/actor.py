@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import pybullet
 
 from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.errors import RunError
@@ -23,7 +22,7 @@ from simscen.core.geometry.scripted_poses import BatchPathSampler, PosesAtTick, 
 from simscen.core.geometry.shapes import Body, Mesh, MotionPath
 from simscen.sim.body.inertia import inertia_of_solids
 from simscen.sim.body.outline import radius_and_height
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import engine, pybullet
 
 FRICTION = 0.6
 """Friction of movable objects on the ground: about that of wood or cardboard on concrete."""

@@ -5,11 +5,10 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
-import pybullet
 
 from simscen.core.geometry import Pose2, Pose3, Vector
 from simscen.core.geometry.shapes import Body, MotionPath
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.divergence import divergence_reason
 from simscen.sim.contact.static_distance import encloses
 from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ActorBuilder, ScheduledPoses

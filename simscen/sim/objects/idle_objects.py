@@ -17,10 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import pybullet
 
 from simscen.core.geometry import Array, Pose3, Vector
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import engine, pybullet
 from simscen.sim.objects.actor import Actor
 
 SAMPLE_PERIOD_TICKS = 6

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
-import pybullet
 
 from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry import Pose2, Pose3, wrap
@@ -12,7 +11,7 @@ from simscen.core.geometry.kinematics import STOP, MecanumWheels, Twist
 from simscen.model.robot import Mecanum
 from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import engine, pybullet
 from simscen.sim.robots.robot_state import RobotState
 from simscen.sim.robots.wheel_drives import VelocityRamp
 

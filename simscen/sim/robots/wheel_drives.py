@@ -3,12 +3,11 @@
 import math
 from collections.abc import Sequence
 
-import pybullet
-
 from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Ackermann, Differential, Limits, SkidSteer
 from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.bullet import pybullet
 from simscen.sim.robots.wheeled_base import WheeledBase
 
 

@@ -5,13 +5,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import pybullet
 
 from simscen.core.geometry import Pose2, Pose3, Vector, rotated
 from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.body.undercarriage import Wheel, caster_gap, compliant_casters
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import engine, pybullet
 from simscen.sim.robots.robot_state import RobotState
 from simscen.sim.scene.terrain import MIN_NORMAL_Z_CASTER, MIN_NORMAL_Z_WHEEL, Terrain
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import pybullet
 
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Body, Solid, TriangleMesh
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import engine, pybullet
 
 NEAR_PLANE_M = 0.02
 FACES_PER_SHAPE = 20_000

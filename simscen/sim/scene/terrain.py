@@ -9,14 +9,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import pybullet
 
 from simscen.core.environment.world_model import Patch
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.meshes import Owners, drivable_solids, is_convex, submesh
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Body, TriangleMesh
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import engine, pybullet
 
 RAY_HEIGHT_M = 1000.0
 """Height above and below the floor between which the ground is searched."""
