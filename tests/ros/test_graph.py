@@ -101,6 +101,7 @@ def test_an_incomplete_graph_is_an_exact_error(ros, run, flaws: dict[str, str]) 
         assert message in ended.said
 
 
+@pytest.mark.slow
 def test_nodes_on_wall_time_and_inactive_lifecycle_nodes_are_named(ros, run) -> None:
     awake = ros.node("flawed", "-r", "cmd_vel:=other", sim_time=False)
     ended = run("--ready", READY, "--launch", f"{awake} & {ros.node('sleeper')}")
@@ -109,6 +110,7 @@ def test_nodes_on_wall_time_and_inactive_lifecycle_nodes_are_named(ros, run) -> 
     assert "the lifecycle node /sleeper is unconfigured, not active" in ended.said
 
 
+@pytest.mark.slow
 def test_the_remapping_for_a_topic_with_another_name_is_suggested(ros, run) -> None:
     ended = run("--ready", READY, "--launch", ros.node("navigator", "-r", "scan:=front", "-r", "cmd_vel:=base/cmd_vel"))
     assert ended.code == 3

@@ -42,9 +42,10 @@ def test_a_bringup_may_take_longer_than_the_limits_of_a_stack_if_ready_says_so(w
     ("parameters", "message"),
     [
         pytest.param({"misfit": "planner_server"}, "there is no node planner_server", marks=pytest.mark.slow),
-        (
+        pytest.param(
             {"misfit": "frame"},
             "amcl: base_frame_id is 'base_footprint'; simscen's base frame is 'base_link': --base-frame",
+            marks=pytest.mark.slow,
         ),
         (
             {"never": "behavior_server"},

@@ -126,6 +126,7 @@ def test_killing_a_node_is_an_error_of_its_run_only(ros, run, alive, tmp_path: P
     assert alive(tag) == []
 
 
+@pytest.mark.slow
 def test_a_ros_without_tf2_msgs_can_drive_nodes_that_do_not_need_tf(ros, run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(NODES.with_name("without")))
     ended = run("--launch", ros.node("navigator"), scenario="short.scenario.yaml")
@@ -144,6 +145,7 @@ def test_a_node_that_needs_tf_is_named_if_the_adapter_has_no_tf2_msgs(
     assert "has no tf2_msgs; install it" in ended.said
 
 
+@pytest.mark.slow
 def test_a_node_that_hangs_is_named_and_ended(ros, run, alive) -> None:
     tag = f"hangs{os.getpid()}"
     launch = ros.node("navigator", "-p", f"tag:={tag}", hangs_at=1.0)

@@ -1,6 +1,7 @@
 """`--resume` keeps verdicts whose logs exist, and marks them."""
 
 import json
+import shutil
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -18,18 +19,27 @@ pass: [{{collisions: {{max: 0}}}}]
 """
 
 
-@pytest.fixture
-def session(tmp_path):
+def run(folder, *options):
+    """Run in a process of its own, because a session locks its folder until the process ends."""
+    command = [sys.executable, "-m", "simscen", "run", "a.scenario.yaml", "b.scenario.yaml", "-j", "1", *options]
+    return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Return a folder with two scenarios and their finished session."""
+    folder = tmp_path_factory.mktemp("finished")
     for name, seconds in (("a", "0.2"), ("b", "0.3")):
-        (tmp_path / f"{name}.scenario.yaml").write_text(SCENARIO.replace("TIME", seconds))
+        (folder / f"{name}.scenario.yaml").write_text(SCENARIO.replace("TIME", seconds))
+    run(folder, "--out", "out")
+    return folder
 
-    def call(*options):
-        """In a process of its own, since one holds the folder until it ends."""
-        command = [sys.executable, "-m", "simscen", "run", "a.scenario.yaml", "b.scenario.yaml", "-j", "1", *options]
-        return subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True).stdout
 
-    call("--out", "out")
-    return tmp_path / "out", lambda: call("--resume", "out")
+@pytest.fixture
+def session(finished, tmp_path):
+    """Return the folder of a copy of the finished session, and a function that resumes it."""
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "out", lambda: run(tmp_path, "--resume", "out")
 
 
 def kept(folder):

@@ -92,7 +92,7 @@ def test_results_do_not_depend_on_the_number_of_workers_or_on_batches(tmp_path: 
     ("x", "claim", "code", "status", "element"),
     [
         ("2 m", "{min: 80 %}", 0, "held", "system-out"),
-        ("1 m", "{min: 80 %}", 1, "refuted", "failure"),
+        pytest.param("1 m", "{min: 80 %}", 1, "refuted", "failure", marks=pytest.mark.slow),
         ("1 m", "{min: 80 %, method: sprt, target: 90 %}", 1, "refuted", "failure"),
         ("2 m", "{min: 80 %, runs: 5}", 6, "undecided", "error"),
     ],
