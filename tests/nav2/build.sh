@@ -135,9 +135,12 @@ for package in rcl_interfaces/statistics_msgs rcl_interfaces/composition_interfa
   pluginlib/pluginlib angles/angles message_filters geometry2/tf2_msgs geometry2/tf2 geometry2/tf2_ros \
   geometry2/tf2_geometry_msgs geometry2/tf2_sensor_msgs geometry2/tf2_eigen laser_geometry navigation_msgs/map_msgs \
   bond_core/bond bond_core/smclib bond_core/bondcpp diagnostics/diagnostic_updater geographic_info/geographic_msgs robot_localization \
-  urdf/urdf_parser_plugin urdf/urdf kdl_parser/kdl_parser robot_state_publisher; do
+  urdf/urdf_parser_plugin; do
   build "$package"
 done
+build urdf/urdf -DCMAKE_CXX_STANDARD=17
+build kdl_parser/kdl_parser
+build robot_state_publisher
 # Nav2 links to bondcpp::bondcpp, which this branch does not export.
 grep -q 'bondcpp::bondcpp' "$INSTALL/share/bondcpp/cmake/bondcppConfig.cmake" ||
   cat >> "$INSTALL/share/bondcpp/cmake/bondcppConfig.cmake" <<'C'
