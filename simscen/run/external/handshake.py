@@ -30,7 +30,7 @@ class RunParameters:
         robot_description: URDF of the robot.
         stop_on_failure: Whether the stack must stop after a failed goal instead of going on to the next one.
         robot_name: Name of the robot; "" for a single robot.
-        later_zones: Zones that events can switch.
+        switchable_zones: Zones that events can switch.
     """
 
     seed: int
@@ -42,7 +42,7 @@ class RunParameters:
     stop_on_failure: bool
     mode: Mode = "navigate_to_pose"
     robot_name: str = ""
-    later_zones: Zones = field(default_factory=Zones)
+    switchable_zones: Zones = field(default_factory=Zones)
 
 
 def hello_content(

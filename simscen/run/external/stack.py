@@ -36,7 +36,7 @@ from simscen.run.external.protocol import (
 )
 from simscen.run.external.publisher import StepPublisher
 from simscen.run.external.stack_process import StackProcess
-from simscen.run.external.zone_masks import ZoneMasks, switched_zones
+from simscen.run.external.zone_masks import ZoneMasks, switchable_zones
 from simscen.run.preparation import PreparedScenario
 from simscen.run.process.isolation import clean_environment
 from simscen.run.robot_interface import sensor_frames, sensor_kinds
@@ -78,7 +78,7 @@ class ExternalStack:
         self._time = SimTime(surroundings.tick_rate)
         self._goals = GoalTracker(parameters.stop_on_failure, surroundings.tick_rate, parameters.mode)
         self._publisher = StepPublisher(surroundings.tick_rate, parameters.sensors, parameters.mounts)
-        self._zone_masks = ZoneMasks(surroundings, parameters.later_zones)
+        self._zone_masks = ZoneMasks(surroundings, parameters.switchable_zones)
         self._process: StackProcess | None = None
         self._topic_table = TopicTable.build(())
         self._welcome = Welcome()
@@ -305,7 +305,7 @@ def build_external_stack(
         stop_on_failure=prepared.spec.on_goal_failure == "stop",
         mode=prepared.spec.navigation.mode,
         robot_name=prepared.loaded.robot_name,
-        later_zones=switched_zones(prepared),
+        switchable_zones=switchable_zones(prepared),
     )
     robot_log = log_file and robot_file(log_file, parameters.robot_name)
     return ExternalStack(spec.external, command, surroundings, parameters, robot_log)

@@ -33,7 +33,7 @@ SPEED_STEP_M_S = 0.01
 """Finest difference in m/s between two speed limits of a mask."""
 
 
-def switched_zones(prepared: PreparedScenario) -> Zones:
+def switchable_zones(prepared: PreparedScenario) -> Zones:
     """Return the zones that events can switch, and their limits."""
     keepout: list[Polygon] = []
     speed: list[tuple[Polygon, float]] = []
@@ -52,15 +52,15 @@ def switched_zones(prepared: PreparedScenario) -> Zones:
 class ZoneMasks:
     """Draws zones into masks, which cover the map of the robot or, without a map, all zones."""
 
-    def __init__(self, surroundings: Surroundings, later: Zones) -> None:
-        """`surroundings` contains the zones at the start of the run, and `later` those that events can switch."""
-        keepout = (*surroundings.keepout, *later.keepout)
-        speed = (*surroundings.speed_zones, *later.speed)
+    def __init__(self, surroundings: Surroundings, switchable: Zones) -> None:
+        """`surroundings` contains the zones at the start of the run, and `switchable` those that events can switch."""
+        keepout = (*surroundings.keepout, *switchable.keepout)
+        speed = (*surroundings.speed_zones, *switchable.speed)
         masks = surroundings.masks
-        frame = surroundings.map or _frame_around([*keepout, *(polygon for polygon, _ in speed)])
-        self._keepout = frame if keepout else masks.keepout
+        grid = surroundings.map or _grid_around([*keepout, *(polygon for polygon, _ in speed)])
+        self._keepout = grid if keepout else masks.keepout
         speed_file = masks.speed.grid if masks.speed is not None else None
-        self._speed = _SpeedMask(frame if speed else speed_file, masks.speed, speed, surroundings)
+        self._speed = _SpeedMask(grid if speed else speed_file, masks.speed, speed, surroundings)
         self._drawn: dict[Topic, OccupancyGrid] = {}
 
     def changed_masks(self, zones: Zones) -> Iterator[tuple[Topic, OccupancyGrid]]:
@@ -77,31 +77,31 @@ class ZoneMasks:
             for polygon in zones.keepout:
                 cells[_cells_inside(self._keepout, polygon)] = OCCUPIED
             yield KEEPOUT_ZONES, _with_cells(self._keepout, cells)
-        if self._speed.frame is not None:
-            yield SPEED_ZONES, self._speed.drawn(self._speed.frame, zones)
+        if self._speed.grid is not None:
+            yield SPEED_ZONES, self._speed.draw(self._speed.grid, zones)
 
     @property
     def meanings(self) -> list[dict[str, Any]]:
-        """What the values of each mask mean: its topic and filter; for limits also percent, base, and multiplier."""
+        """Topic and filter of each mask; for speed limits also `percent`, `base`, and `multiplier` of its values."""
         keepout = {"topic": KEEPOUT_ZONES.name, "filter": "keepout"}
         speed = {"topic": SPEED_ZONES.name, "filter": "speed", **self._speed.scale}
         return [
             *([keepout] if self._keepout is not None else []),
-            *([speed] if self._speed.frame is not None else []),
+            *([speed] if self._speed.grid is not None else []),
         ]
 
 
 class _SpeedMask:
-    """Scale and frame of the mask of speed limits; `frame` is None without any limit."""
+    """Mask of speed limits. `scale` converts its values to speeds; `grid` has its cells, None without any limit."""
 
     def __init__(
         self,
-        frame: OccupancyGrid | None,
+        grid: OccupancyGrid | None,
         file: SpeedLimits | None,
         zones: tuple[tuple[Polygon, float], ...],
         surroundings: Surroundings,
     ) -> None:
-        self.frame, self._file, self._full_speed = frame, file, surroundings.robot.max_linear
+        self.grid, self._file, self._full_speed = grid, file, surroundings.robot.max_linear
         fastest = max((limit for _, limit in zones), default=0.0)
         self._percent = file is not None and file.percent
         self._base = 0.0 if file is None else file.base
@@ -111,26 +111,26 @@ class _SpeedMask:
     def scale(self) -> dict[str, Any]:
         return {"percent": self._percent, "base": self._base, "multiplier": self._multiplier}
 
-    def drawn(self, frame: OccupancyGrid, zones: Zones) -> OccupancyGrid:
-        if not zones.speed and zones.masks.speed is not None and frame is zones.masks.speed.grid:
-            return frame
-        limits: Array = np.full(frame.shape, np.inf)
+    def draw(self, grid: OccupancyGrid, zones: Zones) -> OccupancyGrid:
+        if not zones.speed and zones.masks.speed is not None and grid is zones.masks.speed.grid:
+            return grid
+        limits: Array = np.full(grid.shape, np.inf)
         if zones.masks.speed is not None:
-            limits = zones.masks.speed.along(_centers(frame), self._full_speed).reshape(frame.shape)
+            limits = zones.masks.speed.along(_centers(grid), self._full_speed).reshape(grid.shape)
         for polygon, limit in zones.speed:
-            inside = _cells_inside(frame, polygon)
+            inside = _cells_inside(grid, polygon)
             limits[inside] = np.minimum(limits[inside], limit)
         limited = np.isfinite(limits)
         amounts = limits[limited] * (100 / self._full_speed if self._percent else 1.0)
         values = (amounts - self._base) / self._multiplier
         # A limit between two values becomes the lower one.
         rounded = np.floor(values + 1e-9) if self._multiplier > 0 else np.ceil(values - 1e-9)
-        cells = np.full(frame.shape, FREE, dtype=np.int8)
+        cells = np.full(grid.shape, FREE, dtype=np.int8)
         cells[limited] = np.clip(rounded, 1, OCCUPIED)
-        return _with_cells(frame, cells)
+        return _with_cells(grid, cells)
 
 
-def _frame_around(polygons: list[Polygon]) -> OccupancyGrid:
+def _grid_around(polygons: list[Polygon]) -> OccupancyGrid:
     corners = np.array([corner for polygon in polygons for corner in polygon] or [(0.0, 0.0)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     columns, rows = np.maximum(1, np.ceil((high - low) / CELL_M)).astype(int)
@@ -138,13 +138,13 @@ def _frame_around(polygons: list[Polygon]) -> OccupancyGrid:
     return OccupancyGrid(np.full((rows, columns), FREE, dtype=np.int8), CELL_M, origin)
 
 
-def _cells_of(mask: OccupancyGrid | None, frame: OccupancyGrid) -> npt.NDArray[np.int8]:
+def _cells_of(mask: OccupancyGrid | None, grid: OccupancyGrid) -> npt.NDArray[np.int8]:
     """Return the values of a mask file in the cells of another grid; FREE outside of it, and without it."""
     if mask is None:
-        return np.full(frame.shape, FREE, dtype=np.int8)
-    if mask is frame:
+        return np.full(grid.shape, FREE, dtype=np.int8)
+    if mask is grid:
         return np.array(mask.cells)
-    cells: npt.NDArray[np.int8] = np.maximum(mask.values_at(_centers(frame)), FREE).reshape(frame.shape)
+    cells: npt.NDArray[np.int8] = np.maximum(mask.values_at(_centers(grid)), FREE).reshape(grid.shape)
     return cells
 
 
