@@ -49,7 +49,7 @@ class GoalOutcome:
 
     @property
     def failed_as_expected(self) -> bool:
-        """True if the goal failed with the expected error code."""
+        """True if the goal failed, with the expected error code if there is one."""
         if self.end is None or self.end.kind != EventKind.GOAL_FAILED:
             return False
         return self.failure in (FAILED, code_of(self.end))
@@ -73,9 +73,10 @@ class GoalOutcome:
 def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
     """Return the outcome of each goal of the scenario and of each goal that an event sent, by time of acceptance.
 
-    The k-th goal with a name is matched with the k-th one reported under that name. A goal of the scenario that was
-    never accepted comes last; a goal that no event sent is left out. A via pose without reports of its own takes the
-    outcome of the goal at which its drive stops, because Nav2's action status reports no more.
+    If several goals have the same name, the k-th of them is matched with the k-th report under this name. A goal of the
+    scenario that was never accepted comes last; the goal of an event that did not send it is left out. A via pose
+    without reports of its own takes the outcome of the goal at which its drive stops, because Nav2 reports the status
+    of the whole action only.
     """
     reports = _reports(trace)
     earlier = _earlier_uses([goal.name for goal in case.goals])

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 
 STALE_SCAN_S = 0.2
-"""Age in s above which a scan is mentioned: two periods of a 10 Hz lidar."""
+"""Age in s above which a finding mentions that the newest scan is old: two periods of a 10 Hz lidar."""
 
 
 class StoppedWithin(Spec, Criterion):
     """The robot stopped in time after a fault or an event.
 
-    What is measured: time from the start of `after` until the robot's true speed and turn rate fall to rest and stay
-        there for `hold`; each time that it happens.
+    What is measured: the time from each start of `after` until the robot's true speed and turn rate are at most
+        `speed` and `turn_rate` for the duration `hold`.
     When it fails: that took longer than `time`; or, with `stay`, the robot moved again before the fault ended.
     Why this: a robot without sensor data must not drive. The true speed counts, because wheels can roll after the
         command is zero.
@@ -42,7 +42,7 @@ class StoppedWithin(Spec, Criterion):
     """
 
     time: PositiveDuration
-    """Maximum time in s after its start."""
+    """Maximum time in s from the start of `after` until the robot stands."""
     after: DisturbanceName
     """Name of the fault, e.g. `lidar.off`, or of the event."""
     speed: PositiveSpeed = 0.02
@@ -91,7 +91,7 @@ class StoppedWithin(Spec, Criterion):
         until = span.end if stop is None else stop
         elapsed = trace.seconds(until - span.start)
         if elapsed <= self.time and not (stop is not None and lasted):
-            over = f"`{self.after}`" if span.lasting and stop is None else f"the run ({end_reason(trace)})"
+            over = f"`{self.after}`" if span.has_end_event and stop is None else f"the run ({end_reason(trace)})"
             state = "still moving" if stop is None else "at rest too briefly"
             because = f"{over} was over {elapsed:.2f} s after it started, with the robot {state}"
             return [undecided("stopped_within", because, self._limit)]
@@ -159,23 +159,27 @@ class Stuck(Spec, Criterion):
             for outcome in goal_outcomes(trace, case)
             if outcome.accepted is not None
         ]
-        stays = [stay for start, end in drives for stay in _stays(poses, start, end, self.radius)]
-        if not stays:
+        standstills = [
+            standstill for start, end in drives for standstill in _standstills(poses, start, end, self.radius)
+        ]
+        if not standstills:
             return [undecided("stuck", "no goal was ever under way", f"≤ {self.max:.2f} s")]
-        longest, tick = max(stays, key=lambda stay: (stay[0], -stay[1]))
+        longest, tick = max(standstills, key=lambda standstill: (standstill[0], -standstill[1]))
         detail = [f"from t = {trace.seconds(tick - longest):.2f} s on it stayed within {self.radius:.2f} m"]
         return [at_most("stuck", trace.seconds(longest), self.max, "s", at=(trace, tick), detail=detail)]
 
 
-def _stays(poses: Samples, start: int, end: int, radius: float) -> list[tuple[int, int]]:
-    """Return the duration and end in ticks of each stay between two ticks, as measured by a progress checker."""
+def _standstills(poses: Samples, start: int, end: int, radius: float) -> list[tuple[int, int]]:
+    """Return the duration and end in ticks of each time in which the robot stayed within `radius`.
+
+    The times are consecutive from tick `start` to `end`, as a progress checker measures them."""
     first, last = np.searchsorted(poses.ticks, (start, end + 1), side="left").tolist()
     if first == last:
         return []
     xs, ys, ticks = poses.values[:, 0].tolist(), poses.values[:, 1].tolist(), poses.ticks.tolist()
-    stays, base, since = [], first, start
+    found, base, since = [], first, start
     for k in range(first, last):
         if math.hypot(xs[k] - xs[base], ys[k] - ys[base]) > radius:
-            stays.append((ticks[k] - since, ticks[k]))
+            found.append((ticks[k] - since, ticks[k]))
             base, since = k, ticks[k]
-    return [*stays, (end - since, end)]
+    return [*found, (end - since, end)]

@@ -23,12 +23,12 @@ NEVER_SWITCHED = "no event switched the zone on or off: leave `while_on` out to 
 class Span:
     """Interval from `start` to `end` in ticks.
 
-    `lasting` is True if the interval has an end of its own, such as that of a fault with `for`.
+    `has_end_event` is True if an event of the log ended the interval, and False if it lasts to the end of the run.
     """
 
     start: int
     end: int
-    lasting: bool
+    has_end_event: bool
 
 
 def spans(trace: Trace, label: str) -> list[Span]:

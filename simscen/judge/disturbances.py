@@ -21,22 +21,22 @@ FINDING_NAME = "disturbance did not happen"
 def disturbance_outcomes(trace: Trace, case: Case) -> tuple[DisturbanceOutcome, ...]:
     """Return the outcome of each disturbance of the scenario in order: events, then faults."""
     return tuple(
-        _event_outcome(trace, case, ordered, entry)
-        if ordered.kind == "event"
-        else _fault_outcome(trace, ordered, entry)
-        for entry, ordered in _with_entries(case.disturbances)
+        _event_outcome(trace, case, disturbance, entry)
+        if disturbance.kind == "event"
+        else _fault_outcome(trace, disturbance, entry)
+        for entry, disturbance in _with_entries(case.disturbances)
     )
 
 
 def missing_disturbances(
-    trace: Trace, happened: Sequence[DisturbanceOutcome], others: Sequence[Verdict] = ()
+    trace: Trace, outcomes: Sequence[DisturbanceOutcome], others: Sequence[Verdict] = ()
 ) -> tuple[tuple[Verdict, int], ...]:
     """Return a verdict for each required disturbance that did not happen, with its line in the scenario.
 
     It is inconclusive if the log is truncated, because the disturbance might have happened later. Of a sequence, only
     the first missing step gets a verdict. A name that is already used, also by `others`, gets a number.
     """
-    missing = [one for one in happened if one.missing and not _is_reported_earlier(one, happened)]
+    missing = [one for one in outcomes if one.missing and not _is_reported_earlier(one, outcomes)]
     seen = Counter(verdict.id for verdict in others)
     found = []
     for one in missing:
@@ -47,19 +47,19 @@ def missing_disturbances(
     return tuple(found)
 
 
-def _is_reported_earlier(one: DisturbanceOutcome, happened: Sequence[DisturbanceOutcome]) -> bool:
+def _is_reported_earlier(one: DisturbanceOutcome, outcomes: Sequence[DisturbanceOutcome]) -> bool:
     """Return whether the step waited for an earlier step of its sequence that already has a verdict."""
     after = one.disturbance.after
     if after is None or one.fired:
         return False
-    before = [other for other in happened if other.disturbance.kind == "event"][after]
-    return not before.fired and (before.missing or _is_reported_earlier(before, happened))
+    before = [other for other in outcomes if other.disturbance.kind == "event"][after]
+    return not before.fired and (before.missing or _is_reported_earlier(before, outcomes))
 
 
-def _with_entries(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
-    """Yield the disturbances with their numbers among those of the same kind, to which events of the log refer."""
+def _with_entries(disturbances: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
+    """Yield each disturbance with its number among those of its kind: the `entry` of its events in the log."""
     counts = {"event": 0, "fault": 0}
-    for one in ordered:
+    for one in disturbances:
         yield counts[one.kind], one
         counts[one.kind] += 1
 
@@ -76,34 +76,36 @@ def _events_of_entry(trace: Trace, kind: EventKind, entry: int) -> list[Event]:
     return [event for event in trace.of_kind(kind) if event.data.get("entry") == entry]
 
 
-def _event_outcome(trace: Trace, case: Case, ordered: Disturbance, entry: int) -> DisturbanceOutcome:
+def _event_outcome(trace: Trace, case: Case, disturbance: Disturbance, entry: int) -> DisturbanceOutcome:
     """Return the outcome of an event. Each action must take effect once, and the run must continue after that."""
     started = _events_of_entry(trace, EventKind.EVENT_STARTED, entry)
     fired = tuple(event.tick for event in started)
     ended = _events_of_entry(trace, EventKind.EVENT_ENDED, entry)
     if not started:
-        return DisturbanceOutcome(ordered, (), False, _sequence_state(trace, case, ordered) + _never_began(trace))
+        return DisturbanceOutcome(
+            disturbance, (), False, _sequence_state(trace, case, disturbance) + _never_began(trace)
+        )
     in_time = [event for event in ended if event.tick < trace.end]
     if not in_time:
-        return DisturbanceOutcome(ordered, fired, False, _too_late(trace), fired[0])
+        return DisturbanceOutcome(disturbance, fired, False, _too_late(trace), fired[0])
     starts = [_effects(event) for event in in_time]
     for action in range(len(starts[0])):
         if not any(effects[action][0] for effects in starts):
-            return DisturbanceOutcome(ordered, fired, False, starts[0][action][1], in_time[0].tick)
+            return DisturbanceOutcome(disturbance, fired, False, starts[0][action][1], in_time[0].tick)
     if not starts[0]:
-        return DisturbanceOutcome(ordered, fired, True, "its trigger fired", in_time[0].tick)
+        return DisturbanceOutcome(disturbance, fired, True, "its trigger fired", in_time[0].tick)
     first = next(k for k, effects in enumerate(starts) if any(happened for happened, _ in effects))
     what = "; ".join(what for happened, what in starts[first] if happened)
-    return DisturbanceOutcome(ordered, fired, True, what, in_time[first].tick)
+    return DisturbanceOutcome(disturbance, fired, True, what, in_time[first].tick)
 
 
-def _sequence_state(trace: Trace, case: Case, ordered: Disturbance) -> str:
+def _sequence_state(trace: Trace, case: Case, disturbance: Disturbance) -> str:
     """Return since when a missing step of a sequence was due, or which earlier step was missing."""
-    if ordered.after is None:
+    if disturbance.after is None:
         return ""
     events = [one for one in case.disturbances if one.kind == "event"]
-    awaited = events[ordered.after]
-    begun = _events_of_entry(trace, EventKind.EVENT_STARTED, ordered.after)
+    awaited = events[disturbance.after]
+    begun = _events_of_entry(trace, EventKind.EVENT_STARTED, disturbance.after)
     if begun:
         return f"it was due from t = {trace.seconds(begun[0].tick):.2f} s, after {awaited.name}; "
     while awaited.after is not None and not _events_of_entry(trace, EventKind.EVENT_STARTED, awaited.after):
@@ -118,11 +120,11 @@ def _effects(ended: Event) -> list[tuple[bool, str]]:
     return [(bool(one["happened"]), str(one["what"])) for one in effects if isinstance(one, dict)]
 
 
-def _fault_outcome(trace: Trace, ordered: Disturbance, entry: int) -> DisturbanceOutcome:
+def _fault_outcome(trace: Trace, disturbance: Disturbance, entry: int) -> DisturbanceOutcome:
     started = _events_of_entry(trace, EventKind.FAULT_STARTED, entry)
     fired = tuple(event.tick for event in started)
     if not started:
-        return DisturbanceOutcome(ordered, (), False, _never_began(trace))
+        return DisturbanceOutcome(disturbance, (), False, _never_began(trace))
     sensor, ended = started[0].data.get("sensor"), _events_of_entry(trace, EventKind.FAULT_ENDED, entry)
     touched = [
         event.tick for event in _events_of_entry(trace, EventKind.FAULT_TOOK_EFFECT, entry) if event.tick < trace.end
@@ -132,12 +134,12 @@ def _fault_outcome(trace: Trace, ordered: Disturbance, entry: int) -> Disturbanc
         number = sum(count for count in counts if isinstance(count, int))
         times = (" once" if number == 1 else f" {number} times") if len(ended) == len(started) else ""
         later = f", first at t = {trace.seconds(touched[0]):.2f} s" if touched[0] > fired[0] else ""
-        return DisturbanceOutcome(ordered, fired, True, f"disturbed {sensor}{times}{later}", touched[0])
+        return DisturbanceOutcome(disturbance, fired, True, f"disturbed {sensor}{times}{later}", touched[0])
     if fired[0] >= trace.end:
-        return DisturbanceOutcome(ordered, fired, False, _too_late(trace), fired[0])
+        return DisturbanceOutcome(disturbance, fired, False, _too_late(trace), fired[0])
     until = f"to t = {trace.seconds(ended[0].tick):.2f} s" if ended else "on"
     why = f"it changed no message of {sensor} from t = {trace.seconds(fired[0]):.2f} s {until}"
-    return DisturbanceOutcome(ordered, fired, False, why, fired[0])
+    return DisturbanceOutcome(disturbance, fired, False, why, fired[0])
 
 
 def _never_began(trace: Trace) -> str:

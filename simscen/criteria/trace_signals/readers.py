@@ -99,12 +99,12 @@ def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
 
 
 def localization_error(query: SignalQuery) -> Array:
-    """Return the distance in m between believed and true position."""
+    """Return the distance in m between estimated and true position."""
     return hold(query.trace, pose_error(query.trace), "belief")[:, 0]
 
 
 def localization_yaw_error(query: SignalQuery) -> Array:
-    """Return the angle in rad between believed and true heading."""
+    """Return the angle in rad between estimated and true heading."""
     return hold(query.trace, pose_error(query.trace), "belief")[:, 1]
 
 
@@ -215,7 +215,9 @@ def recovery_active(query: SignalQuery) -> Array:
 
 def is_active(query: SignalQuery) -> Array:
     """Return whether the fault or event is active."""
-    intervals = [(span.start, span.end + (not span.lasting)) for span in spans(query.trace, _label(query.arguments))]
+    intervals = [
+        (span.start, span.end + (not span.has_end_event)) for span in spans(query.trace, _label(query.arguments))
+    ]
     return _as_numbers(_flags(query.trace, intervals))
 
 
