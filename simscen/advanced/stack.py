@@ -91,11 +91,11 @@ class AdvancedStack(ReferenceStack):
         """Pass the moving obstacles to collision monitor, controller, and planner, each in its frame."""
         if self._prediction.is_idle and not self._has_moving_obstacles:
             return
-        moving = self._prediction.moving_in_frame(tick, ROBOT_FRAME)
+        moving = self._prediction.moving_obstacles_in_frame(tick, ROBOT_FRAME)
         self._has_moving_obstacles = len(moving) > 0
         self._monitor.on_moving(moving)
-        self._costmaps.local_costmap.moving = self._prediction.moving_in_frame(tick, frames.odometry)
-        self._costmaps.global_costmap.moving = self._prediction.moving_in_frame(tick, frames.pose)
+        self._costmaps.local_costmap.moving = self._prediction.moving_obstacles_in_frame(tick, frames.odometry)
+        self._costmaps.global_costmap.moving = self._prediction.moving_obstacles_in_frame(tick, frames.pose)
 
     def _on_drive(self) -> None:
         if self._prediction.is_standing:

@@ -1,5 +1,5 @@
-"""Specification of the MPPI controller, with the parameters of nav2_mppi_controller and the defaults of Nav2's own
-file."""
+"""Specification of the MPPI controller, with the parameters of nav2_mppi_controller and the defaults of Nav2's
+nav2_params.yaml."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -126,8 +126,8 @@ class MppiPathAlignCritic(MppiCritic):
     threshold_to_consider: NonNegativeLength = 0.5
     """Distance from the end of the plan within which the critic is inactive."""
     offset_from_furthest: Points = 20
-    """Number of plan points, 5 cm apart, that a trajectory must reach for the critic to be active; a robot must turn
-    first."""
+    """Number of plan points, 5 cm apart, that a trajectory must reach for the critic to be active, so that a robot can
+    turn toward the plan first."""
     use_path_orientations: bool = False
     """Whether headings count, too."""
 
@@ -157,8 +157,8 @@ class MppiPathAngleCritic(MppiCritic):
     max_angle_to_furthest: NonNegativeAngle = 1.0
     """Angle to that point within which the critic is inactive."""
     mode: Annotated[int, Field(ge=0, le=2)] = 0
-    """0: forward driving is preferred; 1: forward and backward driving are equal; 2: as the orientations of the plan.
-    """
+    """0: forward driving is preferred; 1: forward and backward driving are equal; 2: the orientations of the plan
+    decide."""
 
 
 class MppiPreferForwardCritic(MppiCritic):
@@ -233,7 +233,7 @@ class Mppi(PathFollowerSpec):
     az_max: PositiveAngularAcceleration | None = None
     """Maximum angular acceleration; default: the limit of the robot."""
     model_delay_vx: Annotated[Duration, Field(le=2)] = 0.0
-    """Delay of the base after a forward command; commands under way are part of each sample."""
+    """Delay of the base after a forward command; each sample starts with the commands that are still delayed."""
     model_delay_vy: Annotated[Duration, Field(le=2)] = 0.0
     """Delay of the base after a sideways command."""
     model_delay_wz: Annotated[Duration, Field(le=2)] = 0.0
@@ -285,7 +285,7 @@ class Mppi(PathFollowerSpec):
     PreferForwardCritic: MppiPreferForwardCritic = by_default()
     """Parameters of the critic of backward driving."""
     TwirlingCritic: MppiTwirlingCritic = by_default()
-    """Parameters of the critic of turning; used only if listed in `critics`."""
+    """Parameters of the critic of turning; used if listed in `critics`, or by default with the Omni model."""
     VelocityDeadbandCritic: MppiVelocityDeadbandCritic = by_default()
     """Parameters of the critic of velocities below the deadband; used only if listed in `critics`."""
     TrajectoryValidator: MppiTrajectoryValidator = by_default()

@@ -59,7 +59,7 @@ class ControllerSpec(Typed):
 
     @property
     def lookahead_s(self) -> float:
-        """Time horizon of the commands in seconds; the local costmap is large enough for it."""
+        """Time horizon of the commands in seconds. The size of the local costmap follows from it."""
         return 2.0
 
 
@@ -68,7 +68,8 @@ class PathFollowerSpec(ControllerSpec):
 
     goal_tolerance_ratio: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 0.45
     """Fraction of the goal's `xy_goal_tolerance` at which the position counts as reached, and the robot turns to the
-    goal's heading. Nav2: 1, where a localization error of a centimeter causes a false success."""
+    goal's heading. With 1, as in Nav2, a robot may stop at the tolerance, so that a localization error of a
+    centimeter makes it report a false success."""
     max_robot_pose_search_dist: PositiveLength = 1.5
     """Length of plan beyond the last position that is searched for the point nearest to the robot, so that a plan may
     cross itself (Nav2: half the size of the local costmap)."""

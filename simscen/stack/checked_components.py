@@ -240,7 +240,7 @@ class CheckedGoalChecker(CheckedPlugin):
 
 
 class CheckedBehavior(CheckedPlugin):
-    """Calls the behavior and checks its commands. Its name is that of its type."""
+    """Calls the behavior and checks its commands. `name` is its type, or the name that the behavior gives itself."""
 
     def __init__(self, spec: BehaviorSpec, setting: Setting) -> None:
         super().__init__("behavior", spec, setting, Behavior)

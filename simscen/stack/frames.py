@@ -30,9 +30,10 @@ class Frames(NamedTuple):
         return self.odometry.compose(self.pose.inverse())
 
     def moved(self, odom_from_map: Pose2, reach: float) -> float:
-        """Return by how many meters points within `reach` m of the robot have moved in the odom frame.
+        """Return the maximum distance in m that points of the map near the robot have moved in the odom frame.
 
-        `odom_from_map` is the earlier transform to compare with.
+        This is an upper bound for points within `reach` m of the robot. `odom_from_map` is the earlier transform to
+        compare with.
         """
         (x, y, yaw), (mapped_x, mapped_y, mapped_yaw), (odom_x, odom_y, odom_yaw) = (
             odom_from_map,
@@ -146,7 +147,7 @@ class OdometryHistory:
         step = earlier.between(later)
         return earlier.compose(Pose2(fraction * step.x, fraction * step.y, fraction * step.yaw))
 
-    def past_pose(self, now: Pose2, tick: int) -> Pose2:
-        """Return the pose at `tick`, without interpolation, of a robot that is at `now`, in the frame of `now`."""
+    def past_pose(self, latest: Pose2, tick: int) -> Pose2:
+        """Return the pose at `tick`, without interpolation, in the frame of `latest`, the latest pose of the robot."""
         past = self.latest_until(tick)
-        return now if past is self.now else now.compose(self.now.between(past))
+        return latest if past is self.now else latest.compose(self.now.between(past))

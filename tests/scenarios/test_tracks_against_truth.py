@@ -47,7 +47,7 @@ class Compared:
         if moment.truth is None or not any(reading.sensor == "lidar" for reading in moment.readings):
             return
         people = {name: pose.plane for name, pose in moment.truth.objects.items()}
-        moving = self.prediction.moving_in_frame(moment.tick, Pose2(0.0, 0.0))
+        moving = self.prediction.moving_obstacles_in_frame(moment.tick, Pose2(0.0, 0.0))
         here = moment.truth.pose.plane
         c, s = math.cos(here.yaw), math.sin(here.yaw)
         centers, velocities = here.apply(moving.centers), moving.velocities @ np.array([[c, s], [-s, c]])

@@ -24,16 +24,16 @@ MIN_MAPPED = 0.6
 SEARCH_INTERVAL_M, MAX_SEARCH_INTERVAL_M = 0.7, 8.0
 """Distance driven between two searches of the map; doubled after each search without a result, up to the maximum."""
 MIN_LENGTH_M, MIN_LEAD = 2.0, 0.05
-"""A robot without initial pose is found if the score of scans over this distance exceeds that of any other pose by
-this much."""
+"""A robot without initial pose gets a pose if the score of this pose, over at least MIN_LENGTH_M driven, exceeds that of
+any other pose by MIN_LEAD."""
 MIN_GAIN, MIN_SCORE = 0.1, 0.75
-"""A robot that had a pose is found elsewhere if, in addition, the score exceeds that of its pose by MIN_GAIN and is at
+"""A robot that had a pose gets another one if, in addition, the score exceeds that of its pose by MIN_GAIN and is at
 least MIN_SCORE, in two searches that agree."""
 CHECK_INTERVAL_M, CERTAIN_SCORE = 1.5, 0.85
 """Distance driven after which the poses near the current one are searched, if its score is below CERTAIN_SCORE."""
 MIN_NEAR_SCORE, CERTAIN_GAIN = 0.82, 0.04
-"""The robot is moved to a pose nearby with this score that leads by MIN_LEAD and exceeds the current score by MIN_GAIN,
-or by CERTAIN_GAIN if its score exceeds CERTAIN_SCORE.
+"""The estimate is moved to a nearby pose if the score of that pose is at least MIN_NEAR_SCORE, exceeds that of any
+other pose by MIN_LEAD, and exceeds that of the estimate by MIN_GAIN, or by CERTAIN_GAIN if it is above CERTAIN_SCORE.
 
 Scores are reduced by SCORE_SCALE times the negative log-likelihood of the drift since the last certain pose, because in
 a changed corridor a pose one meter away may have a better score by chance.
@@ -41,14 +41,14 @@ a changed corridor a pose one meter away may have a better score by chance.
 MAX_REDUCTION = 0.1
 """Maximum reduction of a score, because the last certain pose may be wrong."""
 MIN_LOG_RATIO = 3.0
-"""Log-likelihood ratio by which another pose must exceed the current one while the initial pose counts."""
+"""Log-likelihood ratio by which another pose must exceed the current one in the first `settling` m of Relocalizer."""
 SAME_POSE = 0.7, 0.3
 """Maximum difference (m, rad) of the poses found by two searches that agree."""
 AGREEMENT_LENGTH_M = 2.0
 """Distance driven over which searches must agree."""
 UNMAPPED_DISTANCE_M, RETURN_SCORE, RETURN_LEAD = 5.0, 0.9, 0.1
-"""After this distance driven outside the mapped area, the map is searched, too. The robot has returned if score and
-lead have these values. They are higher because unmapped rooms often resemble mapped ones."""
+"""After this distance driven outside the mapped area, the map is searched, too. The robot has returned if score
+and lead exceed these values. They are higher because unmapped rooms often resemble mapped ones."""
 SCORE_SCALE = 0.02
 """Difference of two scores for which one pose is e times as likely as the other, and gets e times as many particles."""
 NO_MOTION = ObservedMotion()
@@ -60,7 +60,7 @@ class Relocalizer:
 
     The search uses the scans of the last meters together, which distinguishes rooms that look alike. A robot without
     initial pose has particles at all poses that fit until one of them is clearly the best. A robot with an initial pose
-    is moved only to a clearly better one.
+    gets another pose only if that pose is clearly better.
     """
 
     def __init__(self, search: GlobalSearch, trust: MapTrust, estimate: Estimate, settling: float) -> None:
@@ -136,11 +136,12 @@ class Relocalizer:
         self._certain = self._certain and self._certain.after(last, base, distance, motion)
 
     def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, current: Array) -> tuple[Array, Array] | None:
-        """Return the pose that the initial pose and all scans since give, if the particles are elsewhere.
+        """Return the most likely pose given the initial pose and all scans since, if the particles are elsewhere.
 
         In a room whose furniture was moved, one scan may fit a wrong pose, and the next scans, which show the same,
-        confirm it. All scans together, with the beams' paths, which must be free, often show that it is wrong. If the
-        map shows little of the scans, so that many poses fit by chance, only the expected pose is considered.
+        confirm it. All scans together, and the condition that beams cross only free space, often show that this pose is
+        wrong. If the map shows little of the scans, so that many poses fit by chance, only the expected pose is
+        considered.
         """
         if not self._memory.length:
             return None
@@ -211,7 +212,7 @@ class Relocalizer:
 
     @property
     def _is_unmapped(self) -> bool:
-        """The believed pose has been outside the mapped area for a long way."""
+        """The estimated pose has been outside the mapped area for a long way."""
         return self._driven - self._mapped_at >= UNMAPPED_DISTANCE_M
 
     @property

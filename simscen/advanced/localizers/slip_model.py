@@ -10,11 +10,13 @@ from simscen.advanced.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2
 
 GATE = 15.1
-"""Squared innovation over its variance above which the wheels slip: by chance in one of 10 000 steps (chi-square)."""
+"""Ratio of squared innovation and variance above which the wheels are assumed to slip. Without slip, one of 10 000
+steps exceeds it (chi-square)."""
 WINDOW_S, WINDOW_GATE = 0.5, 24.0
-"""Time over which innovations are summed to detect small slip, and the gate of the sum: by chance once in a million."""
+"""Time over which innovations are summed to detect small slip, and the gate of the sum. Without slip, one of a million
+sums exceeds it."""
 RELEASE_S, RELEASE_GATE = 0.15, 4.0
-"""Time over which innovations are summed to detect the end of small slip, and the gate of the sum: 95 %."""
+"""Time over which innovations are summed to detect the end of small slip, and the gate of the sum (95 % quantile)."""
 
 
 class SlipDetector:
@@ -25,7 +27,7 @@ class SlipDetector:
         self._slips_slowly = self._slips = False
 
     def update(self, innovation: float, noise: float, bias: float, seconds: float) -> float:
-        """Return the time in s of slip that was not detected before the end of this step; 0 if the wheels hold.
+        """Return the seconds of slip until the end of this step that were not detected before; 0 without slip.
 
         innovation:  turn rate of the gyroscope minus that of the wheels, in rad/s
         noise:       variance of this step's innovation, in (rad/s)²
@@ -61,10 +63,10 @@ UNKNOWN_RATE = 10.0
 SLIP_LEVER_M = 0.1
 """Distance from the base to the point around which a slipping robot rotates."""
 SLIP_STD = 0.7
-"""Standard deviation of slip in both directions while the wheels slip: 0.58 if uniform up to the possible speed, 1 if
-always equal to it."""
+"""Standard deviation of slip in both directions while the wheels slip. It would be 0.58 for a uniform distribution up
+to the possible speed, and 1 if slip were always equal to the possible speed."""
 PUSHED_SPEED = 0.3
-"""Possible speed in m/s of a robot that turns more than its wheels, e.g. because a slope or a person moves it."""
+"""Possible speed in m/s of a robot that turns faster than its wheels measure, because a slope or a person moves it."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ class Step:
 
     pose:             motion by the wheels, in the base frame before it
     seconds:          its duration
-    speed:            possible speed in m/s, of which slip is a share
+    speed:            possible speed: the highest plausible speed of the robot in m/s; slip is a share of it
     slips:            the wheels slip
     undetected_slip:  time in s of slip until the end of the step that was not detected before
     """

@@ -1,4 +1,4 @@
-"""Motion prediction: trackers for the lidars, and avoidance of the tracked obstacles.
+"""Motion prediction: tracks moving obstacles in the scans of each lidar, and avoids them.
 
 Scans are compared in a frame of dead reckoning with the gyroscope's heading. With the heading of skidding wheels,
 everything would seem to rotate around the robot and to move.
@@ -141,13 +141,13 @@ class MotionPrediction:
             self._avoidance.reset()
 
     def with_moving_hits(self, scan: Scan) -> Scan:
-        """Return the scan for costmaps, in which hits on moving obstacles are flagged so that they are not marked."""
+        """Return the scan with flags at hits on moving obstacles, so that costmaps do not mark these obstacles."""
         tracker = self._trackers.get(scan.sensor)
         if tracker is None or tracker.moving_hits is None or tracker.tick != scan.tick:
             return scan
         return ScanWithMovingHits(**vars(scan), moving=tracker.moving_hits)
 
-    def moving(self, tick: int) -> MovingObstacles:
+    def moving_obstacles(self, tick: int) -> MovingObstacles:
         """Return the moving obstacles at a tick in the frame of DeadReckoning, from all lidars."""
         if not self._active:
             return self._no_obstacles
@@ -161,9 +161,9 @@ class MotionPrediction:
             [obstacle for each in predicted for obstacle in each.obstacles], self._spec.acceleration
         )
 
-    def moving_in_frame(self, tick: int, pose: Pose2) -> MovingObstacles:
+    def moving_obstacles_in_frame(self, tick: int, pose: Pose2) -> MovingObstacles:
         """Return the moving obstacles at a tick in a frame in which the robot is at `pose` now."""
-        moving = self.moving(tick)
+        moving = self.moving_obstacles(tick)
         if not moving.obstacles:
             return moving
         now, cached = self._dead_reckoning.now, self._transformed
@@ -179,10 +179,12 @@ class MotionPrediction:
             return command if self.is_idle else _limit_speed(command)
         if plan is not self._plan:
             self._plan, self._followed = plan, None if plan is None else FollowedPath(plan.points)
-        return self._avoidance.steer(command, pose, twist, self.moving_in_frame(tick, pose), costmap, self._followed)
+        return self._avoidance.steer(
+            command, pose, twist, self.moving_obstacles_in_frame(tick, pose), costmap, self._followed
+        )
 
     def on_drive(self) -> None:
-        """Clear the stand position, because the robot drives."""
+        """Forget the position to which a standing robot returns, because the robot drives now."""
         self._stand_position.clear()
         self._must_stay = self.is_standing = False
 
@@ -201,7 +203,9 @@ class MotionPrediction:
         command = self._stand_position.return_command(pose)
         if not self._active:
             return command
-        return self._avoidance.steer(command, pose, twist, self.moving_in_frame(tick, pose), costmap, None, home)
+        return self._avoidance.steer(
+            command, pose, twist, self.moving_obstacles_in_frame(tick, pose), costmap, None, home
+        )
 
 
 def _limit_speed(command: Twist) -> Twist:

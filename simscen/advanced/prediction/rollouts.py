@@ -21,7 +21,7 @@ SPEED_RATIOS = (-0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
 TURN_RATIOS = (0.0, 0.1, 0.3, 0.6, 1.0)
 """First turn rates relative to the maximum, in both directions."""
 SECOND_SPEED_RATIOS = (0.0, 0.5, 1.0)
-"""Second speeds relative to full speed, straight or turning back."""
+"""Second speeds relative to full speed, each without a turn and with the opposite of the first turn rate."""
 MAX_TURN_RATE = 3.0
 """Maximum turn rate in rad/s of candidates."""
 RETURN_TIME_S = 0.7
@@ -83,9 +83,10 @@ class TrajectorySampler:
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryFan:
-    """Combinations (n,) of few speed profiles and few turn profiles, with indices `speed` and `turn`.
+    """Trajectories (n,), each with the index of its speed profile (`speed`) and of its turn profile (`turn`).
 
-    Speeds `vx` (k, times), headings `yaw`, and the cosines and sines of the headings in between (m, times).
+    A speed profile has speeds `vx` (k, times). A turn profile has headings `yaw`, and the cosines and sines of the
+    headings in the middle of each time step (m, times).
     """
 
     pose: Pose2
@@ -99,7 +100,7 @@ class TrajectoryFan:
 
     @property
     def ends(self) -> tuple[Array, Array]:
-        """Final x and y (n,), except for rounding."""
+        """Final x and y (n,); they differ from those of `rollouts` by rounding errors at most."""
         speed, turn, (x, y, _) = self.speed, self.turn, self.pose
         along, aside = self.vx @ self.cosine.T, self.vx @ self.sine.T
         return x + along[speed, turn] * STEP_S, y + aside[speed, turn] * STEP_S
@@ -180,9 +181,9 @@ class FollowedPath:
     def position_over_time(
         self, pose: Pose2, twist: Twist, command: Twist, robot: RobotModel
     ) -> tuple[Callable[[float], complex], float, float]:
-        """Return a function for the position (x + iy) of `rollouts` at full speed after any number of seconds.
+        """Return the position (x + iy) at the commanded speed as a continuous function of the time in s.
 
-        Also return the maximum speed in m/s, and the maximum deviation in m from the time steps of `rollouts`.
+        Also return its maximum speed in m/s, and its maximum deviation in m from `rollouts`, which integrates in steps.
         """
         nearest, now, then = self.nearest(pose), twist.vx, command.vx
         rate = robot.linear_acceleration if abs(then) >= abs(now) else robot.linear_deceleration

@@ -1,8 +1,8 @@
-"""Visibility: which positions a scan can see, and a memory of free space as earlier scans.
+"""Visibility: which points a scan can see, and which points were free in earlier scans.
 
-An obstacle at a point that an earlier beam passed has appeared since. Parts of a wall that come into view, and the
-edges of hidden obstacles, were never passed by a beam. Therefore static obstacles do not seem to move when the robot
-moves. The drift of odometry within this time is less than the margin.
+If an earlier beam passed through a point where an obstacle is now, the obstacle has moved there since. No beam passed
+through parts of a wall that come into view, or through the edges of hidden obstacles. Therefore static obstacles do not
+seem to move when the robot moves. The drift of odometry within this time is less than the margin.
 """
 
 import cmath
@@ -28,7 +28,7 @@ otherwise, posts next to a fast robot seem to jump to the next post."""
 REMAINING_RATIOS = 1.0 - np.array(SLIP_RATIOS)[:, None]
 """Remaining share of the distance."""
 PREFERRED_AGE_S, MIN_AGE_S = 0.9, 0.2
-"""Preferred and minimum age in s of the earlier scan. At 0.25 m/s, an obstacle moves by the margin in the former."""
+"""Preferred and minimum age in s of the earlier scan. At 0.25 m/s, an obstacle moves by about the margin in 0.9 s."""
 MIN_INTERVAL_S = 0.19
 """Minimum time in s between two scans that are stored."""
 MIN_BEAMS = 3
@@ -63,7 +63,7 @@ class ScanGeometry:
 
     @cached_property
     def neighbor_offsets(self) -> Indices:
-        """Offsets from the index of a beam in `free` to the previous, the same, and the next beam in `lengths`."""
+        """Offsets from a beam's index in `free_distances` to the previous, the same, and the next beam in `lengths`."""
         return self.neighbors + np.array(((-1,), (0,), (1,)))
 
     @cached_property
@@ -79,7 +79,7 @@ class ScanGeometry:
 
     @cached_property
     def center_index(self) -> float:
-        """Index of the center in `free`."""
+        """Index of the center in `free_distances`."""
         return self.padding - self.neighbors + (self.count - 1) / 2
 
     def lengths(self, scan: Scan) -> Array:
@@ -92,8 +92,11 @@ class ScanGeometry:
             lengths[: self.padding], lengths[-self.padding :] = measured[-self.padding :], measured[: self.padding]
         return lengths
 
-    def free(self, lengths: Array) -> Array:
-        """Return the maximum distance of a new obstacle in each direction; shorter by `neighbors` at each end."""
+    def free_distances(self, lengths: Array) -> Array:
+        """Return the distance in each direction up to which space was surely free.
+
+        The array is shorter than `lengths` by `neighbors` at each end.
+        """
         free = _sliding_minimum(lengths, 2 * self.neighbors + 1)
         free -= MARGIN_M
         free *= 1.0 / (1.0 + MARGIN_RATIO)
@@ -118,7 +121,7 @@ class EarlierScan:
     lidar: Pose2
     geometry: ScanGeometry
     lengths: Array
-    free: Array
+    free_distances: Array
 
     def compare(self, points: Points, lidar: Pose2) -> "BeamComparison":
         """Compare points (n,), given in the frame of a lidar at `lidar`, with this scan."""
@@ -128,7 +131,7 @@ class EarlierScan:
         return BeamComparison(self, rotated, displacement, *self.beams_toward(rotated + displacement))
 
     def beams_toward(self, points: Points) -> tuple[Indices, Array]:
-        """Return the indices in `free` of the beams (…,) toward points, and the distances of the points.
+        """Return the indices in `free_distances` of the beams (…,) toward points, and the distances of the points.
 
         Points are in this lidar's frame, rotated to its center direction.
         """
@@ -139,15 +142,15 @@ class EarlierScan:
 
     def passed_beyond(self, beam: Indices, distance: Array) -> Mask:
         """Return whether beams (…,) passed beyond a distance."""
-        return np.asarray(self.free.take(beam) > distance)
+        return np.asarray(self.free_distances.take(beam) > distance)
 
 
 @fast_dataclass(eq=False)
 class BeamComparison:
     """Beams (n,) of an earlier scan toward points, with the distances of the points in m.
 
-    `rotated` are the points relative to the current lidar in the earlier orientation; `displacement` is that
-    between both lidar poses.
+    `rotated` are the points relative to the current lidar, along the axes of the earlier scan. `displacement` leads
+    from the earlier lidar to the current one, so that the sum of both is relative to the earlier lidar.
     """
 
     earlier: EarlierScan
@@ -198,7 +201,7 @@ class FreeSpaceMemory:
         if (geometry.count, geometry.start, geometry.increment) != (count, scan.angle_min, scan.angle_increment):
             self._geometry = geometry = ScanGeometry(count, scan.angle_min, scan.angle_increment)
         lengths = geometry.lengths(scan)
-        self._scans.append(EarlierScan(scan.tick, lidar, geometry, lengths, geometry.free(lengths)))
+        self._scans.append(EarlierScan(scan.tick, lidar, geometry, lengths, geometry.free_distances(lengths)))
 
     def scan_before(self, tick: int) -> EarlierScan | None:
         """Return the scan that is about PREFERRED_AGE_S old, or None if there is none older than MIN_AGE_S."""
@@ -252,9 +255,10 @@ class CurrentScan:
         return beam is not None and bool(self.scan.ranges[beam] > abs(off))
 
     def has_left(self, track: Track) -> bool:
-        """Return whether a track has left its earlier positions: nothing there now was also hit by an earlier scan.
+        """Return whether the obstacle of a track has left its earlier positions, which are now free or newly occupied.
 
-        A false track that jumps between posts leaves the posts behind. Up to half of the positions may be occupied,
+        A position is still occupied if both this scan and the earlier scan hit something there, for example a post if
+        a false track jumps between posts. Up to half of the positions may be occupied,
         because another obstacle can follow the same path.
         """
         current, radius = self.lidar.to_lidar(track.position), track.radius

@@ -63,10 +63,10 @@ class CriticData:
 
     @cached_property
     def furthest_point(self) -> int:
-        """Index of the furthest point of the plan that is nearest to the end of a rollout.
+        """Index of the furthest point of the plan that any rollout reaches: the point nearest to the rollout's end.
 
-        This is findPathFurthestReachedPoint of nav2_mppi_controller. In addition, a point counts as reached only if it
-        is no further along the plan than the rollout is long.
+        This is findPathFurthestReachedPoint of nav2_mppi_controller. In addition, a point counts as reached only if its
+        distance along the plan is at most the length of the rollout.
         """
         x, y, _ = self.path
         length = self.rollouts.speed[1:].sum(axis=0) * np.float32(self.dt)
@@ -82,7 +82,7 @@ class CriticData:
 
     @cached_property
     def free_points(self) -> Mask:
-        """Mask (m,) of the points of the plan that are not known to be occupied for the center of the robot."""
+        """Mask (m,) of the points of the plan at which the center of the robot can be: free or unknown cells."""
         costs = self.costs(self.lookup(*self.path[:2]))
         return np.asarray((costs < INSCRIBED) | (costs == UNKNOWN))
 
@@ -105,9 +105,9 @@ class CriticData:
 
     @cached_property
     def moving_obstacle_costs(self) -> tuple[Floats, Floats]:
-        """Mean nearness of each rollout (n,) to moving obstacles, and whether it touches one (up to 1).
+        """Mean squared nearness of each rollout (n,) to moving obstacles, and the weight of its first contact (or 0).
 
-        Both decay with time, because moving obstacles may change their direction.
+        Later steps of a rollout weigh less, because moving obstacles may change their direction.
         """
         rollouts, times = self.rollouts, self.times.astype(np.float32)[:, None]
         nearness, touches = self.footprint.discs.nearness(
