@@ -1,4 +1,7 @@
-"""Base classes of actions, and the choice of an action by its key."""
+"""Base classes of actions, and the choice of an action by its key.
+
+A stage is the interface through which an action reads and changes the running simulation (simscen.core.stage).
+"""
 
 from __future__ import annotations
 
@@ -62,8 +65,8 @@ class AnyAction(Choice):
     robot: RobotName | None = None
     """The robot that the action is for, if there are several; default: the only one."""
 
-    def may(self, *kinds: str) -> bool:
-        """Return whether it is one of these actions, or one of a plugin, which can do anything."""
+    def may_do(self, *kinds: str) -> bool:
+        """Return whether it can do what actions of these kinds do; an action of a plugin can do anything."""
         return self.kind in kinds or self.original_class is not None
 
     def perform(self, stage: Stage) -> Effect:
@@ -98,7 +101,7 @@ def perform_checked(action: Action, stage: Stage, origin: str) -> Effect:
 
 
 class _ObservedStage:
-    """A stage that records whether any of its members was used that changes the run."""
+    """A stage that records whether a member that changes the run was used."""
 
     def __init__(self, stage: Stage) -> None:
         self._stage, self.changed = stage, False

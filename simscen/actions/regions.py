@@ -20,8 +20,8 @@ class FrictionPatch(Spec, WorldAction):
 
     Typical values: oil 0.1, a wet or soapy floor 0.3, chips and dust 0.5. The friction force of a wheel is at most this
     coefficient times its load (Coulomb), so that no robot accelerates or brakes faster than friction x 9.81 m/s², and
-    odometry counts spinning wheels. Later patches cover earlier ones; the same region or name replaces its patch, and
-    `value: 1` restores a dry floor.
+    odometry also counts the turns of spinning wheels. Later patches cover earlier ones; the same region or name
+    replaces its patch, and `value: 1` restores a dry floor.
 
     Example: `do: {friction: {at: [3, 1], radius: 0.8 m, value: 0.1, for: 10 s}}`
     """
@@ -64,9 +64,9 @@ class SwitchKeepout(Spec, Action):
     """Enable or disable a keepout zone of the stack.
 
     The stack receives the command as through Nav2's `keepout_filter/toggle_filter` and applies it at the next costmap
-    update: it replans a path through a new zone, and reconsiders a path around a lifted one. For a zone that is
-    disabled at first, omit it from `stack.keepout`. Use it for a fleet manager that closes an aisle, or an area scanner
-    that opens one.
+    update: it replans if its path leads through a new zone. After a zone is lifted, paths through it are possible
+    again. For a zone that is disabled at first, omit it from `stack.keepout`. Use the action for a fleet manager that
+    closes an aisle, or an area scanner that opens one.
 
     Example: `do: {keepout: {region: wet floor, enabled: true}}`
     """
@@ -95,7 +95,7 @@ class SwitchSpeedZone(Spec, Action):
     region: RegionName | None = None
     """A region of the world, in `stack.speed_zones` or not; default: the whole filter with its mask."""
     speed_limit: PositiveSpeed | None = None
-    """Limit while the believed pose is inside; default: that of `stack.speed_zones`."""
+    """Limit while the estimated pose is inside; default: that of `stack.speed_zones`."""
     enabled: bool = True
     """Whether the limit applies from now on."""
 

@@ -1,4 +1,4 @@
-"""Parts of a scenario that can be left out or simplified, trees without them, and their text."""
+"""Reduction of a scenario: parts that can be left out, numbers that can be rounded, and the result as YAML."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -217,9 +217,9 @@ LINE_WIDTH = 100
 
 
 def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str = "") -> str:
-    """Return `content` as YAML, with the lines of `text` for each top-level key and list item that is the same.
+    """Return `content` as YAML. Top-level keys and list items that are the same in `text` keep their lines.
 
-    `path` is the name of the text in positions. `comment` is put at the top, with `# ` before each of its lines.
+    `path` is the file name in the positions of errors. `comment` is put at the top, with `# ` before each of its lines.
     """
     original, _ = parse_yaml(text, path)
     lines = text.splitlines()

@@ -20,8 +20,8 @@ CIRCLE_CORNERS = 24
 class RobotSize:
     """Size of a robot: `footprint` (base frame, m), `radius` of a round one (m), and `height` of the hull (m).
 
-    `underside` is the lowest height (m) of a base that stays at z = 0, because its drive is omnidirectional or mecanum;
-    None for a base on wheels, which climbs low obstacles.
+    `underside` is the height (m) of the lowest point of the hull of an omnidirectional or mecanum base, which stays at
+    z = 0. It is None for other bases, whose wheels climb low obstacles.
     """
 
     footprint: Polygon

@@ -267,7 +267,8 @@ class ScenarioSpec(Spec):
     skip: Reason | None = None
     """Reason for not running this scenario. The file must still be valid."""
     variations: Variations | None = None
-    """Values by path; each combination is a separate run. Default: the file as it is."""
+    """Values by the path of a key, such as `robot.motor_torque`; each combination is a separate run. Default: the file
+    as it is."""
     acceptance: Acceptance | None = None
     """Claim about many random runs, which `simscen study` tests; other commands ignore it."""
 
@@ -328,6 +329,6 @@ class CriteriaSpec(ScenarioSpec):
     simscen: LanguageVersion = 1
     """Version of the scenario language."""
     world: WorldOrFile | None = None  # type: ignore[assignment]
-    """World with the places and regions of the criteria; needed only for foreign logs."""
+    """World with the places and regions of the criteria; needed only for logs that simscen did not record."""
     robot: RobotEntry | None = None
-    """Robot with the footprint for the criteria; needed only for foreign logs."""
+    """Robot with the footprint for the criteria; needed only for logs that simscen did not record."""

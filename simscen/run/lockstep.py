@@ -1,6 +1,7 @@
 """The lockstep loop: physics, sensors, stack, and recording take turns on one clock.
 
-A beat is a tick at which a sensor, a stack, or a truth sample of any robot is due. One pass of the loop is one beat:
+A beat is a tick at which a sensor, a stack, or a truth sample of any robot is due; the docs call it a cycle.
+One pass of the loop is one beat:
 
 1. observe: update where each robot is and which collisions happened
 2. direct: start the events and faults of the scenario whose triggers fire
@@ -91,6 +92,7 @@ class RobotUnderTest:
     stack: Stack
     faults: FaultInjector
     stage: LiveStage
+    """Interface through which triggers observe this robot's run, and actions change it."""
     end_condition: EndCondition
     schedule: TickSchedule
     truth_period: int
@@ -155,6 +157,7 @@ class RunSetup:
     simulation: Simulation
     robots: Sequence[RobotUnderTest]
     directors: Sequence[Director]
+    """Start the events and faults whose triggers fire."""
     truth_period: int
     """Ticks between two samples of the true state."""
 

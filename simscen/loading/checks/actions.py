@@ -86,7 +86,7 @@ def pushes_without_effect(loaded: LoadedScenario) -> Iterator[CheckFinding]:
 def doors_already_in_state(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find doors that are opened although they are open, or closed although they are closed."""
     located_actions = [placed for step in loaded.spec.steps for placed in step.located_actions()]
-    if loaded.world.spec is None or any(action.may() for _, action in located_actions):
+    if loaded.world.spec is None or any(action.may_do() for _, action in located_actions):
         return
     kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, action in located_actions}
     closed = {door.name: door.closed for door in loaded.world.spec.doors}

@@ -57,7 +57,7 @@ def _why_no_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | No
 
 
 def _result(loaded: LoadedScenario, result: Any) -> str | None:
-    cancels = any(action.may("cancel_goal") for step in loaded.spec.steps for action in step.actions)
+    cancels = any(action.may_do("cancel_goal") for step in loaded.spec.steps for action in step.actions)
     if result.status == "CANCELED" and not cancels:
         return "no event cancels a goal"
     if result.status == "SUCCEEDED" and result.error_code not in (None, NO_ERROR):
@@ -99,7 +99,7 @@ def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
 def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find goals after one that is expected to fail, in scenarios that stop at the first failure."""
     spec = loaded.spec
-    new_goals = any(action.may("new_goal") for step in spec.steps for action in step.actions)
+    new_goals = any(action.may_do("new_goal") for step in spec.steps for action in step.actions)
     if spec.on_goal_failure == "continue" or new_goals:
         return
     for index, goal in enumerate(spec.goals):

@@ -173,7 +173,9 @@ class PossibleRun:
 
     def may_do(self, *kinds: str) -> bool:
         """Return whether a possible event has, or may have, one of these actions."""
-        return any(action.may(*kinds) for step in self.steps if step.name in self.possible for action in step.actions)
+        return any(
+            action.may_do(*kinds) for step in self.steps if step.name in self.possible for action in step.actions
+        )
 
     def goal_count(self, goal: str | None) -> int:
         """Return how many goals of this name (None: any name) the robot can get."""

@@ -21,7 +21,7 @@ from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 NO_ROUTE_HINT = "widen the gap, or expect the failure with `result: {status: FAILED, error_code: NO_VALID_PATH}`"
 GAP_EDGE_M = 0.03
-"""Distance from the edge of a gap within which the solid is searched that forms it."""
+"""Distance from the edge of a gap within which the solid that forms the edge is searched."""
 
 
 class Gap(NamedTuple):
@@ -31,7 +31,7 @@ class Gap(NamedTuple):
     position: tuple[float, float]
 
 
-def closed_gaps(scene: Scene) -> list[tuple[CheckFinding, Gap]]:
+def unreachable_goals(scene: Scene) -> list[tuple[CheckFinding, Gap]]:
     """Return a finding for each goal without a route, and the gap that is too narrow.
 
     It is an error if fixed walls block the goal, and a warning if the robot might pass or push what blocks it.
@@ -64,7 +64,7 @@ def closed_gaps(scene: Scene) -> list[tuple[CheckFinding, Gap]]:
 @WORLD.check("SC302")
 def check_reachability(scene: Scene) -> Iterator[CheckFinding]:
     """Find goals that no route leads to."""
-    return (finding for finding, _ in scene.cached(closed_gaps))
+    return (finding for finding, _ in scene.cached(unreachable_goals))
 
 
 def _ramp_hint(scene: Scene) -> str:
@@ -95,7 +95,7 @@ def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
 
 
 MIN_PATH_SHARE = 0.97
-"""Factor from the computed shortest path to a length that no drive falls below.
+"""Every drive is at least this share of the computed shortest path.
 
 Computed lengths are exact to 1 %, and a robot can cut corners a little more than they assume.
 """

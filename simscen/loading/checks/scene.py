@@ -172,7 +172,7 @@ class Scene:
 
     def may_do(self, *kinds: str) -> bool:
         """Return whether an event has, or may have, one of these actions; without kinds: may do anything."""
-        return any(action.may(*kinds) for step in self.loaded.spec.steps for action in step.actions)
+        return any(action.may_do(*kinds) for step in self.loaded.spec.steps for action in step.actions)
 
     def footprint_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
         """Return how the footprint of the robot conflicts with a solid, as words after "is"; None if it is free."""

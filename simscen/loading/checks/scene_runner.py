@@ -63,7 +63,7 @@ def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
         problems += TIMING.problems(scene)
     problems = [scene.loaded.with_source_line(problem) for problem in sorted(problems)]
     if problems and pictures is not None:
-        gaps = [gap.position for _, gap in scene.cached(routes.closed_gaps)]
+        gaps = [gap.position for _, gap in scene.cached(routes.unreachable_goals)]
         file = draw_picture(scene, gaps, pictures)
         problems = [replace(problem, hint=f"{problem.hint}; picture: {file}".lstrip("; ")) for problem in problems]
     return problems

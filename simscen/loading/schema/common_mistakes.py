@@ -1,4 +1,7 @@
-"""Hints for common YAML mistakes."""
+"""Hints for common YAML mistakes.
+
+A choice is a mapping with one key that selects its kind, such as the criterion `collisions: {max: 0}`.
+"""
 
 from collections.abc import Iterable, Sequence
 
@@ -82,7 +85,7 @@ def _sequence_for_mapping_hint(models: Iterable[type[BaseModel]], node: Sequence
 
 
 def _scalar_for_mapping_hint(models: Iterable[type[BaseModel]], node: ScalarNode) -> str:
-    """Return a hint if a value was written instead of a mapping with one key, or with none."""
+    """Return how to write a value as the mapping `{key: value}`, or `true` as the empty mapping `{}`; else ""."""
     plain_models = [model for model in models if not issubclass(model, Choice)]
     matching = {key for model in plain_models for key in keys_of([model]) if _is_valid(model, {key: node.value})}
     if len(matching) == 1 and not isinstance(node.value, bool):
@@ -99,7 +102,7 @@ def _is_valid(model: type[BaseModel], value: dict[str, object]) -> bool:
 
 
 def _explain_hint(model: type[BaseModel], loc: Sequence[Key]) -> str:
-    """Return a hint to `simscen explain` for a choice."""
+    """Return a hint that refers to `simscen explain` if the value belongs to a key of a choice."""
     chosen = any(issubclass(one, Choice) and loc[-1] in one.choices() for one in models_at(model, loc[:-1]) if loc)
     return f"`simscen explain {loc[-1]}` shows its keys" if chosen else ""
 
@@ -133,4 +136,5 @@ def _find_key_below(models: Iterable[type[BaseModel]], key: str, depth: int = 1)
 
 
 def _is_tag(part: Key) -> bool:
+    """Return whether pydantic added this part for the member of a union: such parts contain a space."""
     return isinstance(part, str) and " " in part
