@@ -21,7 +21,7 @@ from simscen.core.version import __version__
 from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, Progressed, Started, always
 from simscen.run.process.ray_node import (
     PACKAGE_FOLDER,
-    FilePiece,
+    FileChunk,
     JobEnded,
     JobProgressed,
     JobQueue,
@@ -301,7 +301,7 @@ class _Batch:
                         yield Started(job)
             case JobProgressed(number, seconds):
                 yield Progressed(self.running[number], seconds)
-            case FilePiece(number, name, data):
+            case FileChunk(number, name, data):
                 file = (self.running.get(number) or self.sent[number]).folder / name
                 file.parent.mkdir(parents=True, exist_ok=True)
                 with file.open("ab") as output:

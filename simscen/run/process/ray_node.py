@@ -139,8 +139,8 @@ class _Unpickler(pickle.Unpickler):
         return self._folder / text.lstrip("/") if text in self._moved else Path(text)
 
 
-PIECE_BYTES = 8 << 20
-"""Largest part of a file that is sent at once."""
+CHUNK_BYTES = 8 << 20
+"""Maximum size of a chunk of a file in bytes."""
 
 
 @dataclass(frozen=True)
@@ -159,8 +159,8 @@ class JobProgressed:
 
 
 @dataclass(frozen=True)
-class FilePiece:
-    """The next part of a file in the output folder of a job; `name` is relative to the folder."""
+class FileChunk:
+    """The next chunk of a file in the output folder of a job; `name` is relative to the folder."""
 
     number: int
     name: str
@@ -175,11 +175,11 @@ class JobEnded:
     end: ProcessEnd | ForkServerDeath
 
 
-NodeUpdate = JobStarted | JobProgressed | FilePiece | JobEnded
+NodeUpdate = JobStarted | JobProgressed | FileChunk | JobEnded
 
 
 class JobQueue:
-    """Jobs that wait for a runner, and the numbers of the jobs that each runner took; `runner` is its name."""
+    """Jobs that wait for a runner, and the numbers of the jobs that each runner took, by the name of the runner."""
 
     def __init__(self) -> None:
         self._waiting: deque[PackedJob] = deque()
@@ -257,15 +257,15 @@ class _JobsOfQueue:
         return self._unpack(packed)
 
 
-def _files(job: Job) -> Iterator[FilePiece]:
+def _files(job: Job) -> Iterator[FileChunk]:
     """Yield all files in the output folder of a job."""
     for path in sorted(job.folder.rglob("*")):
         if path.is_file():
             name = path.relative_to(job.folder).as_posix()
             with path.open("rb") as file:
-                yield FilePiece(job.number, name, file.read(PIECE_BYTES))
-                while data := file.read(PIECE_BYTES):
-                    yield FilePiece(job.number, name, data)
+                yield FileChunk(job.number, name, file.read(CHUNK_BYTES))
+                while data := file.read(CHUNK_BYTES):
+                    yield FileChunk(job.number, name, data)
 
 
 def _same_plugin(entry: Entry) -> Entry:

@@ -12,7 +12,7 @@ from simscen.run.preparation import prepare
 from simscen.run.process.jobs import Job
 from simscen.run.process.ray_node import (
     PACKAGE_FOLDER,
-    FilePiece,
+    FileChunk,
     JobQueue,
     NodeRunner,
     PackedJob,
@@ -111,13 +111,13 @@ def test_a_queue_gives_each_job_to_one_runner_and_remembers_to_which() -> None:
 def test_large_files_are_sent_in_pieces(job: Job, tmp_path: Path, monkeypatch) -> None:
     from simscen.run.process import ray_node
 
-    monkeypatch.setattr(ray_node, "PIECE_BYTES", 4)
+    monkeypatch.setattr(ray_node, "CHUNK_BYTES", 4)
     (tmp_path / "out/inner").mkdir(parents=True)
     (tmp_path / "out/inner/file").write_bytes(b"123456789")
     (tmp_path / "out/empty").write_bytes(b"")
     assert list(ray_node._files(job)) == [
-        FilePiece(3, "empty", b""),
-        *(FilePiece(3, "inner/file", data) for data in (b"1234", b"5678", b"9")),
+        FileChunk(3, "empty", b""),
+        *(FileChunk(3, "inner/file", data) for data in (b"1234", b"5678", b"9")),
     ]
 
 
