@@ -1,6 +1,6 @@
 """Planar world of boxes and discs, in which a stack can drive a robot without physics.
 
-Ray casting and collision checks use closed formulas, so they are an independent reference.
+Ray casting and distances use closed formulas, so they are an independent reference.
 """
 
 import math
@@ -49,7 +49,7 @@ def box_robot(length: float = 0.42, width: float = 0.31, speed: float = 2.0) -> 
 
 
 def setting(robot: RobotModel, *, name: str = "test", seed: int = 1, grid: OccupancyGrid | None = None) -> Setting:
-    """Return the setting of a single component, which is called at 20 Hz with costmaps of 5 cm."""
+    """Return what a single component is built with; it is called at 20 Hz, with costmaps of 5 cm per cell."""
     return Setting(Surroundings(robot, grid, RATE, lidars=("lidar",)), name, Streams(seed), CONTROL / RATE, 0.05)
 
 
@@ -196,14 +196,14 @@ class Drive:
         self.track.append(self.pose)
         self.min_clearance = min(self.min_clearance, self.world.clearance(self.robot, self.pose))
 
-    def kinds(self, kind: str) -> list[Event]:
+    def events_of_kind(self, kind: str) -> list[Event]:
         """Return the events of a kind."""
         return [event for event in self.log if event.kind == kind]
 
     @property
     def result(self) -> str:
         """Result of the navigation, or ""."""
-        return self.kinds("navigation.ended")[-1].name if self.kinds("navigation.ended") else ""
+        return self.events_of_kind("navigation.ended")[-1].name if self.events_of_kind("navigation.ended") else ""
 
 
 def drive(

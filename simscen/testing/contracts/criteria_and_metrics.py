@@ -57,7 +57,7 @@ class CriterionContract(Contract):
         return findings
 
     @promise
-    def every_bound_yields_a_finding(self) -> None:
+    def every_trace_yields_a_finding(self) -> None:
         """Given any trace then there is at least one finding."""
         for label, description in TRACES.items():
             findings = self.findings(synthetic_trace(description), synthetic_case(CASE), label)
@@ -157,7 +157,7 @@ class MetricContract(Contract):
 
 @dataclass(frozen=True, eq=False)
 class ActionContract(Contract):
-    """Contract of an action, on a stage that records calls."""
+    """Contract of an action, on a fake stage (the interface to the running simulation) that records calls."""
 
     role = "action"
     spec: Any
@@ -171,7 +171,7 @@ class ActionContract(Contract):
 
     @promise
     def it_returns_an_effect(self) -> None:
-        """Given a stage then the action returns an Effect with a description, and happened only if it did something."""
+        """Given a stage then the action returns an Effect with a description, `happened` only if it did something."""
         effect, done = self.perform()
         require(isinstance(effect, Effect), f"returns {effect!r}, not an Effect")
         require(isinstance(effect.happened, bool), f"happened is {effect.happened!r}")

@@ -46,7 +46,7 @@ class LocalizerContract(Contract):
 
     @promise
     def the_same_calls_give_the_same_beliefs_bit_for_bit(self) -> None:
-        """Given the same readings with the same generator then bit-identical beliefs."""
+        """Given the same readings and the same seed then the beliefs are bit-identical."""
         for pose in (start_estimate().pose, None):
             first, again = (
                 call_component("localizes", run, self.build_at(Estimate(pose)), short_drive(), 4, imu=True)
@@ -82,7 +82,7 @@ class LocalizerContract(Contract):
         require(np.array_equal(belief.particles, particles), "particles change after they were returned")
 
     @promise
-    def a_scan_is_neither_changed_nor_kept_to_be_changed_later(self) -> None:
+    def a_scan_is_neither_changed_nor_kept(self) -> None:
         """Given a scan then its ranges are not changed, and later changes of them do not affect the belief."""
         subject, ranges = self.build_at(start_estimate()), short_drive().ranges[0].copy()
         call_component("receives a scan", lambda: subject.on_scan(scan(ranges, 24)))
@@ -150,7 +150,7 @@ def require_near_start(belief: Belief, when: str) -> None:
 
 
 def send_odometry(subject: Localizer, number: int, pose: Pose2) -> None:
-    """Send odometry reading `number` of a 10 Hz sensor to the localizer."""
+    """Send odometry reading `number` to the localizer, one every 0.1 s like the scans."""
     call_component("receives odometry", lambda: subject.on_odometry(Odometry("odom", 24 * number, pose, Twist())))
 
 

@@ -111,8 +111,12 @@ class StackContract(Contract):
         canceled_at = len(d.commands)
         d.run(0.5, until="")
         require(set(d.commands[canceled_at:]) == {STOP}, "commands a velocity after it was canceled")
-        require([e.name for e in d.kinds("goal.canceled")] == ["far"], "does not report that its goal is canceled")
-        require([e.name for e in d.kinds("navigation.ended")] == ["CANCELED"], "does not end its task as CANCELED")
+        require(
+            [e.name for e in d.events_of_kind("goal.canceled")] == ["far"], "does not report that its goal is canceled"
+        )
+        require(
+            [e.name for e in d.events_of_kind("navigation.ended")] == ["CANCELED"], "does not end its task as CANCELED"
+        )
 
     @promise
     def a_goal_that_preempts_is_driven_to_first(self) -> None:
@@ -122,20 +126,26 @@ class StackContract(Contract):
         d.run(0.5, until="")
         require(d.stack.goal == ASIDE, f"drives to {d.stack.goal} after it was sent to {ASIDE}")
         d.run(60)
-        canceled = [e.name for e in d.kinds("goal.canceled")]
+        canceled = [e.name for e in d.events_of_kind("goal.canceled")]
         require(canceled == ["far"], f"reports that {canceled or 'nothing'} is canceled, not far")
-        require([e.name for e in d.kinds("goal.reached")] == ["aside"], "does not reach the goal that it was sent to")
+        require(
+            [e.name for e in d.events_of_kind("goal.reached")] == ["aside"],
+            "does not reach the goal that it was sent to",
+        )
 
     @promise
     def every_goal_is_accepted_once_and_ends_once(self) -> None:
         """Given goals of which the last is unreachable then each goal is accepted once and ends once, in order."""
         d = self.new_drive(NEAR, Goal("never", Pose2(40.0, 0.0), timeout=3.0)).run(60)
-        accepted = [e.name for e in d.kinds("goal.accepted")]
+        accepted = [e.name for e in d.events_of_kind("goal.accepted")]
         ended = [e.name for e in d.log if e.kind in GOAL_END_KINDS]
         require(accepted == ["near", "never"], f"accepts {accepted}, not near, then never")
         require(ended == ["near", "never"], f"ends {ended}, not near, then never")
-        require([e.name for e in d.kinds("goal.failed")] == ["never"], "does not fail a goal outside the map")
-        require([e.name for e in d.kinds("navigation.ended")] == ["FAILED"], "does not end its task once, as FAILED")
+        require([e.name for e in d.events_of_kind("goal.failed")] == ["never"], "does not fail a goal outside the map")
+        require(
+            [e.name for e in d.events_of_kind("navigation.ended")] == ["FAILED"],
+            "does not end its task once, as FAILED",
+        )
 
     @promise
     def the_same_seed_gives_the_same_drive_bit_for_bit(self) -> None:

@@ -27,13 +27,13 @@ def in_a_hall(seconds: float, *, entirely: bool = False) -> Drive:
 @pytest.mark.slow
 def test_wall_across_a_hall_fails_with_no_valid_path() -> None:
     d = in_a_hall(60)
-    assert [event.data["error_name"] for event in d.kinds("goal.failed")] == ["NO_VALID_PATH"]
+    assert [event.data["error_name"] for event in d.events_of_kind("goal.failed")] == ["NO_VALID_PATH"]
     assert d.tick / 240 < 40
     assert d.min_clearance > 0.02
 
 
 def test_nav2_profile_clears_the_whole_costmap_each_time() -> None:
-    assert not in_a_hall(45, entirely=True).kinds("goal.failed")
+    assert not in_a_hall(45, entirely=True).events_of_kind("goal.failed")
 
 
 def test_reopened_door_out_of_sight_is_tried_again() -> None:

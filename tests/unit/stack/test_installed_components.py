@@ -336,11 +336,11 @@ def test_a_behavior_is_named_or_written_out_and_takes_what_it_does_not_say_from_
 
 def test_a_behavior_of_a_package_runs_and_is_in_the_log_by_its_name(odd) -> None:
     d = driven(Pose2(2.95, 1.0, 0.0), recovery={"behaviors": ["nod"], "number_of_retries": 2}).run(20)
-    assert [event.name for event in d.kinds("recovery.started")] in ([], ["nod", "nod"])
+    assert [event.name for event in d.events_of_kind("recovery.started")] in ([], ["nod", "nod"])
     d = driven(Pose2(2.5, 1.0), controller={"type": "regulated_pure_pursuit"}, recovery={"behaviors": ["nod"]})
     d.world.boxes.append((1.6, 0.0, 1.7, 4.0))
     d.run(30)
-    assert {event.name for event in d.kinds("recovery.started")} == {"nod"}
+    assert {event.name for event in d.events_of_kind("recovery.started")} == {"nod"}
 
 
 def test_a_behavior_of_a_package_is_named_in_triggers_criteria_and_the_schema(odd, tmp_path: Path) -> None:

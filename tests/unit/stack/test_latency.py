@@ -45,13 +45,13 @@ def test_zero_latency_is_bit_identical_to_unset_latency(seed: int, zero: dict[st
     assert said.log == unsaid.log
     assert said.commands == unsaid.commands
     assert said.track == unsaid.track
-    assert len(said.kinds("plan.made")) > 1
+    assert len(said.events_of_kind("plan.made")) > 1
 
 
 def test_a_plan_is_there_when_its_planner_is_done_and_the_robot_stands_until_then() -> None:
     d = start(planner=0.2).run(1.0)
-    made = d.kinds("plan.made")[0].tick
-    assert made - d.kinds("goal.accepted")[0].tick == 0.2 * RATE
+    made = d.events_of_kind("plan.made")[0].tick
+    assert made - d.events_of_kind("goal.accepted")[0].tick == 0.2 * RATE
     assert set(d.commands[: made // ODOMETRY]) == {STOP}
     assert d.commands[made // ODOMETRY] != STOP
 
@@ -61,7 +61,7 @@ def test_a_planner_that_is_computing_does_not_stop_the_controller() -> None:
     d = start(world, planner=1.0).run(2.0)
     d.world.discs.append((5.0, 1.0, 0.25))
     d.run(5.0)
-    blocked = next(event.tick for event in d.kinds("plan.made") if event.data["reason"] == "blocked")
+    blocked = next(event.tick for event in d.events_of_kind("plan.made") if event.data["reason"] == "blocked")
     before = d.commands[(blocked - RATE) // ODOMETRY : blocked // ODOMETRY]
     assert all(command.vx > 0.3 for command in before)
     assert d.run(40).result == "SUCCEEDED"

@@ -35,11 +35,11 @@ def start(world: Flatland, *goals: Goal, grid: Flatland | None = None, **options
 
 
 def codes(drive: Drive, kind: str = "goal.failed") -> list[object]:
-    return [event.data["error_name"] for event in drive.kinds(kind)]
+    return [event.data["error_name"] for event in drive.events_of_kind(kind)]
 
 
 def reasons(drive: Drive) -> list[object]:
-    return [event.data["reason"] for event in drive.kinds("plan.made")]
+    return [event.data["reason"] for event in drive.events_of_kind("plan.made")]
 
 
 def test_navigator_drives_through_a_door_and_stops_at_the_goal() -> None:
@@ -55,9 +55,9 @@ def test_navigator_drives_through_a_door_and_stops_at_the_goal() -> None:
 
 def test_navigator_visits_goals_in_order() -> None:
     d = start(rooms(), Goal("a", Pose2(3, 5)), Goal("b", Pose2(8, 3)), Goal("c", Pose2(1, 1))).run(120)
-    assert [e.name for e in d.kinds("goal.reached")] == ["a", "b", "c"]
-    assert [e.data["index"] for e in d.kinds("goal.accepted")] == [0, 1, 2]
-    assert len(d.kinds("navigation.ended")) == 1
+    assert [e.name for e in d.events_of_kind("goal.reached")] == ["a", "b", "c"]
+    assert [e.data["index"] for e in d.events_of_kind("goal.accepted")] == [0, 1, 2]
+    assert len(d.events_of_kind("navigation.ended")) == 1
 
 
 def test_a_door_that_is_shut_is_waited_for_with_recoveries_and_passed_when_it_opens() -> None:
@@ -65,7 +65,7 @@ def test_a_door_that_is_shut_is_waited_for_with_recoveries_and_passed_when_it_op
     d = start(world).run(2.0)
     world.boxes.append(DOOR)
     d.run(8.0)
-    assert d.kinds("recovery.started")
+    assert d.events_of_kind("recovery.started")
     world.boxes.remove(DOOR)
     d.run(60.0)
     assert d.result == "SUCCEEDED"
@@ -74,7 +74,7 @@ def test_a_door_that_is_shut_is_waited_for_with_recoveries_and_passed_when_it_op
 
 def test_recoveries_come_in_turn_and_end_after_the_retries() -> None:
     d = start(rooms(DOOR), grid=rooms()).run(90)
-    assert [e.name for e in d.kinds("recovery.started")] == [
+    assert [e.name for e in d.events_of_kind("recovery.started")] == [
         "clear_costmap", "spin", "wait", "backup", "clear_costmap", "spin",
     ]  # fmt: skip
     assert codes(d) == ["NO_VALID_PATH"]
@@ -87,7 +87,7 @@ def test_an_unmapped_obstacle_on_the_plan_is_driven_around_without_recovery() ->
     d = start(world, grid=rooms()).run(60)
     assert d.result == "SUCCEEDED"
     assert "blocked" in reasons(d)
-    assert not d.kinds("recovery.started")
+    assert not d.events_of_kind("recovery.started")
     assert d.min_clearance > 0.02
 
 
@@ -112,7 +112,7 @@ def test_a_goal_that_can_never_be_reached_fails_at_once(goal: Pose2, code: str) 
     d = start(rooms(), Goal("bad", goal)).run(10)
     assert codes(d) == [code]
     assert d.tick < 240
-    assert not d.kinds("recovery.started")
+    assert not d.events_of_kind("recovery.started")
 
 
 def test_a_goal_occupied_by_something_that_is_not_on_the_map_fails() -> None:
@@ -120,12 +120,12 @@ def test_a_goal_occupied_by_something_that_is_not_on_the_map_fails() -> None:
     world.discs.append((9.0, 1.0, 0.1))
     d = start(world, grid=rooms()).run(90)
     assert codes(d) == ["GOAL_OCCUPIED"]
-    assert not d.kinds("recovery.started")  # GOAL_OCCUPIED is none of Nav2's codes that help
+    assert not d.events_of_kind("recovery.started")  # GOAL_OCCUPIED is none of Nav2's codes that help
     assert d.min_clearance > 0.02
     d = start(world, grid=rooms(), spec=ADVANCED).run(90)
     # Which of them depends on how much of the thing it has seen when the retries end.
     assert codes(d)[0] in ("GOAL_OCCUPIED", "NO_VALID_PATH", "PATIENCE_EXCEEDED")
-    assert d.kinds("recovery.started")
+    assert d.events_of_kind("recovery.started")
     assert d.min_clearance > 0.02
 
 
@@ -167,7 +167,7 @@ def test_sporadic_planning_failures_cause_no_recovery() -> None:
     planner.plan = flaky
     d.run(60)
     assert codes(d, "plan.failed") == ["NO_VALID_PATH"] * 3
-    assert not d.kinds("recovery.started")
+    assert not d.events_of_kind("recovery.started")
     assert d.result == "SUCCEEDED"
 
 
@@ -184,7 +184,7 @@ def test_a_plan_that_fails_twice_in_a_row_leads_to_a_recovery() -> None:
 
     planner.plan = flaky
     d.run(60)
-    assert [e.name for e in d.kinds("recovery.started")] == ["clear_costmap"]
+    assert [e.name for e in d.events_of_kind("recovery.started")] == ["clear_costmap"]
     assert d.result == "SUCCEEDED"
 
 
@@ -218,9 +218,9 @@ def no_command(*_: object) -> Twist:
 def test_on_goal_failure_stops_or_continues() -> None:
     goals = Goal("bad", Pose2(30, 1)), Goal("good", Pose2(2.5, 1.0))
     stopped = start(rooms(), *goals).run(30)
-    assert [e.name for e in stopped.kinds("goal.accepted")] == ["bad"]
+    assert [e.name for e in stopped.events_of_kind("goal.accepted")] == ["bad"]
     went_on = start(rooms(), *goals, stop_on_failure=False).run(30)
-    assert [e.name for e in went_on.kinds("goal.reached")] == ["good"]
+    assert [e.name for e in went_on.events_of_kind("goal.reached")] == ["good"]
     assert went_on.result == "FAILED"
 
 
@@ -231,16 +231,16 @@ def test_a_silent_lidar_stops_the_robot_within_half_a_second_and_it_goes_on_when
     assert d.twist.vx < 0.06
     d.run(14.5)
     assert d.commands[-1] == STOP
-    assert not d.kinds("recovery.started")  # the progress checker's clock stood still
-    (held,) = d.kinds("robot.held")
+    assert not d.events_of_kind("recovery.started")  # the progress checker's clock stood still
+    (held,) = d.events_of_kind("robot.held")
     assert held.name == "collision_monitor"
     assert held.tick < 6.6 * 240
     assert "`lidar` has been silent" in held.data["message"]
     d.blind = False
     d.run(60)
     assert d.result == "SUCCEEDED"
-    assert not d.kinds("recovery.started")
-    assert [event.name for event in d.kinds("robot.released")] == ["collision_monitor"]
+    assert not d.events_of_kind("recovery.started")
+    assert [event.name for event in d.events_of_kind("robot.released")] == ["collision_monitor"]
 
 
 def test_cancel_stops_at_once_and_ends_the_task() -> None:
@@ -248,7 +248,7 @@ def test_cancel_stops_at_once_and_ends_the_task() -> None:
     d.stack.cancel(d.tick)
     before = len(d.commands)
     d.run(1.0, until="")
-    assert [e.name for e in d.kinds("goal.canceled")] == ["far"]
+    assert [e.name for e in d.events_of_kind("goal.canceled")] == ["far"]
     assert d.result == "CANCELED"
     assert set(d.commands[before:]) == {STOP}
     assert d.stack.goal is None
@@ -258,15 +258,15 @@ def test_a_new_goal_preempts_the_current_one_and_the_later_ones_follow() -> None
     d = start(rooms(), FAR, Goal("last", Pose2(1.0, 1.0))).run(2.0)
     d.stack.preempt(d.tick, Goal("new", Pose2(3.0, 5.0)))
     d.run(60)
-    assert [e.name for e in d.kinds("goal.canceled")] == ["far"]
-    assert [e.name for e in d.kinds("goal.reached")] == ["new", "last"]
+    assert [e.name for e in d.events_of_kind("goal.canceled")] == ["far"]
+    assert [e.name for e in d.events_of_kind("goal.reached")] == ["new", "last"]
 
 
 def test_a_task_that_has_ended_can_be_given_a_new_goal() -> None:
     d = start(rooms(), Goal("a", Pose2(2.0, 1.0))).run(30)
     d.stack.preempt(d.tick, Goal("b", Pose2(1.0, 2.0)))
     d.run(30)
-    assert [e.name for e in d.kinds("goal.reached")] == ["a", "b"]
+    assert [e.name for e in d.events_of_kind("goal.reached")] == ["a", "b"]
 
 
 def test_replanning_at_a_rate_replans_at_that_rate() -> None:
@@ -340,7 +340,7 @@ def test_obstacle_seen_only_by_the_collision_monitor_fails_soon() -> None:
     """The costmap marks nothing beyond 5 cm: the monitor alone stops the robot before the wall that is not mapped."""
     spec = StackSpec(localizer=TRUTH, costmap=Costmap(obstacle_max_range=0.05))
     d = start(rooms(DOOR), grid=rooms(), spec=spec).run(14)
-    held = [e for e in d.kinds("recovery.started") if "monitor holds" in str(e.data["message"])]
+    held = [e for e in d.events_of_kind("recovery.started") if "monitor holds" in str(e.data["message"])]
     standing = next(k for k, pose in enumerate(d.track) if pose.distance(d.track[min(k + 40, len(d.track) - 1)]) < 0.01)
     assert held
     assert held[0].tick / 240 - standing * 14 / len(d.track) < 4.0
@@ -372,7 +372,7 @@ def test_a_dead_end_that_was_seen_is_not_forgotten_when_control_fails_out_of_its
     d = drive(world, Pose2(2.0, 1.5), goal, grid=grid, spec=ADVANCED)
     while d.pose.y < 4.8:
         d.run(0.1)
-    controller, shut = d.stack.inner._navigator._controller, len(d.kinds("plan.made"))
+    controller, shut = d.stack.inner._navigator._controller, len(d.events_of_kind("plan.made"))
     command, steps = controller.command, round(seconds * 20)
 
     def failing(*asked: object) -> Twist:
@@ -384,8 +384,8 @@ def test_a_dead_end_that_was_seen_is_not_forgotten_when_control_fails_out_of_its
     before = len(d.track)
     d.run(60)
     assert d.result == "SUCCEEDED"
-    assert len(d.kinds("plan.made")) > shut
-    assert len(d.kinds("recovery.started")) == (seconds > 0.6)
+    assert len(d.events_of_kind("plan.made")) > shut
+    assert len(d.events_of_kind("recovery.started")) == (seconds > 0.6)
     assert min(pose.y for pose in d.track[before:] if pose.x < 3.5) > 4.3
 
 
@@ -399,4 +399,4 @@ def test_navigator_passes_a_wall_that_is_off_the_map_by_centimeters(off: float) 
     goal = Goal("g", Pose2(4.0, 1.8), timeout=60.0)
     d = drive(world, Pose2(3.5, 3.2, math.pi), goal, grid=mapped.grid((-0.5, -0.5, 12.5, 5.5)), spec=spec).run(61)
     assert d.result == "SUCCEEDED"
-    assert len(d.kinds("recovery.started")) <= 2
+    assert len(d.events_of_kind("recovery.started")) <= 2

@@ -39,7 +39,7 @@ def test_a_robot_that_waits_for_its_planner_or_its_controller_says_so(part: str)
     world = Flatland().room(8, 6)
     spec = StackSpec(latency=Latency(**{part: 2.0}))
     d = drive(world, Pose2(1, 3), Goal("g", Pose2(6, 3)), spec=spec, grid=world.grid((-0.5, -0.5, 8.5, 6.5))).run(6.0)
-    held, released = d.kinds("robot.held")[0], d.kinds("robot.released")[0]
+    held, released = d.events_of_kind("robot.held")[0], d.events_of_kind("robot.released")[0]
     assert held.name == released.name == part
     assert f"the {part} takes 2 s" in held.data["message"]
     assert 1.0 <= held.tick / 240 < 1.2
