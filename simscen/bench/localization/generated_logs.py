@@ -35,7 +35,7 @@ CELL_M = 0.05
 MAP_MARGIN_M = 1.0
 """Margin of the map around the floor."""
 MAP_RANGE_M = 12.0
-"""Longer ranges are not drawn into the map."""
+"""Range at which longer beams are cut off when the map is drawn."""
 OCCUPIED_SHARE = 0.25
 """A cell is occupied if at least this share of the beams that reach it end in it."""
 
@@ -98,9 +98,10 @@ UNCHANGED_WORLD = ("clean", "slipping")
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """Generated log with the map and the initial estimate of the localizer. `sensed` holds the readings and the truth.
+    """Generated log with the map and the initial estimate of the localizer.
 
-    `building` and `number` identify the log among those of one circumstance.
+    `sensed` holds the readings and the true poses. `building` and `number` identify the log among those of one
+    circumstance.
     """
 
     building: int
@@ -158,7 +159,7 @@ def generate_log(building: int, number: int, circumstance: str, seconds: float =
 def _drive(
     floor: Building, circumstance: str, seconds: float, rng: np.random.Generator, furniture: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return the true poses (k, 3) and the furniture (n, 4). Repeats the drawing if furniture encloses the robot."""
+    """Return the true poses (k, 3) and the furniture (n, 4). Rearranges it again if it encloses the robot."""
     while True:
         current = furniture
         if current is None:

@@ -210,7 +210,7 @@ def _moving_world_text(field: barn.DynamicField) -> str:
 
 
 def write_scenario(file: Path, text: str) -> Path:
-    """Write a text file, and return its path."""
+    """Write a scenario or world file, and return its path."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(text, encoding="utf-8")
     return file
@@ -219,7 +219,7 @@ def write_scenario(file: Path, text: str) -> Path:
 def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
     """Return the same drives with additional stack parameters, as files in `folder` that extend the scenarios.
 
-    Without a map, the robot keeps the localizer of the drive.
+    If the drives have no map, `localizer` of `stack` is ignored.
     """
     drives = []
     stack = {key: value for key, value in stack.items() if not (experiment.mapless and key == "localizer")}
@@ -321,7 +321,8 @@ pass:
   - localization_error: {final: 0.2 m}
   - collisions: {max: 0, caused_by_robot: true}
 """
-"""All parameters have their defaults. The rotation of the recoveries lets a standing robot localize itself."""
+"""All parameters have their defaults. A robot that cannot plan localizes itself while a recovery
+turns it."""
 
 
 def start_unknown_scenario() -> str:

@@ -30,7 +30,7 @@ Measurements = dict[str, Measurement]
 class Stopwatch:
     """Measures the wall time of methods by wrapping them on their instances.
 
-    Time in a nested part counts only for this part. `seconds` has the parts in the order of their first `watch`.
+    Time in a nested part counts for the nested part only. `seconds` has the parts in the order of their first `watch`.
     """
 
     seconds: dict[str, float] = field(default_factory=dict)

@@ -113,7 +113,7 @@ def _measure_parts(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
 def timed_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tuple[float, float, float]:
     """Return simulated, CPU, and wall seconds of a run from setup to verdicts. `watch` measures its parts."""
     gc.collect()
-    gc.freeze()  # as the warm process does, so that older objects are not searched for garbage
+    gc.freeze()  # as the fork server does, so that older objects are not searched for garbage
     previous = gc.get_threshold()
     gc.set_threshold(GC_THRESHOLD)  # as a run's own process does
     with TemporaryDirectory() as folder:

@@ -1,4 +1,7 @@
-"""Overhead of a run, of the start of a session, of a suite of runs, and of an external stack."""
+"""Overhead of a run, of the start of a session, of a suite of runs, and of an external stack.
+
+A cycle is one pass of the loop in simscen.run.lockstep, where it is called a beat.
+"""
 
 import gc
 import statistics
@@ -41,17 +44,17 @@ class Overhead:
     """Overhead in several rounds: CPU time in ms. The names of the fields are keys of the JSON output.
 
     run:        a run of SHORT_RUN_S in this process
-    beyond:     its time before the first and after the last cycle: setup, start and end of the log, verdicts
+    outside:    time of `run` before the first and after the last cycle: setup, start and end of the log, verdicts
     process:    the same run in a session, from the fork on, with its picture
-    wall:       wall time of this process in ms
-    memory:     maximum memory of this process in MB
+    wall:       wall time of the process of `process` in ms
+    memory:     maximum memory of the process of `process` in MB
     preparing:  world, map, and shortest paths, once for all runs
     start:      import of the engines, once per session
     validate:   `simscen validate`
     """
 
     run: tuple[float, ...]
-    beyond: tuple[float, ...]
+    outside: tuple[float, ...]
     process: tuple[float, ...]
     wall: tuple[float, ...]
     memory: tuple[float, ...]
@@ -64,7 +67,7 @@ class Overhead:
         """The medians by name."""
         return {
             f"a run of {SHORT_RUN_S} s": Measurement.of(self.run, MILLISECONDS),
-            "of that beyond its simulation": Measurement.of(self.beyond, MILLISECONDS),
+            "of that outside the simulation": Measurement.of(self.outside, MILLISECONDS),
             "the same as a process": Measurement.of(self.process, MILLISECONDS),
             "the same as a process, wall time": Measurement.of(self.wall, MILLISECONDS),
             "preparing a scenario": Measurement.of(self.preparing, MILLISECONDS),
@@ -93,7 +96,7 @@ class _SimulationTimer:
 
 
 def measure_overhead(rounds: int, entry: Sequence[str], report_progress: ProgressCallback = no_progress) -> Overhead:
-    """Measure short runs of the patrol. `entry` are the arguments with which Python becomes a warm process."""
+    """Measure short runs of the scenario PATROL. `entry` are the Python arguments that start the fork server."""
     report_progress("overhead of a run")
     with TemporaryDirectory() as folder:
         file = short_patrol(Path(folder))
@@ -120,7 +123,7 @@ def measure_overhead(rounds: int, entry: Sequence[str], report_progress: Progres
         measured = ends[1:]  # the first run includes the import of the engines
         return Overhead(
             run=tuple(whole for whole, _ in durations),
-            beyond=tuple(whole - simulated for whole, simulated in durations),
+            outside=tuple(whole - simulated for whole, simulated in durations),
             process=tuple(1e3 * end.cpu for end in measured),
             wall=tuple(1e3 * end.wall for end in measured),
             memory=tuple(end.peak_bytes / 1e6 for end in measured),
@@ -205,7 +208,7 @@ def measure_suite(
     entry: Sequence[str],
     report_progress: ProgressCallback = no_progress,
 ) -> Suite:
-    """Run each scenario once with a log. `entry` are the arguments with which Python becomes a warm process."""
+    """Run each scenario once with a log. `entry` are the Python arguments that start the fork server."""
     patrol = prepare(load_scenario(PATROL, PATROL.parent))
     baselines = [time_baseline_patrol(patrol, BASELINE_DURATION_S)]
     start = time.perf_counter()
@@ -236,17 +239,17 @@ def measure_suite(
 class ExternalStackCost:
     """Wall time in µs that the engine waits for the stack in each cycle.
 
-    `here_us` is with the stack in the process of the engine, `there_us` with the stack as an external process.
+    `in_process_us` is with the stack in the process of the engine, `external_us` with the stack as an external process.
     """
 
-    beats: int
-    here_us: float
-    there_us: float
+    cycles: int
+    in_process_us: float
+    external_us: float
 
     @property
     def ratio(self) -> float:
         """Ratio of both times."""
-        return self.there_us / self.here_us
+        return self.external_us / self.in_process_us
 
 
 def measure_external(rounds: int) -> ExternalStackCost:
@@ -261,14 +264,14 @@ def measure_external(rounds: int) -> ExternalStackCost:
 
 def _wait_per_cycle(prepared: PreparedScenario) -> tuple[int, float]:
     """Return the number of cycles of a run, and the mean wall time in µs that the engine waits for the stack."""
-    watch, cycles = Stopwatch(), _CycleCounter()
+    watch, counter = Stopwatch(), _CycleCounter()
 
     def attach(setup: RunSetup, _: Sequence[MomentSink]) -> Sequence[MomentSink]:
         watch.watch("stack", setup.robots[0].stack, "decide")
-        return (cycles,)
+        return (counter,)
 
     simulate(prepared, SEED, attach=attach)
-    return cycles.count, 1e6 * watch.seconds["stack"] / cycles.count
+    return counter.count, 1e6 * watch.seconds["stack"] / counter.count
 
 
 class _CycleCounter:

@@ -53,7 +53,16 @@ def column_widths(table: Sequence[TableRow]) -> list[int]:
 PUBLISHED_DWA = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
     f"{name} {value:.3f}" for name, value in DWA.items()
 )
-COMPARISON_HEAD = ("same drives, with and without", "pairs", "better", "worse", "success", "seconds", "SCT", "score")
+COMPARISON_HEAD = (
+    "with minus without --stack",
+    "pairs",
+    "better",
+    "worse",
+    "success",
+    "seconds",
+    "SCT",
+    "score",
+)
 TABLE_HEAD = (
     "experiment",
     "runs",
@@ -70,7 +79,7 @@ TABLE_HEAD = (
 
 
 def as_text(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = (), columns: int | None = None) -> str:
-    """Return the table of results, the effect of another stack, and published figures for comparison.
+    """Return the table of results, the effect of other stack parameters, and published figures for comparison.
 
     If a line would be longer than `columns`, each experiment has one line for its name and one for its numbers.
     """
@@ -104,7 +113,7 @@ def _comparison_lines(pairs: Sequence[DriveComparison], columns: int | None) -> 
 
 
 def _changes(pair: DriveComparison) -> tuple[str, ...]:
-    """Return the cells for the effect of the other stack on the same drives."""
+    """Return the cells for the effect of the other stack parameters on the same drives."""
     forms = ((pair.success, ".3f"), (pair.seconds, ".1f"), (pair.sct, ".3f"), (pair.score, ".3f"))
     changes = (_change(difference, form) for difference, form in forms)
     return (pair.case, f"{pair.pairs}", f"{pair.better}", f"{pair.worse}", *changes)

@@ -218,7 +218,7 @@ def _other_figures(fields: "list[Field]", external: "ExternalStackCost") -> Meas
     for field in fields:
         figures[f"scan among {field.obstacles} obstacles"] = Measurement(field.scan_ms, "ms")
         figures[f"step among {field.obstacles} obstacles"] = Measurement(field.step_us, "µs")
-    return {**figures, "beat with the stack as a process": Measurement(external.there_us, "µs")}
+    return {**figures, "cycle with the stack as a process": Measurement(external.external_us, "µs")}
 
 
 def _patrol_lines(patrol: "Patrol", rounds: int) -> list[str]:
@@ -258,6 +258,7 @@ def _field_lines(fields: "list[Field]") -> list[str]:
 
 def _external_lines(external: "ExternalStackCost") -> list[str]:
     return [
-        f"the stack of the patrol as an external process with all topics, {external.beats} cycles",
-        f"    {external.there_us:.0f} µs per cycle; in process {external.here_us:.0f} µs ({external.ratio:.1f} times)",
+        f"the stack of the patrol as an external process with all topics, {external.cycles} cycles",
+        f"    {external.external_us:.0f} µs per cycle; "
+        f"in process {external.in_process_us:.0f} µs ({external.ratio:.1f} times)",
     ]

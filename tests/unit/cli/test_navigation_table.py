@@ -21,8 +21,8 @@ localization, tour    20    1.000              -      0.000    0.000   0.000  48
 localization, tour: 0.030 m RMSE, worst run 0.040 m
   ANEES 0.02 at 5 s, 2.50 at 10 s; a consistent belief lies in 2.02 … 4.17 (95 %)
 
-same drives, with and without  pairs  better  worse                   success  seconds     SCT                     score
-BARN                              30       0      3  -0.100 (-0.200 … +0.000)     +1.5  -0.050  -0.020 (-0.030 … -0.010)
+with minus without --stack  pairs  better  worse                   success  seconds     SCT                     score
+BARN                           30       0      3  -0.100 (-0.200 … +0.000)     +1.5  -0.050  -0.020 (-0.030 … -0.010)
 
 BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: success 0.850, collisions 0.056, \
 timeouts 0.094, score 0.159"""
@@ -48,7 +48,7 @@ experiment
 BARN
     30    0.967  0.833 … 0.994      0.033    0.000   0.000  7.2 s  1.03  0.710  0.476
 
-same drives, with and without
+with minus without --stack
 BARN
   pairs 30  better 0  worse 3  success -0.100 (-0.200 … +0.000)  seconds +1.5
     SCT -0.050  score -0.020 (-0.030 … -0.010)
