@@ -216,12 +216,31 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
     if get_origin(kind) is Literal:
         return " | ".join(f"`{value}`" for value in get_args(kind))
     if get_origin(kind) is list:
-        return f"list of {kind_of(get_args(kind)[0])}"
+        return f"list of {_plural(kind_of(get_args(kind)[0]))}"
     if get_origin(kind) is dict:
         return f"names, each with {kind_of(get_args(kind)[1])}"
     if isinstance(kind, type) and issubclass(kind, RootModel):
         return kind_of(kind.model_fields["root"])
     return _simple_kind(kind, metadata)
+
+
+_NOUN = re.compile(r"(?P<noun>[a-z ]+?)(?P<unit> in [^,]+)?(?P<range>, .+)?")
+_WITHOUT_PLURAL = frozenset({"text", "names", "true", "false"})
+
+
+def _plural(kind: str) -> str:
+    """Return the description of several values of a type, such as "lengths in m, each ≥ 0"."""
+    return " or ".join(map(_plural_of_member, kind.split(" or ")))
+
+
+def _plural_of_member(kind: str) -> str:
+    if kind.startswith("list of "):
+        return kind.replace("list", "lists", 1)
+    match = _NOUN.fullmatch(kind)
+    if match is None or match["noun"] in _WITHOUT_PLURAL:
+        return kind
+    bounds = f", each{match['range'][1:]}" if match["range"] else ""
+    return f"{match['noun']}s{match['unit'] or ''}{bounds}"
 
 
 def by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:

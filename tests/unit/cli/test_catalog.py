@@ -75,7 +75,7 @@ def test_every_criterion_documents_measure_failure_reason_and_source(topic: Topi
 def test_type_is_described_with_unit_and_range() -> None:
     assert kind_of(Angle) == "angle in rad, -100 … 100"
     assert kind_of(Probability) == "ratio, 0 … 1"
-    assert kind_of(list[Angle] | None) == "list of angle in rad, -100 … 100"
+    assert kind_of(list[Angle] | None) == "list of angles in rad, each -100 … 100"
 
 
 def test_defaults_are_listed_and_required_keys_have_none() -> None:
