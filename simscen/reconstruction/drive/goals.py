@@ -1,6 +1,7 @@
 """Goals of a drive, and the part of a recording in which the robot drives to them.
 
-Goals are found in goal messages and results of actions, or in plans, or where the robot stopped.
+Goals come from goal messages and the status of actions; without messages, from the ends of plans; without plans, from
+stops and bends of the path.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ MIN_STOP_S = 2.0
 MIN_LEG_M = 0.5
 """Minimum distance between two stops that count as goals."""
 MIN_BEND_M = 0.5
-"""Distance of the path from the straight line between two goals from which on it bends at a goal of its own."""
+"""Minimum distance of the path from the straight line between two stops at which its farthest point counts as another
+goal."""
 STOP_SOURCE, BEND_SOURCE = "the robot stopped there", "its path bends there"
 _ENDINGS = {
     EventKind.GOAL_REACHED: "reached",
@@ -37,22 +39,24 @@ _ENDINGS = {
     EventKind.GOAL_FAILED: "failed",
     EventKind.GOAL_CANCELED: "canceled",
 }
-Seconds = Callable[[int], float]
+ToSeconds = Callable[[int], float]
 """Converts a time of logging in ns to s since the start of the drive."""
 
 
-def goals_of(messages: LogMessages, seconds: Seconds, poses: TimedValues) -> tuple[tuple[RecordedGoal, ...], str]:
+def goals_of(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -> tuple[tuple[RecordedGoal, ...], str]:
     """Return the goals of a drive and the final result of the navigation, "" if unknown."""
     sent = [
-        RecordedGoal("", Pose2(*planar_pose(message.content.pose)), seconds(message.log_time), source="/goal_pose")
+        RecordedGoal("", Pose2(*planar_pose(message.content.pose)), to_seconds(message.log_time), source="/goal_pose")
         for message in messages.of("goal")
     ]
-    events = [(seconds(message.log_time), event_text.from_json(message.content)) for message in messages.of("events")]
+    events = [
+        (to_seconds(message.log_time), event_text.from_json(message.content)) for message in messages.of("events")
+    ]
     if events:
         return tuple(_with_events(sent, events)), _result(events)
     if not sent:
-        sent = list(_ends_of_plans(messages, seconds))
-    status = _with_status(sent, messages, seconds)
+        sent = list(_ends_of_plans(messages, to_seconds))
+    status = _with_status(sent, messages, to_seconds)
     if sent:
         return tuple(status), ""
     return tuple(ends_of_motion(poses)), ""
@@ -83,7 +87,7 @@ def _result(events: Sequence[tuple[float, Event]]) -> str:
     return ended[-1] if ended else ""
 
 
-def _with_status(sent: Sequence[RecordedGoal], messages: LogMessages, seconds: Seconds) -> Iterator[RecordedGoal]:
+def _with_status(sent: Sequence[RecordedGoal], messages: LogMessages, to_seconds: ToSeconds) -> Iterator[RecordedGoal]:
     """Yield the goals with the results of their actions, if the log has as many actions as goals."""
     states = [(message.log_time, message.content) for message in messages.of("status")]
     names = [str(number) for number in range(len(sent))]
@@ -93,17 +97,17 @@ def _with_status(sent: Sequence[RecordedGoal], messages: LogMessages, seconds: S
         return
     for name, goal in zip(names, sent, strict=True):
         own = [event for event in events if event.name == name]
-        accepted = next((seconds(event.tick) for event in own if event.kind is EventKind.GOAL_ACCEPTED), goal.sent)
+        accepted = next((to_seconds(event.tick) for event in own if event.kind is EventKind.GOAL_ACCEPTED), goal.sent)
         ending = next((event for event in own if event.kind in _ENDINGS), None)
         source = f"{goal.source} and the action's status"
         if ending is None:
             yield replace(goal, sent=accepted, source=source)
         else:
             status = _ENDINGS[ending.kind]
-            yield replace(goal, sent=accepted, ended=seconds(ending.tick), status=status, source=source)
+            yield replace(goal, sent=accepted, ended=to_seconds(ending.tick), status=status, source=source)
 
 
-def _ends_of_plans(messages: LogMessages, seconds: Seconds) -> Iterator[RecordedGoal]:
+def _ends_of_plans(messages: LogMessages, to_seconds: ToSeconds) -> Iterator[RecordedGoal]:
     """Yield a goal for each plan that ends elsewhere than the previous one."""
     last: Pose2 | None = None
     for message in messages.of("plan"):
@@ -111,7 +115,7 @@ def _ends_of_plans(messages: LogMessages, seconds: Seconds) -> Iterator[Recorded
             continue
         end = Pose2(*planar_pose(tuple(message.content.poses[-1].tolist())))
         if last is None or end.distance(last) > SAME_GOAL_M:
-            yield RecordedGoal("", end, seconds(message.log_time), source="end of the plan on /plan")
+            yield RecordedGoal("", end, to_seconds(message.log_time), source="end of the plan on /plan")
         last = end
 
 
@@ -148,11 +152,11 @@ def ends_of_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
 MIN_IDLE_S = 1.0
 """Shorter times before the first goal are kept."""
 LEAD_S = 0.5
-"""Time before the first motion that is kept if the goals are unknown."""
+"""Time before the first motion that is kept if the log has no goal messages."""
 
 
 def from_first_goal(drive: RecordedDrive) -> RecordedDrive:
-    """Return the drive without what the log holds before its first goal; times count from then."""
+    """Return the drive from its first goal on. All times count from that moment."""
     if not drive.goals:
         return drive
     begin = drive.goals[0].sent

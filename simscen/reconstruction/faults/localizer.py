@@ -1,4 +1,4 @@
-"""Faults of the localizer: outages, and jumps of the estimated pose that come back."""
+"""Faults of the localizer: outages, and jumps of the estimated pose."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
 MIN_SILENCE_S, MIN_SILENCE_PERIODS = 1.0, 6.0
 """Shortest time without an estimate that is reported: the larger of a time and a multiple of the usual period."""
 MIN_CORRECTION_M_RAD = 1e-9
-"""Change of the pose of the odom frame on the map, in m and rad, that a working localizer exceeds."""
+"""A smaller change of the transform from map to odom, in m and rad, means that the localizer has not corrected it."""
 MAX_JUMP_S = 30.0
 """Longest time between a jump and the jump back."""
 MIN_DRIVEN_M = 0.6
-"""Distance that the robot must drive meanwhile: more than twice Nav2's update_min_d, 0.25 m."""
+"""Distance that the robot must drive during an outage that is reported: more than twice Nav2's update_min_d, 0.25 m."""
 
 
 def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
@@ -49,7 +49,7 @@ def _jumps(drive: RecordedDrive) -> Iterator[FoundFault]:
         before, after = np.hypot(*errors[out - 1, :2]), np.hypot(*errors[back, :2])
         if (
             end - begin > MAX_JUMP_S
-            or _is_carried(drive, begin - 0.5, end + 0.5)
+            or _is_kidnapped(drive, begin - 0.5, end + 0.5)
             or max(before, after) > 0.5 * float(np.median(away))
         ):
             continue
@@ -63,19 +63,19 @@ def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, out: int) -
     """Yield a jump of the belief at the sample `out` that does not come back until the end of the drive."""
     begin, errors = float(drive.belief.times[out]), np.hypot(*(belief - truth)[:, :2].T)
     stays = float(errors[out:].min()) > MIN_JUMP_M and float(errors[:out].max()) < MIN_JUMP_M
-    if stays and not _is_carried(drive, begin - 0.5, begin + 0.5):
+    if stays and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
         text = f"the estimated pose jumps by {float(errors[out]):.2f} m and stays there"
         evidence = Evidence(text, begin, float(drive.belief.times[-1]), "medium")
         yield FoundFault("localizer", "jump", _jump_values(truth[out], belief[out]), begin, None, evidence)
 
 
 def _jump_values(truth: Array, belief: Array) -> dict[str, object]:
-    """Return the parameters of a jump from the true pose (3,) to the believed one."""
+    """Return the parameters of a jump from the true pose (3,) to the estimated one."""
     error = Pose2(*truth.tolist()).between(Pose2(*belief.tolist()))
     return {"x": f"{error.x:.2f} m", "y": f"{error.y:.2f} m", "yaw": f"{math.degrees(error.yaw):.1f} deg"}
 
 
-def _is_carried(drive: RecordedDrive, begin: float, end: float) -> bool:
+def _is_kidnapped(drive: RecordedDrive, begin: float, end: float) -> bool:
     """Return whether the true pose jumps in this time, so that the belief is not what jumps."""
     chosen = (drive.poses.times >= begin) & (drive.poses.times <= end)
     steps = np.hypot(*np.diff(drive.poses.values[chosen, :2], axis=0).T)
@@ -83,7 +83,10 @@ def _is_carried(drive: RecordedDrive, begin: float, end: float) -> bool:
 
 
 def _silence(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the times without corrections of the odometry although the robot drove."""
+    """Yield the times without an estimated pose although the robot drove.
+
+    If estimates come without gaps, yield the times in which they did not correct the odometry.
+    """
     times = drive.belief.times
     limit = max(MIN_SILENCE_S, MIN_SILENCE_PERIODS * drive.belief.period)
     gaps = np.flatnonzero(np.diff(times) > limit)

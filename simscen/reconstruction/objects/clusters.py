@@ -21,7 +21,7 @@ MAX_GAP_M, MAX_GAP_BEAMS = 0.25, 3.0
 """Distance between neighbor hits of one object: in m, and as a multiple of the distance of two beams."""
 TRUE_WALL_DISTANCE_M = 0.12
 BELIEVED_WALL_DISTANCE_M, BELIEVED_WALL_DISTANCE_PER_M = 0.2, 0.02
-"""Distance from a wall on the map within which a hit belongs to the wall: with true poses, and with believed poses,
+"""Distance from a wall on the map within which a hit belongs to the wall: with true poses, and with estimated poses,
 whose heading errors add a distance per meter of range."""
 
 

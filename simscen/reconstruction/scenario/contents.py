@@ -122,7 +122,7 @@ def passing_radius(drive: RecordedDrive) -> float | None:
 
 
 def _believed_pose(drive: RecordedDrive, time: float) -> Pose2:
-    """Return the pose that the robot believed: its odometry with the latest correction, if the log has both."""
+    """Return the pose that the robot estimated: its odometry with the latest correction, if the log has both."""
     at = np.array([time])
     if not len(drive.corrections) or not len(drive.odometry):
         return Pose2(*drive.poses.poses_at(at)[0].tolist())

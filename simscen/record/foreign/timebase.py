@@ -17,10 +17,13 @@ MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
 """Minimum change of a clock that is reported. Smaller changes are within the delays of logging."""
 MIN_MESSAGES_AROUND_STEP = 20
 """Minimum number of messages before and after a change of a clock, to distinguish it from delayed messages."""
-MAX_CLOCK_STEP_SHARE = 1.5
-"""Maximum lasting change of the clock, as a share of the change at one message. A recorder that catches up after a busy
-start, and lost messages meanwhile, changes far more in the end than at any message."""
-MAX_LOGGING_DELAY_NS = 10 * NS_PER_SECOND
+MAX_CLOCK_STEP_RATIO = 1.5
+"""Maximum ratio of the permanent change of the difference of two clocks to its change at one message.
+
+The ratio is larger if a recorder catches up after a busy start, or loses messages meanwhile: then the difference
+changes by far more in total than at any single message, and no clock was set.
+"""
+MAX_STAMP_DIFFERENCE_NS = 10 * NS_PER_SECOND
 """Maximum difference between the stamps of two topics at the same time. A larger one means different clocks."""
 
 
@@ -76,7 +79,7 @@ def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
     changes = np.diff(offsets)
     lasting = np.maximum.accumulate(offsets[::-1])[::-1][1:] - np.maximum.accumulate(offsets)[:-1]
     share = lasting / np.where(changes == 0, 1, changes)
-    is_step = (np.abs(changes) > MIN_CLOCK_STEP_NS) & (share > 0.5) & (share < MAX_CLOCK_STEP_SHARE)
+    is_step = (np.abs(changes) > MIN_CLOCK_STEP_NS) & (share > 0.5) & (share < MAX_CLOCK_STEP_RATIO)
     is_step &= np.abs(stamp_gaps - np.median(stamp_gaps)) > np.abs(logged_gaps - np.median(logged_gaps))
     found = np.flatnonzero(is_step[count - 1 : -count + 1])
     if not len(found):
@@ -86,10 +89,10 @@ def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
 
 
 def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int]) -> None:
-    """Raise UnusableLog if the clock of the recorder was set back, together with that of the stamps if they are set.
+    """Raise UnusableLog if the clock of the recorder was set back.
 
-    Both times are in ns, in the order of the file. A file whose messages are sorted in another way has many steps back,
-    or parts that do not overlap in time.
+    Both times are in ns, in the order of the file. If the messages have stamps, these must step back as well. A file
+    that is not sorted by time of logging is not an error: it has many steps back, or parts that do not overlap in time.
     """
     times = np.array(logged, dtype=np.int64)
     backward = np.flatnonzero(np.diff(times) < 0)
@@ -142,7 +145,7 @@ class Timebase:
         if self.anchor is None:
             return self._ticks(messages.logged)
         delays = np.abs(messages.stamps - _header_times(messages.logged, self.anchor))
-        if len(delays) > 2 and np.median(delays) > MAX_LOGGING_DELAY_NS:
+        if len(delays) > 2 and np.median(delays) > MAX_STAMP_DIFFERENCE_NS:
             seconds = float(np.median(delays)) / NS_PER_SECOND
             topics = f"{messages.topic} and {self.anchor.topic}"
             text = f"{topics} do not share a clock: their stamps differ by {seconds:.1f} s"

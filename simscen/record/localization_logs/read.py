@@ -89,7 +89,7 @@ def _checked_pose(values: list[float], count: int) -> Triple:
 
 
 DEFAULT_MAX_RANGE_M = 81.9
-"""Range of a SICK LMS without a hit. FLASER lines do not contain the maximum range."""
+"""Range that a SICK LMS reports for a beam without a hit. FLASER lines do not contain the maximum range."""
 
 
 def read_carmen_rows(path: Path) -> LocalizationRows:
@@ -177,7 +177,7 @@ _LINE_PARSERS = {
 
 @dataclass(frozen=True, eq=False)
 class LocalizationLog:
-    """Recorded input of a localizer. Ticks are 1/TICK_RATE_HZ s since the first reading.
+    """Recorded input of a localizer. Ticks count from the first reading, TICK_RATE_HZ per second.
 
     Attributes:
         readings: Readings in the order in which the robot received them.
