@@ -206,4 +206,4 @@ def _believed_distance(trace: Trace, outcome: GoalOutcome) -> list[str]:
         return []
     x, y, yaw = check_samples(trace.belief, "the belief", trace).at(np.array([tick]))[0, :3].tolist()
     angle = math.degrees(abs(wrap(yaw - goal.yaw)))
-    return [f"its believed pose was {math.hypot(x - goal.x, y - goal.y):.2f} m and {angle:.0f}° from the goal"]
+    return [f"its estimated pose was {math.hypot(x - goal.x, y - goal.y):.2f} m and {angle:.0f}° from the goal"]

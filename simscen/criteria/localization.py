@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Samples, Trace
 
-NO_BELIEF = "the robot never reported a believed pose"
+NO_BELIEF = "the robot never reported an estimated pose"
 
 
 class LocalizationError(Spec, Criterion):
     """The localization error of the robot stayed small.
 
-    What is measured: the distance between believed and true position (and the heading error) whenever the robot
+    What is measured: the distance between estimated and true position (and the heading error) whenever the robot
         publishes its belief, and all the time while its newest belief is over 1 s old; without any alignment.
     When it fails: the largest, the root mean square or the last error exceeds its bound.
     Why this: with an error of half a meter, a robot reaches goals only by chance, until an obstacle is near.
@@ -186,10 +186,10 @@ class RelocalizedWithin(Spec, Criterion):
 
 
 class LocalizationConsistency(Spec, Criterion):
-    """The covariance of the believed pose matched its error.
+    """The covariance of the estimated pose matched its error.
 
-    What is measured: the normalized estimation error squared e' P⁻¹ e of the believed pose (x, y, wrapped heading) with
-        its covariance P, sampled every `every` seconds, averaged over the run; 3 for a correct covariance.
+    What is measured: the normalized estimation error squared e' P⁻¹ e of the estimated pose (x, y, wrapped heading)
+        with its covariance P, sampled every `every` seconds, averaged over the run; 3 for a correct covariance.
     When it fails: the average is above what a consistent belief keeps with this probability (the robot is
         overconfident), or, with `both_sides`, below the lower bound; or a covariance is singular, like that of a
         collapsed particle set.

@@ -24,7 +24,7 @@ Rings = Annotated[list[Ring], Field(max_length=100)]
 class Jump(Spec, Fault):
     """The estimated pose jumps to another place, as when a localizer mistakes one aisle for another.
 
-    The jump is given in the frame of the believed pose at the start of the fault. The estimate keeps this error until
+    The jump is given in the frame of the estimated pose at the start of the fault. The estimate keeps this error until
     the fault ends, and then jumps back. The localizer itself continues undisturbed.
 
     Example: `{sensor: localizer, jump: {x: 1 m, yaw: 10 deg}, when: {time: 5 s}, for: 3 s}`

@@ -160,7 +160,7 @@ def diagnose_localization(trace: Trace, tick: int, known: bool = False) -> tuple
     error = _position_error(trace, tick)
     if not error >= LOST_DISTANCE_M:  # also for nan: unknown
         return [], set()
-    lines = [] if known else [f"its believed position was {error:.2f} m from the true one"]
+    lines = [] if known else [f"its estimated position was {error:.2f} m from the true one"]
     named: set[str] = set()
     current_event = ""
     for event in trace.events:

@@ -91,7 +91,7 @@ class DistanceRemaining(Value[NonNegativeLength], Condition):
 
 
 class BelievedDistanceRemaining(Value[NonNegativeLength], Condition):
-    """True while the straight-line distance from the believed pose to the goal is at most this (m).
+    """True while the straight-line distance from the estimated pose to the goal is at most this (m).
 
     A robot with a wrong belief slows down, parks, or reports success where it believes the goal is.
     `distance_remaining` measures from the true position.
@@ -105,7 +105,7 @@ class BelievedDistanceRemaining(Value[NonNegativeLength], Condition):
 
 
 class LocalizationError(Value[NonNegativeLength], Condition):
-    """True while the believed position of the robot is further than this from its true position.
+    """True while the estimated position of the robot is further than this from its true position.
 
     Example: `when: {localization_error: 0.5 m}`
     """
@@ -116,7 +116,7 @@ class LocalizationError(Value[NonNegativeLength], Condition):
 
 
 class LocalizationLost(Spec, Condition):
-    """True while the believed pose has a large error or, with `std`, a large reported uncertainty.
+    """True while the estimated pose has a large error or, with `std`, a large reported uncertainty.
 
     Use it for disturbances after kidnapping or slip: stairs, a person, or a new goal while the robot navigates with a
     wrong pose. `localization_error` considers the position alone. False without a belief.
@@ -125,11 +125,12 @@ class LocalizationLost(Spec, Condition):
     """
 
     tolerance: PositiveLength = 0.5
-    """Maximum error of the believed position (m)."""
+    """Maximum error of the estimated position (m)."""
     yaw_tolerance: PositiveAngle = 0.5236
-    """Maximum error of the believed heading (rad); default: 30°."""
+    """Maximum error of the estimated heading (rad); default: 30°."""
     std: PositiveLength | None = None
-    """Maximum standard deviation of the position (m) that the belief reports, correct or not; default: no maximum."""
+    """Maximum standard deviation of the position (m) that the localizer reports, whether the estimate is correct or
+    not; default: no maximum."""
 
     def holds(self, now: Situation) -> bool:
         """Return whether there is a belief that is wrong or uncertain."""
@@ -166,6 +167,8 @@ class RobotIn(Spec, Condition):
 
 class RobotWithin(Spec, Condition):
     """True while the robot's center is at most `distance` away from a point, an object, or a region.
+
+    Set exactly one of `of`, `object`, and `region`.
 
     Example: `when: {robot_within: {of: [2, 2], distance: 1.5 m}}`
     """

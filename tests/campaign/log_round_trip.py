@@ -86,7 +86,7 @@ class Row:
 def compare(file: Path, out: Path, truth: str | None = None) -> Row:
     """Reconstruct the scenario of one log, and compare it with the log's own.
 
-    With `truth` "none", use the poses that the robot believed, as for a real robot.
+    With `truth` "none", use the poses that the robot estimated, as for a real robot.
     """
     log = read_log(file)
     row = Row(log.header.name.removeprefix("scenarios/"))
@@ -186,7 +186,7 @@ def main() -> int:
     parser.add_argument("runs", nargs="?", type=Path, help="output folder of `simscen run scenarios`")
     parser.add_argument("-k", default="", help="only scenarios whose name contains this text")
     parser.add_argument("--keep", type=Path, help="folder for the reconstructed scenarios; default: a temporary one")
-    parser.add_argument("--belief", action="store_true", help="use the poses that the robot believed")
+    parser.add_argument("--belief", action="store_true", help="use the poses that the robot estimated")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=ROOT) as temporary:
         runs = arguments.runs or Path(temporary) / "runs"

@@ -111,7 +111,7 @@ COMMAND = "Command"
 WHEELS = "Wheels"
 """Kind of `wheels`: the motion that the motors execute for a command, and the motion that odometry measures."""
 BELIEF = "Belief"
-"""Kind of `localizer`: the believed pose that the navigator receives."""
+"""Kind of `localizer`: the estimated pose that the navigator receives."""
 MAP = "Map"
 """Kind of `map`: the map that the stack receives."""
 KIND_BY_INSTANCE = {"cmd_vel": COMMAND, "wheels": WHEELS, "localizer": BELIEF, "map": MAP}

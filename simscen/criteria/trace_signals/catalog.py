@@ -123,7 +123,7 @@ SIGNALS: dict[SignalName, Signal] = {
         maximum=math.pi,
     ),
     "distance_remaining": Signal(
-        "Length of the newest plan from the believed position on; before the first plan, the goal_distance.",
+        "Length of the newest plan from the estimated position on; before the first plan, the goal_distance.",
         "length",
         distances.distance_remaining,
         {Evidence.ALIGNMENT, Evidence.PLANS, Evidence.BELIEF, Evidence.NAVIGATION},
@@ -149,27 +149,27 @@ SIGNALS: dict[SignalName, Signal] = {
         {Evidence.ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT},
     ),
     "localization_error": Signal(
-        "Distance between the newest believed position and the true one of the same time; the current "
+        "Distance between the newest estimated position and the true one of the same time; the current "
         "true position if the belief is over 1 s old. Not aligned.",
         "length",
         readers.localization_error,
         {Evidence.ALIGNMENT, Evidence.BELIEF},
     ),
     "localization_yaw_error": Signal(
-        "Angle between believed and true heading, at the same times.",
+        "Angle between estimated and true heading, at the same times.",
         "angle",
         readers.localization_yaw_error,
         {Evidence.ALIGNMENT, Evidence.BELIEF},
         maximum=math.pi,
     ),
     "position_std": Signal(
-        "Standard deviation of the believed position along its worst direction.",
+        "Standard deviation of the estimated position along its worst direction.",
         "length",
         readers.position_std,
         {Evidence.BELIEF, Evidence.COVARIANCE},
     ),
     "yaw_std": Signal(
-        "Standard deviation of the believed heading.", "angle", readers.yaw_std, {Evidence.BELIEF, Evidence.COVARIANCE}
+        "Standard deviation of the estimated heading.", "angle", readers.yaw_std, {Evidence.BELIEF, Evidence.COVARIANCE}
     ),
     "nees": Signal(
         "Normalized estimation error squared of the belief: 3 on average if its covariance is right; infinite"

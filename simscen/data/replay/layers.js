@@ -9,7 +9,7 @@ export const LAYERS = [
   { id: "plan", name: "Plan", key: "5", sign: "line" },
   { id: "local", name: "Local plan", key: "6", sign: "line" },
   { id: "things", name: "Objects and pedestrians", key: "7", sign: "area" },
-  { id: "scan", name: "Scan (at believed pose)", key: "8", sign: "dots" },
+  { id: "scan", name: "Scan (at estimated pose)", key: "8", sign: "dots" },
   { id: "belief", name: "Belief with particles, 95 % ellipse", key: "9", sign: "dash" },
   { id: "truth", name: "Robot and path (ground truth)", key: "0", sign: "line" },
 ];

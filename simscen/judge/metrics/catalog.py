@@ -161,7 +161,7 @@ METRICS: dict[str, Metric] = {
     },
     "nees": Metric(
         "",
-        "Normalized estimation error squared: squared pose error weighted by the inverse of the believed covariance, "
+        "Normalized estimation error squared: squared pose error weighted by the inverse of the estimated covariance, "
         "mean over the run; 3 for a correct covariance.",
         "filterpy; Bar-Shalom et al. 2001",
         evidence=_BELIEF | {Evidence.COVARIANCE},

@@ -93,7 +93,7 @@ RPE_DELTA_M = 1.0
 """Driven distance in m between the two poses of a relative error."""
 
 _STATISTICS = ("rmse", "mean", "median", "max")
-NO_BELIEF = "the robot never reported a believed pose"
+NO_BELIEF = "the robot never reported an estimated pose"
 
 
 def pose_metrics(trace: Trace) -> Values:
@@ -167,7 +167,9 @@ def _nees(trace: Trace) -> float | str:
     if not len(values):
         return "the belief has no covariance"
     mean = float(values.mean())
-    return mean if np.isfinite(mean) else "infinite: the believed covariance is singular, so the robot is overconfident"
+    return (
+        mean if np.isfinite(mean) else "infinite: the estimated covariance is singular, so the robot is overconfident"
+    )
 
 
 _KINDS = ("trans", "rot")

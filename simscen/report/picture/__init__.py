@@ -1,1 +1,1 @@
-"""The picture of a run, map.png: map, true and believed path, plans, obstacles, events, and violations."""
+"""The picture of a run, map.png: map, true and estimated path, plans, obstacles, events, and violations."""

@@ -1,4 +1,4 @@
-"""Pictures of test drives for `simscen robot`, and of believed and reference paths on a map for `simscen localize`."""
+"""Pictures of test drives for `simscen robot`, and of estimated and reference paths on a map for `simscen localize`."""
 
 from collections.abc import Sequence
 from pathlib import Path

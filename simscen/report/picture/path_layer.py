@@ -89,7 +89,7 @@ def draw_kidnapping(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_belief(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw the believed path with gaps at jumps."""
+    """Draw the estimated path with gaps at jumps."""
     for piece in split_at_jumps(scene.trace.belief, scene.trace.tick_rate):
         canvas.dashes(_drop_close_points(piece.values[:, :2], canvas), palette.BELIEF, 1.2, 4.0)
         canvas.add_part(scene.label("belief"), piece.values[[0, -1], :2])

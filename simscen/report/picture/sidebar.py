@@ -132,7 +132,7 @@ def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
     """Return the entries of the legend: word in the names of the parts (see `_is_drawn`), text, and symbol."""
     return [
         ("", f"true path, a dot every {step:g} s", _path),
-        ("belief", "believed path", _dashes),
+        ("belief", "estimated path", _dashes),
         ("", "plans", lambda d, x, y: d.line([(x, y), (x + 24, y)], fill=palette.PLAN, width=4)),
         ("set down", "robot lifted and set down elsewhere", _arrow),
         ("goal", "goal, its tolerance and heading", _ring(palette.GREEN, False)),

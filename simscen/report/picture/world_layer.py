@@ -48,7 +48,7 @@ def _chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> None:
 
 
 def draw_floors(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw floors with a friction that differs from dry concrete; changes during the run have their time."""
+    """Draw floors with a friction that differs from dry concrete; changes during a run are labeled with their time."""
     for floor in scene.scenery.floors:
         yield from _floor(canvas, floor.region, np.array(floor.outline), f"friction {floor.friction:g}")
     for event in scene.each[0].trace.of_kind(EventKind.FLOOR_CHANGED):
@@ -122,7 +122,7 @@ def _zone_text(scene: Scene, zone: FilterZone, events: list[Event]) -> str:
 
 
 def _mask_outlines(zone: FilterZone) -> list[Array]:
-    """Return the blocks of a mask with a restriction, as rectangles."""
+    """Return the blocks of a mask in which the robot is restricted, as rectangles."""
     cells = zone.cells or MaskBlocks(1.0)
     restricted = [block for block in cells.blocks if block[4] == 100 or zone.filter == "speed"]
     boxes = [[(c, r), (c + w, r), (c + w, r + h), (c, r + h)] for c, r, w, h, _ in restricted]
@@ -207,7 +207,10 @@ def _heading_line(canvas: Canvas, pose: Pose2, outline: Array) -> None:
 
 
 def _earlier_poses(samples: Samples) -> list[int]:
-    """Return indices of samples, evenly spread over the path of an object without its end; empty if it did not move."""
+    """Return indices of samples that are evenly spread over the path of an object, except its end.
+
+    Empty if the object did not move.
+    """
     steps = np.diff(samples.values[:, :3], axis=0)
     distances = np.hypot(steps[:, 0], steps[:, 1]) + 0.3 * np.abs(np.angle(np.exp(1j * steps[:, 2])))
     lengths = np.concatenate(([0.0], np.cumsum(distances)))

@@ -23,7 +23,7 @@ from simscen.report.suite.run_entry import full_run_name, run_element, theme
 
 ORDER = (Outcome.ERROR, Outcome.FAILED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED, Outcome.PASSED)
 MAX_MARKS = 200
-"""Maximum number of runs of a scenario with a mark for each run in the heading."""
+"""If a scenario has at most this many runs, its heading shows a mark for each of them."""
 MAX_LISTED = 2000
 """Maximum number of runs on the page."""
 _FILES = ("report.html", "junit.xml", "results.json", "run.json", "console.txt")
@@ -49,6 +49,7 @@ class Session:
         files: Names of the other files in the folder.
         live: Progress of a running session.
         study: Result of `simscen study`.
+        title: Title of the page.
     """
 
     runs: Sequence[RunFinished]
@@ -94,7 +95,7 @@ def to_html(session: Session) -> str:
 
 
 class Totals:
-    """Sums over all runs: number by outcome, simulated seconds, and runs (good, all) by scenario."""
+    """Sums over all runs: runs by outcome, simulated seconds, and by scenario the good runs and all runs."""
 
     def __init__(self, runs: Iterable[RunFinished]) -> None:
         self.outcomes: Counter[Outcome] = Counter()

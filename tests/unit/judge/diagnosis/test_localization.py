@@ -8,7 +8,7 @@ def test_a_robot_that_was_set_down_elsewhere_is_lost_for_that_reason():
     far = {"belief": {"offset": [2.0, 0, 0]}}
     case = {"goals": [GOAL]}
     assert why("goals_reached", events, case=case, **far) == [
-        "why: its believed position was 2.00 m from the true one",
+        "why: its estimated position was 2.00 m from the true one",
         "why: event `carried off` had moved the robot elsewhere 4.00 s before",
     ]
     assert why("localization_error", events, case=case, **far) == [
@@ -40,9 +40,9 @@ def test_error_of_half_a_meter_counts_as_lost():
     case = {"goals": [GOAL]}
     at_one = {"seconds": 10, "truth": [[0, 0, 1]]}
     half = why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.5, 0, 0]})
-    assert half == ["why: its believed position was 0.50 m from the true one"]
+    assert half == ["why: its estimated position was 0.50 m from the true one"]
     assert why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0, 0.8, 0]}) == [
-        "why: its believed position was 0.80 m from the true one"
+        "why: its estimated position was 0.80 m from the true one"
     ]
     assert why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.49, 0, 0]}) == []
 

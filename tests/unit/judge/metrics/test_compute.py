@@ -371,7 +371,7 @@ def test_a_run_without_belief_has_no_localization():
         synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "belief": None}), synthetic_case({})
     )
     assert measures.values["ape_trans_rmse"] is measures.values["nees"] is None
-    assert measures.undefined["nees"] == "the robot never reported a believed pose"
+    assert measures.undefined["nees"] == "the robot never reported an estimated pose"
 
 
 def test_a_signal_that_is_not_a_number_leaves_its_metrics_undefined_and_no_others():
