@@ -54,7 +54,7 @@ def processor() -> str:
 
 
 def fork() -> str:
-    """Check that processes can be forked: each run is forked from a warm process."""
+    """Check that processes can be forked: each run is forked from another process."""
     if sys.platform != "linux":
         raise CheckFailed(f"{sys.platform}: simscen runs on Linux only")
     child = os.fork()

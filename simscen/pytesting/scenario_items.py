@@ -1,6 +1,6 @@
 """Collection of scenario files by pytest, and their execution.
 
-There is one item per run, named as on the command line, one warm process per worker, and one output folder per
+There is one item per run, named as on the command line, one fork server per worker, and one output folder per
 session.
 """
 
@@ -67,7 +67,7 @@ class Runner:
         return finished_run(job, ends[0])
 
     def close(self) -> None:
-        """End the warm process."""
+        """End the fork server."""
         self._supervisor.close()
 
 

@@ -34,7 +34,7 @@ GRAY_MODES = ("L", "I", "I;16", "I;16B", "F")
 class MeshCache:
     """Cache of parsed mesh files by content; the least recently used file is dropped first.
 
-    The cache is in memory only, because a run must not write outside its output folder. The warm process fills the
+    The cache is in memory only, because a run must not write outside its output folder. The fork server fills the
     cache, and its forks inherit it. The returned arrays are shared and must not be changed.
     """
 
