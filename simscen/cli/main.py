@@ -38,7 +38,7 @@ class _LazyModule(ModuleType):
 
 
 def import_lazily(name: str, *functions: str) -> None:
-    """Make `import name` free until an attribute of the module is used.
+    """Defer the import of a module until one of its attributes is used.
 
     `from name import function` counts as use, except for the given `functions`, which load the module when called.
     """

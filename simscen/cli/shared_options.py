@@ -39,16 +39,16 @@ class TimeStamps(str, Enum):
 ScenarioOption = Annotated[Path | None, typer.Option(help="Use the criteria of this file; it needs only `pass:`.")]
 TruthOption = Annotated[
     str | None,
-    typer.Option(help="Ground truth in a foreign log: a topic, or two frames such as map:base_link."),
+    typer.Option(help="Ground truth in a log of a real robot: a topic, or two frames such as map:base_link."),
 ]
 TopicOption = Annotated[
     list[str] | None,
     typer.Option(help="NAME=TOPIC: other name of a standard topic, e.g. odom=/my/odom; repeatable."),
 ]
 TimeOption = Annotated[
-    TimeStamps, typer.Option(help="Time stamps to use in a foreign log: of the message headers, or of logging.")
+    TimeStamps, typer.Option(help="Time stamps to use in a log of a real robot: of message headers, or of logging.")
 ]
-TickRateOption = Annotated[int, typer.Option(min=1, max=10_000, help="Ticks per second for foreign logs.")]
+TickRateOption = Annotated[int, typer.Option(min=1, max=10_000, help="Ticks per second for logs of real robots.")]
 SameFrameOption = Annotated[
     bool,
     typer.Option("--same-frame", help="Treat the frame of the truth as the map frame although its name differs."),
@@ -58,7 +58,7 @@ SameFrameOption = Annotated[
 def foreign_log_options(
     truth: str | None, topics: list[str] | None, time: TimeStamps, tick_rate: int, same_frame: bool
 ) -> ForeignLogOptions:
-    """Return how to read a foreign log according to the command-line options. Raises UsageError."""
+    """Return how to read a log of a real robot according to the command-line options. Raises UsageError."""
     clock: Clock = "log" if time is TimeStamps.LOG else "header"
     options = ForeignLogOptions(truth, parse_topics(topics or [], TOPICS), tick_rate, clock, same_frame)
     _check_truth(options)

@@ -1,4 +1,4 @@
-"""Numbers with units. A bare number is in SI units; a string has a unit, whose dimension is checked."""
+"""Numbers with units. A plain number is in SI units; a string has a unit, whose dimension is checked."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""JSON Schemas of the language for editors: completion, hover texts, and precise errors."""
+"""JSON Schemas of simscen's YAML files for editors: completion, hover texts, and precise errors."""
 
 import json
 from typing import Any
@@ -32,7 +32,7 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
 def schema_of(name: str, installed: bool = False) -> Schema:
-    """Return the JSON Schema of a kind of file such as "scenario"; with installed types if `installed`."""
+    """Return the JSON Schema of a kind of file such as "scenario"; `installed` adds the types of installed packages."""
     model = MODELS[name]
     generated = model.model_json_schema(schema_generator=_InstalledTypesGenerator if installed else _Generator)
     if name == "stack":
@@ -70,7 +70,7 @@ def _append_keys(generated: Schema) -> Schema:
 
 
 def _make_extensible_keys_optional(generated: Schema) -> None:
-    """Make keys of a base file optional where an extending file can add them, which is not possible in lists."""
+    """Make required keys of a base file optional, except in lists, because the extending file can add them."""
     definitions = generated.get("$defs", {})
     in_lists = _referenced_definitions(generated, definitions, lists=True)
     for name in _referenced_definitions(generated, definitions, lists=False) - in_lists:
@@ -158,8 +158,9 @@ class _InstalledTypesGenerator(_Generator):
 def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
     """Return a schema that requires exactly one of `keys`.
 
-    Without any of them, the error is left to the schema that does not know the key. `maxProperties` is not used, since
-    yaml-language-server would then offer no completions: it counts the key that is being typed.
+    A mapping with another key instead gets only the error that this key is unknown. A mapping without such keys gets
+    "expected one of …". `maxProperties` is not used, since yaml-language-server would then offer no completions: it
+    counts the key that is being typed.
     """
     present: list[Schema] = [{"type": "object", "required": [key]} for key in keys]
     modifiers = [field.alias or name for name, field in model.model_fields.items() if name in model.modifiers]

@@ -174,8 +174,8 @@ METRICS_TEXT = """\
 Every run reports these numbers in result.json, independently of its criteria. They are computed from the trace, so
 `simscen judge` returns the same numbers for its log. They refer to the truth unless noted otherwise. A number that is
 not defined (a robot that never moved has no smoothness) is null, and `undefined` contains the reason. A jump by
-`kidnap` counts neither as driving nor as turning. Subjective measures of people near a robot (`intrusion_*`) are not
-included."""
+`kidnap` counts neither as driving nor as turning. How safe people feel near a
+robot is not measured; `intrusion_*` are computed from distances."""
 
 METRICS_CAVEATS = """\
 SPARC and LDLJ are reported, but affect the verdict only with a `smoothness` criterion. SPARC hardly notices a stop of
@@ -184,17 +184,27 @@ drives on the same route. The NEES of one run is a mean over correlated errors; 
 distribution apply to a mean over runs at a fixed time, as computed by `simscen bench nav`."""
 
 SESSION_METRICS_TEXT = """\
-A session reports these numbers in results.json under `suite` (`suites` by name with several `--stack`), and
-`simscen report DIR` prints them: `runs`, without the second runs of `--check-determinism`; `success_rate` of all runs,
-including errors, with its 95 % Wilson interval; `spl` and `soft_spl`, means over the `spl_runs` that have them;
-`collisions_per_km` and `collisions_per_hour` over the driven `kilometers` and simulated `hours` of the `measured_runs`
-that were completed. In a run with several robots, each has its own distance, collisions, and SPL; the run succeeds if
-all robots do. With several stacks (`--stack`), the numbers are reported for each, and `comparison` contains, for each
-stack against the first (`baseline`): `pairs` with the same scenario and seed, the number of runs `left_out`, `flips`
-(passed with one stack, failed with the other) with McNemar's exact `flips_p`, and `differences` of time, path length,
-clearance, jerk, standing time, replans, recoveries, collisions (of each robot: `a/collisions`), and the metrics of
-installed packages: `difference` is the mean over pairs, `interval` its 95 % bootstrap interval (from five pairs on),
-and `p` Wilcoxon's signed-rank test ([Statistics](statistics.md))."""
+A session reports these numbers in results.json under `suite`, and `simscen report DIR` prints them. With several
+`--stack`, `suites` contains them for each stack:
+
+- `runs`: number of runs, without the second runs of `--check-determinism`.
+- `success_rate`: share of successful runs in all runs, including errors, with its 95 % Wilson interval.
+- `spl`, `soft_spl`: means over the `spl_runs`, which have these metrics.
+- `collisions_per_km`, `collisions_per_hour`: collisions over the driven `kilometers` and the simulated `hours` of the
+  `measured_runs`, which were completed.
+
+In a run with several robots, each robot has its own distance, collisions, and SPL; the run succeeds if all robots do.
+
+With several `--stack`, `comparison` compares each stack with the first one (`baseline`):
+
+- `pairs`: number of pairs of runs with the same scenario and seed. `left_out` counts the pairs that are not used,
+  because a run was not completed (`broken_pairs`), and the `runs_without_partner`.
+- `flips`: pairs that passed with one stack and failed with the other; `flips_p` is from McNemar's exact test.
+- `differences`: for each metric, the mean `difference` over pairs, its 95 % bootstrap `interval` (from five pairs on),
+  and `p` from Wilcoxon's signed-rank test.
+
+The compared metrics are time, path length, clearance, jerk, standing time, replans, recoveries, collisions (of each
+robot: `a/collisions`), and those of installed packages. See [Statistics](statistics.md)."""
 
 
 def metric_topics(installed: bool = False) -> list[Topic]:

@@ -69,7 +69,7 @@ def command(
         *without_log,
     ]
     if foreign != ForeignLogOptions() and not judging.foreign:
-        judging.notes.append("logs of simscen contain truth and times; options for foreign logs have no effect")
+        judging.notes.append("logs of simscen contain truth and times; options for logs of real robots have no effect")
     for note in judging.notes:
         print_text(f"note: {escaped(note)}", sys.stderr)
     if json_:

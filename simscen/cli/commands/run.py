@@ -69,7 +69,9 @@ def command(
     wall_limit: WallLimitOption = 300.0,
     resume: Annotated[
         Path | None,
-        typer.Option(help="Continue in this output folder: execute runs without a verdict or with changed files."),
+        typer.Option(
+            help="Continue in this output folder: execute the runs that have no verdict or whose files changed."
+        ),
     ] = None,
     shard: Annotated[
         str,
@@ -117,7 +119,7 @@ def command(
     ] = ReplayMode.FAILED,
     keep_logs: Annotated[
         KeptLogs,
-        typer.Option(help="failed: delete logs and pictures of runs that pass, for sessions of thousands of runs."),
+        typer.Option(help="`failed` deletes logs and pictures of runs that pass, for sessions of thousands of runs."),
     ] = KeptLogs.ALL,
     lenient: LenientOption = False,
 ) -> None:

@@ -128,7 +128,7 @@ class LogJudge:
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(self._scenario))
 
     def _judge_foreign_log(self, log: Path, with_sensors: bool = False) -> tuple[ForeignLog, RunResult]:
-        """Return a foreign log and its result by the criteria file."""
+        """Return a log that simscen did not record and its result by the criteria file."""
         assert self._criteria is not None
         with _scenario_errors(self._criteria):
             criteria = self._criteria.for_robot("")

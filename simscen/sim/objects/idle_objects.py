@@ -1,9 +1,11 @@
-"""Idle objects: pushable ones that rest, and pairs of scripted and pushable ones too far apart to touch.
+"""Idle objects: pushable objects at rest that no scripted object can touch soon, so that they need no computing time.
+
+A scripted object follows a given path and has no mass in the engine.
 
 Bullet deactivates a body after two seconds at rest; until then, a chair takes as much computing time as a robot. The
 world settles before tick 0, and the speed of each object is sampled meanwhile. An object is at rest if it is slow at
-every sample and its speed does not increase from each sample to the next. A speed that increases every time shows that
-the object begins to slide or tip over; other small speeds are jitter of the contact solver.
+every sample and its speed does not increase at least once between two samples. A speed that increases every time shows
+that the object begins to slide or tip over; other small speeds are jitter of the contact solver.
 
 Bullet does not wake a body that is touched by a body without mass. Pushable objects must therefore be awake where a
 scripted object arrives; elsewhere they sleep, which saves nearly all of their computing time. Any other contact wakes
@@ -74,9 +76,9 @@ class RestPoses:
 
 
 HORIZON_S = 0.1
-"""Time for which the bounds of speeds hold, including those of objects that fall or are hit."""
+"""Time for which the assumed maximum speeds hold, also for objects that fall or are hit."""
 NEAR_CONTACT_S = 0.05
-"""Time to contact below which pushable objects are woken and every tick is stepped with scripted motion."""
+"""Time to contact below which pushable objects are woken, and scripted objects are moved in the engine every tick."""
 SHAPE_MARGIN_M = 0.05
 """Distance that collision shapes may extend beyond their vertices, from which sizes are computed."""
 

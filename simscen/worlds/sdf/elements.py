@@ -1,4 +1,4 @@
-"""XML elements of SDF files with positions: their numbers, names and poses, and which ones the importer knows."""
+"""XML elements of SDF files with lines and columns: reading of values, and the elements that the importer knows."""
 
 import difflib
 import math
@@ -247,7 +247,8 @@ def report_unknown(element: Element, parent: str, report: ImportReport) -> None:
 
     Raises UnusableElement if the unknown element could change the geometry: if it contains solids, if its parent is a
     shape, or if its name is a misspelling of an element in GEOMETRIC. Otherwise adds a note. Elements with a namespace
-    prefix are ignored as extensions, which SDF allows.
+    prefix are ignored as extensions, which SDF allows, except for xacro elements and `experimental:params` that must be
+    expanded first.
     """
     tag = element.tag
     harmless = HARMLESS.get(parent, set()) | (set() if parent in SHAPES else _HARMLESS_ANYWHERE)

@@ -23,7 +23,7 @@ from simscen.worlds.sdf.report import ImportReport, UnusableElement
 from simscen.worlds.sdf.shapes import MIN_LEVEL_NORMAL_Z, ShapeReader
 
 MAX_OUTLIER_SHARE = 0.05
-"""Fraction of the models that may be outliers; with more, the world is regarded as large."""
+"""Fraction of the models (rounded down, plus one) that may be outliers; with more, the world is regarded as large."""
 MAX_FLOOR_HEIGHT_M = 0.3
 """Height up to which a level face can be the floor instead of a platform."""
 MIN_FLOOR_HEIGHT_M = 0.001
