@@ -24,8 +24,8 @@ MIN_MAPPED = 0.6
 SEARCH_INTERVAL_M, MAX_SEARCH_INTERVAL_M = 0.7, 8.0
 """Distance driven between two searches of the map; doubled after each search without a result, up to the maximum."""
 MIN_LENGTH_M, MIN_LEAD = 2.0, 0.05
-"""A robot without initial pose gets a pose if the score of this pose, over at least MIN_LENGTH_M driven, exceeds that of
-any other pose by MIN_LEAD."""
+"""A robot without initial pose gets a pose if the score of this pose, over at least MIN_LENGTH_M driven, exceeds that
+of any other pose by MIN_LEAD."""
 MIN_GAIN, MIN_SCORE = 0.1, 0.75
 """A robot that had a pose gets another one if, in addition, the score exceeds that of its pose by MIN_GAIN and is at
 least MIN_SCORE, in two searches that agree."""
