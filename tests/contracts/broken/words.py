@@ -20,13 +20,13 @@ from tests.contracts.broken.cases import COUNT, word
 FINE = Finding(Status.PASS, "it", "0", "≤ 1", margin=1.0)
 
 
-@word("every bound yields", "returns no finding for")
+@word("every trace yields", "returns no finding for")
 class ChecksNothing(Spec, Criterion):
     def judge(self, trace, case):
         return []
 
 
-@word("every bound yields", "raises IndexError when it judges the trace of a stationary robot")
+@word("every trace yields", "raises IndexError when it judges the trace of a stationary robot")
 class NeedsABelief(Spec, Criterion):
     def judge(self, trace, case):
         trace.belief.values[0]
