@@ -1,12 +1,12 @@
-"""Names of the robot's frames in the user's graph."""
+"""Frames in the user's graph: their names, and the order in which their transforms are published."""
 
-from typing import Any, Dict, Optional, Sequence
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
 
 from simscen.ros2.messages import find_type
 from simscen.ros2.options import AdapterError
 
 BASE_FRAME = "base_link"
-STATIC_TRANSFORMS = "/tf_static"
+TRANSFORMS, STATIC_TRANSFORMS = "/tf", "/tf_static"
 SHARED_FRAMES = ("map", "odom")
 """Frames that the nodes and simscen exchange in both directions, so that they have one name."""
 
@@ -42,7 +42,7 @@ class FrameNames:
         from rclpy.serialization import deserialize_message, serialize_message
 
         message = deserialize_message(data, message_type)
-        parts = message.transforms if topic in ("/tf", STATIC_TRANSFORMS) else [message]
+        parts = message.transforms if topic in (TRANSFORMS, STATIC_TRANSFORMS) else [message]
         for part in parts:
             self._rename(part)
         if has_second_base:
@@ -63,3 +63,12 @@ class FrameNames:
         transform.header.frame_id, transform.child_frame_id = self.bases
         transform.transform.rotation.w = 1.0
         return transform
+
+
+def transforms_first(messages: Iterable[Tuple[str, bytes]]) -> List[Tuple[str, bytes]]:
+    """Return the messages with those of /tf_static and /tf before the others, otherwise in the same order.
+
+    Some nodes, such as Nav2's collision monitor, wait in a callback until they can transform their newest scan. They
+    do not answer meanwhile, and the barrier would wait for them before the transform is published.
+    """
+    return sorted(messages, key=lambda message: message[0] not in (TRANSFORMS, STATIC_TRANSFORMS))

@@ -21,6 +21,7 @@ adapter counts such periods. Time stands still within a control period: /clock p
 import time
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
+from simscen.ros2.frames import transforms_first
 from simscen.ros2.graph import Graph, Received
 from simscen.ros2.messages import NANOSECONDS, read_header
 from simscen.ros2.nav2_actions import MotionActions
@@ -49,7 +50,7 @@ class Lockstep:
         Raises AdapterError that names a node whose command is overdue.
         """
         graph, barrier = self._graph, self._barrier
-        for topic, data in messages:
+        for topic, data in transforms_first(messages):
             if graph.publish(topic, data):
                 barrier.round()
         if not due:
@@ -107,7 +108,7 @@ class Paced:
         due_at = self._start + elapsed
         self._graph.spin_until(lambda: time.monotonic() >= due_at, max(0.0, due_at - time.monotonic()))
         self._graph.publish_clock(now)
-        for topic, data in messages:
+        for topic, data in transforms_first(messages):
             self._graph.publish(topic, data)
         self._graph.take_all()
         if due:
