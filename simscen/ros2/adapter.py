@@ -249,7 +249,7 @@ class Adapter:
         for topic, data in messages:
             self._estimate.take_published(topic, data)
             if topic == STATIC_TRANSFORMS and topic in self._options.without:
-                self._readiness.user_transforms = UserTransforms(self._graph, self._frames, data)
+                self._readiness.use_transforms(UserTransforms(self._graph, self._frames, data))
         messages = [(topic, self._with_frames(topic, data)) for topic, data in messages]
         self._initial_pose = next((m for m in messages if m[0] == INITIAL_POSE), self._initial_pose)
         messages = [message for message in messages if message[0] != INITIAL_POSE]

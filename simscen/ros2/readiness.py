@@ -39,10 +39,14 @@ class Readiness:
         self._options = options
         self._states = ServicePoll(graph, STATE_SERVICE, "get_state") if find_type(STATE_SERVICE) else None
         self._nav2 = Nav2Readiness(graph, barrier, topics, options, bases)
-        self.user_transforms: Optional[UserTransforms] = None
+        self._user_transforms: Optional[UserTransforms] = None
         self.has_map = True
         """Whether simscen has published the map."""
         barrier.required = self.required_nodes
+
+    def use_transforms(self, transforms: UserTransforms) -> None:
+        """Require the user's transforms, and accept their frames as base frames."""
+        self._user_transforms = self._nav2.user_transforms = transforms
 
     def no_nodes(self) -> List[str]:
         """Return what is missing if there is no other node."""
@@ -57,7 +61,7 @@ class Readiness:
         for topic in self._topics:
             found += self._subscribers(topic) + self._other_publishers(topic)
         found += self._unused_sensors()
-        found += self.user_transforms.missing() if self.user_transforms is not None else []
+        found += self._user_transforms.missing() if self._user_transforms is not None else []
         if self._options.nav2:
             found += self._nav2.missing_nodes()
             found += [] if found else self._nav2.wrong_parameters()
@@ -196,6 +200,7 @@ class Nav2Readiness:
     ) -> None:
         self._graph, self._options = graph, options
         self._known = NodeParameters(graph, barrier)
+        self.user_transforms: Optional[UserTransforms] = None
         odometry = [graph.names(topic.name) for topic in topics if topic.type == ODOMETRY]
         self._offer = nav2_parameters.Offer(
             [graph.names(topic.name) for topic in topics if topic.type == SCAN],
@@ -203,6 +208,12 @@ class Nav2Readiness:
             bases,
             graph.names.namespace,
         )
+
+    def _offered(self) -> nav2_parameters.Offer:
+        """Return what simscen and the user's transforms offer to Nav2."""
+        if self.user_transforms is None:
+            return self._offer
+        return self._offer._replace(bases=[*self._offer.bases, *self.user_transforms.robot_frames])
 
     def missing_nodes(self) -> List[str]:
         """Return the problems of the parameter file, and Nav2's nodes that do not exist."""
@@ -221,7 +232,7 @@ class Nav2Readiness:
         return self._findings({node[0]: self._parameters(full_name(node), node[0]) for node in nodes}, "")
 
     def _findings(self, nodes: Dict[str, Dict[str, Any]], prefix: str) -> List[str]:
-        found = nav2_parameters.check(nodes, self._offer)
+        found = nav2_parameters.check(nodes, self._offered())
         return [f"{prefix}{finding.node}: {finding.message}" for finding in found if finding.severe]
 
     def _parameters(self, path: str, name: str) -> Dict[str, Any]:

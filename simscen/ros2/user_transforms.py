@@ -34,9 +34,14 @@ class UserTransforms:
         for link in message.transforms:
             self._published |= {link.header.frame_id, link.child_frame_id}
 
+    @property
+    def robot_frames(self) -> List[str]:
+        """The frames of the robot that the user's nodes publish."""
+        return sorted(self._published - set(SHARED_FRAMES))
+
     def missing(self) -> List[str]:
         """Return the frames that no node publishes, one sentence each."""
-        known = ", ".join(sorted(self._published - set(SHARED_FRAMES))) or "no other"
+        known = ", ".join(self.robot_frames) or "no other"
         return [
             f"no node publishes the frame {frame}, and {STATIC_TRANSFORMS} of simscen is left out: "
             f"--frame {frame}:=NAME uses the name of your URDF (your nodes publish {known})"

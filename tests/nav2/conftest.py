@@ -105,7 +105,7 @@ class Ended(NamedTuple):
 def run(nav2: Nav2, tmp_path: Path) -> Callable[..., Ended]:
     """Return a function that runs a scenario of the library with `simscen ros2 nav2 WORDS` as its stack."""
 
-    def call(scenario: str, *words: str, launch: str = nav2.launch) -> Ended:
+    def call(scenario: str | Path, *words: str, launch: str = nav2.launch) -> Ended:
         out = tmp_path / "out"
         adapter = [SIMSCEN, "ros2", "nav2", "--base-frame", "base_footprint", "--ready", "60", "--launch", launch]
         stack = shlex.join([*adapter, *words])

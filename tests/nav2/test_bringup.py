@@ -10,6 +10,7 @@ import yaml
 
 pytestmark = pytest.mark.slow
 GOAL = "navigation/goal.scenario.yaml"
+WORLDS = Path(__file__).parents[2] / "worlds"
 Nav2 = Any
 """The fixture `nav2`."""
 
@@ -92,14 +93,26 @@ def test_transforms_of_the_users_robot_state_publisher(run, nav2: Nav2, tmp_path
     assert "/robot_state_publisher" in ended.about["nodes"]
 
 
+TWO_ROBOTS = f"""\
+simscen: 1
+world: {WORLDS}/office.world.yaml
+robots:
+  east: {{pose: {{x: 9.5, y: 4.65}}, goals: [{{pose: {{x: 14, y: 4.65}}}}]}}
+  west: {{pose: {{x: 8, y: 5.35, yaw: 180 deg}}, goals: [{{pose: {{x: 3.5, y: 5.35, yaw: 180 deg}}}}]}}
+pass: [{{goals_reached: {{}}}}, {{collisions: {{max: 0}}}}]
+time_limit: 90 s
+"""
+
+
 def test_two_robots_each_with_a_nav2(run, nav2: Nav2, tmp_path: Path) -> None:
     """Each robot has its own parameters, in a file with its name."""
-    for robot in ("eastbound", "westbound"):
+    (tmp_path / "two.scenario.yaml").write_text(TWO_ROBOTS)
+    for robot in ("east", "west"):
         with_parameters(nav2, tmp_path, lambda nodes: None).params.rename(tmp_path / f"{robot}.yaml")
     launch = nav2.launch.replace(str(nav2.params), f"{tmp_path}/$SIMSCEN_ROBOT.yaml")
-    ended = run("multi_robot/meet_in_corridor.scenario.yaml", "--ready", "100", launch=launch)
+    ended = run(tmp_path / "two.scenario.yaml", "--ready", "100", launch=launch)
     assert ended.code == 0, ended.said
-    for robot in ("eastbound", "westbound"):
+    for robot in ("east", "west"):
         assert "/controller_server" in ended.about_of(robot)["nodes"]
 
 
@@ -131,7 +144,7 @@ def test_a_typo_in_the_name_of_a_plugin_is_reported_with_its_node(run, nav2: Nav
 
 
 def test_the_map_of_the_users_map_server(run, nav2: Nav2, tmp_path: Path) -> None:
-    map_file = Path(__file__).parents[2] / "worlds/house_last_year.yaml"
+    map_file = WORLDS / "house_last_year.yaml"
     server = f"source {shlex.quote(str(nav2.script))}; node nav2_map_server map_server --ros-args"
     started = f"{server} -p use_sim_time:=true -p yaml_filename:={map_file}"
     manager = "node nav2_lifecycle_manager lifecycle_manager --ros-args -r __node:=lifecycle_manager_map"
