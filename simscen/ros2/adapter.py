@@ -11,7 +11,7 @@ import os
 import sys
 import time
 from importlib.metadata import version
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Set, Tuple
 
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -103,9 +103,10 @@ class Adapter:
         self._paced = Paced(self._graph, options.factor)
 
     @property
-    def advertised(self) -> Dict[str, Any]:
-        """Publishers by topic of the protocol."""
-        return self._graph.publishers
+    def needed_topics(self) -> Set[str]:
+        """Topics of the protocol that are published, and /tf_static to compare the user's transforms with it."""
+        replaced = {STATIC_TRANSFORMS} & set(self._options.without)
+        return {*self._graph.publishers, *replaced}
 
     def _check_launched(self) -> None:
         """Raise AdapterError when the launched command has ended."""

@@ -115,7 +115,7 @@ class AdapterRun:
             "step": "control",
             "modes": [*MODES],
             "first_answer_limit": options.ready + READY_MARGIN_S,
-            "topics": [PROTOCOL_TOPICS.get(t.name, t.name) for t in topics if t.name in adapter.advertised],
+            "topics": [PROTOCOL_TOPICS.get(t.name, t.name) for t in topics if t.name in adapter.needed_topics],
             "about": about,
         }
         connection.send_json(wire.WELCOME, welcome)

@@ -1,6 +1,7 @@
 """A real Nav2 that is started, configured, or broken in the ways that users know."""
 
 import shlex
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -93,19 +94,20 @@ def test_transforms_of_the_users_robot_state_publisher(run, nav2: Nav2, tmp_path
     assert "/robot_state_publisher" in ended.about["nodes"]
 
 
-TWO_ROBOTS = f"""\
+TWO_ROBOTS = """\
 simscen: 1
-world: {WORLDS}/office.world.yaml
+world: office.world.yaml
 robots:
-  east: {{pose: {{x: 9.5, y: 4.65}}, goals: [{{pose: {{x: 14, y: 4.65}}}}]}}
-  west: {{pose: {{x: 8, y: 5.35, yaw: 180 deg}}, goals: [{{pose: {{x: 3.5, y: 5.35, yaw: 180 deg}}}}]}}
-pass: [{{goals_reached: {{}}}}, {{collisions: {{max: 0}}}}]
+  east: {pose: {x: 9.5, y: 4.65}, goals: [{pose: {x: 14, y: 4.65}}]}
+  west: {pose: {x: 8, y: 5.35, yaw: 180 deg}, goals: [{pose: {x: 3.5, y: 5.35, yaw: 180 deg}}]}
+pass: [{goals_reached: {}}, {collisions: {max: 0}}]
 time_limit: 90 s
 """
 
 
 def test_two_robots_each_with_a_nav2(run, nav2: Nav2, tmp_path: Path) -> None:
     """Each robot has its own parameters, in a file with its name."""
+    shutil.copy(WORLDS / "office.world.yaml", tmp_path)
     (tmp_path / "two.scenario.yaml").write_text(TWO_ROBOTS)
     for robot in ("east", "west"):
         with_parameters(nav2, tmp_path, lambda nodes: None).params.rename(tmp_path / f"{robot}.yaml")
