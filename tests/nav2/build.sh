@@ -97,7 +97,7 @@ NAV2='nav2_common nav2_msgs nav2_util nav2_lifecycle_manager nav2_voxel_grid nav
   nav2_dwb_controller/dwb_plugins nav2_mppi_controller nav2_smac_planner nav2_waypoint_follower'
 for package in $NAV2; do export_source ros-navigation+navigation2 jazzy "nav2/$package" "$package"; done
 export_source ros-navigation+navigation2 jazzy nav2/nav2_bringup nav2_bringup/params
-# Built with xsimd 8 of Debian 12 and -ffast-math, the MPPI controller drives backward into walls.
+# With its own compiler options for xsimd and -ffast-math, the MPPI controller drives backward into walls on Debian 12.
 sed -i -E '/-DXTENSOR_(ENABLE|USE)_XSIMD/d; s/^set\(XTENSOR_USE_XSIMD 1\)/set(XTENSOR_USE_XSIMD 0)/; s/ -ffast-math//' \
   "$SRC/nav2/nav2_mppi_controller/nav2_mppi_controller/CMakeLists.txt"
 # The waypoint follower needs one service of robot_localization, and OpenCV only for photos.
