@@ -105,8 +105,12 @@ class Adapter:
     @property
     def needed_topics(self) -> Set[str]:
         """Topics of the protocol that are published, and /tf_static to compare the user's transforms with it."""
-        replaced = {STATIC_TRANSFORMS} & set(self._options.without)
-        return {*self._graph.publishers, *replaced}
+        return {*self._graph.publishers, *self._replaced_topics}
+
+    @property
+    def _replaced_topics(self) -> Set[str]:
+        """Topics that the user's nodes publish instead of simscen, and that are compared with simscen's."""
+        return {STATIC_TRANSFORMS} & set(self._options.without)
 
     def _check_launched(self) -> None:
         """Raise AdapterError when the launched command has ended."""
@@ -144,7 +148,8 @@ class Adapter:
     def prepare(self) -> None:
         """Wait before the first step until the graph is complete, or until it probably needs sensor data.
 
-        Raises AdapterError when the launched command ends, or when a node needs a topic that cannot be published.
+        Transforms that replace simscen's are checked in the first step, which brings simscen's. Raises AdapterError
+        when the launched command ends, or when a node needs a topic that cannot be published.
         """
         changed_at = incomplete_at = time.monotonic()
         nodes = self._graph.nodes()
@@ -161,8 +166,9 @@ class Adapter:
             if missing:
                 incomplete_at = now
                 return bool(nodes) and now - changed_at >= patience
-            self._complete = now - max(changed_at, incomplete_at) >= settle and not self._options.warm_up
-            return now - max(changed_at, incomplete_at) >= settle
+            is_settled = now - max(changed_at, incomplete_at) >= settle
+            self._complete = is_settled and not self._options.warm_up and not self._replaced_topics
+            return is_settled
 
         self._graph.spin_until(_throttled(settled), min(self._options.ready, PREPARE_S))
         if self._complete:
@@ -249,7 +255,7 @@ class Adapter:
         messages, self._pending_infos = [*messages, *self._pending_infos], []
         for topic, data in messages:
             self._estimate.take_published(topic, data)
-            if topic == STATIC_TRANSFORMS and topic in self._options.without:
+            if topic in self._replaced_topics:
                 self._readiness.use_transforms(UserTransforms(self._graph, self._frames, data))
         messages = [(topic, self._with_frames(topic, data)) for topic, data in messages]
         self._initial_pose = next((m for m in messages if m[0] == INITIAL_POSE), self._initial_pose)

@@ -2,7 +2,7 @@
 # Build Nav2 (Jazzy) from source on top of the ros-jazzy-* wheels: build.sh PREFIX SOURCES
 #
 # SOURCES holds clones or bare repositories, each as OWNER+NAME/repo, OWNER+NAME or NAME, with the branches named below.
-# Environment: J = number of parallel compilers (2). About 25 minutes on two cores; a second call builds what is missing.
+# Environment: J = number of parallel compilers (2). About an hour on two cores; a second call builds what is missing.
 # Debian packages: libtinyxml2-dev libconsole-bridge-dev libeigen3-dev libyaml-cpp-dev liborocos-kdl-dev libzmq3-dev
 #   libgraphicsmagick++1-dev libsqlite3-dev nlohmann-json3-dev libboost-dev liblttng-ust-dev libpython3.11 pkg-config
 #   libxtensor-dev libxsimd-dev (MPPI) liburdfdom-dev liburdfdom-headers-dev (robot_state_publisher)
@@ -137,8 +137,8 @@ for package in rcl_interfaces/statistics_msgs rcl_interfaces/composition_interfa
   rclcpp/rclcpp rclcpp/rclcpp_action rclcpp/rclcpp_lifecycle eigen3_cmake_module class_loader rclcpp/rclcpp_components \
   pluginlib/pluginlib angles/angles message_filters geometry2/tf2_msgs geometry2/tf2 geometry2/tf2_ros \
   geometry2/tf2_geometry_msgs geometry2/tf2_sensor_msgs geometry2/tf2_eigen laser_geometry navigation_msgs/map_msgs \
-  bond_core/bond bond_core/smclib bond_core/bondcpp diagnostics/diagnostic_updater geographic_info/geographic_msgs robot_localization \
-  urdf/urdf_parser_plugin; do
+  bond_core/bond bond_core/smclib bond_core/bondcpp diagnostics/diagnostic_updater geographic_info/geographic_msgs \
+  robot_localization urdf/urdf_parser_plugin; do
   build "$package"
 done
 build urdf/urdf -DCMAKE_CXX_STANDARD=17

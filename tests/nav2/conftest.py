@@ -34,6 +34,13 @@ class Nav2(NamedTuple):
     params: Path
     unchanged_params: Path
 
+    def with_parameters(self, file: Path, change: Callable[[dict[str, Any]], object]) -> "Nav2":
+        """Return Nav2 with parameters that `change` has changed, in a new file."""
+        nodes = yaml.safe_load(self.params.read_text())
+        change(nodes)
+        file.write_text(yaml.safe_dump(nodes))
+        return self._replace(params=file)
+
     @property
     def launch(self) -> str:
         """The command that starts all servers."""

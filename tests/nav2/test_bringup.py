@@ -2,7 +2,6 @@
 
 import shlex
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +13,6 @@ GOAL = "navigation/goal.scenario.yaml"
 WORLDS = Path(__file__).parents[2] / "worlds"
 Nav2 = Any
 """The fixture `nav2`."""
-
-
-def with_parameters(nav2: Nav2, folder: Path, change: Callable[[dict[str, Any]], Any]) -> Nav2:
-    """Return Nav2 with changed parameters."""
-    nodes = yaml.safe_load(nav2.params.read_text())
-    params = folder / "changed_params.yaml"
-    params.write_text(yaml.safe_dump(change(nodes) or nodes))
-    return nav2._replace(params=params)
 
 
 def with_filters(nodes: dict[str, Any]) -> None:
@@ -41,7 +32,7 @@ def with_filters(nodes: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("scenario", ["closed_passage", "keepout_under_way", "slow_zone_begins"])
 def test_costmap_filters_receive_the_zones_of_the_scenario(run, nav2: Nav2, tmp_path: Path, scenario: str) -> None:
-    filtered = with_parameters(nav2, tmp_path, with_filters)
+    filtered = nav2.with_parameters(tmp_path / "filters.yaml", with_filters)
     ended = run(f"zones/{scenario}.scenario.yaml", launch=filtered.launch)
     assert ended.code == 0, ended.said
 
@@ -110,7 +101,7 @@ def test_two_robots_each_with_a_nav2(run, nav2: Nav2, tmp_path: Path) -> None:
     shutil.copy(WORLDS / "office.world.yaml", tmp_path)
     (tmp_path / "two.scenario.yaml").write_text(TWO_ROBOTS)
     for robot in ("east", "west"):
-        with_parameters(nav2, tmp_path, lambda nodes: None).params.rename(tmp_path / f"{robot}.yaml")
+        shutil.copy(nav2.params, tmp_path / f"{robot}.yaml")
     launch = nav2.launch.replace(str(nav2.params), f"{tmp_path}/$SIMSCEN_ROBOT.yaml")
     ended = run(tmp_path / "two.scenario.yaml", "--ready", "100", launch=launch)
     assert ended.code == 0, ended.said
@@ -139,7 +130,7 @@ def test_a_typo_in_the_name_of_a_plugin_is_reported_with_its_node(run, nav2: Nav
     def misspell(nodes: dict[str, Any]) -> None:
         nodes["planner_server"]["ros__parameters"]["GridBased"]["plugin"] = "nav2_navfn_planner::NavfnPlaner"
 
-    ended = run(GOAL, "--ready", "30", launch=with_parameters(nav2, tmp_path, misspell).launch)
+    ended = run(GOAL, "--ready", "30", launch=nav2.with_parameters(tmp_path / "typo.yaml", misspell).launch)
     assert ended.code == 3
     assert "planner_server" in ended.said
     assert "NavfnPlaner" in ended.said

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shlex
 import signal
 import threading
 import time
@@ -30,6 +29,7 @@ DWB = {
     **{"GoalDist.scale": 24.0, "RotateToGoal.scale": 32.0},
 }
 """The controller of the parameters that nav2_bringup had up to Iron."""
+SMAC_2D = {"plugin": "nav2_smac_planner::SmacPlanner2D", "tolerance": 0.125, "max_planning_time": 2.0}
 
 
 def processes(word: str) -> list[int]:
@@ -100,36 +100,22 @@ def test_recoveries_of_nav2_are_events(run) -> None:
 
 @pytest.mark.parametrize("plugins", ["dwb", "mppi", "smac_2d"])
 def test_other_plugins_of_nav2_reach_the_goal(run, nav2, tmp_path: Path, plugins: str) -> None:
-    params = tmp_path / "nav2_params.yaml"
-    params.write_text(yaml.safe_dump(with_plugins(nav2, plugins)))
-    ended = run(GOAL, launch=nav2.launch.replace(str(nav2.params), shlex.quote(str(params))))
+    server, name = ("planner_server", "GridBased") if plugins == "smac_2d" else ("controller_server", "FollowPath")
+    unchanged = yaml.safe_load(nav2.unchanged_params.read_text())
+    values = {"dwb": DWB, "mppi": unchanged["controller_server"]["ros__parameters"]["FollowPath"], "smac_2d": SMAC_2D}
+
+    def change(nodes: dict[str, Any]) -> None:
+        nodes[server]["ros__parameters"][name] = values[plugins]
+
+    ended = run(GOAL, launch=nav2.with_parameters(tmp_path / "plugins.yaml", change).launch)
     assert ended.code == 0, ended.said
 
 
-def with_plugins(nav2: Any, plugins: str) -> dict[str, Any]:
-    """Return parameters with the DWB or MPPI controller, or with the Smac 2D planner."""
-    nodes: dict[str, Any] = yaml.safe_load(nav2.params.read_text())
-    controller = nodes["controller_server"]["ros__parameters"]
-    if plugins == "dwb":
-        controller["FollowPath"] = DWB
-    elif plugins == "mppi":
-        unchanged = yaml.safe_load(nav2.unchanged_params.read_text())
-        controller["FollowPath"] = unchanged["controller_server"]["ros__parameters"]["FollowPath"]
-    else:
-        nodes["planner_server"]["ros__parameters"]["GridBased"] = {
-            "plugin": "nav2_smac_planner::SmacPlanner2D",
-            "tolerance": 0.125,
-            "max_planning_time": 2.0,
-        }
-    return nodes
-
-
 def test_waypoints_are_visited_by_the_waypoint_follower(run, nav2, tmp_path: Path) -> None:
-    nodes = yaml.safe_load(nav2.params.read_text())
-    nodes["waypoint_follower"]["ros__parameters"]["wait_at_waypoint"]["waypoint_pause_duration"] = 0
-    params = tmp_path / "nav2_params.yaml"
-    params.write_text(yaml.safe_dump(nodes))
-    launch = nav2.launch.replace(str(nav2.params), shlex.quote(str(params)))
+    def change(nodes: dict[str, Any]) -> None:
+        nodes["waypoint_follower"]["ros__parameters"]["wait_at_waypoint"]["waypoint_pause_duration"] = 0
+
+    launch = nav2.with_parameters(tmp_path / "waypoints.yaml", change).launch
     ended = run("navigation/waypoints_with_waits.scenario.yaml", launch=launch)
     assert ended.about["goals"] == "/follow_waypoints"
     verdicts = verdicts_of(ended)
@@ -143,12 +129,14 @@ def verdicts_of(ended: Any) -> dict[str, str]:
 
 
 def test_a_wrong_frame_is_named_with_its_node(run, nav2, tmp_path: Path) -> None:
-    params = tmp_path / "nav2_params.yaml"
-    params.write_text(nav2.params.read_text().replace("base_frame_id: base_footprint", "base_frame_id: base_fotprint"))
-    ended = run(GOAL, "--ready", "10", launch=nav2.launch.replace(str(nav2.params), shlex.quote(str(params))))
+    def misspell(nodes: dict[str, Any]) -> None:
+        nodes["amcl"]["ros__parameters"]["base_frame_id"] = "base_fotprint"
+
+    changed = nav2.with_parameters(tmp_path / "typo.yaml", misspell)
+    ended = run(GOAL, "--ready", "10", launch=changed.launch)
     assert ended.code == 3
     assert "amcl: base_frame_id is 'base_fotprint'" in ended.said
-    assert processes(str(params)) == []
+    assert processes(str(changed.params)) == []
 
 
 def test_a_scenario_without_a_map_is_named_as_the_cause(run) -> None:

@@ -258,8 +258,8 @@ class CurrentScan:
         """Return whether the obstacle of a track has left its earlier positions, which are now free or newly occupied.
 
         A position is still occupied if both this scan and the earlier scan hit something there, for example a post if
-        a false track jumps between posts. Up to half of the positions may be occupied,
-        because another obstacle can follow the same path.
+        a false track jumps between posts. Up to half of the positions may be occupied, because another obstacle can
+        follow the same path.
         """
         current, radius = self.lidar.to_lidar(track.position), track.radius
         positions = [update.position for update in track.updates if abs(update.position - track.position) > radius]

@@ -321,8 +321,7 @@ pass:
   - localization_error: {final: 0.2 m}
   - collisions: {max: 0, caused_by_robot: true}
 """
-"""All parameters have their defaults. A robot that cannot plan localizes itself while a recovery
-turns it."""
+"""All parameters have their defaults. A robot that cannot plan localizes itself while a recovery turns it."""
 
 
 def start_unknown_scenario() -> str:

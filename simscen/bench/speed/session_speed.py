@@ -1,6 +1,6 @@
 """Overhead of a run, of the start of a session, of a suite of runs, and of an external stack.
 
-A cycle is one pass of the loop in simscen.run.lockstep, where it is called a beat.
+A cycle is a control cycle of the stack (a beat in simscen.run.lockstep).
 """
 
 import gc
@@ -46,8 +46,8 @@ class Overhead:
     run:        a run of SHORT_RUN_S in this process
     outside:    time of `run` before the first and after the last cycle: setup, start and end of the log, verdicts
     process:    the same run in a session, from the fork on, with its picture
-    wall:       wall time of the process of `process` in ms
-    memory:     maximum memory of the process of `process` in MB
+    wall:       wall time of the run of `process` in ms
+    memory:     maximum memory of the run of `process` in MB
     preparing:  world, map, and shortest paths, once for all runs
     start:      import of the engines, once per session
     validate:   `simscen validate`

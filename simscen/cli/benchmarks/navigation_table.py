@@ -53,16 +53,7 @@ def column_widths(table: Sequence[TableRow]) -> list[int]:
 PUBLISHED_DWA = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
     f"{name} {value:.3f}" for name, value in DWA.items()
 )
-COMPARISON_HEAD = (
-    "with minus without --stack",
-    "pairs",
-    "better",
-    "worse",
-    "success",
-    "seconds",
-    "SCT",
-    "score",
-)
+COMPARISON_HEAD = ("with minus without --stack", "pairs", "better", "worse", "success", "seconds", "SCT", "score")
 TABLE_HEAD = (
     "experiment",
     "runs",

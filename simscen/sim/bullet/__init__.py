@@ -1,7 +1,6 @@
 """PyBullet clients, collision shapes and rigid bodies. Other modules import PyBullet itself from here, too."""
 
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -16,7 +15,6 @@ def _discarded_stderr() -> Iterator[None]:
     except OSError:  # stderr is closed
         yield
         return
-    sys.stderr.flush()
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 2)
     try:
