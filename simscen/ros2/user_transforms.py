@@ -32,19 +32,20 @@ class UserTransforms:
 
     def _take(self, message: Any) -> None:
         for link in message.transforms:
-            self._published |= {link.header.frame_id, link.child_frame_id}
+            if link.header.frame_id not in SHARED_FRAMES:  # simscen publishes odom -> base frame
+                self._published |= {link.header.frame_id, link.child_frame_id}
 
     @property
     def robot_frames(self) -> List[str]:
         """The frames of the robot that the user's nodes publish."""
-        return sorted(self._published - set(SHARED_FRAMES))
+        return sorted(self._published)
 
     def missing(self) -> List[str]:
         """Return the frames that no node publishes, one sentence each."""
-        known = ", ".join(self.robot_frames) or "no other"
+        known = ", ".join(self.robot_frames) or "none"
         return [
             f"no node publishes the frame {frame}, and {STATIC_TRANSFORMS} of simscen is left out: "
-            f"--frame {frame}:=NAME uses the name of your URDF (your nodes publish {known})"
+            f"--frame {frame}:=NAME uses the name of your URDF (frames of your nodes: {known})"
             for frame in self._required
             if frame not in self._published
         ]
