@@ -88,7 +88,7 @@ def test_a_sensor_without_a_frame_is_named_with_the_option(with_interfaces, run)
             marks=pytest.mark.slow,
         ),
         pytest.param(
-            {"another map frame": "/amcl_pose comes in the frame 'world'; simscen's map frame is 'map'"},
+            {"another map frame": "/amcl_pose is in the frame 'world'; simscen's map frame is 'map'"},
             marks=pytest.mark.slow,
         ),
     ],
