@@ -28,6 +28,8 @@ def with_filters(nodes: dict[str, Any]) -> None:
         costmap |= {"filters": ["keepout_filter"], "keepout_filter": {**keepout, "enabled": True}}
     costmap = nodes["global_costmap"]["global_costmap"]["ros__parameters"]
     costmap |= {"filters": ["keepout_filter", "speed_filter"], "speed_filter": {**speed, "enabled": True}}
+    # The speed filter applies a limit when the costmap is updated; slow_zone_begins gives it one second.
+    costmap["update_frequency"] = 5.0
 
 
 @pytest.mark.parametrize("scenario", ["closed_passage", "keepout_under_way", "slow_zone_begins"])
