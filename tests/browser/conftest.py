@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,14 @@ from typing import Any
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+from editor_page import TEXT, Edit, settle
 from rig import Opened, Opener
+
+from simscen.cli.session.backends import backend_of
+from simscen.editor.document import EditedFile
+from simscen.editor.server import EditorServer
+from simscen.editor.session import EditorSession
+from simscen.run.sessions.run_session import SessionOptions
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / ".browser"
@@ -95,3 +103,32 @@ class _locked:
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
+
+
+@pytest.fixture
+def edit(open_page: Opener, tmp_path: Path) -> Iterator[Edit]:
+    """Opens a file in the editor."""
+    servers: list[EditorServer] = []
+
+    def open_(file: Path, kind: str = "scenario", root: Path | None = None, **given: Any) -> Opened:
+        session = EditorSession(EditedFile(file, kind, root or file.parent), lambda: backend_of(SessionOptions()))
+        server = EditorServer(session)
+        servers.append(server)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        opened = open_page(server.url, **given)
+        opened.until("document.documentElement.dataset.ready !== undefined")
+        settle(opened)
+        return opened
+
+    yield open_
+    for server in servers:
+        server.shutdown()
+        server.server_close()
+        server.close_files()
+
+
+@pytest.fixture
+def hall(tmp_path: Path) -> Path:
+    file = tmp_path / "hall.scenario.yaml"
+    file.write_text(TEXT)
+    return file

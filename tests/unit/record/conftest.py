@@ -1,6 +1,40 @@
-"""Lets the tests of this folder share `moments.py` and the like; pytest's importlib mode does not."""
+"""Fixtures that read messages as the log of a real robot; tests of this folder also share `moments.py` and others."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+from foreign_logs import Said, write_mcap
+
+from simscen.core.errors import InvalidInput
+from simscen.record.foreign.options import ForeignLogOptions
+from simscen.record.foreign.read import ForeignLog, read_foreign_log
+
+MOCAP = ForeignLogOptions(truth="/mocap")
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Callable[..., ForeignLog]:
+    """Writes messages as an MCAP file and reads it."""
+
+    def call(said: list[Said], wanted: ForeignLogOptions = MOCAP, **options: Any) -> ForeignLog:
+        return read_foreign_log(write_mcap(tmp_path / "a.mcap", said, **options), wanted)
+
+    return call
+
+
+@pytest.fixture
+def refused(read: Callable[..., ForeignLog]) -> Callable[..., str]:
+    """Why a log cannot be used."""
+
+    def call(said: list[Said], wanted: ForeignLogOptions = MOCAP, **options: Any) -> str:
+        with pytest.raises(InvalidInput) as raised:
+            read(said, wanted, **options)
+        (problem,) = raised.value.problems
+        return f"{problem.code} {problem.message} ({problem.hint})"
+
+    return call

@@ -1,6 +1,5 @@
 """Reading the logs of real robots."""
 
-import random
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,15 +11,12 @@ import pytest
 from foreign_logs import (
     BEGIN,
     CHUNKED,
-    LATENCY,
     SECOND,
     SPEED,
     STORE,
     UNINDEXED,
     Said,
-    believed,
     drive,
-    header,
     link,
     odometry,
     stamped_pose,
@@ -35,7 +31,6 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import Evidence
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.read import ForeignLog, read_foreign_log
-from simscen.record.foreign.timebase import find_clock_step
 
 MOCAP = ForeignLogOptions(truth="/mocap")
 WRITERS: dict[str, Callable[[Path, list[Said]], Path]] = {
@@ -52,29 +47,6 @@ WRITERS: dict[str, Callable[[Path, list[Said]], Path]] = {
         for name, options in CHUNKED.items()
     },
 }
-
-
-@pytest.fixture
-def read(tmp_path: Path) -> Callable[..., ForeignLog]:
-    """Writes messages as an MCAP file and reads it."""
-
-    def call(said: list[Said], wanted: ForeignLogOptions = MOCAP, **options: Any) -> ForeignLog:
-        return read_foreign_log(write_mcap(tmp_path / "a.mcap", said, **options), wanted)
-
-    return call
-
-
-@pytest.fixture
-def refused(read: Callable[..., ForeignLog]) -> Callable[..., str]:
-    """Why a log cannot be used."""
-
-    def call(said: list[Said], wanted: ForeignLogOptions = MOCAP, **options: Any) -> str:
-        with pytest.raises(InvalidInput) as raised:
-            read(said, wanted, **options)
-        (problem,) = raised.value.problems
-        return f"{problem.code} {problem.message} ({problem.hint})"
-
-    return call
 
 
 @pytest.mark.parametrize("writer", WRITERS)
@@ -94,28 +66,6 @@ def test_every_container_gives_the_same_trace(tmp_path: Path, writer: str) -> No
         Evidence.TRUTH, Evidence.VELOCITY, Evidence.BELIEF, Evidence.COVARIANCE, Evidence.ALIGNMENT,
         Evidence.SCANS, Evidence.COMMANDS,
     }  # fmt: skip
-
-
-def test_times_are_those_of_the_headers(read: Callable[..., ForeignLog]) -> None:
-    """AMCL's pose is logged 80 ms after the truth of the same moment; at 0.5 m/s that would be 4 cm of error."""
-    log = read(drive(off=0.0))
-    error = log.trace.belief.values[:, 0] - np.interp(
-        log.trace.belief.ticks, log.trace.truth.ticks, log.trace.truth.values[:, 0]
-    )
-    assert np.abs(error).max() < 1e-3
-    by_log = read(drive(off=0.0), ForeignLogOptions(truth="/mocap", clock="log"))
-    late = by_log.trace.belief.values[:, 0] - np.interp(
-        by_log.trace.belief.ticks, by_log.trace.truth.ticks, by_log.trace.truth.values[:, 0]
-    )
-    assert np.abs(late[:-1]).max() == pytest.approx(0.04, abs=0.002)
-
-
-def test_times_without_header_are_converted_to_the_clock_of_the_headers(read: Callable[..., ForeignLog]) -> None:
-    """Twist has no header; with simulated time the log's own clock is another one, and runs at another rate."""
-    said = [replace(one, time=BEGIN + 2 * (one.time - 5 * SECOND)) for one in drive(begin=5 * SECOND)]
-    trace = read(said).trace
-    assert trace.seconds(trace.end) == pytest.approx(10.0, abs=0.2)
-    assert np.abs(trace.command.ticks - trace.truth.ticks).max() <= 2
 
 
 def test_without_a_truth_nothing_is_known_of_it_and_the_reason_names_what_could_be(
@@ -154,122 +104,6 @@ def test_a_truth_in_a_frame_of_its_own_is_not_compared_with_the_map(read: Callab
     assert Evidence.TRUTH not in log.coverage.missing
     same = read(drive(mocap="vicon"), ForeignLogOptions(truth="/mocap", same_frame=True))
     assert Evidence.ALIGNMENT not in same.coverage.missing
-
-
-def test_repeated_and_late_stamps_are_sorted_and_noted(read: Callable[..., ForeignLog]) -> None:
-    said = [one for one in drive() if one.topic == "/mocap"]
-    said[10], said[11] = replace(said[10], message=said[11].message), replace(said[11], message=said[10].message)
-    said.insert(51, replace(said[50], time=said[50].time + 1))
-    log = read(said)
-    assert len(log.trace.truth) == 201
-    assert (np.diff(log.trace.truth.ticks) > 0).all()
-    assert (np.diff(log.trace.truth.values[:, 0]) > 0).all()
-    assert log.notes == ["/mocap: 1 messages out of order, 1 repeated stamps, of which the last message is used"]
-
-
-def test_a_clock_that_jumps_back_is_refused(refused: Callable[..., str]) -> None:
-    said = drive(4.0) + [replace(one, time=one.time + 5 * SECOND) for one in drive(4.0)]
-    assert refused(said).startswith("SC804 the time of /mocap jumps back by 4.0 s at its message 82 (")
-
-
-def with_clock_step(seconds: float, also_recorder: bool = False) -> list[Said]:
-    """A drive during which the clock of the stamps, and perhaps that of the recorder, is set after 5 s."""
-    step, said = round(seconds * SECOND), []
-    for one in drive():
-        if one.time > BEGIN + 5 * SECOND + LATENCY and hasattr(one.message, "header"):
-            stamp = one.message.header.stamp
-            moved = header(stamp.sec * SECOND + stamp.nanosec + step, one.message.header.frame_id)
-            time = one.time + step if also_recorder else one.time
-            said.append(Said(one.topic, time, replace(one.message, header=moved)))
-        else:
-            said.append(one)
-    return said
-
-
-@pytest.mark.parametrize("seconds", [-0.9, -0.3, 0.3, 0.9, 3.0])
-def test_clock_that_is_set_while_recording_is_refused(
-    refused: Callable[..., str], read: Callable[..., ForeignLog], seconds: float
-) -> None:
-    direction = "back" if seconds < 0 else "forward"
-    text = f"SC804 the clock of /mocap was set {direction} by {abs(seconds):.1f} s at its message 102 ("
-    assert refused(with_clock_step(seconds)).startswith(text)
-    by_log = read(with_clock_step(seconds), ForeignLogOptions(truth="/mocap", clock="log"))
-    assert by_log.trace.velocity.values[:, 0] == pytest.approx(SPEED, abs=1e-6)
-
-
-def with_busy_start(step: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Times of logging and stamps in ns of a public log: 90 Hz, logged from 1.1 s on, with losses of 0.1 s before.
-
-    The clock of the stamps is set by `step` ns at 5 s.
-    """
-    stamps = np.arange(0, 10 * SECOND, 11_000_000)
-    is_lost = np.zeros(len(stamps), dtype=bool)
-    for begin in (6, 30, 50):
-        is_lost[begin : begin + 12] = True
-    stamps = stamps[~is_lost]
-    logged = np.maximum(stamps, round(1.1 * SECOND)) + LATENCY
-    return logged, stamps + np.where(stamps >= 5 * SECOND, step, 0)
-
-
-def test_a_recorder_that_catches_up_after_a_busy_start_is_no_clock_that_was_set() -> None:
-    assert find_clock_step(*with_busy_start()) is None
-    found = find_clock_step(*with_busy_start(round(0.3 * SECOND)))
-    assert found is not None
-    assert found[1] == pytest.approx(0.3 * SECOND, abs=0.02 * SECOND)
-
-
-def test_a_log_is_judged_from_when_the_recorder_has_subscribed_to_scans(read: Callable[..., ForeignLog]) -> None:
-    late = [one for one in drive() if one.topic != "/scan" or one.time > BEGIN + SECOND]
-    log = read(late)
-    assert log.notes == ["/scan is recorded 1.0 s after the first message; the log is judged from then on"]
-    assert (log.trace.scans[0], log.trace.seconds(log.trace.end)) == (0, pytest.approx(9.1, abs=0.1))
-    assert log.trace.truth.values[0, 0] == pytest.approx(SPEED * 1.0, abs=0.03)
-    silent = read([one for one in drive() if one.topic != "/scan" or one.time > BEGIN + 3 * SECOND])
-    assert (silent.notes, silent.trace.scans[0]) == ([], pytest.approx(3000, abs=50))
-
-
-def test_clock_of_the_recorder_that_is_set_back_is_refused(refused: Callable[..., str]) -> None:
-    text = "SC804 the clock of the recorder was set back by 0.5 s at message 102 of /mocap ("
-    assert refused(with_clock_step(-0.55, also_recorder=True)).startswith(text)
-
-
-def delayed(said: list[Said], begin: float, end: float, seconds: float) -> list[Said]:
-    """Messages of one topic, of which those between two times (s) are logged late, and none before an earlier one."""
-    late, last = [], 0
-    for one in said:
-        is_late = begin * SECOND <= one.time - BEGIN < end * SECOND
-        last = max(last, one.time + (round(seconds * SECOND) if is_late else 0))
-        late.append(replace(one, time=last))
-    return late
-
-
-@pytest.mark.parametrize("change", ["shuffled", "reversed", "stalled", "slow start", "slow end", "jitter"])
-def test_order_and_delay_of_logging_do_not_change_stamped_poses(read: Callable[..., ForeignLog], change: str) -> None:
-    said, rng = [one for one in drive() if one.topic == "/mocap"], random.Random(4)
-    changed = {
-        "shuffled": lambda: rng.sample(said, len(said)),
-        "reversed": lambda: said[::-1],
-        "stalled": lambda: delayed(said, 4.0, 5.0, 1.5),
-        "slow start": lambda: delayed(said, 0.0, 3.0, 0.5),
-        "slow end": lambda: delayed(said, 5.0, 99.0, 0.5),
-        "jitter": lambda: [replace(one, time=one.time + rng.randrange(SECOND // 3)) for one in said],
-    }[change]()
-    assert (read(changed).trace.truth.values == read(said).trace.truth.values).all()
-
-
-def test_topics_of_different_clocks_are_refused(refused: Callable[..., str], read: Callable[..., ForeignLog]) -> None:
-    said = [one for one in drive() if one.topic == "/mocap"]
-    said += [Said("/amcl_pose", BEGIN + k * SECOND, believed(k * SECOND, SPEED * k)) for k in range(10)]
-    assert "/amcl_pose and /mocap do not share a clock" in refused(said)
-    assert len(read(said, ForeignLogOptions(truth="/mocap", clock="log")).trace.belief) == 10
-
-
-def test_stamps_that_were_never_set_are_not_used(read: Callable[..., ForeignLog]) -> None:
-    said = [one for one in drive() if one.topic != "/mocap"]
-    said += [Said("/mocap", BEGIN + k * SECOND // 20, stamped_pose(0, "map", SPEED * k / 20)) for k in range(201)]
-    log = read(said)
-    assert len(log.trace.truth) == 201
-    assert log.notes == ["/mocap: all stamps are zero, so the times of logging are used"]
 
 
 def test_a_gap_in_the_truth_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:

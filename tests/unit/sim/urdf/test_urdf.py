@@ -1,15 +1,13 @@
 """Tests of robots from URDF files, and of invalid URDFs (CASES 37-44, 50)."""
 
-import math
 import os
 import struct
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from simscen.core.errors import InvalidInput
-from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Box, Mesh
 from simscen.model.robot import RobotSpec
@@ -18,7 +16,6 @@ from simscen.sim.single_robot import SingleRobotSimulation
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.sdf.mesh_files import UnusableMesh, read_parts
 
-JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf"
 DIFFERENTIAL = {"type": "differential", "wheel_radius": 0.05, "wheel_separation": 0.4}
 LIMITS = {"linear": 0.5, "angular": 2.0, "linear_acceleration": 1.0, "angular_acceleration": 3.0}
 
@@ -327,70 +324,6 @@ def test_xacro_files_are_expanded(tmp_path):
         robot().replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" ')
     )
     assert build_robot_body(spec(urdf="robot.urdf.xacro"), tmp_path / "cart.robot.yaml", [tmp_path]).hull
-
-
-@pytest.fixture
-def jackal():
-    if not JACKAL.is_dir():
-        pytest.skip("the Jackal of others is not here: see CONTRIBUTING.md")
-    drive = {"type": "skid_steer", "wheel_radius": 0.098, "wheel_separation": 0.37559, "wheel_base": 0.262,
-             "turning_scale": 1.6}  # fmt: skip
-    limits = {"linear": 2.0, "angular": 4.0, "linear_acceleration": 3.0, "angular_acceleration": 8.0}
-    body = build_robot_body(spec(drive, "jackal.urdf", limits=limits), JACKAL / "jackal.robot.yaml", [JACKAL])
-    simulation = SingleRobotSimulation(merge_solids([]), [], body, Pose2(0, 0, 0), triangulate)
-    yield simulation
-    simulation.close()
-
-
-def drive_until(simulation, done, command, seconds):
-    """Control at 20 Hz from the true pose; a robot that does not get there in time fails the test, and never hangs."""
-    for _ in range(round(seconds * 20)):
-        if done(simulation.truth().pose.plane):
-            simulation.drive(Twist())
-            simulation.step(120)
-            return
-        simulation.drive(command(simulation.truth().pose.plane))
-        simulation.step(12)
-    pytest.fail(f"not there after {seconds} s: {simulation.truth().pose.plane}")
-
-
-def test_the_jackal_drives_a_square_of_two_meters(jackal):
-    """With feedback from the true pose, as a controller would: four sides, four turns in place."""
-    corners, odometer = [], jackal.encoders()
-    for side in range(4):
-        begin, heading = jackal.truth().pose.plane, side * math.pi / 2
-        drive_until(
-            jackal,
-            lambda pose, begin=begin: begin.distance(pose) >= 2.0 - 0.04,
-            lambda pose, heading=heading: Twist(0.5, 0.0, 2 * wrap(heading - pose.yaw)),
-            seconds=10,
-        )
-        corners.append(jackal.truth().pose.plane)
-        heading += math.pi / 2
-        drive_until(
-            jackal,
-            lambda pose, heading=heading: wrap(heading - pose.yaw) <= 0.01,
-            lambda pose, heading=heading: Twist(0.0, 0.0, min(1.0, 2 * wrap(heading - pose.yaw) + 0.1)),
-            seconds=10,
-        )
-    for corner, (x, y) in zip(corners, ((2, 0), (2, 2), (0, 2), (0, 0)), strict=True):
-        assert math.hypot(corner.x - x, corner.y - y) < 0.15
-    assert wrap(jackal.truth().pose.yaw) == pytest.approx(0.0, abs=0.05)
-    left, right = (now - before for now, before in zip(jackal.encoders(), odometer, strict=True))
-    by_wheels = (right - left) * 0.098 / 0.37559
-    assert by_wheels > 1.15 * 2 * math.pi, "its wheels turn further than the robot does"
-
-
-def test_the_jackal_turns_in_place_and_its_wheels_slip(jackal):
-    jackal.drive(Twist(0.0, 0.0, 1.0))
-    jackal.step(240)
-    begin, rolled = jackal.truth().pose, jackal.encoders()
-    jackal.step(480)
-    end, after = jackal.truth().pose, jackal.encoders()
-    turned = math.remainder(end.yaw - begin.yaw, 2 * math.pi)
-    by_wheels = (after[1] - rolled[1] - after[0] + rolled[0]) * 0.098 / 0.37559
-    assert math.hypot(end.x - begin.x, end.y - begin.y) < 0.1
-    assert 1.2 < by_wheels / turned < 2.0
 
 
 @pytest.mark.parametrize("size", [25.0, 1e3, 1e30, 3e38])
