@@ -1,35 +1,28 @@
-"""Adapter that makes a ROS graph a stack: it prepares the graph, publishes sensor data, sends goals, returns commands.
-
-**Getting ready.** Nodes such as Nav2's become active only while time advances and sensor data arrive: a costmap waits
-for odom -> base_link, a planner for the pose on the map. The first step brings the readings of the robot at its start.
-If the graph is not complete by then, the adapter publishes these readings repeatedly with advancing time while the
-simulation waits, until nothing is missing. So the time of the graph is ahead of the run's time (`Graph.offset_ns`).
-"""
+"""Adapter that makes a ROS graph a stack: it publishes sensor data, sends goals, and returns commands."""
 
 import math
 import os
 import sys
-import time
 from importlib.metadata import version
-from typing import Any, Callable, Dict, List, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Set, Tuple
 
 import rclpy
-from rclpy.clock import Clock, ClockType
 
 from simscen.peer.goals import Goal, Goals
-from simscen.ros2.filter_info import FilterInfo
+from simscen.ros2.bring_up import BringUp
 from simscen.ros2.frames import STATIC_TRANSFORMS, FrameNames
 from simscen.ros2.goal_sender import ACTIONS, ActionSender, Failed, GoalSender, GoalSenders, StackState
 from simscen.ros2.graph import CLOCK, LATCHED, Graph, Received, Topic
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.lockstep import Lockstep, Message, Paced
 from simscen.ros2.messages import NANOSECONDS, find_type, read_twist, write_twist
-from simscen.ros2.nav2_actions import MotionActions, Recoveries
-from simscen.ros2.nav2_report import Line, Nav2Report
+from simscen.ros2.nav2.actions import MotionActions, Recoveries
+from simscen.ros2.nav2.filter_info import FilterInfo
+from simscen.ros2.nav2.report import Line, Nav2Report
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError, Options, TopicNames
 from simscen.ros2.pose_estimate import PLAN, PoseEstimate
-from simscen.ros2.readiness import COMMAND, MAP, SCAN, TWIST_STAMPED, Readiness
+from simscen.ros2.readiness import COMMAND, TWIST_STAMPED, Readiness
 from simscen.ros2.user_transforms import UserTransforms
 
 SUBSCRIPTIONS = {
@@ -42,16 +35,7 @@ SUBSCRIPTIONS = {
 }
 """Topics of the stack besides its commands."""
 THROUGH_POSES = "navigate_through_poses"
-INITIAL_POSE = "/initialpose"
 STOP = (0.0,) * 6
-PREPARE_S = 10.0
-"""Longest wait for a graph without sensor data."""
-PREPARE_SETTLE_S = 2.0
-"""Additional time without new nodes after which an incomplete graph probably needs sensor data."""
-CHECK_PERIOD_S = 0.25
-"""Time between two checks of the graph, which should not slow down nodes that are starting."""
-FIRST_SCAN_S = 2.0
-"""Simulated time that passes at real time, if necessary, until each lidar has measured."""
 STEP_SHARE = 0.8
 """Part of a step's wall time that waiting may take, so that the error arrives in time."""
 
@@ -79,13 +63,10 @@ class Adapter:
         self._sender: Optional[GoalSender] = None
         self._barrier = NodeBarrier(self._graph, options.answer)
         self._velocity: Tuple[float, ...] = STOP
-        self._started_at = time.monotonic()
-        self._complete = self._ready = False
+        self._ready = False
         self._continue_after_failure = True
         self.mode, self._sent = "", 0
         self._planned_goal: Optional[Goal] = None
-        self._initial_pose: Optional[Message] = None
-        self._latest: Dict[str, bytes] = {}
         self._unused_masks: List[str] = []
         self._filter_info = filter_info
         self._pending_infos = filter_info.messages(self._graph.names)
@@ -97,6 +78,7 @@ class Adapter:
         self._actions = MotionActions(self._graph, self._barrier)
         self._recoveries = Recoveries(self._graph, goals.report)
         self._report = Nav2Report(self._graph, self._barrier) if options.nav2 else None
+        self._bring_up = BringUp(self._graph, self._readiness, options, period_s, self._unavailable, self._report)
         self._lockstep = Lockstep(
             self._graph, self._barrier, self._actions, options.rounds, options.wait, options.answer
         )
@@ -151,84 +133,8 @@ class Adapter:
         Transforms that replace simscen's are checked in the first step, which brings simscen's. Raises AdapterError
         when the launched command ends, or when a node needs a topic that cannot be published.
         """
-        changed_at = incomplete_at = time.monotonic()
-        nodes = self._graph.nodes()
-        settle = self._options.settle
-        patience = settle if self._options.nav2 or self._options.warm_up else settle + PREPARE_SETTLE_S
-
-        def settled() -> bool:
-            nonlocal changed_at, incomplete_at, nodes
-            missing = self._readiness.no_nodes() if self._options.warm_up else self._readiness.missing()
-            self._check_unavailable()
-            now = time.monotonic()
-            if nodes != self._graph.nodes():
-                changed_at, nodes = now, self._graph.nodes()
-            if missing:
-                incomplete_at = now
-                return bool(nodes) and now - changed_at >= patience
-            is_settled = now - max(changed_at, incomplete_at) >= settle
-            self._complete = is_settled and not self._options.warm_up and not self._replaced_topics
-            return is_settled
-
-        self._graph.spin_until(_throttled(settled), min(self._options.ready, PREPARE_S))
-        if self._complete:
+        if self._bring_up.prepare() and not self._replaced_topics:
             self._begin()
-
-    def _wait_until_ready(self, now: int, limit_s: float) -> None:
-        """Publish the latest readings with advancing time until nothing is missing.
-
-        Raises AdapterError with what is missing after `limit_s` seconds.
-        """
-        self._readiness.has_map = MAP in self._latest
-        for topic in LATCHED.intersection(self._latest):
-            self._graph.publish(topic, self._latest.pop(topic))
-
-        def publish() -> None:
-            self._graph.offset_ns += round(self._period * NANOSECONDS)
-            self._graph.publish_clock(now)
-            for topic, data in [*self._latest.items(), *self._due_initial_pose()]:
-                self._graph.publish(topic, data)
-
-        pace = self._options.factor if self._options.sync == "paced" else 1.0
-        wall_clock = Clock(clock_type=ClockType.STEADY_TIME)
-        timer = self._graph.node.create_timer(self._period / pace, publish, clock=wall_clock)
-        missing: List[str] = []
-        changed_at, nodes = time.monotonic(), self._graph.nodes()
-
-        def complete() -> bool:
-            nonlocal changed_at, nodes
-            missing[:] = self._readiness.missing()
-            self._check_unavailable()
-            if self._report is not None:
-                self._report.follow_log()
-            if missing or nodes != self._graph.nodes():
-                changed_at, nodes = time.monotonic(), self._graph.nodes()
-            return time.monotonic() - changed_at >= self._options.settle
-
-        try:
-            if not self._graph.spin_until(_throttled(complete), limit_s):
-                waited = time.monotonic() - self._started_at
-                missing = list(dict.fromkeys([*self._readiness.likely_causes(), *missing]))
-                reasons = "; ".join(missing) or "nodes keep appearing and disappearing"
-                errors = [] if self._report is None else self._report.errors()
-                reasons += f"; errors in the log: {'; '.join(errors)}" if errors else ""
-                raise AdapterError(f"the graph is not ready after {waited:.0f} s: {reasons}")
-        finally:
-            self._graph.node.destroy_timer(timer)
-        self._graph.offset_ns += round(self._period * NANOSECONDS)
-        waited, ahead = time.monotonic() - self._started_at, self._graph.offset_ns / NANOSECONDS
-        print(f"simscen ros2: ready after {waited:.1f} s; ROS time = time of the run + {ahead:g} s", file=sys.stderr)
-
-    def _check_unavailable(self) -> None:
-        """Raise AdapterError if a node subscribes to a topic whose message type this Python does not have."""
-        for topic in self._unavailable:
-            for end in self._graph.subscribers_of(self._graph.names(topic.name)):
-                package = topic.type.partition("/")[0]
-                raise AdapterError(
-                    f"{end.node} subscribes to {self._graph.names(topic.name)}, which cannot be published: "
-                    f"{sys.executable} has no {package}; install it, or do not publish the topic: "
-                    f"--without {topic.name}"
-                )
 
     def start(self, goals: Sequence[Goal], continue_after_failure: bool) -> None:
         """Take the goals of the run."""
@@ -258,17 +164,16 @@ class Adapter:
             if topic in self._replaced_topics:
                 self._readiness.use_transforms(UserTransforms(self._graph, self._frames, data))
         messages = [(topic, self._with_frames(topic, data)) for topic, data in messages]
-        self._initial_pose = next((m for m in messages if m[0] == INITIAL_POSE), self._initial_pose)
-        messages = [message for message in messages if message[0] != INITIAL_POSE]
-        warming_up = now < self._options.warm_up * NANOSECONDS or self._lacks_scan(now, messages)
+        messages = self._bring_up.keep_initial_pose(messages)
+        warming_up = now < self._options.warm_up * NANOSECONDS
         if not self._ready:
-            self._latest.update(messages)
-        if not warming_up and not self._ready:
-            remaining = self._options.ready - (0.0 if self._options.warm_up else time.monotonic() - self._started_at)
-            self._wait_until_ready(now, max(0.5, min(remaining, STEP_SHARE * limit_s)))
-            messages = [message for message in messages if message[0] not in LATCHED]
-            self._begin()
-        messages = [*messages, *self._due_initial_pose()]
+            warming_up = warming_up or self._bring_up.lacks_scan(now, messages)
+            self._bring_up.keep(messages)
+            if not warming_up:
+                self._bring_up.wait(now, STEP_SHARE * limit_s)
+                messages = [message for message in messages if message[0] not in LATCHED]
+                self._begin()
+        messages = [*messages, *self._bring_up.due_initial_pose()]
         self._barrier.step_time.begin(STEP_SHARE * limit_s)
         synchronized: Any = self._lockstep if self._options.sync == "lockstep" and not warming_up else self._paced
         if not warming_up and self._goals.current is None:
@@ -290,20 +195,10 @@ class Adapter:
         """Return the lines that Nav2 has reported since the last call, for /rosout of the run's log."""
         return [] if self._report is None else self._report.take_lines()
 
-    def _lacks_scan(self, now: int, messages: Sequence[Message]) -> bool:
-        """Return whether the run waits to be ready and a lidar has not measured yet, for example a delayed one.
-
-        AMCL publishes map -> odom only with scans, so waiting with the readings of this step cannot succeed.
-        """
-        if not self._options.nav2 or self._ready or now >= FIRST_SCAN_S * NANOSECONDS:
-            return False
-        known = {*self._latest, *(topic for topic, _ in messages)}
-        return any(type_name == SCAN and topic not in known for topic, type_name in self._graph.types.items())
-
     def _begin(self) -> None:
         """Subscribe to the topics of the ready graph."""
         self._ready = True
-        self._latest.clear()
+        self._bring_up.end()
         self._unused_masks = self._filter_info.unused_masks(
             lambda topic: bool(self._graph.subscribers_of(self._graph.names(topic)))
         )
@@ -379,13 +274,6 @@ class Adapter:
         self._planned_goal = goal
         self._goals.report("plan.made", goal.name, reason=reason, length=round(length, 6))
 
-    def _due_initial_pose(self) -> List[Message]:
-        """Return the initial pose once, as soon as there is a subscriber."""
-        if self._initial_pose is None or not self._graph.subscribers_of(self._graph.names(INITIAL_POSE)):
-            return []
-        message, self._initial_pose = self._initial_pose, None
-        return [message]
-
     def _with_frames(self, topic: str, data: bytes) -> bytes:
         """Return the message with the names that frames have in the graph."""
         publisher = self._graph.publishers.get(topic)
@@ -396,21 +284,6 @@ class Adapter:
         self._graph.close()
         if self._launched is not None:
             self._launched.end()
-
-
-def _throttled(check: Callable[[], bool]) -> Callable[[], bool]:
-    """Return a function that calls `check` once per CHECK_PERIOD_S and returns False in between."""
-    due_at = -math.inf
-
-    def call() -> bool:
-        nonlocal due_at
-        if time.monotonic() < due_at:
-            return False
-        result = check()
-        due_at = time.monotonic() + CHECK_PERIOD_S
-        return result
-
-    return call
 
 
 def require_packages(options: Options) -> None:

@@ -24,7 +24,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 from simscen.ros2.frames import transforms_first
 from simscen.ros2.graph import Graph, Received
 from simscen.ros2.messages import NANOSECONDS, read_header
-from simscen.ros2.nav2_actions import MotionActions
+from simscen.ros2.nav2.actions import MotionActions
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError
 from simscen.ros2.readiness import COMMAND, TWIST_STAMPED

@@ -11,9 +11,9 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tu
 from simscen.peer import messages, wire
 from simscen.peer.goals import Goal, Goals
 from simscen.peer.wire import Connection, Disconnected
-from simscen.ros2.filter_info import MASKS, FilterInfo
 from simscen.ros2.launch import LaunchedCommand
-from simscen.ros2.nav2_report import ROSOUT
+from simscen.ros2.nav2.filter_info import MASKS, FilterInfo
+from simscen.ros2.nav2.report import ROSOUT
 from simscen.ros2.options import AdapterError, Domain, Options, claim_domain, ros_environment
 
 EVENTS = "/simscen/events"

@@ -9,6 +9,7 @@ from typing import Any, Optional, Sequence, Tuple
 LITTLE_ENDIAN = b"\0\1\0\0"
 NANOSECONDS = 10**9
 TRANSFORMS, PATH = "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Path"
+SCAN, ODOMETRY = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
 POSE_BYTES = 56
 """Size of a pose or a transform: seven doubles."""
 

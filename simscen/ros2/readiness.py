@@ -1,19 +1,18 @@
 """Checks of the graph before a run: what is missing, what does not match, which nodes are not active yet."""
 
-from typing import Any, Dict, Iterable, List, Optional, Sequence, Set, Tuple
+from typing import Any, Iterable, List, Optional, Sequence, Set, Tuple
 
-from simscen.ros2 import nav2_parameters
 from simscen.ros2.goal_sender import GOAL_POSE, GoalPoseSender, GoalSenders
 from simscen.ros2.graph import Endpoint, Graph, Topic, full_name, incompatible_policies
-from simscen.ros2.messages import find_type
+from simscen.ros2.messages import ODOMETRY, find_type
+from simscen.ros2.nav2.parameters import NODES
+from simscen.ros2.nav2.readiness import Nav2Readiness
 from simscen.ros2.node_barrier import POLL_S, NodeBarrier, ServicePoll
-from simscen.ros2.node_parameters import NodeParameters
 from simscen.ros2.options import Options
 from simscen.ros2.user_transforms import UserTransforms
 
 COMMAND = "/cmd_vel"
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
-SCAN, ODOMETRY = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
 MAP = "/map"
 STATE_SERVICE = "lifecycle_msgs/srv/GetState"
 ACTIVE = 3
@@ -88,7 +87,7 @@ class Readiness:
         if isinstance(self._senders.usable, GoalPoseSender):
             names |= {end.node for end in self._graph.subscribers_of(self._graph.names(GOAL_POSE))}
         if self._options.nav2:
-            names |= {full_name(node) for node in self._graph.nodes() if node[0] in nav2_parameters.NODES}
+            names |= {full_name(node) for node in self._graph.nodes() if node[0] in NODES}
         return names | {full_name(node) for node in self._lifecycle_nodes()}
 
     def command_type(self) -> str:
@@ -190,52 +189,3 @@ class Readiness:
             elif answer.current_state.id != ACTIVE:
                 found.append(f"the lifecycle node {full_name(node)} is {answer.current_state.label}, not active")
         return found
-
-
-class Nav2Readiness:
-    """Checks the nodes of a running Nav2 and their parameters, and the parameter file if there is one."""
-
-    def __init__(
-        self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], options: Options, bases: Sequence[str]
-    ) -> None:
-        self._graph, self._options = graph, options
-        self._known = NodeParameters(graph, barrier)
-        self.user_transforms: Optional[UserTransforms] = None
-        odometry = [graph.names(topic.name) for topic in topics if topic.type == ODOMETRY]
-        self._offer = nav2_parameters.Offer(
-            [graph.names(topic.name) for topic in topics if topic.type == SCAN],
-            odometry[0] if odometry else "",
-            bases,
-            graph.names.namespace,
-        )
-
-    def _offered(self) -> nav2_parameters.Offer:
-        """Return what simscen and the user's transforms offer to Nav2."""
-        if self.user_transforms is None:
-            return self._offer
-        return self._offer._replace(bases=[*self._offer.bases, *self.user_transforms.robot_frames])
-
-    def missing_nodes(self) -> List[str]:
-        """Return the problems of the parameter file, and Nav2's nodes that do not exist."""
-        found = self._findings(self._options.parameters or {}, f"{self._options.parameter_file}: ")
-        names = {name for name, _ in self._graph.nodes()}
-        for name in nav2_parameters.NODES:
-            # Another localizer may publish map -> odom.
-            localized = name == "amcl" and self._graph.publishers_of(self._graph.names("/tf"))
-            if name not in names and not localized:
-                found.append(f"there is no node {name}")
-        return found
-
-    def wrong_parameters(self) -> List[str]:
-        """Return parameters of the running nodes that do not match what simscen publishes."""
-        nodes = [node for node in self._graph.nodes() if node[0] in nav2_parameters.RULES]
-        return self._findings({node[0]: self._parameters(full_name(node), node[0]) for node in nodes}, "")
-
-    def _findings(self, nodes: Dict[str, Dict[str, Any]], prefix: str) -> List[str]:
-        found = nav2_parameters.check(nodes, self._offered())
-        return [f"{prefix}{finding.node}: {finding.message}" for finding in found if finding.severe]
-
-    def _parameters(self, path: str, name: str) -> Dict[str, Any]:
-        """Return the parameters of a node that the rules use; none if it does not answer."""
-        names = nav2_parameters.relevant_parameters(name, self._known.names(path))
-        return self._known.values(path, names)

@@ -1,5 +1,6 @@
 """A real Nav2 that is started, configured, or broken in the ways that users know."""
 
+import re
 import shlex
 import shutil
 from pathlib import Path
@@ -55,6 +56,32 @@ def test_nav2_in_a_namespace(run, nav2: Nav2, tmp_path: Path) -> None:
     ended = run(GOAL, "--namespace", "robot1", launch=launch)
     assert ended.code == 0, ended.said
     assert "/robot1/controller_server" in ended.about["nodes"]
+
+
+TOPICS = {"/scan": "/front/scan", "/odom": "/wheel/odometry", "/cmd_vel": "/base/cmd_vel"}
+"""Topics of simscen and the names that a user's graph has for them."""
+
+
+def test_nav2_with_remapped_topics(run, nav2: Nav2) -> None:
+    launch = shlex.join(
+        [
+            *shlex.split(nav2.launch),
+            *(word for name, other in TOPICS.items() for word in ("-r", f"{name[1:]}:={other}")),
+        ]
+    )
+    ended = run(GOAL, *(f"--remap={name}:={other}" for name, other in TOPICS.items()), launch=launch)
+    assert ended.code == 0, ended.said
+
+
+def test_nav2_with_other_topics_in_its_parameters(run, nav2: Nav2, tmp_path: Path) -> None:
+    text = nav2.params.read_text()
+    for name in ("/scan", "/odom"):
+        text = re.sub(rf"topic: /?{name[1:]}\n", f"topic: {TOPICS[name]}\n", text)
+    params = tmp_path / "other_topics.yaml"
+    params.write_text(text)
+    launch = f"{nav2._replace(params=params).launch} -r odom:={TOPICS['/odom']} -r cmd_vel:={TOPICS['/cmd_vel']}"
+    ended = run(GOAL, *(f"--remap={name}:={other}" for name, other in TOPICS.items()), launch=launch)
+    assert ended.code == 0, ended.said
 
 
 def test_commands_through_velocity_smoother_and_collision_monitor(run, nav2: Nav2) -> None:
@@ -132,8 +159,9 @@ def test_a_typo_in_the_name_of_a_plugin_is_reported_with_its_node(run, nav2: Nav
     def misspell(nodes: dict[str, Any]) -> None:
         nodes["planner_server"]["ros__parameters"]["GridBased"]["plugin"] = "nav2_navfn_planner::NavfnPlaner"
 
-    ended = run(GOAL, "--ready", "30", launch=nav2.with_parameters(tmp_path / "typo.yaml", misspell).launch)
+    ended = run(GOAL, launch=nav2.with_parameters(tmp_path / "typo.yaml", misspell).launch)
     assert ended.code == 3
+    assert "lifecycle_manager_navigation has given up the bring-up" in ended.said
     assert "planner_server" in ended.said
     assert "NavfnPlaner" in ended.said
 

@@ -17,7 +17,7 @@ from simscen.cli.diagnostics import as_text, print_text, relative_to_working_fol
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.loading.stacks.nav2_parameters import Nav2Parameters, read_nav2_parameters
 from simscen.ros2.frames import FrameNames
-from simscen.ros2.nav2_parameters import Offer
+from simscen.ros2.nav2.parameters import Offer
 from simscen.ros2.options import AdapterError
 
 SOCKET = "SIMSCEN_STACK_FD"

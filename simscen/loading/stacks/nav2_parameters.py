@@ -24,7 +24,7 @@ from simscen.loading.yaml.tree import (
     child,
     value_position,
 )
-from simscen.ros2.nav2_parameters import Offer, check
+from simscen.ros2.nav2.parameters import Offer, check
 
 PARAMETERS = "ros__parameters"
 EVERY_NODE = "**"

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from simscen.ros2 import node_parameters
-from simscen.ros2.nav2_actions import MotionActions, OverdueCommand
+from simscen.ros2.nav2.actions import MotionActions, OverdueCommand
 
 MS = 1_000_000
 

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from simscen.cli.main import app
 from simscen.core.errors import UsageError
-from simscen.ros2.nav2_parameters import Finding, Offer, check, relevant_parameters
+from simscen.ros2.nav2.parameters import Finding, Offer, check, relevant_parameters
 
 OFFER = Offer(["/scan", "/rear/scan"], "/odom", ["base_link"])
 FITS = """\

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from simscen.ros2.nav2_report import Line, Nav2Report
+from simscen.ros2.nav2.report import Line, Nav2Report
 from simscen.ros2.node_parameters import plain_value
 
 
@@ -58,3 +58,13 @@ def test_the_last_different_errors_are_listed() -> None:
     assert report.errors() == ["planner_server: error 2", "planner_server: error 3", "planner_server: error 4"]
     report.take_lines()
     assert report.errors() == []
+
+
+def test_a_lifecycle_manager_that_gives_up_is_known_by_name() -> None:
+    missing: Any = None
+    report = Nav2Report(missing, missing)
+    report._take_log(SimpleNamespace(level=40, name="robot1.manager", msg="Failed to change state for node: amcl"))
+    assert not report.aborted_bring_up
+    text = "Failed to bring up all requested nodes. Aborting bringup."
+    report._take_log(SimpleNamespace(level=40, name="robot1.manager", msg=text))
+    assert report.aborted_bring_up == "robot1.manager"

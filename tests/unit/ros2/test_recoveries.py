@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from simscen.ros2.nav2_actions import Recoveries
+from simscen.ros2.nav2.actions import Recoveries
 
 S = 1_000_000_000
 

@@ -17,6 +17,8 @@ ROSOUT = "/rosout"
 INFO, WARNING, ERROR = 20, 30, 40
 """Levels of rcl_interfaces/msg/Log."""
 LISTED_ERRORS = 3
+ABORTED_BRING_UP = "Aborting bringup"
+"""Part of the error that a lifecycle manager logs before it gives up. It does not try again."""
 NODES = (
     *("amcl", "map_server", "planner_server", "controller_server", "smoother_server", "behavior_server"),
     *("bt_navigator", "waypoint_follower", "velocity_smoother", "collision_monitor"),
@@ -45,6 +47,8 @@ class Nav2Report:
         self._follows_log = False
         self.parameters: dict[str, dict[str, Any]] = {}
         """Values of all parameters by node."""
+        self.aborted_bring_up = ""
+        """Name of a lifecycle manager that has given up the bring-up of its nodes, or empty."""
 
     def begin(self) -> None:
         """Subscribe to the logs of the graph, and read the parameters of Nav2's nodes."""
@@ -86,6 +90,8 @@ class Nav2Report:
     def _take_log(self, message: Any) -> None:
         if message.level >= WARNING:
             self._lines.append(Line(message.level, message.name, message.msg))
+        if ABORTED_BRING_UP in message.msg:
+            self.aborted_bring_up = message.name
 
     def _read_parameters(self, node: str) -> dict[str, Any]:
         """Return the values of a node's parameters; empty if the node does not answer."""
