@@ -80,7 +80,7 @@ class OmplPlanner(OmplParameters):
     """Number of batches after which a path is good enough; `bit_star` only. OMPL continues until a time is over."""
     rewire_factor: Annotated[float, Field(ge=0.1, le=10)] | None = None
     """Factor on the distance, or on the number of neighbors, up to which samples are connected; `bit_star`, `rrt_star`,
-    and `informed_rrt_star` only. Default: 1.5 for `bit_star`, since OMPL's 1.1 makes more detours; otherwise 1.1."""
+    and `informed_rrt_star` only. Default: 1.3 for `bit_star`, since OMPL's 1.1 makes more detours; otherwise 1.1."""
     range: PositiveLength | None = None
     """Longest motion added to a tree; all planners except `bit_star`. Default: 1 m in the plane, since the value that
     OMPL chooses, a fifth of the map, mostly ends in a wall; over poses, the value that OMPL chooses."""

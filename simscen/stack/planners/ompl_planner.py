@@ -189,6 +189,8 @@ FINE_CELLS = 0.125
 """Spacing of the collision checks of the next search, if the path of the first one is blocked between its checks."""
 SEARCHES = 4
 """Number of searches with different seeds before planning fails, because a search may miss a narrow gap."""
+REPEATED_REWIRE_FACTOR = 1.6
+"""Default of `rewire_factor` in all searches but the first: longer motions find narrow gaps, but take more time."""
 
 
 class OmplPlanner:
@@ -220,9 +222,11 @@ class OmplPlanner:
     def _search(self, costs: TraversalCosts, ends: Endpoints, seed: int) -> Array:
         """Return the points (n, 2) of a path without blocked cells."""
         spec, problem = self._spec, whole_problem(costs, ends)
+        repeated = spec if spec.rewire_factor else spec.model_copy(update={"rewire_factor": REPEATED_REWIRE_FACTOR})
         for number in range(SEARCHES):
             points = OmplSearch(spec, problem, seed + number).solve(simplify=spec.simplify)
             if points is None:
+                spec = repeated
                 continue
             path = avoid_cell_corners(costs, spaced(np.array(points), SPACING_M))
             if path is not None:

@@ -33,7 +33,7 @@ FEASIBLE_ONLY = frozenset(("rrt_connect", "kpiece"))
 """Planners that stop at their first path. The others continue to improve it."""
 DEFAULT_RANGE_M = 1.0
 """Default of the parameter `range` in the plane."""
-DEFAULT_BIT_STAR_REWIRE_FACTOR = 1.5
+DEFAULT_BIT_STAR_REWIRE_FACTOR = 1.3
 """Default of the parameter `rewire_factor` of BIT*."""
 PERTURBATIONS_M = (0.5, 0.15)
 """Distances by which states are moved to reduce the cost of the path, one pass each."""
