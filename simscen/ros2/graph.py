@@ -5,7 +5,7 @@ ready. `Graph.offset_ns` is the difference; stamps are converted in both directi
 """
 
 import time
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -159,6 +159,13 @@ class Graph:
     def subscribers_of(self, name: str) -> List[Endpoint]:
         """Return the subscriptions to the ROS topic `name` that belong to other nodes."""
         return _endpoints(self.node.get_subscriptions_info_by_topic(name))
+
+    def subscribed_topics(self, node: Node) -> Set[str]:
+        """Return the topics to which a node subscribes; none if the node has ended."""
+        try:
+            return {name for name, _ in self.node.get_subscriber_names_and_types_by_node(*node)}
+        except rclpy.node.NodeNameNonExistentError:
+            return set()
 
     def topics(self) -> Dict[str, List[str]]:
         """Return all topics of the graph and their types."""

@@ -3,7 +3,7 @@
 Names and defaults are those of Nav2's configuration guide (https://docs.nav2.org/configuration/).
 """
 
-from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Collection, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 MAP, ODOM = "map", "odom"
 
@@ -35,11 +35,22 @@ COSTMAPS = {"local_costmap": ODOM, "global_costmap": MAP}
 """Costmaps and their usual frames."""
 
 
-def check(nodes: Mapping[str, Parameters], offer: Offer) -> List[Finding]:
-    """Return all findings in the parameters of Nav2's nodes; keys of `nodes` are node names without namespace."""
+Subscriptions = Mapping[str, Collection[str]]
+"""Topics to which each node subscribes."""
+
+
+def check(
+    nodes: Mapping[str, Parameters], offer: Offer, subscriptions: Optional[Subscriptions] = None
+) -> List[Finding]:
+    """Return all findings in the parameters of Nav2's nodes.
+
+    Keys of `nodes` and `subscriptions` are node names without namespace. If `subscriptions` are known, a parameter with
+    the name of a topic is only wrong if the node subscribes to this topic: otherwise, the topic has been remapped.
+    """
     findings: List[Finding] = []
     for name in sorted(nodes):
-        node = _Node(name, nodes[name], offer, findings)
+        subscribed = None if subscriptions is None else subscriptions.get(name, ())
+        node = _Node(name, nodes[name], offer, subscribed, findings)
         if node.get("use_sim_time") is False:
             node.add_finding("use_sim_time", "is false: the node would use wall time", severe=False)
         if name in RULES:
@@ -67,8 +78,15 @@ _FRAMES = frozenset(
 class _Node:
     """The parameters of one node, with functions that check them and add findings."""
 
-    def __init__(self, name: str, parameters: Parameters, offer: Offer, findings: List[Finding]) -> None:
-        self.name, self.offer = name, offer
+    def __init__(
+        self,
+        name: str,
+        parameters: Parameters,
+        offer: Offer,
+        subscribed: Optional[Collection[str]],
+        findings: List[Finding],
+    ) -> None:
+        self.name, self.offer, self._subscribed = name, offer, subscribed
         self._parameters, self._findings = parameters, findings
 
     def get(self, key: str) -> Optional[Any]:
@@ -94,7 +112,7 @@ class _Node:
         if not isinstance(value, str):
             return
         absolute = value if value.startswith("/") else f"{self.offer.namespace}/{value}"
-        if absolute not in topics:
+        if absolute not in topics and (self._subscribed is None or absolute in self._subscribed):
             available = ", ".join(topics) or "none"
             self.add_finding(key, f"is {value!r}, which no node publishes; simscen's {what}: {available}")
 

@@ -36,7 +36,7 @@ class Nav2Readiness:
 
     def missing_nodes(self) -> List[str]:
         """Return the problems of the parameter file, and Nav2's nodes that do not exist."""
-        found = self._findings(self._options.parameters or {}, f"{self._options.parameter_file}: ")
+        found = self._findings(self._options.parameters or {}, {}, f"{self._options.parameter_file}: ")
         names = {name for name, _ in self._graph.nodes()}
         for name in parameters.NODES:
             # Another localizer may publish map -> odom.
@@ -48,10 +48,13 @@ class Nav2Readiness:
     def wrong_parameters(self) -> List[str]:
         """Return parameters of the running nodes that do not match what simscen publishes."""
         nodes = [node for node in self._graph.nodes() if node[0] in parameters.RULES]
-        return self._findings({node[0]: self._parameters(full_name(node), node[0]) for node in nodes}, "")
+        values = {node[0]: self._parameters(full_name(node), node[0]) for node in nodes}
+        return self._findings(values, {node[0]: self._graph.subscribed_topics(node) for node in nodes}, "")
 
-    def _findings(self, nodes: Dict[str, Dict[str, Any]], prefix: str) -> List[str]:
-        found = parameters.check(nodes, self._offered())
+    def _findings(
+        self, nodes: Dict[str, Dict[str, Any]], subscriptions: parameters.Subscriptions, prefix: str
+    ) -> List[str]:
+        found = parameters.check(nodes, self._offered(), subscriptions)
         return [f"{prefix}{finding.node}: {finding.message}" for finding in found if finding.severe]
 
     def _parameters(self, path: str, name: str) -> Dict[str, Any]:

@@ -118,6 +118,18 @@ def test_topics_without_a_slash_are_relative_to_the_namespace(topic: str, is_fou
     assert bool(check({"amcl": {"scan_topic": topic}}, offer)) is not is_found
 
 
+@pytest.mark.parametrize(
+    ("subscriptions", "is_found"),
+    [(None, True), ({"amcl": {"/lidar"}}, True), ({"amcl": {"/scan"}}, False), ({}, False)],
+    ids=["file", "as the parameter says", "remapped", "not configured yet"],
+)
+def test_a_topic_that_a_running_node_has_remapped_is_not_wrong(
+    subscriptions: dict[str, set[str]] | None, is_found: bool
+) -> None:
+    findings = check({"amcl": {"scan_topic": "lidar"}}, OFFER, subscriptions)
+    assert [finding.parameter for finding in findings] == ["scan_topic"] * is_found
+
+
 def test_a_correct_file_passes(tmp_path: Path) -> None:
     code, said = called(tmp_path, FITS)
     assert code == 0
