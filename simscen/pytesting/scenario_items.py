@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from simscen.loading.loaded import LoadedScenario
 
 
-WARM_PROCESS = ("-m", "simscen.cli.session.warm_process")
+FORK_SERVER = ("-m", "simscen.cli.session.fork_server_main")
 WALL_LIMIT_S = 300.0
 """Wall-clock limit of a run, as in `simscen run`."""
 
@@ -57,7 +57,7 @@ class Runner:
         """Create a runner that writes to a folder."""
         self.folder = folder
         self._numbers = count()
-        self._supervisor = Supervisor(1, WARM_PROCESS)
+        self._supervisor = Supervisor(1, FORK_SERVER)
 
     def run(self, scenario: LoadedScenario, seed: int) -> RunFinished:
         """Run a scenario and return its result."""

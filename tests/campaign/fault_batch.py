@@ -15,11 +15,11 @@ from pathlib import Path
 
 from junitparser import JUnitXml
 
-TELLING = Path(__file__).parents[1] / "conformance" / "telling_zygote.py"
+SCRIPTED_FORK_SERVER = Path(__file__).parents[1] / "conformance" / "scripted_fork_server.py"
 SIMSCEN = f"""
 import simscen.cli.session.backends
 from simscen.cli.main import main
-simscen.cli.session.backends.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.session.backends.FORK_SERVER = ({str(SCRIPTED_FORK_SERVER)!r},)
 main()
 """
 FAULTS = {
@@ -90,7 +90,7 @@ def left_behind() -> list[str]:
             words = path.read_bytes().split(b"\0")
         except OSError:
             continue
-        if b"61.5" in words or str(TELLING).encode() in words:
+        if b"61.5" in words or str(SCRIPTED_FORK_SERVER).encode() in words:
             found.append(b" ".join(words).decode())
     return found
 

@@ -12,7 +12,7 @@ import pytest
 from simscen.run.process import supervisor
 
 SIMSCEN = Path(sys.executable).with_name("simscen")
-TELLING = str(Path(__file__).with_name("telling_zygote.py"))
+SCRIPTED_FORK_SERVER = str(Path(__file__).with_name("scripted_fork_server.py"))
 BUSY = "import os, time; os.nice(10); end = time.monotonic() + 60\nwhile time.monotonic() < end: sum(range(100000))"
 NOISY = """\
 events: [{when: {time: 1 s}, do: {spawn: {name: box, box: [0.2, 0.2, 0.4], pose: {x: 1.9, y: 1.6}}}}]
@@ -83,7 +83,7 @@ def test_86_87_log_does_not_depend_on_order_folder_hash_seed_or_load(reference, 
 
 
 def test_88_run_after_a_crash_has_the_same_log(reference, pair: Path, simscen, monkeypatch) -> None:
-    monkeypatch.setattr("simscen.cli.session.backends.WARM_PROCESS", (TELLING,))
+    monkeypatch.setattr("simscen.cli.session.backends.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
     text = (pair / "a.scenario.yaml").read_text()
     (pair / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [crash]"))
     assert simscen("run", ".", "-j", 1, "--out", "out").code == 3
@@ -93,7 +93,7 @@ def test_88_run_after_a_crash_has_the_same_log(reference, pair: Path, simscen, m
 
 
 def test_world_that_never_finishes_preparing_times_out_its_run_only(pair: Path, simscen, monkeypatch) -> None:
-    monkeypatch.setattr("simscen.cli.session.backends.WARM_PROCESS", (TELLING,))
+    monkeypatch.setattr("simscen.cli.session.backends.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
     text = (pair / "a.scenario.yaml").read_text()
     (pair / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [slow-to-prepare]"))
     assert simscen("run", ".", "-j", 1, "--out", "out", "--wall-limit", 3).code == 3

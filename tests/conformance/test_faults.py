@@ -13,12 +13,12 @@ from junitparser import JUnitXml
 from simscen.record.log_reader import read_log
 from simscen.record.trace_difference import first_difference
 
-TELLING = Path(__file__).with_name("telling_zygote.py")
+SCRIPTED_FORK_SERVER = Path(__file__).with_name("scripted_fork_server.py")
 WITH_FAULTS = f"""
 import sys
 import simscen.cli.session.backends
 from simscen.cli.main import main
-simscen.cli.session.backends.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.session.backends.FORK_SERVER = ({str(SCRIPTED_FORK_SERVER)!r},)
 main()
 """
 LIMIT = 10.0

@@ -14,12 +14,12 @@ import pytest
 from simscen.record.log_reader import read_log
 
 SIMSCEN = str(Path(sys.executable).with_name("simscen"))
-TELLING = Path(__file__).with_name("telling_zygote.py")
+SCRIPTED_FORK_SERVER = Path(__file__).with_name("scripted_fork_server.py")
 IMPATIENT = f"""
 import simscen.cli.session.backends
 from simscen.cli.main import main
 from simscen.run.process import supervisor
-simscen.cli.session.backends.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.session.backends.FORK_SERVER = ({str(SCRIPTED_FORK_SERVER)!r},)
 supervisor.MAX_SILENCE_S = 5.0
 main()
 """
@@ -124,7 +124,7 @@ def test_78_unwritable_report_is_an_error_before_any_run(simscen, folder: Path, 
 
 
 @pytest.mark.slow
-def test_102_stopped_warm_process_is_replaced(folder: Path) -> None:
+def test_102_stopped_fork_server_is_replaced(folder: Path) -> None:
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [stop-preparer]"))
     (folder / "b.scenario.yaml").write_text(text)

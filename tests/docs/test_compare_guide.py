@@ -57,7 +57,7 @@ def test_comparison_prints_the_output_of_the_guide(project: Path) -> None:
     assert done.exit_code == 1
     told = done.output.partition("\n\n")[2].partition("\n\n\ndid not pass:")[0]
     assert words(told) == words(TABLE)
-    assert "scenarios/room   6/6   3/6" in told
+    assert "scenarios/room   6/6   4/6" in told
     assert (project / "out/runs/scenarios/room/seed-3-dwb/run.mcap").is_file()
     assert "room [seed 3, dwb]" in (project / "out/junit.xml").read_text()
     assert '"comparison"' in (project / "out/results.json").read_text()

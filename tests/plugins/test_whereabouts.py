@@ -1,4 +1,4 @@
-"""Tests that the isolated warm process finds the installed packages."""
+"""Tests that the isolated fork server finds the installed packages."""
 
 import json
 import os

@@ -107,7 +107,7 @@ def suite_command(
     after), and the memory of the workers. Exit code 0; 3: a run was aborted.
     """
     from simscen.cli.process import engine_output_on_stderr
-    from simscen.cli.session.backends import WARM_PROCESS
+    from simscen.cli.session.backends import FORK_SERVER
     from simscen.cli.session.selection import Selection, load_all
 
     before = load_baseline(compare)
@@ -116,7 +116,7 @@ def suite_command(
         from simscen.bench.speed.session_speed import evenly_spaced, measure_suite
 
         scenarios, _ = load_all(paths or [Path("scenarios")], None, (), False, Selection())
-        suite = measure_suite(evenly_spaced(scenarios, most), workers, Path(folder), WARM_PROCESS, print_progress)
+        suite = measure_suite(evenly_spaced(scenarios, most), workers, Path(folder), FORK_SERVER, print_progress)
     print_result(Result.on_this_machine(suite.figures), suite_text(suite), {"suite": asdict(suite)}, format_, before)
     if suite.unfinished:
         print(f"{len(suite.unfinished)} runs were aborted: {', '.join(suite.unfinished)}", file=sys.stderr)
@@ -170,7 +170,7 @@ def command(
     if ctx.invoked_subcommand is not None:
         return
     from simscen.cli.process import engine_output_on_stderr
-    from simscen.cli.session.backends import WARM_PROCESS
+    from simscen.cli.session.backends import FORK_SERVER
 
     before = load_baseline(compare)
     with engine_output_on_stderr():
@@ -178,7 +178,7 @@ def command(
         from simscen.bench.speed.session_speed import measure_external, measure_overhead
 
         patrol = run_speed.measure_patrol(rounds, print_progress)
-        overhead = measure_overhead(rounds, WARM_PROCESS, print_progress)
+        overhead = measure_overhead(rounds, FORK_SERVER, print_progress)
         print_progress("fields of obstacles")
         fields = [run_speed.measure_field(count) for count in (209, 2090)]
         print_progress("the stack as an external process")

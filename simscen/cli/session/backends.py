@@ -59,7 +59,7 @@ def exit_at_once(number: int) -> None:
     os._exit(128 + number)
 
 
-WARM_PROCESS = ("-m", "simscen.cli.session.warm_process")
+FORK_SERVER = ("-m", "simscen.cli.session.fork_server_main")
 """Python arguments that start the fork server."""
 
 OWN_CLUSTER = "auto"
@@ -102,7 +102,7 @@ def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | N
 def backend_of(options: SessionOptions) -> Backend:
     """Return the backend that the options select. Its processes start with the first run."""
     if not options.cluster:
-        return Supervisor(options.workers, WARM_PROCESS)
+        return Supervisor(options.workers, FORK_SERVER)
     from simscen.run.process.ray_backend import RayBackend
 
-    return RayBackend(options.cluster, options.workers, WARM_PROCESS)
+    return RayBackend(options.cluster, options.workers, FORK_SERVER)

@@ -1,10 +1,10 @@
-"""Tests that the warm process imports everything that runs need."""
+"""Tests that the fork server imports everything that runs need."""
 
 import subprocess
 import sys
 from pathlib import Path
 
-from simscen.cli.session import warm_process
+from simscen.cli.session import fork_server_main
 from simscen.spec.base import Component
 
 SCENARIO = """\
@@ -20,7 +20,7 @@ pass: [{goals_reached: {}}]
 PROGRAM = """\
 import sys
 from pathlib import Path
-from simscen.cli.session import warm_process
+from simscen.cli.session import fork_server_main
 from simscen.loading.scenario import load_scenario
 from simscen.run.process.jobs import Job
 from simscen.stack.costmap import layers
@@ -28,10 +28,10 @@ from simscen.stack.costmap import layers
 folder = Path(sys.argv[1])
 loaded = load_scenario(folder / "a.scenario.yaml", folder)
 job = Job(0, loaded, loaded.key(1), folder, 60.0)
-warm_process._warm_up(job)
+fork_server_main._warm_up(job)
 before = set(sys.modules)
 layers.squared_distances = None  # what a fork need not work out any more
-assert warm_process._execute(job, lambda seconds: None)["outcome"] == "passed"
+assert fork_server_main._execute(job, lambda seconds: None)["outcome"] == "passed"
 print("late:", *sorted(name for name in set(sys.modules) - before if name.split(".")[0] in ("simscen", "ompl", "PIL")))
 """
 
@@ -52,8 +52,8 @@ def test_components_of_packages_are_left_to_the_process_of_the_run() -> None:
         component = "simscen.sensors.imu:ImuSensor"
         inner: Theirs = Theirs()
 
-    assert [found.component for found in warm_process._components([{"a": (Ours(),)}])] == [
+    assert [found.component for found in fork_server_main._components([{"a": (Ours(),)}])] == [
         Ours.component,
         Theirs.component,
     ]
-    assert list(warm_process.shipped_modules([Ours(), Theirs()])) == ["simscen.sensors.imu"]
+    assert list(fork_server_main.shipped_modules([Ours(), Theirs()])) == ["simscen.sensors.imu"]

@@ -1,4 +1,4 @@
-"""Tests of the cache of the warm process."""
+"""Tests of the cache of the fork server."""
 
 from pathlib import Path
 

@@ -23,7 +23,7 @@ from ray.cluster_utils import Cluster  # noqa: E402
 
 from simscen.run.process.ray_backend import RayBackend, connect  # noqa: E402
 
-ENTRY = (str(Path(__file__).parents[1] / "process/faulty_zygote.py"),)
+ENTRY = (str(Path(__file__).parents[1] / "process/faulty_fork_server.py"),)
 SCENARIO = """
 simscen: 1
 tags: [{fault}]
@@ -152,15 +152,17 @@ def test_an_interrupt_ends_the_processes_on_all_nodes(cluster, tmp_path: Path) -
     assert session.stdout is not None
     while b"\xe2\x9c\x93" not in session.stdout.readline():  # until a run has passed
         assert session.poll() is None
-    servers = [pid for pid in processes("simscen.cli.session.warm_process") if b"ray::" in command_of(parent_of(pid))]
+    servers = [
+        pid for pid in processes("simscen.cli.session.fork_server_main") if b"ray::" in command_of(parent_of(pid))
+    ]
     assert servers
     session.send_signal(signal.SIGINT)
     session.communicate(timeout=60)
     assert session.returncode == 130
     end = time.monotonic() + 20
-    while set(servers) & set(processes("warm_process")) and time.monotonic() < end:
+    while set(servers) & set(processes("fork_server_main")) and time.monotonic() < end:
         time.sleep(0.1)
-    assert not set(servers) & set(processes("warm_process"))
+    assert not set(servers) & set(processes("fork_server_main"))
 
 
 def test_missing_cluster_is_an_error() -> None:

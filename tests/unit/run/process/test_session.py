@@ -18,7 +18,7 @@ from simscen.run.process import supervisor
 from simscen.run.process.supervisor import Interrupted, Supervisor
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
 
-ENTRY = (str(Path(__file__).with_name("faulty_zygote.py")),)
+ENTRY = (str(Path(__file__).with_name("faulty_fork_server.py")),)
 SCENARIO = """
 simscen: 1
 tags: [{fault}]
@@ -63,7 +63,7 @@ def test_successful_run_returns_its_result(session):
         ("kill", "crashed", "killed (SIGKILL; possibly out of memory; peak memory"),
         ("exit-0", "crashed", "exited 0 without a result"),
         ("sys-exit", "crashed", "exited 0"),
-        ("exception", "crashed", "ZeroDivisionError: the controller divided by zero (faulty_zygote.py:"),
+        ("exception", "crashed", "ZeroDivisionError: the controller divided by zero (faulty_fork_server.py:"),
         ("memory", "out-of-memory", "exceeded its memory limit"),
         ("garbled", "crashed", "its result cannot be read"),
         ("grandchild", "crashed", "left a process behind"),
@@ -84,7 +84,7 @@ def test_a_fault_is_an_error_that_says_what_happened_and_leaves_its_neighbors_al
 
 
 def daemons():
-    """The processes that faulty_zygote's daemon left, wherever they are."""
+    """The processes that faulty_fork_server's daemon left, wherever they are."""
     found = []
     for entry in os.scandir("/proc"):
         with contextlib.suppress(OSError):
@@ -95,7 +95,7 @@ def daemons():
 
 def test_the_log_of_a_crashed_worker_shows_where_it_was(session):
     answers, _ = session("segfault")
-    assert "faulty_zygote.py" in answers["segfault"].result.error.tail
+    assert "faulty_fork_server.py" in answers["segfault"].result.error.tail
 
 
 @pytest.mark.parametrize("fault", ["hang", "deaf"])
@@ -116,13 +116,13 @@ def test_of_a_flood_the_log_keeps_the_beginning_and_the_end(session, tmp_path, c
     assert capfd.readouterr().out == ""
 
 
-def test_when_the_warm_process_dies_its_runs_are_errors_and_the_rest_still_runs(session):
+def test_when_the_fork_server_dies_its_runs_are_errors_and_the_rest_still_runs(session):
     answers, _ = session("kill-parent", "fine")
     assert answers["kill-parent"].result.error.kind == "crashed"
     assert answers["fine"].outcome is Outcome.PASSED
 
 
-def test_a_neighbor_of_a_run_that_kills_the_warm_process_runs_again_by_itself(session):
+def test_a_neighbor_of_a_run_that_kills_the_fork_server_runs_again_by_itself(session):
     answers, _ = session("kill-parent", "long", "fine", workers=2)
     assert [name for name, answer in answers.items() if answer.outcome is Outcome.PASSED] == ["long", "fine"]
     assert answers["kill-parent"].result.error.kind == "crashed"
@@ -142,19 +142,19 @@ def test_a_preparation_that_hangs_in_c_is_a_timeout_with_its_stack(session, monk
     monkeypatch.setattr(supervisor, "MAX_SILENCE_S", 2.0)
     answers, _ = session("prepare-hang", "fine", wall_limit=1.0)
     assert answers["prepare-hang"].result.error.kind == "timeout"
-    assert ", in prepare (faulty_zygote.py:" in answers["prepare-hang"].result.error.message
+    assert ", in prepare (faulty_fork_server.py:" in answers["prepare-hang"].result.error.message
     assert answers["fine"].outcome is Outcome.PASSED
 
 
 @pytest.mark.slow
-def test_a_warm_process_that_is_stopped_is_replaced(session, monkeypatch):
+def test_a_fork_server_that_is_stopped_is_replaced(session, monkeypatch):
     monkeypatch.setattr(supervisor, "MAX_SILENCE_S", 2.0)
     answers, _ = session("stop-parent", "fine")
     assert "did not respond and was killed" in answers["stop-parent"].result.error.message
     assert answers["fine"].outcome is Outcome.PASSED
 
 
-def test_a_warm_process_that_cannot_start_is_an_error_of_every_run_with_its_reason(session, tmp_path):
+def test_a_fork_server_that_cannot_start_is_an_error_of_every_run_with_its_reason(session, tmp_path):
     broken = tmp_path / "broken.py"
     broken.write_text("import no_such_module")
     answers, _ = session("fine", "hang", entry=(str(broken),))

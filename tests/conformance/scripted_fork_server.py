@@ -1,4 +1,4 @@
-"""A warm process whose runs do what the scenario's first tag says, before they begin or mid-run.
+"""A fork server whose runs do what the scenario's first tag says, before they begin or mid-run.
 
 `segfault` strikes before the run, `segfault.at.5` from inside the lockstep when five simulated seconds have gone by.
 """
@@ -15,12 +15,12 @@ import time
 import numpy as np
 import pybullet
 
-from simscen.cli.session import warm_process
+from simscen.cli.session import fork_server_main
 from simscen.stack.localizers import sensor_models
 
 FLOOD = 200  # MiB
-perform = warm_process._execute
-prepared = warm_process._SCENARIOS.prepared
+perform = fork_server_main._execute
+prepared = fork_server_main._SCENARIOS.prepared
 
 
 def spin():
@@ -137,6 +137,6 @@ def slow_to_prepare(scenario):
 
 
 if __name__ == "__main__":
-    warm_process._execute = misbehave
-    warm_process._SCENARIOS.prepared = slow_to_prepare
-    warm_process.main()
+    fork_server_main._execute = misbehave
+    fork_server_main._SCENARIOS.prepared = slow_to_prepare
+    fork_server_main.main()

@@ -1,4 +1,4 @@
-"""A warm process whose runs go wrong the way the scenario's first tag says: the test-only hook for faults."""
+"""A fork server whose runs go wrong the way the scenario's first tag says: the test-only hook for faults."""
 
 import contextlib
 import ctypes

@@ -1,4 +1,4 @@
-"""Program of the fork server: `python -I -m simscen.cli.session.warm_process [PLUGIN_PATH] FD`, for internal use."""
+"""Program of the fork server: `python -I -m simscen.cli.session.fork_server_main [PLUGIN_PATH] FD`, internal."""
 
 import os
 import resource
