@@ -66,7 +66,7 @@ def test_nav2_with_remapped_topics(run, nav2: Nav2) -> None:
     launch = shlex.join(
         [
             *shlex.split(nav2.launch),
-            *(word for name, other in TOPICS.items() for word in ("-r", f"{name[1:]}:={other}")),
+            *(word for name, other in TOPICS.items() for word in ("-r", f"{name}:={other}")),
         ]
     )
     ended = run(GOAL, *(f"--remap={name}:={other}" for name, other in TOPICS.items()), launch=launch)
