@@ -50,12 +50,19 @@ class Adapter:
         goals: Goals,
         launched: Optional[LaunchedCommand],
         period_s: float,
+        answer_limit_s: float,
         filter_info: FilterInfo,
     ) -> None:
-        """`period_s` is the control period; `filter_info` describes the masks among `topics`."""
+        """Join the graph and publish the topics.
+
+        Args:
+            period_s: Control period.
+            answer_limit_s: Wall time for the answer to a step once the graph is ready.
+            filter_info: Description of the masks among `topics`.
+        """
         if not rclpy.ok():
             rclpy.init(args=[])
-        self._options, self._goals, self._launched, self._period = options, goals, launched, period_s
+        self._options, self._goals, self._launched, self._answer_limit_s = options, goals, launched, answer_limit_s
         self._graph = Graph(TopicNames(options.namespace, options.remap), self._check_launched)
         self._frames = FrameNames(options.frame, options.base_frame)
         self._estimate = PoseEstimate()
@@ -88,6 +95,11 @@ class Adapter:
     def needed_topics(self) -> Set[str]:
         """Topics of the protocol that are published, and /tf_static to compare the user's transforms with it."""
         return {*self._graph.publishers, *self._replaced_topics}
+
+    @property
+    def latest_start_s(self) -> float:
+        """Simulated time in s at which the graph is ready at the latest."""
+        return self._bring_up.latest_start_s
 
     @property
     def _replaced_topics(self) -> Set[str]:
@@ -155,9 +167,12 @@ class Adapter:
     def step(self, now: int, messages: Sequence[Message], due: bool, limit_s: float) -> List[Message]:
         """Take one step at `now` nanoseconds within `limit_s` of wall time; return the messages of the stack.
 
+        Once the graph is ready, the time for an answer is limited to `answer_limit_s` as well.
+
         Raises AdapterError when the graph is not ready or no longer usable.
         """
         self._check_launched()
+        limit_s = min(limit_s, self._answer_limit_s) if self._ready else limit_s
         messages, self._pending_infos = [*messages, *self._pending_infos], []
         for topic, data in messages:
             self._estimate.take_published(topic, data)

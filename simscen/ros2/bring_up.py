@@ -50,6 +50,11 @@ class BringUp:
         self._latest: Dict[str, bytes] = {}
         self._initial_pose: Optional[bytes] = None
 
+    @property
+    def latest_start_s(self) -> float:
+        """Simulated time in s at which the graph is ready at the latest."""
+        return max(self._options.warm_up, FIRST_SCAN_S if self._options.nav2 else 0.0) + self._period
+
     def prepare(self) -> bool:
         """Wait before the first step; return whether the graph is complete without sensor data.
 

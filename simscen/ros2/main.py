@@ -53,6 +53,8 @@ class Hello(NamedTuple):
     mode: str
     zone_masks: List[Dict[str, Any]]
     """What the values of each mask of zones mean."""
+    answer_limit_s: float
+    """Wall time for an answer once the graph is ready."""
 
     @classmethod
     def receive(cls, connection: Connection) -> "Hello":
@@ -73,6 +75,7 @@ class Hello(NamedTuple):
             hello["control_period"] / hello["tick_rate"],
             hello.get("mode", DEFAULT_MODE),
             hello["zone_masks"],
+            hello["answer_limit"],
         )
 
 
@@ -104,7 +107,8 @@ class AdapterRun:
             require_packages(options)
         launched = self._start_nodes()
         topics = [Topic(*topic) for topic in hello.topics.values()]
-        adapter = Adapter(options, topics, self.goals, launched, hello.period_s, FilterInfo(hello.zone_masks))
+        limits = hello.period_s, hello.answer_limit_s
+        adapter = Adapter(options, topics, self.goals, launched, *limits, FilterInfo(hello.zone_masks))
         self._cleanup.append(adapter.end)
         adapter.prepare()
         about = adapter.about()
@@ -115,6 +119,7 @@ class AdapterRun:
             "step": "control",
             "modes": [*MODES],
             "first_answer_limit": options.ready + READY_MARGIN_S,
+            "first_answer_until": adapter.latest_start_s,
             "topics": [PROTOCOL_TOPICS.get(t.name, t.name) for t in topics if t.name in adapter.needed_topics],
             "about": about,
         }

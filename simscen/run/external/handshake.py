@@ -175,6 +175,7 @@ class Welcome:
         every_beat: Whether the stack requests a step at each beat with messages, not only when a command is due.
         about: Further information that the stack gives about itself, for the log.
         first_answer_limit: Wall time in s for the first answer; it counts only if it is longer than `answer_limit`.
+        first_answer_until: Simulated time in s until which this limit applies to all answers.
     """
 
     name: str = ""
@@ -183,6 +184,7 @@ class Welcome:
     every_beat: bool = False
     about: dict[str, Any] = field(default_factory=dict)
     first_answer_limit: float = 0.0
+    first_answer_until: float = 0.0
 
     @classmethod
     def parse(cls, kind: int, body: bytes, topic_table: TopicTable, mode: Mode = "navigate_to_pose") -> "Welcome":
@@ -211,13 +213,10 @@ class Welcome:
                 f"it requests the topic `{unknown[0][:80]}`, which does not exist; "
                 f"available: {', '.join(topic_table.sent)}"
             )
-        limit = content.get("first_answer_limit", 0.0)
-        if not isinstance(limit, int | float) or not 0 <= limit <= MAX_FIRST_ANSWER_S:
-            raise ProtocolViolation(f"`first_answer_limit` is not a number of seconds from 0 to {MAX_FIRST_ANSWER_S}")
-        every_beat = step == "beat"
         return cls(
-            _text(content, "name"), _text(content, "version"), tuple(topics), every_beat, _about(content), float(limit)
-        )
+            _text(content, "name"), _text(content, "version"), tuple(topics), step == "beat", _about(content),
+            _seconds(content, "first_answer_limit"), _seconds(content, "first_answer_until"),
+        )  # fmt: skip
 
     def with_bye(self, body: bytes) -> "Welcome":
         """Return a copy in which the `about` of a BYE frame is added. An invalid BYE is ignored: the run is over."""
@@ -238,6 +237,13 @@ def _text(content: dict[str, Any], key: str) -> str:
     if not isinstance(text, str) or len(text) > MAX_NAME_LENGTH:
         raise ProtocolViolation(f"`{key}` is not a text of at most {MAX_NAME_LENGTH} characters")
     return text
+
+
+def _seconds(content: dict[str, Any], key: str) -> float:
+    seconds = content.get(key, 0.0)
+    if not isinstance(seconds, int | float) or not 0 <= seconds <= MAX_FIRST_ANSWER_S:
+        raise ProtocolViolation(f"`{key}` is not a number of seconds from 0 to {MAX_FIRST_ANSWER_S}")
+    return float(seconds)
 
 
 def _about(content: dict[str, Any]) -> dict[str, Any]:

@@ -212,7 +212,7 @@ class ExternalStack:
         """Send a step and return the answer."""
         assert self._process is not None
         limit = self._command.answer_limit
-        if self._awaits_first_answer:
+        if self._awaits_first_answer or tick <= self._welcome.first_answer_until * self._time.rate:
             limit, self._awaits_first_answer = max(limit, self._welcome.first_answer_limit), False
         sec, nanosec = self._time.stamp(tick)
         flags = wire.COMMAND_DUE if due else 0

@@ -144,3 +144,23 @@ def test_a_plan_that_comes_with_the_end_of_a_goal_is_for_the_next(play) -> None:
     run = play(text, events=events, goals=goals, on_goal_failure="continue", time_limit="1")
     (done,) = run.trace.of_kind(EventKind.EVENT_ENDED)
     assert [effect["happened"] for effect in done.data["effects"]] == [True]
+
+
+@pytest.mark.parametrize(("until", "longer"), [(0.1, {0.0, 0.05, 0.1}), (0, {0.0})])
+def test_a_stack_may_take_longer_for_its_first_answers(play, tmp_path: Path, until: float, longer: set[float]) -> None:
+    raw = (
+        "c = Connection.inherited(); c.receive()\n"
+        f"welcome = {{'protocol': 1, 'topics': [], 'first_answer_limit': 60, 'first_answer_until': {until}}}\n"
+        "c.send_json(wire.WELCOME, welcome); c.receive()\n"
+        "while True:\n"
+        "    kind, body = c.receive()\n"
+        "    if kind == wire.END: break\n"
+        "    header, _ = wire.from_step(body)\n"
+        "    print(header.tick, header.deadline)\n"
+        "    c.send(wire.answer_frame(header.tick, [(1, messages.twist(0.0, 0.0, 0.0))]))\n"
+        "c.send_json(wire.BYE, {})\n"
+    )
+    play(raw, time_limit="0.2")
+    lines = [line.split() for line in (tmp_path / "stack.log").read_text().splitlines()]
+    deadlines = {int(tick) / 240: int(deadline) / 1000 for tick, deadline in lines}
+    assert deadlines == {time: 60.0 if time in longer else 20.0 for time in (0.0, 0.05, 0.1, 0.15, 0.2)}
