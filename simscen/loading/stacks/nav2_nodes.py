@@ -138,11 +138,14 @@ def costmap(node: str, parameters: Parameters, known: Known) -> Iterator[Transla
         layer, _, rest = name.partition(".")
         if not rest:
             yield from _translate_costmap_parameter(node, name, value, section, known[section])
+        elif layers.get(layer) in OBSERVATION_LAYERS:
+            continue  # _observation_layers translates all of them together
         elif layer in layers:
-            yield from _translate_layer_parameter(node, name, parameters, layers, section, known)
+            yield from _translate_layer_parameter(node, name, value, layers, section, known)
         elif layer not in handled:
             handled.add(layer)
             yield Translation(node, name, (), value, f"`plugins` does not list {layer}", covers=f"{layer}.")
+    yield from _observation_layers(node, parameters, layers, section, known[section])
     for zones in strings(parameters.get("filters")):
         yield Translation(node, "filters", (), None, covers=f"{zones}.")  # zones are part of the scenario
 
@@ -164,15 +167,57 @@ def _translate_costmap_parameter(
 
 
 def _translate_layer_parameter(
-    node: str, name: str, parameters: Parameters, layers: Mapping[str, str], section: str, known: Known
+    node: str, name: str, value: Any, layers: Mapping[str, str], section: str, known: Known
 ) -> Iterator[Translation]:
-    layer, _, rest = name.partition(".")
-    value, kind, (source, _, last) = parameters[name], layers[layer], rest.rpartition(".")
-    sources = str(parameters.get(f"{layer}.observation_sources", source)).split()
-    if kind == "InflationLayer" or (kind in OBSERVATION_LAYERS and source and source in sources):
+    kind, last = layers[name.partition(".")[0]], name.rpartition(".")[2]
+    if kind == "InflationLayer":
         yield from translate_same_name(node, name, value, (section,), known[section], last)
     elif kind == "DenoiseLayer":
         yield from translate_same_name(node, name, value, (section, "denoise_layer"), known["denoise_layer"], last)
+
+
+LASER_SCAN = "LaserScan"
+"""Data type of an observation source without `data_type`."""
+HEIGHTS = ("min_obstacle_height", "max_obstacle_height")
+"""Parameters of observation sources that simscen applies to camera data only."""
+
+
+def _observation_layers(
+    node: str, parameters: Parameters, layers: Mapping[str, str], section: str, known: Sequence[str]
+) -> Iterator[Translation]:
+    """Translate the parameters of observation sources, of which simscen has one set for all sensors.
+
+    The first source of laser scans sets the ranges. The first source sets the heights, with point clouds before scans.
+    """
+    types = {
+        source: parameters.get(f"{source}.data_type", LASER_SCAN) for source in _observation_sources(parameters, layers)
+    }
+    first: dict[str, str] = {}
+    for source in sorted(types, key=lambda source: types[source] == LASER_SCAN):  # point clouds first
+        is_scan = types[source] == LASER_SCAN
+        ignored = "" if is_scan else f"{types[source]} data does not set the ranges of the lidar"
+        for key, value in parameters_below(parameters, source):
+            name = f"{source}.{key}"
+            if key not in known:
+                continue
+            if not is_scan and key not in HEIGHTS:
+                yield Translation(node, name, (), value, ignored, covers=f"{source}.")
+                ignored = ""  # one note for all ranges of a source
+            elif first.setdefault(key, source) == source:
+                yield Translation(node, name, (section, key), value)
+            else:
+                differs = types[first[key]] == types[source] and parameters[f"{first[key]}.{key}"] != value
+                note = f"only the value of the first source is used: {first[key]}" if differs else ""
+                yield Translation(node, name, (), value, note)
+
+
+def _observation_sources(parameters: Parameters, layers: Mapping[str, str]) -> Iterator[str]:
+    """Yield the observation sources of all layers as `layer.source`."""
+    for layer, kind in layers.items():
+        if kind in OBSERVATION_LAYERS:
+            found = [name.partition(".")[0] for name, _ in parameters_below(parameters, layer) if "." in name]
+            listed = str(parameters.get(f"{layer}.observation_sources", " ".join(found))).split()
+            yield from (f"{layer}.{source}" for source in listed)
 
 
 def velocity_smoother(node: str, parameters: Parameters, _: Known) -> Iterator[Translation]:
@@ -209,21 +254,27 @@ def velocity_smoother(node: str, parameters: Parameters, _: Known) -> Iterator[T
 
 
 def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[Translation]:
-    """Translate polygons with the action `approach`; other actions are not supported."""
+    """Translate the first enabled polygon with the action `approach`; other actions are not supported."""
     if "source_timeout" in parameters:
         yield Translation(node, "source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
     on = parameters.get("enabled", True)
-    approaching = []
-    for polygon in strings(parameters.get("polygons")):
-        action = parameters.get(f"{polygon}.action_type")
-        if action != "approach":
+    actions = {polygon: parameters.get(f"{polygon}.action_type") for polygon in strings(parameters.get("polygons"))}
+    approaching = {
+        polygon: parameters.get(f"{polygon}.enabled", True) for polygon in actions if actions[polygon] == "approach"
+    }
+    used = max(approaching, key=lambda polygon: bool(approaching[polygon]), default="")  # the first enabled one, if any
+    for polygon, action in actions.items():
+        if polygon == used:
+            yield from (Translation(node, f"{polygon}.{setting}", (), None) for setting in ("action_type", "enabled"))
+            yield from _approach(node, parameters, polygon)
+        elif approaching.get(polygon, True):
             why = f"action_type {action} of {polygon} is not supported"
+            if polygon in approaching:
+                why = f"only the first polygon that approaches is used: {used}, not {polygon}"
             yield Translation(node, "polygons", (), action, why, covers=f"{polygon}.")
-            continue
-        yield from (Translation(node, f"{polygon}.{setting}", (), None) for setting in ("action_type", "enabled"))
-        approaching.append(parameters.get(f"{polygon}.enabled", True))
-        yield from _approach(node, parameters, polygon)
-    on = on and (any(approaching) or not approaching)
+        else:
+            yield Translation(node, "polygons", (), action, covers=f"{polygon}.")  # disabled
+    on = on and (any(approaching.values()) or not approaching)
     for name in ("enabled", "polygons"):
         if name in parameters:
             yield Translation(node, name, ("collision_monitor", "enabled"), on)

@@ -275,3 +275,52 @@ controller_server:
     assert (drives.type, drives.motion_model, drives.min_turning_r) == ("mppi", "Ackermann", 0.6)
     assert drives.critics == ["CostCritic", "GoalCritic"]
     assert [note.line for note in found.notes] == [6, 9]
+
+
+SOURCES = """\
+local_costmap:
+  local_costmap:
+    ros__parameters:
+      plugins: [obstacle_layer, voxel_layer]
+      obstacle_layer:
+        plugin: "nav2_costmap_2d::ObstacleLayer"
+        observation_sources: front rear
+        front: {obstacle_max_range: 10.0, raytrace_max_range: 11.0, max_obstacle_height: 1.0}
+        rear: {data_type: LaserScan, obstacle_max_range: 10.0, raytrace_max_range: 8.0, max_obstacle_height: 3.0}
+      voxel_layer:
+        plugin: "nav2_costmap_2d::VoxelLayer"
+        observation_sources: depth
+        depth:
+          data_type: PointCloud2
+          obstacle_max_range: 0.4
+          raytrace_max_range: 0.5
+          max_obstacle_height: 0.8
+"""
+
+
+def test_only_laser_scans_set_the_ranges_of_the_lidar(tmp_path: Path) -> None:
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", SOURCES)
+    costmap = found.spec.stack.local_costmap
+    assert (costmap.obstacle_max_range, costmap.raytrace_max_range, costmap.max_obstacle_height) == (10.0, 11.0, 0.8)
+    assert [(note.line, note.message) for note in found.notes] == [
+        (9, "local_costmap: `obstacle_layer.rear.raytrace_max_range`: only the value of the first source is used:"
+         " obstacle_layer.front"),
+        (15, "local_costmap: `voxel_layer.depth.obstacle_max_range`: PointCloud2 data does not set the ranges of the"
+         " lidar"),
+    ]  # fmt: skip
+
+
+def test_only_the_first_enabled_approach_polygon_is_used(tmp_path: Path) -> None:
+    polygons = """\
+collision_monitor:
+  ros__parameters:
+    polygons: [Off, Near, Far]
+    Off: {action_type: approach, enabled: false, min_points: 7}
+    Near: {action_type: approach, min_points: 4}
+    Far: {action_type: approach, min_points: 9}
+"""
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", polygons)
+    assert (found.spec.stack.collision_monitor.enabled, found.spec.stack.collision_monitor.min_points) == (True, 4)
+    assert [note.message for note in found.notes] == [
+        "collision_monitor: `polygons`: only the first polygon that approaches is used: Near, not Far"
+    ]
