@@ -31,7 +31,7 @@ from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import MIN_GROUND_CLEARANCE_M, RobotBody, assemble
 from simscen.sim.body.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import MeshReader, MeshSource, Tree, build_tree
-from simscen.sim.urdf.wheels import WheelJoint, infer_wheels, select_wheels
+from simscen.sim.urdf.wheels import WheelJoint, examine_joints, select_wheels
 from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
 from simscen.sim.urdf.xml_source import CODE, RobotFiles, read_xml
 
@@ -53,8 +53,8 @@ def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshRead
     """
     folders = AllowedFolders.of(roots or (path.resolve().parent,))
     tree = read_tree(path, folders, read_mesh)
-    wheels = infer_wheels(tree)
-    drive = _drive(tree, wheels)
+    wheels, others = examine_joints(tree)
+    drive = _drive(tree, wheels, others)
     draft = RobotSpec(
         simscen=1,
         name=tree.name.lstrip("/") or path.stem,
@@ -71,14 +71,17 @@ def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshRead
     return draft.model_copy(update={"sensors": sensors})
 
 
-def _drive(tree: Tree, wheels: list[WheelJoint]) -> Drive:
+def _drive(tree: Tree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> Drive:
     driven = [wheel for wheel in wheels if not wheel.steered]
     left, right = ([w for w in driven if (w.place[1] > 0) is side] for side in (True, False))
     if not left or len(left) != len(right):
-        raise InvalidInput([tree.element.problem("the drive of the robot cannot be inferred from its wheels", HINT)])
+        why = _why_no_drive(left, right, [wheel for wheel in wheels if wheel.steered], others)
+        message = f"the drive of the robot cannot be inferred from its wheels: {why}"
+        raise InvalidInput([tree.element.problem(message, HINT)])
     separation = float(np.mean([w.place[1] for w in left]) - np.mean([w.place[1] for w in right]))
     axles = [w.place[0] for w in driven]
-    size = {"wheel_radius": driven[0].radius, "wheel_separation": separation, "wheel_width": driven[0].width}
+    radius, width = (float(np.mean(values)) for values in zip(*((w.radius, w.width) for w in driven), strict=True))
+    size = {"wheel_radius": radius, "wheel_separation": separation, "wheel_width": width}
     steered = [wheel.place[0] for wheel in wheels if wheel.steered and not wheel.is_caster]
     if steered:
         check_front_steering(wheels)
@@ -92,9 +95,29 @@ def _drive(tree: Tree, wheels: list[WheelJoint]) -> Drive:
     return SkidSteer.model_validate({"type": "skid_steer", "wheel_base": base, "turning_scale": scale, **size})
 
 
+def _why_no_drive(
+    left: list[WheelJoint], right: list[WheelJoint], steered: list[WheelJoint], others: Mapping[str, list[str]]
+) -> str:
+    """Describe the wheels that were found, and why the other movable joints are none."""
+    if not (left or right or steered or others):
+        return "it has no movable joints"
+    sides = {"left": left, "right": right} | ({"steered": steered} if steered else {})
+    found = [f"{side}: {_shortened([wheel.joint.name for wheel in group])}" for side, group in sides.items()]
+    reasons = [f"{_shortened(names)} ({reason})" for reason, names in others.items()][:MAX_LISTED]
+    return "; ".join(found + ([f"no wheels: {', '.join(reasons)}"] if reasons else []))
+
+
+MAX_LISTED = 4
+"""Maximum number of joints, and of reasons, in a message."""
+
+
+def _shortened(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
+    return ", ".join(names[:MAX_LISTED]) + more if names else "none"
+
+
 def _limits(wheels: list[WheelJoint], drive: Drive) -> Limits:
-    limits = [(wheel.joint.element.child("limit"), wheel.radius) for wheel in wheels if not wheel.steered]
-    speeds = [limit.numbers("velocity", 1, (0.0,))[0] * radius for limit, radius in limits if limit is not None]
+    speeds = [wheel.joint.limits.velocity * wheel.radius for wheel in wheels if not wheel.steered]
     linear = min([1.0, *(speed for speed in speeds if speed > 0)])
     angular = min(1.5, 2 * linear / getattr(drive, "wheel_separation", 1.0))
     return Limits(linear=linear, angular=angular, linear_acceleration=1.0, angular_acceleration=2.0)
@@ -102,7 +125,7 @@ def _limits(wheels: list[WheelJoint], drive: Drive) -> Limits:
 
 def _lidar_mount(tree: Tree, draft: RobotSpec, wheels: list[WheelJoint]) -> Mount:
     body = body_from_tree(draft, tree)
-    ground = min(wheel.place[2] - wheel.radius for wheel in wheels)
+    ground = min(wheel.bottom for wheel in wheels)
     axle = np.mean([wheel.place for wheel in wheels if not wheel.steered], axis=0)
     for name in tree.links:
         if any(word in name.lower() for word in LIDAR_NAMES):
@@ -229,7 +252,7 @@ def _base_from_root(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:
     if not wheels:
         return Pose3(0.0, 0.0, -min(_lowest(solid) for solid in solids))
     x, y, _ = np.mean([wheel.place for wheel in wheels if not wheel.steered], axis=0).tolist()
-    return Pose3(-x, -y, -min(wheel.place[2] - wheel.radius for wheel in wheels))
+    return Pose3(-x, -y, -min(wheel.bottom for wheel in wheels))
 
 
 def _lowest(solid: Solid) -> float:

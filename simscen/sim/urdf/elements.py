@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,6 +32,14 @@ class Link:
     element: Element
 
 
+class JointLimits(NamedTuple):
+    """Smallest and largest position of a joint in rad or m, and its largest velocity (0: unknown)."""
+
+    lower: float = -math.inf
+    upper: float = math.inf
+    velocity: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Joint:
     """A joint: `pose` of the child frame in the parent frame, and unit `axis` of motion in the child frame."""
@@ -41,6 +50,7 @@ class Joint:
     child: str
     pose: Pose3
     axis: tuple[float, float, float]
+    limits: JointLimits
     element: Element
 
 
@@ -112,8 +122,21 @@ def parse_joint(element: Element) -> Joint:
         element.required_child("child").text("link"),
         _origin(element),
         (axis[0] / length, axis[1] / length, axis[2] / length),
+        _limits(element),
         element,
     )
+
+
+def _limits(joint: Element) -> JointLimits:
+    limit = joint.child("limit")
+    if limit is None or joint.attributes.get("type") in ("fixed", "floating"):
+        return JointLimits()
+    lower, upper, velocity = (
+        limit.numbers(key, 1, (0.0,), largest=math.inf)[0] for key in ("lower", "upper", "velocity")
+    )
+    if joint.attributes.get("type") == "continuous":
+        lower, upper = -math.inf, math.inf
+    return JointLimits(lower, upper, velocity)
 
 
 def _origin(element: Element) -> Pose3:

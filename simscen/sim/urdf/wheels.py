@@ -1,6 +1,7 @@
 """Finds the wheels and the steering joints of a URDF, and warns about misaligned ones."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,19 +16,25 @@ from simscen.sim.urdf.elements import Joint, Tree
 MIN_AXIS_COSINE = 0.99
 """Cosine of the largest angle (8 degrees) between a joint axis and the direction that it is compared with."""
 
-STEERING_JOINT_TYPES = ("revolute", "continuous")
-"""Types of joints that can steer; a vertical prismatic joint is a suspension."""
+ROTARY_JOINT_TYPES = ("revolute", "continuous")
+"""Types of joints that can steer or turn a wheel; a vertical prismatic joint is a suspension."""
 ROUNDNESS_TOLERANCE = 0.05
 """Largest difference of the extents of a round mesh, and of its center from its axis, relative to the radius."""
 MIN_CASTER_TRAIL_RADII = 0.1
 """Smallest distance along x, in wheel radii, of a caster's wheel from its swivel axis; a steered wheel has none."""
+MIN_WHEEL_RANGE_RAD = 20 * math.pi
+"""Smallest range of a revolute joint that counts as continuous: ten turns."""
+MAX_WHEEL_GAP_RADII = 0.25
+"""Largest height of a wheel above the lowest one, in radii of the wheel; higher ones do not stand on the ground."""
+MIN_DRIVEN_RADIUS_RATIO = 0.75
+"""Smallest radius of a driven wheel relative to the largest one; smaller wheels that are not steered are rollers."""
 
 
 @dataclass(frozen=True, eq=False)
 class WheelJoint:
     """A wheel in the root frame: the `place` of its center, `radius`, and `width` in meters.
 
-    `trail` is its distance in m along x from the axis of its steering joint.
+    `steering` is its steering joint, if it has one, and `trail` its distance in m along x from the axis of that joint.
     """
 
     joint: Joint
@@ -36,6 +43,12 @@ class WheelJoint:
     width: float
     steered: bool
     trail: float = 0.0
+    steering: Joint | None = None
+
+    @property
+    def bottom(self) -> float:
+        """Height in m of its lowest point in the root frame."""
+        return self.place[2] - self.radius
 
     @property
     def is_caster(self) -> bool:
@@ -44,27 +57,63 @@ class WheelJoint:
 
 
 def infer_wheels(tree: Tree) -> list[WheelJoint]:
-    """Return the wheels in a URDF: continuous joints with a lateral axis and a round link."""
-    joints = tree.joints.values()
-    steering_joints = [
-        joint for joint in joints if joint.type in STEERING_JOINT_TYPES and _has_axis_along(tree, joint, 2)
-    ]
+    """Return the wheels in a URDF: joints with a lateral axis and a round link that stands on the ground."""
+    return examine_joints(tree)[0]
+
+
+def examine_joints(tree: Tree) -> tuple[list[WheelJoint], Mapping[str, list[str]]]:
+    """Return the wheels in a URDF, and the names of the other movable joints by the reason why they are none."""
+    joints = [joint for joint in tree.joints.values() if joint.type != "fixed"]
+    steering_joints = [joint for joint in joints if joint.type in ROTARY_JOINT_TYPES and _axis(tree, joint) == "z"]
     steered = steered_links(tree, steering_joints)
-    wheels = [
-        _with_trail(tree, wheel, steering_joints)
-        for joint in joints
-        if joint.type == "continuous"
-        and _has_axis_along(tree, joint, 1)
-        and (wheel := wheel_joint(tree, joint, joint.child in steered)) is not None
-    ]
-    return sorted(wheels, key=lambda w: (w.place[0], -w.place[1], w.joint.name))
+    wheels: list[WheelJoint] = []
+    others: dict[str, list[str]] = {}
+    for joint in joints:
+        wheel = wheel_joint(tree, joint, joint.child in steered)
+        if reason := _why_no_wheel(tree, joint, wheel):
+            others.setdefault(reason, []).append(joint.name)
+        elif wheel is not None:
+            wheels.append(_with_trail(tree, wheel, steering_joints))
+    ground = min((wheel.bottom for wheel in wheels), default=0.0)
+    largest = max((wheel.radius for wheel in wheels if not wheel.steered and _is_on(ground, wheel)), default=0.0)
+    kept = []
+    for wheel in sorted(wheels, key=lambda w: (w.place[0], -w.place[1], w.joint.name)):
+        if not _is_on(ground, wheel):
+            others.setdefault(f"{wheel.bottom - ground:.3g} m above the ground", []).append(wheel.joint.name)
+        elif not wheel.steered and wheel.radius < MIN_DRIVEN_RADIUS_RATIO * largest:
+            reason = f"radius {wheel.radius:.3g} m, much less than that of the largest wheel"
+            others.setdefault(reason, []).append(wheel.joint.name)
+        else:
+            kept.append(wheel)
+    return kept, others
+
+
+def _is_on(ground: float, wheel: WheelJoint) -> bool:
+    return wheel.bottom - ground <= MAX_WHEEL_GAP_RADII * wheel.radius
+
+
+def _why_no_wheel(tree: Tree, joint: Joint, wheel: WheelJoint | None) -> str:
+    """Return why a joint has no wheel, or "" if it has one."""
+    if not _turns_freely(joint):
+        return f"{joint.type} joint with limits" if joint.type == "revolute" else f"{joint.type} joint"
+    axis = _axis(tree, joint)
+    if axis != "y":
+        return f"axis along {axis}, not y" if axis else "axis not along y"
+    if wheel is not None:
+        return ""
+    return "no round collision shape" if tree.links[joint.child].solids else "no collision shape"
+
+
+def _turns_freely(joint: Joint) -> bool:
+    """Return whether a joint is continuous, or revolute with limits that no drive reaches."""
+    return joint.type in ROTARY_JOINT_TYPES and joint.limits.upper - joint.limits.lower >= MIN_WHEEL_RANGE_RAD
 
 
 def _with_trail(tree: Tree, wheel: WheelJoint, steering_joints: Sequence[Joint]) -> WheelJoint:
-    """Return a wheel with its distance along x from the axis of its steering joint."""
+    """Return a wheel with its steering joint, if it has one."""
     for joint in steering_joints:
         if wheel.joint.child in tree.subtree(joint.child):
-            return replace(wheel, trail=abs(wheel.place[0] - tree.poses[joint.child].x))
+            return replace(wheel, trail=abs(wheel.place[0] - tree.poses[joint.child].x), steering=joint)
     return wheel
 
 
@@ -138,11 +187,11 @@ def _round_mesh(joint: Joint, solid: Solid) -> tuple[Pose3, float, float] | None
     return Pose3(x, y, z), radius, float(np.ptp(along))
 
 
-def _has_axis_along(tree: Tree, joint: Joint, direction: int) -> bool:
-    """Return whether a joint axis is parallel to the x, y, or z axis (0, 1, 2) of the root frame."""
+def _axis(tree: Tree, joint: Joint) -> str:
+    """Return the axis of the root frame that a joint axis is parallel to: x, y, z, or "" for none."""
     rotation = tree.poses[joint.child]._replace(x=0.0, y=0.0, z=0.0)
-    axis = rotation.compose(Pose3(*joint.axis)).position
-    return abs(axis[direction]) >= MIN_AXIS_COSINE
+    parts = rotation.compose(Pose3(*joint.axis)).position
+    return "".join(name for name, part in zip("xyz", parts, strict=True) if abs(part) >= MIN_AXIS_COSINE)
 
 
 CODE = "SC405"
@@ -161,14 +210,14 @@ def alignment_warnings(tree: Tree, drive: Drive) -> list[Problem]:
     wheels = select_wheels(tree, drive)
     if not wheels:
         return []
-    ground = min(wheel.place[2] - wheel.radius for wheel in wheels)
+    ground = min(wheel.bottom for wheel in wheels)
     found = [*_wheel_warnings(wheels, ground), *_caster_warnings(tree, wheels, ground, drive.type == "differential")]
     return [Problem(p.path, p.line, p.col, CODE, p.message, p.hint, "warning", p.source) for p in found]
 
 
 def _wheel_warnings(wheels: list[WheelJoint], ground: float) -> Iterator[Problem]:
     for wheel in wheels:
-        gap = wheel.place[2] - wheel.radius - ground
+        gap = wheel.bottom - ground
         if gap > HEIGHT_TOLERANCE_M:
             message = f"the wheel on joint {wheel.joint.name!r} is {1e3 * gap:.1f} mm higher than the lowest wheel"
             yield wheel.joint.element.problem(message, "simscen places all wheels on the ground")

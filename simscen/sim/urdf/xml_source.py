@@ -1,6 +1,5 @@
 """Elements of URDF files, with errors that refer to their line."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,8 +39,10 @@ class Element(markup.Element):
             raise InvalidElement(self, f'<{self.tag}> without {attribute}="…"')
         return self.attributes[attribute]
 
-    def numbers(self, attribute: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
-        """Return `count` finite numbers of an attribute, or the default; raises InvalidElement."""
+    def numbers(
+        self, attribute: str, count: int, default: tuple[float, ...] | None = None, largest: float = 1e6
+    ) -> tuple[float, ...]:
+        """Return `count` numbers of an attribute with at most this size, or the default; raises InvalidElement."""
         if attribute not in self.attributes and default is not None:
             return default
         words = self.text(attribute).split()
@@ -51,7 +52,7 @@ class Element(markup.Element):
             raise InvalidElement(self, f'{attribute}="{" ".join(words)[:60]}" must consist of numbers') from None
         if len(values) != count:
             raise InvalidElement(self, f"{attribute} has {len(values)} numbers instead of {count}")
-        if not all(math.isfinite(value) and abs(value) <= 1e6 for value in values):
+        if not all(abs(value) <= largest for value in values):
             raise InvalidElement(self, f"{attribute}: must be a finite number of reasonable size")
         return values
 

@@ -77,7 +77,7 @@ def test_wheels_on_a_suspension_are_not_steered(infer):
 
 
 def test_a_robot_without_wheels_is_not_guessed(infer):
-    with pytest.raises(InvalidInput, match="cannot be inferred from its wheels"):
+    with pytest.raises(InvalidInput, match="cannot be inferred from its wheels: it has no movable joints"):
         infer(to_urdf(build_robot_body(shipped("omni"))))
 
 
@@ -134,3 +134,69 @@ def test_wheels_may_be_round_meshes(tmp_path, stretch):
     assert drive.wheel_radius == pytest.approx(0.05, rel=0.01)
     assert drive.wheel_width == pytest.approx(0.03)
     assert drive.wheel_separation == pytest.approx(0.4)
+
+
+def add(text, joint):
+    """Return a URDF with a joint and its link, a short cylinder along y unless COLLISION is something else."""
+    link = (
+        '<link name="part">COLLISION<inertial><mass value="0.1"/></inertial></link><joint name="extra" TYPE>'
+        '<parent link="base_link"/><child link="part"/><origin xyz="0.1 0.05 0.35"/><axis xyz="0 1 0"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    cylinder = (
+        '<collision><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.02" length="0.04"/></geometry></collision>'
+    )
+    for old, new in joint.items():
+        link = link.replace(old, new)
+    return text.replace("</robot>", link.replace("COLLISION", cylinder).replace("TYPE", 'type="continuous"'))
+
+
+@pytest.mark.parametrize("name", ["turtlebot", "jackal", "car"])
+@pytest.mark.parametrize("height", ["0.35", "0.08"])
+def test_round_links_above_the_ground_are_not_wheels(infer, name, height):
+    """They were: a tilting camera made a robot unusable, two rollers of a belt made it a skid-steer robot."""
+    text = to_urdf(build_robot_body(shipped(name)))
+    assert infer(add(text, {"0.35": height})).drive == infer(text).drive
+
+
+def test_small_rollers_on_the_ground_are_not_driven(infer):
+    text = to_urdf(build_robot_body(shipped("turtlebot")))
+    radius = infer(text).drive.wheel_radius
+    roller = {"0.1 0.05 0.35": "-0.1 0 0.02"}
+    assert infer(add(text, roller)).drive.wheel_radius == radius
+
+
+@pytest.mark.parametrize(("limit", "drive"), [("1e+16", "differential"), ("40", "differential"), ("6.3", None)])
+def test_revolute_joints_with_limits_of_many_turns_are_wheels(infer, limit, drive):
+    text = to_urdf(build_robot_body(shipped("amr"))).replace('type="continuous"', 'type="revolute"')
+    text = text.replace('<axis xyz="0 1 0" />', f'<axis xyz="0 1 0"/><limit lower="-{limit}" upper="{limit}"/>')
+    if drive:
+        assert infer(text).drive.type == drive
+    else:
+        with pytest.raises(InvalidInput, match=r"no wheels: .* \(revolute joint with limits\)"):
+            infer(text)
+
+
+@pytest.mark.parametrize(
+    ("joint", "reason"),
+    [
+        ({"TYPE": 'type="revolute"'}, "revolute joint with limits"),
+        ({"TYPE": 'type="prismatic"'}, "prismatic joint"),
+        ({"0 1 0": "1 0 0"}, "axis along x, not y"),
+        ({"0 1 0": "1 1 0"}, "axis not along y"),
+        ({"COLLISION": ""}, "no collision shape"),
+        ({"COLLISION": '<collision><geometry><box size="1 1 1"/></geometry></collision>'}, "no round collision shape"),
+    ],
+)
+def test_the_reason_is_given_for_each_joint_without_a_wheel(infer, joint, reason):
+    with pytest.raises(InvalidInput) as error:
+        infer(add(to_urdf(build_robot_body(shipped("omni"))), joint))
+    assert error.value.problems[0].message.endswith(f": left: none; right: none; no wheels: extra ({reason})")
+
+
+def test_wheels_on_one_side_are_named(infer):
+    text = to_urdf(build_robot_body(shipped("turtlebot"))).replace(
+        '<joint name="wheel_right" type="continuous">', '<joint name="wheel_right" type="fixed">'
+    )
+    with pytest.raises(InvalidInput, match=r"left: wheel_left; right: none$"):
+        infer(text)
