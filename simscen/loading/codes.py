@@ -65,7 +65,7 @@ CODES = {
     "SC330": "A map would have too many cells.",
     "SC331": "A map would result in too many walls.",
     "SC340": "A parameter of Nav2 does not fit what simscen publishes.",
-    "SC341": "A parameter in a Nav2 parameter file (`nav2_params`) has no counterpart in simscen and is ignored.",
+    "SC341": "A parameter in a Nav2 parameter file (`nav2_params`) has no exact counterpart and is ignored or changed.",
     "SC400": "A URDF or xacro file cannot be read, or part of it cannot be used.",
     "SC401": "A part of a robot's body reaches the ground, so that it would drag instead of roll.",
     "SC402": "A robot is larger than any that can be simulated.",

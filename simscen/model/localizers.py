@@ -37,6 +37,7 @@ class AmclParameters(Ranged, LocalizerSpec):
     """Parameters of nav2_amcl, with its names and, except for `laser_model_type`, its default values."""
 
     needs_map: ClassVar[bool] = True
+    unlimited_at_zero: ClassVar[tuple[str, ...]] = ("laser_max_range",)
     robot_model: Literal["differential", "omni"] | None = None
     """Motion model; default: the one of the robot's drive."""
     alpha1: Noise = 0.2
@@ -83,9 +84,9 @@ class AmclParameters(Ranged, LocalizerSpec):
     laser_likelihood_max_dist: PositiveLength = 2.0
     """Distances from obstacles are capped at this value in the likelihood field."""
     laser_min_range: Length = -1.0
-    """Minimum range that is used; -1 = the lidar's own."""
+    """Minimum range that is used, at least the lidar's own; 0 or less = the lidar's own."""
     laser_max_range: Length = 100.0
-    """Maximum range that is used, at most the lidar's own; -1 = the lidar's own."""
+    """Maximum range that is used, at most the lidar's own; 0 or less = the lidar's own."""
     recovery_alpha_slow: Probability = 0.0
     """Decay rate of the slow average of weights, which decides when to add random particles; 0 = never."""
     recovery_alpha_fast: Probability = 0.0

@@ -51,8 +51,8 @@ class Spin(BehaviorSpec):
     """Minimum turn rate, unless `max_rotational_vel` is lower."""
     rotational_acc_lim: PositiveAngularAcceleration | None = None
     """Angular deceleration at the end of the turn; default: the limit of the robot (Nav2: 3.2 rad/s²)."""
-    simulate_ahead_time: PositiveDuration = 2.0
-    """Time for which the motion is checked for collisions."""
+    simulate_ahead_time: Duration = 2.0
+    """Time for which the motion is checked for collisions; 0 = no check."""
     time_allowance: PositiveDuration = 10.0
     """Time after which the behavior fails with SPIN_TIMEOUT."""
 
@@ -75,8 +75,8 @@ class BackUp(BehaviorSpec):
     """Distance to back up."""
     backup_speed: PositiveSpeed = 0.15
     """Speed."""
-    simulate_ahead_time: PositiveDuration = 2.0
-    """Time for which the motion is checked for collisions."""
+    simulate_ahead_time: Duration = 2.0
+    """Time for which the motion is checked for collisions; 0 = no check."""
     time_allowance: PositiveDuration = 10.0
     """Time after which the behavior fails with BACKUP_TIMEOUT."""
     backup_partial: bool = False
@@ -169,8 +169,8 @@ class Recovery(Spec):
     """Whether `backup` drives a shorter distance if there is not enough room. Nav2 fails instead."""
     retrace_dist: NonNegativeLength = 1.0
     """Maximum distance of `retrace`. After `backup_dist`, it ends as soon as there is room to turn in place."""
-    simulate_ahead_time: PositiveDuration = 2.0
-    """Time for which the motions of `spin` and `backup` are checked for collisions."""
+    simulate_ahead_time: Duration = 2.0
+    """Time for which the motions of `spin` and `backup` are checked for collisions; 0 = no check."""
     max_rotational_vel: PositiveAngularSpeed = 1.0
     """Maximum turn rate of `spin`."""
     min_rotational_vel: NonNegativeAngularSpeed = 0.4

@@ -70,6 +70,9 @@ class Value(RootModel[T], Generic[T]):
 class Ranged(Spec):
     """Specification in which no `min_…` may be greater than its `max_…`."""
 
+    unlimited_at_zero: ClassVar[tuple[str, ...]] = ()
+    """Names of the maximums that are no limit if they are 0 or less."""
+
     @model_validator(mode="after")
     def _check_order(self) -> "Ranged":
         for low in type(self).model_fields:
@@ -77,7 +80,7 @@ class Ranged(Spec):
             if high == low or high not in type(self).model_fields:
                 continue
             minimum, maximum = getattr(self, low), getattr(self, high)
-            if minimum > maximum:
+            if minimum > maximum and not (high in self.unlimited_at_zero and maximum <= 0):
                 raise ValueError(f"`{low}` {minimum:g} is greater than `{high}` {maximum:g}")
         return self
 

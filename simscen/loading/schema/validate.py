@@ -1,6 +1,8 @@
 """Validate a tree against a pydantic model."""
 
+import re
 from collections.abc import Callable, Iterator
+from itertools import islice
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -109,6 +111,9 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
         message = message._replace(hint=common_mistakes.hint_for_wrong_type(kind, model, loc, node))
     elif not message.hint and message.code == "SC013":
         message = message._replace(hint=common_mistakes.HINTS_FOR_BOUNDS.get(loc, ""))
+    if kind == "value_error" and isinstance(node, MappingNode):
+        named = (name for name in re.findall(r"`(\w+)`", message.text) if name in node.entries)
+        loc = (*loc, *islice(named, 1))  # the first key that the message names
     return _problem(value_position(tree, loc), *message)
 
 

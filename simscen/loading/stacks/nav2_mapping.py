@@ -93,8 +93,8 @@ Known = Mapping[str, Sequence[str]]
 class Translation:
     """Nav2 parameter, and the keys and value below `stack:` that it becomes.
 
-    `note` is for the user. A parameter with neither path nor note already matches the behavior of simscen. Parameters
-    whose names begin with `covers` are treated the same way, without notes of their own.
+    `note` and `hint` are for the user. A parameter with neither path nor note already matches the behavior of simscen.
+    Parameters whose names begin with `covers` are treated the same way, without notes of their own.
     """
 
     node: str
@@ -103,6 +103,7 @@ class Translation:
     value: Any
     note: str = ""
     covers: str | None = None
+    hint: str = "it is ignored"
 
 
 def translate_same_name(

@@ -345,7 +345,9 @@ def _amcl(node: str, parameters: Parameters, known: Known) -> Iterator[Translati
 
 def _behavior_server(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
     for name, value in parameters.items():
-        yield from translate_same_name(node, name, value, ("recovery",), known["recovery"])
+        # A negative minimum has no effect in Nav2.
+        no_minimum = name == "min_rotational_vel" and isinstance(value, float | int) and value < 0
+        yield from translate_same_name(node, name, 0.0 if no_minimum else value, ("recovery",), known["recovery"])
 
 
 NODES = {

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
+from simscen.core.clock import Clock
 from simscen.core.errors import Problem
 from simscen.loading.files.paths import PathProblem
 from simscen.loading.stacks.nav2_mapping import Known, Translation
@@ -160,13 +161,36 @@ def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree
         return stack
     library.add({display_name: parameters.text}, {display_name: file})
     profile = MappingNode(position, {"profile": Entry(position, ScalarNode(position, "nav2"))})
-    translations = list(translate(parameters.nodes, _known_parameters()))
+    clock = _clock(result.tree)
+    translations = [_with_possible_rate(one, clock) for one in translate(parameters.nodes, _known_parameters())]
     below = profile
     for translation in translations:
         if translation.path:
             below = merge_mappings(below, _nested(translation, parameters))
     result.notes += sorted({*parameters.notes, *_notes(translations, parameters)})
     return merge_mappings(stack, below)
+
+
+def _clock(scenario: MappingNode) -> Clock:
+    from simscen.model.scenario import Physics
+
+    physics = child(scenario, "physics")
+    try:
+        return Clock(Physics.model_validate(physics.plain if physics else {}).tick_rate)
+    except ValidationError:
+        return Clock()  # validation reports the error
+
+
+def _with_possible_rate(one: Translation, clock: Clock) -> Translation:
+    """Return a translation in which the controller frequency is the nearest one with a period of whole ticks."""
+    if one.path != ("controller_frequency",) or not isinstance(one.value, int | float) or one.value <= 0:
+        return one
+    try:
+        clock.period(one.value)
+    except ValueError as error:
+        hint = "the nearest is used; write `stack: {controller_frequency: …}` in the scenario for another one"
+        return replace(one, value=clock.nearest_rate(one.value), note=str(error), hint=hint)
+    return one
 
 
 def _nested(one: Translation, parameters: Nav2Parameters) -> MappingNode:
@@ -191,6 +215,7 @@ def _notes(translations: Sequence[Translation], parameters: Nav2Parameters) -> I
             yield _note(
                 parameters.positions[translation.node, translation.parameter],
                 f"{translation.node}: `{translation.parameter}`: {translation.note}",
+                translation.hint,
             )
     used = {
         parameters.positions[translation.node, translation.parameter]
@@ -215,8 +240,8 @@ def _notes(translations: Sequence[Translation], parameters: Nav2Parameters) -> I
         yield _note(min(node_positions), f"simscen has no node like {node}")
 
 
-def _note(position: Position, message: str) -> Problem:
-    return Problem(*position, code="SC341", message=message, hint="it is ignored", severity="warning")
+def _note(position: Position, message: str, hint: str = "it is ignored") -> Problem:
+    return Problem(*position, code="SC341", message=message, hint=hint, severity="warning")
 
 
 def _known_parameters() -> Known:

@@ -324,3 +324,36 @@ collision_monitor:
     assert [note.message for note in found.notes] == [
         "collision_monitor: `polygons`: only the first polygon that approaches is used: Near, not Far"
     ]
+
+
+ACCEPTED = """\
+amcl:
+  ros__parameters: {alpha1: 0.2, laser_min_range: 1.44, laser_max_range: -1.44}
+behavior_server:
+  ros__parameters: {simulate_ahead_time: 0.0, min_rotational_vel: -0.8}
+controller_server:
+  ros__parameters: {controller_frequency: 50.0}
+"""
+
+
+def test_values_with_a_special_meaning_in_nav2_are_accepted(tmp_path: Path) -> None:
+    """AMCL ignores range limits of 0 and less, Spin a negative minimum; without time ahead, nothing is checked."""
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", ACCEPTED)
+    stack = found.spec.stack
+    assert (stack.localizer.laser_min_range, stack.localizer.farthest) == (1.44, float("inf"))
+    assert (stack.recovery.simulate_ahead_time, stack.recovery.min_rotational_vel) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("physics", "rate"), [("", 48.0), ("physics: {tick_rate: 200 Hz}", 50.0)])
+def test_controller_frequency_is_the_nearest_possible_one(tmp_path: Path, physics: str, rate: float) -> None:
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", ACCEPTED, rest=physics)
+    assert found.spec.stack.controller_frequency == rate
+    notes = [(note.line, note.message) for note in found.notes]
+    expected = "controller_server: `controller_frequency`: 50 Hz does not divide 240 Hz; the nearest that does is 48 Hz"
+    assert notes == ([] if physics else [(6, expected)])
+
+
+def test_a_minimum_above_its_maximum_is_reported_at_the_minimum(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput) as wrong:
+        loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", ACCEPTED.replace("-1.44", "1.0"))
+    assert [(p.code, p.line, p.col) for p in wrong.value.problems] == [("SC016", 2, 51)]
