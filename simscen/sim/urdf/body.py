@@ -171,7 +171,11 @@ def read_tree(
     robot = read_xml(path, folders)
     expanded = path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes
     if expanded:
+        defines_macros = any(robot.all("xacro:macro"))
         robot = expand(robot, path, folders, lambda included: read_xml(included, folders), arguments)
+        if defines_macros and not any(robot.all("link")):
+            hint = "use the file that includes it and calls its macros"
+            raise InvalidInput([robot.problem("the file defines macros but does not use them", hint)])
     elif arguments:
         raise UnknownArgument(robot, next(iter(arguments)), ())
     return build_tree(robot, MeshSource(path.parent, folders, read_mesh, expanded))

@@ -254,7 +254,9 @@ def _join(robot: Element, links: dict[str, Link], joints: dict[str, Joint]) -> T
         child_joints.setdefault(joint.parent, []).append(joint)
     roots = [name for name in links if name not in parents]
     if len(roots) != 1 and not problems:
-        problems.append(robot.problem(f"expected one root link, found {len(roots)}: {', '.join(roots[:5])}"))
+        without_root = "a loop of joints" if links else "no <link>"
+        found = f"{len(roots)}: {', '.join(roots[:5])}" if roots else without_root
+        problems.append(robot.problem(f"expected one root link, found {found}"))
     if problems:
         raise InvalidInput(problems)
     poses = {roots[0]: Pose3()}

@@ -200,3 +200,25 @@ def test_wheels_on_one_side_are_named(infer):
     )
     with pytest.raises(InvalidInput, match=r"left: wheel_left; right: none$"):
         infer(text)
+
+
+XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">{}</robot>'
+MACRO = '<xacro:macro name="robot" params="x"><link name="base_link"/></xacro:macro>'
+LOOP = (
+    '<link name="a"/><link name="b"/><joint name="i" type="fixed"><parent link="a"/><child link="b"/></joint>'
+    '<joint name="j" type="fixed"><parent link="b"/><child link="a"/></joint>'
+)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (MACRO, "the file defines macros but does not use them"),
+        ("", "expected one root link, found no <link>"),
+        (LOOP, "expected one root link, found a loop of joints"),
+    ],
+)
+def test_file_without_a_root_link_is_refused_with_its_reason(infer, content, message):
+    with pytest.raises(InvalidInput) as error:
+        infer(XACRO.format(content))
+    assert error.value.problems[0].message == message
