@@ -39,6 +39,10 @@ AXLE_TOLERANCE_M = 0.02
 """Largest difference in m along x of wheels on the same axle."""
 MAX_UPSIDE_DOWN_Z = -0.9
 """Largest z component, in the frame of the robot, of the z axis of a lidar that is mounted upside down."""
+DEFAULT_MAX_STEERING_RAD = 0.5
+"""Largest steering angle of a car whose steering joints have no limits, or have limits of 90 degrees or more."""
+MIN_STEERING_RAD, MAX_STEERING_RAD = 0.1, 1.0
+"""Plausible limits of a steering joint; others are replaced by the nearest of them."""
 LIDAR_NAMES = ("laser", "lidar", "scan")
 """Words in the names of links that carry a lidar."""
 HINT = "write a *.robot.yaml next to it with its drive, limits, and sensors; see `simscen explain robot`"
@@ -82,17 +86,31 @@ def _drive(tree: Tree, wheels: list[WheelJoint], others: Mapping[str, list[str]]
     axles = [w.place[0] for w in driven]
     radius, width = (float(np.mean(values)) for values in zip(*((w.radius, w.width) for w in driven), strict=True))
     size = {"wheel_radius": radius, "wheel_separation": separation, "wheel_width": width}
-    steered = [wheel.place[0] for wheel in wheels if wheel.steered and not wheel.is_caster]
+    steered = [wheel for wheel in wheels if wheel.steered and not wheel.is_caster]
     if steered:
         check_front_steering(wheels)
-        base = float(np.mean(steered) - np.mean(axles))
-        return Ackermann.model_validate({"type": "ackermann", "wheel_base": base, "max_steering": 0.5, **size})
+        base = float(np.mean([wheel.place[0] for wheel in steered]) - np.mean(axles))
+        steering = _max_steering(steered, separation / (2 * base))
+        return Ackermann.model_validate({"type": "ackermann", "wheel_base": base, "max_steering": steering, **size})
     if max(axles) - min(axles) < AXLE_TOLERANCE_M:
         return Differential.model_validate({"type": "differential", **size})
     base = max(axles) - min(axles)
     # Coulomb friction at the corners of a rectangle: turning in place takes this much more than the kinematics say.
     scale = min(10.0, 1 + (base / separation) ** 2)
     return SkidSteer.model_validate({"type": "skid_steer", "wheel_base": base, "turning_scale": scale, **size})
+
+
+def _max_steering(wheels: list[WheelJoint], ratio: float) -> float:
+    """Return the largest angle in rad of the virtual wheel in the middle, from the limits of the steering joints.
+
+    The inner wheel turns more: cot(middle) = cot(inner) + ratio, where ratio is wheel separation / (2 * wheel base).
+    """
+    ranges = [min(-wheel.steering.limits.lower, wheel.steering.limits.upper) for wheel in wheels if wheel.steering]
+    limits = [angle for angle in ranges if 0 < angle < math.pi / 2]
+    if not limits:
+        return DEFAULT_MAX_STEERING_RAD
+    tangent = math.tan(max(MIN_STEERING_RAD, min(MAX_STEERING_RAD, *limits)))
+    return math.atan(tangent / (1 + tangent * ratio))
 
 
 def _why_no_drive(

@@ -151,7 +151,7 @@ def add(text, joint):
     return text.replace("</robot>", link.replace("COLLISION", cylinder).replace("TYPE", 'type="continuous"'))
 
 
-@pytest.mark.parametrize("name", ["turtlebot", "jackal", "car"])
+@pytest.mark.parametrize("name", ["turtlebot", "jackal"])
 @pytest.mark.parametrize("height", ["0.35", "0.08"])
 def test_round_links_above_the_ground_are_not_wheels(infer, name, height):
     """They were: a tilting camera made a robot unusable, two rollers of a belt made it a skid-steer robot."""
@@ -222,3 +222,30 @@ def test_file_without_a_root_link_is_refused_with_its_reason(infer, content, mes
     with pytest.raises(InvalidInput) as error:
         infer(XACRO.format(content))
     assert error.value.problems[0].message == message
+
+
+def car(limit):
+    """Return the URDF of a turtlebot with two steered wheels in front."""
+    front = """
+  <link name="SIDE_knuckle"/><joint name="SIDE_steering" type="revolute"><parent link="base_link"/>
+  <child link="SIDE_knuckle"/><origin xyz="0.3 Y 0.033"/><axis xyz="0 0 1"/>LIMIT</joint>
+  <link name="SIDE_front"><collision><geometry><sphere radius="0.033"/></geometry></collision>
+  <inertial><mass value="0.1"/></inertial></link>
+  <joint name="SIDE_rolling" type="continuous"><parent link="SIDE_knuckle"/><child link="SIDE_front"/>
+  <axis xyz="0 1 0"/></joint>""".replace("LIMIT", limit)
+    wheels = front.replace("SIDE", "left").replace("Y", "0.14") + front.replace("SIDE", "right").replace("Y", "-0.14")
+    return to_urdf(build_robot_body(shipped("turtlebot"))).replace("</robot>", f"{wheels}</robot>")
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "inner"), [(-0.7, 0.7, 0.7), (-0.7, 0.4, 0.4), (-1.3, 1.3, 1.0), (-0.01, 0.01, 0.1)]
+)
+def test_limits_of_the_steering_joints_limit_the_inner_wheel(infer, lower, upper, inner):
+    drive = infer(car(f'<limit lower="{lower}" upper="{upper}"/>')).drive
+    radius = drive.wheel_base / math.tan(drive.max_steering)
+    assert math.atan(drive.wheel_base / (radius - drive.wheel_separation / 2)) == pytest.approx(inner)
+
+
+@pytest.mark.parametrize("limit", ["", '<limit lower="-3.2" upper="3.2"/>', '<limit effort="1"/>'])
+def test_car_without_limits_of_its_steering_joints_has_a_usual_limit(infer, limit):
+    assert infer(car(limit)).drive.max_steering == 0.5
