@@ -87,7 +87,7 @@ def test_the_jackal_is_skid_steered():
     assert spec.drive.type == "skid_steer"
     assert spec.drive.wheel_separation == pytest.approx(0.37559)
     assert spec.drive.wheel_base == pytest.approx(0.262)
-    assert spec.drive.turning_scale == pytest.approx(1.487, abs=0.001)
+    assert spec.drive.turning_scale == pytest.approx(1.584, abs=0.001)
     assert build_robot_body(spec, JACKAL).mass == pytest.approx(18.4, abs=0.1)
 
 
