@@ -35,7 +35,7 @@ EVERY_NODE = "**"
 class Nav2Parameters:
     """Parameters by node and dotted name, and their positions; `display_name` is the name of the file in messages.
 
-    Parameters of `/**` apply to every node of the file. `notes` are warnings about duplicate keys.
+    Parameters of `/**` apply to every node of the file. `notes` are warnings about duplicate keys and nodes.
     """
 
     display_name: str
@@ -69,7 +69,13 @@ def read_nav2_parameters(path: Path, display_name: str = "") -> Nav2Parameters |
     notes = tuple(problem for problem in problems if problem.severity == "warning")
     if len(notes) < len(problems) or tree is None:
         return [problem for problem in problems if problem not in notes]
-    found = dict(_nodes(tree, ""))
+    sections = list(_nodes(tree, ""))
+    found = dict(sections)
+    notes += tuple(
+        _note(section.position, f"only the last of the nodes called {name} is used")
+        for name, section in sections
+        if section is not found[name]
+    )
     if not found:
         return [Problem(display_name, 0, 0, "SC340", f"not a Nav2 parameter file: it has no key {PARAMETERS}")]
     nodes: dict[str, dict[str, Any]] = {}

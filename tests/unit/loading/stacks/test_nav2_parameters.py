@@ -357,3 +357,12 @@ def test_a_minimum_above_its_maximum_is_reported_at_the_minimum(tmp_path: Path) 
     with pytest.raises(InvalidInput) as wrong:
         loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", ACCEPTED.replace("-1.44", "1.0"))
     assert [(p.code, p.line, p.col) for p in wrong.value.problems] == [("SC016", 2, 51)]
+
+
+def test_only_the_last_of_several_nodes_with_the_same_name_is_used(tmp_path: Path) -> None:
+    params = "a: {amcl: {ros__parameters: {alpha1: 0.1}}}\nb: {amcl: {ros__parameters: {alpha1: 0.3}}}\n"
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params)
+    assert found.spec.stack.localizer.alpha1 == 0.3
+    assert [(note.line, note.message) for note in found.notes] == [
+        (1, "only the last of the nodes called amcl is used")
+    ]
