@@ -78,10 +78,9 @@ def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshRead
 
 def _drive(tree: Tree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> Drive:
     driven = [wheel for wheel in wheels if not wheel.steered]
-    left, right = ([w for w in driven if (w.place[1] > 0) is side] for side in (True, False))
+    left, right = ([w for w in driven if w.is_left is side] for side in (True, False))
     if not left or len(left) != len(right):
-        why = _why_no_drive(left, right, [wheel for wheel in wheels if wheel.steered], others)
-        message = f"the drive of the robot cannot be inferred from its wheels: {why}"
+        message = f"the drive of the robot cannot be inferred from its wheels: {_found_wheels(wheels, others)}"
         raise InvalidInput([tree.element.problem(message, HINT)])
     separation = float(np.mean([w.place[1] for w in left]) - np.mean([w.place[1] for w in right]))
     axles = [w.place[0] for w in driven]
@@ -89,7 +88,7 @@ def _drive(tree: Tree, wheels: list[WheelJoint], others: Mapping[str, list[str]]
     size = {"wheel_radius": radius, "wheel_separation": separation, "wheel_width": width}
     steered = [wheel for wheel in wheels if wheel.steered and not wheel.is_caster]
     if steered:
-        check_front_steering(wheels)
+        check_front_steering([*driven, *steered])
         base = float(np.mean([wheel.place[0] for wheel in steered]) - np.mean(axles))
         steering = _max_steering(steered, separation / (2 * base))
         return Ackermann.model_validate({"type": "ackermann", "wheel_base": base, "max_steering": steering, **size})
@@ -123,14 +122,15 @@ def _max_steering(wheels: list[WheelJoint], ratio: float) -> float:
     return math.atan(tangent / (1 + tangent * ratio))
 
 
-def _why_no_drive(
-    left: list[WheelJoint], right: list[WheelJoint], steered: list[WheelJoint], others: Mapping[str, list[str]]
-) -> str:
+def _found_wheels(wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> str:
     """Describe the wheels that were found, and why the other movable joints are none."""
-    if not (left or right or steered or others):
+    if not wheels and not others:
         return "it has no movable joints"
-    sides = {"left": left, "right": right} | ({"steered": steered} if steered else {})
-    found = [f"{side}: {_shortened([wheel.joint.name for wheel in group])}" for side, group in sides.items()]
+    groups: dict[str, list[str]] = {"left": [], "right": []}
+    for wheel in wheels:
+        group = "steered" if wheel.steered else "left" if wheel.is_left else "right"
+        groups.setdefault(group, []).append(wheel.joint.name)
+    found = [f"{group}: {_shortened(names)}" for group, names in groups.items()]
     reasons = [f"{_shortened(names)} ({reason})" for reason, names in others.items()][:MAX_LISTED]
     return "; ".join(found + ([f"no wheels: {', '.join(reasons)}"] if reasons else []))
 
@@ -242,10 +242,10 @@ def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None
     if isinstance(spec.drive, Mecanum):
         _check_corners(tree, wheels)
     driven = [wheel for wheel in wheels if not wheel.steered]
-    sides = {wheel.place[1] > 0 for wheel in driven}
-    if len(sides) < 2:
+    if len({wheel.is_left for wheel in driven}) < 2:
         hint = "name the wheel joints in the drive's `left` and `right`"
-        raise InvalidInput([tree.element.problem("no driven wheels found on both sides", hint)])
+        message = f"no driven wheels found on both sides: {_found_wheels(*examine_joints(tree))}"
+        raise InvalidInput([tree.element.problem(message, hint)])
     if spec.drive.type == "ackermann" and not any(wheel.steered for wheel in wheels):
         hint = "name the steering joints in the drive's `steering`"
         raise InvalidInput([tree.element.problem("no steered wheels found", hint)])

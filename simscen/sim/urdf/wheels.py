@@ -51,6 +51,11 @@ class WheelJoint:
         return self.place[2] - self.radius
 
     @property
+    def is_left(self) -> bool:
+        """Whether it is on the left side."""
+        return self.place[1] > 0
+
+    @property
     def is_caster(self) -> bool:
         """Whether the wheel follows the motion of the robot instead of being steered."""
         return self.steered and self.trail > MIN_CASTER_TRAIL_RADII * self.radius
