@@ -96,9 +96,7 @@ class StoppedWithin(Spec, Criterion):
             state = "still moving" if stop is None else "at rest too briefly"
             because = f"{over} was over {elapsed:.2f} s after it started, with the robot {state}"
             return [undecided("stopped_within", because, self._limit)]
-        detail = _describe_motion(trace, span.start, until) + (
-            [] if stop is not None else ["it never came to rest"]
-        )
+        detail = _describe_motion(trace, span.start, until) + ([] if stop is not None else ["it never came to rest"])
         context = f"after {self.after}"
         found = at_most("stopped_within", elapsed, self.time, "s", at=(trace, until), context=context, detail=detail)
         return [found, self._judge_stay(trace, span, until, is_standing)] if self.stay and stop is not None else [found]
