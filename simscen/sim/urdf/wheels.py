@@ -10,7 +10,7 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Cylinder, Mesh, Solid, Sphere
 from simscen.model.robot import Ackermann, Differential, Drive, Omnidirectional
 from simscen.sim.body.outline import hull_points
-from simscen.sim.urdf.elements import Joint, Tree
+from simscen.sim.urdf.elements import Joint, LinkTree
 
 MIN_AXIS_COSINE = 0.99
 """Cosine of the largest angle (8 degrees) between a joint axis and the direction that it is compared with."""
@@ -43,7 +43,7 @@ class WheelJoint:
         return self.steered and self.trail > MIN_CASTER_TRAIL_RADII * self.radius
 
 
-def infer_wheels(tree: Tree) -> list[WheelJoint]:
+def infer_wheels(tree: LinkTree) -> list[WheelJoint]:
     """Return the wheels in a URDF: continuous joints with a lateral axis and a round link."""
     joints = tree.joints.values()
     steering_joints = [
@@ -60,7 +60,7 @@ def infer_wheels(tree: Tree) -> list[WheelJoint]:
     return sorted(wheels, key=lambda w: (w.place[0], -w.place[1], w.joint.name))
 
 
-def _with_trail(tree: Tree, wheel: WheelJoint, steering_joints: Sequence[Joint]) -> WheelJoint:
+def _with_trail(tree: LinkTree, wheel: WheelJoint, steering_joints: Sequence[Joint]) -> WheelJoint:
     """Return a wheel with its distance along x from the axis of its steering joint."""
     for joint in steering_joints:
         if wheel.joint.child in tree.subtree(joint.child):
@@ -68,7 +68,7 @@ def _with_trail(tree: Tree, wheel: WheelJoint, steering_joints: Sequence[Joint])
     return wheel
 
 
-def select_wheels(tree: Tree, drive: Drive) -> list[WheelJoint]:
+def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
     """Return the wheels of a drive: those in its specification, or the inferred ones. Raises InvalidInput."""
     if isinstance(drive, Omnidirectional):
         return []
@@ -97,12 +97,12 @@ def select_wheels(tree: Tree, drive: Drive) -> list[WheelJoint]:
     return given + [w for w in wheels if w.joint.name not in rolling and w.joint.child in turned]
 
 
-def steered_links(tree: Tree, knuckles: Sequence[Joint]) -> set[str]:
+def steered_links(tree: LinkTree, knuckles: Sequence[Joint]) -> set[str]:
     """Return the names of all links below the steering joints."""
     return {link for joint in knuckles for link in tree.subtree(joint.child)}
 
 
-def wheel_joint(tree: Tree, joint: Joint, steered: bool) -> WheelJoint | None:
+def wheel_joint(tree: LinkTree, joint: Joint, steered: bool) -> WheelJoint | None:
     """Return the wheel on a joint by its collision shape, or None if that is not round."""
     for solid in tree.links[joint.child].solids:
         place = tree.poses[joint.child].compose(solid.pose).position
@@ -138,7 +138,7 @@ def _round_mesh(joint: Joint, solid: Solid) -> tuple[Pose3, float, float] | None
     return Pose3(x, y, z), radius, float(np.ptp(along))
 
 
-def _has_axis_along(tree: Tree, joint: Joint, direction: int) -> bool:
+def _has_axis_along(tree: LinkTree, joint: Joint, direction: int) -> bool:
     """Return whether a joint axis is parallel to the x, y, or z axis (0, 1, 2) of the root frame."""
     rotation = tree.poses[joint.child]._replace(x=0.0, y=0.0, z=0.0)
     axis = rotation.compose(Pose3(*joint.axis)).position
@@ -156,7 +156,7 @@ MAX_CASTER_SIZE_M = 0.1
 """Largest length and width of a caster in m."""
 
 
-def alignment_warnings(tree: Tree, drive: Drive) -> list[Problem]:
+def alignment_warnings(tree: LinkTree, drive: Drive) -> list[Problem]:
     """Return warnings about wheels at different heights, and about casters that are too low or too high."""
     wheels = select_wheels(tree, drive)
     if not wheels:
@@ -174,7 +174,7 @@ def _wheel_warnings(wheels: list[WheelJoint], ground: float) -> Iterator[Problem
             yield wheel.joint.element.problem(message, "simscen places all wheels on the ground")
 
 
-def _caster_warnings(tree: Tree, wheels: list[WheelJoint], ground: float, needs_caster: bool) -> Iterator[Problem]:
+def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, needs_caster: bool) -> Iterator[Problem]:
     rolling = {link for wheel in wheels for link in tree.subtree(wheel.joint.child)}
     gaps = {
         name: _lowest(tree, name) - ground for name in tree.links if name not in rolling and tree.links[name].solids
@@ -195,14 +195,14 @@ def _caster_warnings(tree: Tree, wheels: list[WheelJoint], ground: float, needs_
         yield tree.links[nearest].element.problem(message, hint)
 
 
-def _points(tree: Tree, name: str) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
+def _points(tree: LinkTree, name: str) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
     pose = tree.poses[name]
     return np.concatenate([pose.compose(s.pose).apply(hull_points(s.shape)) for s in tree.links[name].solids])
 
 
-def _lowest(tree: Tree, name: str) -> float:
+def _lowest(tree: LinkTree, name: str) -> float:
     return float(_points(tree, name)[:, 2].min())
 
 
-def _is_small(tree: Tree, name: str) -> bool:
+def _is_small(tree: LinkTree, name: str) -> bool:
     return bool((np.ptp(_points(tree, name)[:, :2], axis=0) <= MAX_CASTER_SIZE_M).all())
