@@ -14,7 +14,7 @@ from simscen.stack.localizers.dead_reckoning import propagate_covariance, rotati
 WINDOW = 36
 """Number of recent corrections that are compared, about 9 m of driving."""
 CORRELATION_LENGTHS_M = np.array((2.0, 2.0, 1.1))
-"""Correlation length of the errors (longitudinal, lateral, yaw) in m driven, rotations included.
+"""Correlation length of the errors (longitudinal, lateral, yaw) in m driven, measured by `_distance`.
 
 The errors of poses 4 m apart have the correlations 0.4, 0.4 and 0.1, both with correct maps and with moved furniture.
 """
@@ -177,5 +177,5 @@ class CovarianceEstimator:
 
 
 def _distance(step: Pose2) -> float:
-    """Return the length of a step in m, rotations included."""
+    """Return the length of a step in m; a rotation by 1 rad counts as METERS_PER_RAD."""
     return math.hypot(step.x, step.y) + METERS_PER_RAD * abs(step.yaw)
