@@ -19,7 +19,7 @@ from simscen.record.messages.decode import StampedPose
 
 @dataclass
 class _Link:
-    """Poses of a frame in its parent frame, with their times in ns."""
+    """Poses of a frame in its parent frame, with the times in ns of their logging and their stamps."""
 
     parent: str
     logged: list[int] = field(default_factory=list)
@@ -47,8 +47,8 @@ class TransformTree:
     def between(self, outer: str, inner: str) -> tuple[StampedMessages, Array] | str:
         """Return the poses (n, 7) of `inner` in `outer` with their times, or the reason why they are unknown.
 
-        There is one pose for each message of the innermost moving transform. The other transforms keep their value from
-        one message to the next, without interpolation.
+        There is one pose for each message of the moving transform that is closest to `inner`. The other transforms keep
+        their value from one message to the next, without interpolation.
         """
         chain = self._chain(outer, inner)
         if isinstance(chain, str):
@@ -148,7 +148,7 @@ LoggedMessage = tuple[int, int, Any]
 
 
 def parse_frame_pair(name: str) -> tuple[str, str] | None:
-    """Return the parent and child frame of `map:base_link`, or None for the name of a topic."""
+    """Return the parent and child frame of a name such as `map:base_link`; None if it is the name of a topic."""
     outer, colon, inner = name.partition(":")
     return (outer, inner) if colon and not name.startswith("/") else None
 
