@@ -139,8 +139,9 @@ def _header(reader: Reader) -> tuple[Stamp, str]:
 
 def _laser_scan(reader: Reader) -> LaserScan:
     stamp, frame = _header(reader)
-    angles_times_and_limits = reader.take("7f")
-    return LaserScan(stamp, frame, *angles_times_and_limits, reader.numbers("f"))
+    angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max = reader.take("7f")
+    angles = angle_min, angle_max, angle_increment
+    return LaserScan(stamp, frame, *angles, time_increment, scan_time, range_min, range_max, reader.numbers("f"))
 
 
 def _odometry(reader: Reader) -> Odometry:

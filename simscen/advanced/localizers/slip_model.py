@@ -76,7 +76,7 @@ class Step:
     pose:             motion by the wheels, in the base frame before it
     seconds:          its duration
     speed:            possible speed: the highest plausible speed of the robot in m/s; slip is a share of it
-    slips:            the wheels slip
+    slips:            whether the wheels slip
     undetected_slip:  time in s of slip until the end of the step that was not detected before
     """
 
@@ -103,7 +103,8 @@ class Model:
 def rate_model(spec: SlipEkf, step: Step, noise: float, slipped: bool) -> Model:
     """Return the model of turn rate, bias and slip from one step to the next.
 
-    `noise` is the variance of the wheels' turn rate in (rad/s)²; `slipped`: the wheels slipped in the step before.
+    `noise` is the variance of the wheels' turn rate in (rad/s)²; `slipped` states whether the wheels slipped in the
+    step before.
     """
     f, q = np.eye(7), np.zeros((7, 7))
     f[RATE, RATE], q[RATE, RATE] = 0.0, UNKNOWN_RATE_STD_RAD_S**2 if step.slips else noise

@@ -1,4 +1,4 @@
-"""Checks of keepout zones and filter masks: do they forbid the start or a goal, do they have any effect?"""
+"""Checks that find keepout zones and filter masks that forbid the start or a goal, or that have no effect."""
 
 from collections.abc import Callable, Iterator, Mapping
 

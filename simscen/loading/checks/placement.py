@@ -1,4 +1,4 @@
-"""Checks of poses: is the robot, a goal, or an object of an event inside an obstacle or outside the map?"""
+"""Checks that find poses of the robot, goals, and objects of events inside an obstacle or outside the map."""
 
 import math
 from collections.abc import Iterator, Sequence
