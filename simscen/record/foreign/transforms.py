@@ -13,7 +13,7 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.records.trace import Ticks
 from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.foreign.timebase import StampedMessages
-from simscen.record.localization_logs.rows import Triple
+from simscen.record.localization_logs.rows import PlanarPose
 from simscen.record.messages.decode import StampedPose
 
 
@@ -114,7 +114,7 @@ _BASE_FRAMES = ("base_link", "base_footprint")
 class LidarMount(NamedTuple):
     """Pose x, y, yaw of a lidar on the base. If the lidar is mounted upside down, its angles have the opposite sign."""
 
-    pose: Triple
+    pose: PlanarPose
     is_upside_down: bool
 
 

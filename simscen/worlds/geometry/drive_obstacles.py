@@ -36,7 +36,8 @@ def drive_obstacles(
 ) -> tuple[Solid, ...]:
     """Return the solids that block a robot; the same tuple if no solid is drivable ground.
 
-    The robot has wheels of `wheel_radius` m and climbs slopes up to `max_slope` rad and steps up to `max_step` m.
+    The robot climbs slopes up to `max_slope` rad and steps up to `max_step` m. Only solids that begin at most
+    `wheel_radius` m above the floor can be ground, because wheels do not reach higher ones.
     """
     if max_slope <= 0 or has_no_drivable_solids(solids, wheel_radius):
         return solids
