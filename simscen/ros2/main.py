@@ -98,7 +98,6 @@ class AdapterRun:
         self._cleanup: List[Callable[[], None]] = []
         self.goals = Goals()
         self._adapter: Any = None
-        self._make_adapter: Callable[[str], Any] = lambda _: None
         self._steps_until_ready: List[ReceivedStep] = []
 
     def __enter__(self) -> "AdapterRun":
@@ -129,7 +128,6 @@ class AdapterRun:
             limits, filter_info = (hello.period_s, hello.answer_limit_s), FilterInfo(hello.zone_masks)
             return Adapter(options, topics, self.goals, launched, *limits, filter_info, restart_reason)
 
-        self._make_adapter = make_adapter
         adapter = self._adapter = make_adapter("")
         adapter.prepare()
         about = adapter.about()
@@ -145,9 +143,9 @@ class AdapterRun:
             "about": about,
         }
         connection.send_json(wire.WELCOME, welcome)
-        self._answer_steps(connection, hello)
+        self._answer_steps(connection, hello, make_adapter)
 
-    def _answer_steps(self, connection: Connection, hello: Hello) -> None:
+    def _answer_steps(self, connection: Connection, hello: Hello, make_adapter: Callable[[str], Any]) -> None:
         now = 0
         while True:
             kind, body = connection.receive()
@@ -157,7 +155,7 @@ class AdapterRun:
                 self.goals.now = now * 1e-9
                 published = [(hello.topics[number][0], data) for number, data in content]
                 due = bool(header.flags & wire.COMMAND_DUE)
-                received = self._step(ReceivedStep(now, published, due, header.deadline * 1e-3))
+                received = self._step(ReceivedStep(now, published, due, header.deadline * 1e-3), make_adapter)
                 stamp = header.sec, header.nanosec
                 received += [(ROSOUT, messages.log(stamp, *line)) for line in self._adapter.take_lines()]
                 connection.send(wire.answer_frame(header.tick, self._number_messages(received, hello.stack_topics)))
@@ -167,7 +165,7 @@ class AdapterRun:
             else:
                 self._process_frame(kind, wire.from_json(body), now)
 
-    def _step(self, step: ReceivedStep) -> List[Tuple[str, bytes]]:
+    def _step(self, step: ReceivedStep, make_adapter: Callable[[str], Any]) -> List[Tuple[str, bytes]]:
         """Return the answer to a step. If the bring-up was aborted, start the nodes once more and repeat the steps.
 
         On a busy machine, the lifecycle manager of Nav2 gives up when a single response is lost.
@@ -181,9 +179,9 @@ class AdapterRun:
             if self._adapter.restart_reason:
                 raise
             print(f"simscen ros2: {error}; starting the launched command again", file=sys.stderr)
-            earlier = self._adapter
+            earlier, self._adapter = self._adapter, None
             earlier.end()
-            self._adapter = self._make_adapter(str(error))
+            self._adapter = make_adapter(str(error))
             self._adapter.mode, self._adapter.continue_after_failure = earlier.mode, earlier.continue_after_failure
             self._adapter.prepare()
             for repeated in self._steps_until_ready:
