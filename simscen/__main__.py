@@ -1,4 +1,4 @@
-"""`python -m simscen`: the command line, where its program is not on the path."""
+"""Run the command line with `python -m simscen`, for example if the program `simscen` is not on PATH."""
 
 from simscen.cli.start import start
 

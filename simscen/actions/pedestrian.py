@@ -45,7 +45,8 @@ class _WalkSettings(Spec):
     """Keys that `pedestrian` and `crowd` share."""
 
     repeat: Literal["once", "loop", "back_and_forth"] = "once"
-    """After the last goal: stay, return to the first goal, or walk back through the goals."""
+    """After the last goal: stay (`once`), walk to the first goal again (`loop`), or walk back through the goals
+    (`back_and_forth`)."""
     speed: Annotated[PositiveSpeed, Field(le=3)] | None = None
     """Preferred speed; default: drawn from the seed, 1.29 m/s with a standard deviation of 0.19 m/s."""
     behavior: Behavior = "regular"
@@ -97,7 +98,7 @@ class _WalkSettings(Spec):
 
 
 def _stream_owner(name: str, group: str | None) -> str:
-    """Return the first part of the names of the random streams of a pedestrian."""
+    """Return the prefix of the names of the random streams of a pedestrian."""
     return f"person {name}" if group is None else f"group {group}"
 
 
@@ -115,13 +116,13 @@ class Pedestrian(_WalkSettings, WorldAction):
     pose: PlaceOrPose
     """Initial pose, or a place by name."""
     goals: Annotated[list[PlaceOrPoint], Field(max_length=1000)] = []
-    """Goals in order: points [x, y] in the world frame, or places by name. Without goals, they stand, and return to
-    their place after stepping aside."""
+    """Goals in order: points [x, y] in the world frame, or places by name. Without goals, they stand still;
+    if they step aside, they return to their place."""
     group: Name | None = None
     """Members of the same group walk side by side."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Add the pedestrian; has no effect if there is no free space."""
+        """Add the pedestrian. Does not count as having happened if there is no free space."""
         pose = self.pose.pose
         if not stage.has_room((pose.x, pose.y), self.radius):
             return Effect(False, f"there is no free space for {self.name} at ({pose.x:.2f}, {pose.y:.2f})")
@@ -156,7 +157,7 @@ class Crowd(_WalkSettings, WorldAction):
         return [f"{self.name}-{number}" for number in range(1, self.count + 1)]
 
     def perform(self, stage: Stage) -> Effect:
-        """Add the people; does not count as having happened if there is not enough free space for all."""
+        """Add the people. Does not count as having happened if there is not enough free space for all."""
         added, group_start = 0, None
         for index in range(self.count):
             is_follower = index % self.group_size > 0

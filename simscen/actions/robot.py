@@ -51,9 +51,9 @@ class Push(Spec, Action):
     name: MovableName | None = None
     """An object with a mass; default: the robot."""
     impulse: Annotated[list[Impulse], Field(min_length=2, max_length=2)] | None = None
-    """N s along x and y of the world frame, within one physics tick."""
+    """Impulse in N s along x and y of the world frame, within one physics tick."""
     force: Annotated[list[Force], Field(min_length=2, max_length=2)] | None = None
-    """Alternatively: N along x and y of the world frame, for the duration `for`."""
+    """Alternatively: force in N along x and y of the world frame, for the duration `for`."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
     """Duration of the force."""
 
@@ -87,7 +87,7 @@ class Push(Spec, Action):
 
 
 class NewGoal(Spec, Action):
-    """Send another goal; it preempts the current goal, and the remaining goals follow it.
+    """Send another goal. It preempts the current goal; the remaining goals come after the new one.
 
     Criteria judge it like any other goal of the scenario. They neither require the preempted goal nor count it as
     failed. The name must differ from the names of all other goals. If the event happens twice, the goal is sent twice,

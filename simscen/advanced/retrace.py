@@ -27,8 +27,8 @@ MIN_LATERAL_SHARE = 0.1
 class Trail:
     """Evenly spaced poses (n, 3) of the robot's path in reverse, without loops, starting at the current pose.
 
-    `along` (n,) is the distance in m that the footprint moves to each pose, rotations included. Beyond the known part,
-    the trail continues straight backward.
+    `along` (n,) is the distance in m that the footprint moves to each pose, in rotations as well. Beyond the known
+    part, the trail continues straight backward.
     """
 
     def __init__(self, poses: Sequence[Pose2], pose: Pose2, lever: float, length: float) -> None:

@@ -21,6 +21,7 @@ MIN_MEMORY_BYTES = 1 << 30
 MIN_SHARED_MEMORY_BYTES = 16 << 20
 """What OpenMP and the renderer request in /dev/shm."""
 MIN_OPEN_FILES = 64
+"""Enough for a run."""
 
 
 class CheckFailed(Exception):
@@ -96,8 +97,8 @@ def disk_space(folder: Path) -> str:
 
 def resource_limits() -> str:
     """Check that the limits of shell, container, and system allow a run."""
-    memory = min(_soft(resource.RLIMIT_AS), _cgroup_memory(), MAX_MEMORY_BYTES)
-    files, length = _soft(resource.RLIMIT_NOFILE), _soft(resource.RLIMIT_FSIZE)
+    memory = min(_soft_limit(resource.RLIMIT_AS), _cgroup_memory(), MAX_MEMORY_BYTES)
+    files, length = _soft_limit(resource.RLIMIT_NOFILE), _soft_limit(resource.RLIMIT_FSIZE)
     if memory < MIN_MEMORY_BYTES:
         hint = "raise `ulimit -v` or the container's limit to 1 GiB for each job"
         raise CheckFailed(f"a run gets {_mib(memory)} of memory; {hint}")
@@ -120,7 +121,7 @@ def shared_memory() -> str:
     return f"/dev/shm has {_mib(free)} free"
 
 
-def _soft(limit: int) -> int:
+def _soft_limit(limit: int) -> int:
     soft = resource.getrlimit(limit)[0]
     return sys.maxsize if soft == resource.RLIM_INFINITY else soft
 

@@ -43,10 +43,16 @@ class CountBounds(Spec):
             raise ValueError(f"min {self.min} is above max {self.max}, so no number is allowed")
         return self
 
-    def bound(self, trace: Trace, what: str, noun: str, hits: Sequence[Event], detail: Sequence[str]) -> list[Finding]:
-        """Return one finding for each bound. In a truncated log, a number below `min` is inconclusive."""
-        at = (trace, hits[-1].tick) if hits else None
-        findings = counted(what, len(hits), noun, self.min, self.max, at=at, detail=detail)
+    def judge_count(
+        self, trace: Trace, what: str, noun: str, events: Sequence[Event], detail: Sequence[str]
+    ) -> list[Finding]:
+        """Return one finding for each bound. In a truncated log, a number below `min` is inconclusive.
+
+        `what` is the measured quantity, e.g. "replans"; `noun` names one event in the singular; `detail` are the lines
+        that explain a failure.
+        """
+        at = (trace, events[-1].tick) if events else None
+        findings = counted(what, len(events), noun, self.min, self.max, at=at, detail=detail)
         if self.min is not None and findings[0].status is Status.FAIL and not has_ended(trace):
             findings[0] = undecided(what, f"{findings[0].measured} so far", findings[0].limit, detail)
         return findings
@@ -65,9 +71,9 @@ class Replans(CountBounds, Criterion):
     """
 
     reason: ReplanReason | None = None
-    """Only plans made for this reason: the plan was `blocked`, the robot had left it (`missed`), an obstacle came too
-    near (`tight`), obstacles went away (`better`), a mapless robot's `window` moved on, after a `recovery`, or at the
-    planner's `rate`."""
+    """Only plans made for this reason: `blocked` (the old plan was blocked), `missed` (the robot had left it), `tight`
+    (an obstacle came too near to it), `better` (obstacles went away), `window` (the local window of a robot without a
+    map moved), `recovery` (after a recovery), or `rate` (periodic replanning)."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -83,7 +89,7 @@ class Replans(CountBounds, Criterion):
         details = [
             f"t = {trace.seconds(plan.tick):.2f} s: {plan.data.get('reason', 'goal')}" for plan in plans[:MAX_DETAILS]
         ]
-        return self.bound(trace, "replans", "replan", replans, details or ["no plan was ever made"])
+        return self.judge_count(trace, "replans", "replan", replans, details or ["no plan was ever made"])
 
 
 class Recoveries(CountBounds, Criterion):
@@ -112,4 +118,4 @@ class Recoveries(CountBounds, Criterion):
         counted_starts = [start for start in starts if self.name in (None, start.name)]
         details = [f"t = {trace.seconds(start.tick):.2f} s: {start.name}" for start in starts[:MAX_DETAILS]]
         noun = "recovery" if self.name is None else f"{self.name} recovery"
-        return self.bound(trace, "recoveries", noun, counted_starts, details)
+        return self.judge_count(trace, "recoveries", noun, counted_starts, details)

@@ -32,7 +32,8 @@ def at_most(
 ) -> Finding:
     """Return a finding that passes if `value` <= `limit`.
 
-    `at` is the tick of the smallest margin, `context` the text after the limit ("after lidar.off"). Raises InvalidTrace
+    `what` is the measured quantity, e.g. "path_length", and `detail` are lines that explain a failure. `at` is the tick
+    of the smallest margin, `context` the text after the limit ("after lidar.off"). Raises InvalidTrace
     if `value` is nan, because comparisons with nan are meaningless.
     """
     return _bound(what, value, limit, unit, limit - value, "≤", at, context, detail)
@@ -62,7 +63,7 @@ def counted(
     at: tuple[Trace, int] | None = None,
     detail: Sequence[str] = (),
 ) -> list[Finding]:
-    """Return one finding for each bound on a number of events, with margins in events."""
+    """Return one finding for each bound on a number of events. `noun` names one event in the singular."""
     measured = f"{count} {noun}" if count == 1 else f"{count} {_plural(noun)}"
     bounds = [] if low is None else [(count - low, f"≥ {low}")]
     bounds += [] if high is None else [(high - count, f"≤ {high}")]

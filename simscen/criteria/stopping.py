@@ -36,7 +36,8 @@ class StoppedWithin(Spec, Criterion):
         command is zero.
     Source: Nav2's collision monitor, whose source_timeout stops a robot without sensor data.
 
-    Inconclusive if `after` never started, if the fault or the run ended before `time`, or if the robot already stood.
+    Inconclusive if `after` never started, if the fault or the run ended before `time`, or if the robot was already
+    standing when `after` started.
 
     Example: `stopped_within: {time: 0.5 s, after: lidar.off}`
     """
@@ -67,26 +68,26 @@ class StoppedWithin(Spec, Criterion):
         if not happened:
             because, detail = never_started(trace, self.after)
             return [undecided("stopped_within", because, self._limit, detail)]
-        rest = self._rest(trace)
-        if all(_stood_before(trace, rest, span.start) for span in happened):
+        is_standing = self._standing_samples(trace)
+        if all(_stood_before(trace, is_standing, span.start) for span in happened):
             because = f"the robot was not moving when `{self.after}` started, so nothing had to stop"
             return [undecided("stopped_within", because, self._limit)]
-        return [finding for span in happened for finding in self._judge_span(trace, span, rest)]
+        return [finding for span in happened for finding in self._judge_span(trace, span, is_standing)]
 
     @property
     def _limit(self) -> str:
         return f"≤ {self.time:.2f} s after {self.after}"
 
-    def _rest(self, trace: Trace) -> Flags:
+    def _standing_samples(self, trace: Trace) -> Flags:
         """Return, for each sample of the truth, whether the robot stands."""
         slow = speed(trace).values[:, 0] <= self.speed
         steady = turn_rate(trace).values[:, 0] <= self.turn_rate
         return slow & steady
 
-    def _judge_span(self, trace: Trace, span: Span, rest: Flags) -> list[Finding]:
+    def _judge_span(self, trace: Trace, span: Span, is_standing: Flags) -> list[Finding]:
         first = max(int(np.searchsorted(trace.velocity.ticks, span.start, side="right")) - 1, 0)
         hold = round(self.hold * trace.tick_rate)
-        stop, lasted = first_sustained(trace.velocity.ticks[first:], rest[first:], hold, trace.end)
+        stop, lasted = first_sustained(trace.velocity.ticks[first:], is_standing[first:], hold, trace.end)
         stop = None if stop is None or stop > span.end else max(stop, span.start)
         until = span.end if stop is None else stop
         elapsed = trace.seconds(until - span.start)
@@ -98,11 +99,11 @@ class StoppedWithin(Spec, Criterion):
         detail = _describe_motion(trace, span.start, until) + ([] if stop is not None else ["it never came to rest"])
         context = f"after {self.after}"
         found = at_most("stopped_within", elapsed, self.time, "s", at=(trace, until), context=context, detail=detail)
-        return [found, self._stayed(trace, span, until, rest)] if self.stay and stop is not None else [found]
+        return [found, self._judge_stay(trace, span, until, is_standing)] if self.stay and stop is not None else [found]
 
-    def _stayed(self, trace: Trace, span: Span, stop: int, rest: Flags) -> Finding:
+    def _judge_stay(self, trace: Trace, span: Span, stop: int, is_standing: Flags) -> Finding:
         ticks = trace.velocity.ticks
-        again = ticks[~rest & (ticks > stop) & (ticks < span.end)]
+        again = ticks[~is_standing & (ticks > stop) & (ticks < span.end)]
         expected = f"standing until {self.after} ends"
         if not len(again):
             return held("stayed", "stood still", expected)
@@ -112,9 +113,9 @@ class StoppedWithin(Spec, Criterion):
         )
 
 
-def _stood_before(trace: Trace, rest: Flags, tick: int) -> bool:
+def _stood_before(trace: Trace, is_standing: Flags, tick: int) -> bool:
     """Return whether the robot stood just before `tick`."""
-    return bool(rest[max(int(np.searchsorted(trace.velocity.ticks, tick, side="left")) - 1, 0)])
+    return bool(is_standing[max(int(np.searchsorted(trace.velocity.ticks, tick, side="left")) - 1, 0)])
 
 
 def _describe_motion(trace: Trace, start: int, end: int) -> list[str]:
@@ -131,9 +132,10 @@ def _describe_motion(trace: Trace, start: int, end: int) -> list[str]:
 
 
 class Stuck(Spec, Criterion):
-    """The robot made progress while it had a goal.
+    """The robot was never stuck: it made progress while it had a goal.
 
-    What is measured: the longest time in which it stayed within `radius` of where it was, while a goal was under way.
+    What is measured: the longest time during which it stayed within `radius` of one position, while a goal was under
+        way.
     When it fails: that is longer than `max`.
     Why this: a robot that spins and backs up for a minute before it arrives passes all other criteria.
     Source: Nav2's SimpleProgressChecker, whose defaults these are; ScenarioRunner's ActorBlockedTest.

@@ -52,7 +52,7 @@ class Slip(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Odometry", "Wheels"})
-    idle: ClassVar[Mapping[str, object]] = {"left": 0.0, "right": 0.0}
+    neutral_values: ClassVar[Mapping[str, object]] = {"left": 0.0, "right": 0.0}
     left: SlipRatio = 0.0
     """Slip ratio of the left wheels."""
     right: SlipRatio = 0.0
@@ -96,7 +96,7 @@ class Gain(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Command", "Wheels"})
-    idle: ClassVar[Mapping[str, object]] = dict.fromkeys(("linear", "angular", "left", "right"), 1.0)
+    neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(("linear", "angular", "left", "right"), 1.0)
     linear: GainFactor = 1.0
     """Driven over commanded linear velocity, forward and lateral."""
     angular: GainFactor = 1.0
@@ -107,7 +107,7 @@ class Gain(Spec, Fault):
     """The same for the right wheels; only on `wheels`."""
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Reject sides on targets without sides."""
+        """Return a side and the reason if the target has no sides, or None."""
         for key in ("left", "right"):
             if key in self.model_fields_set and (finding := inapplicable_side(target, key)):
                 return finding
@@ -141,7 +141,7 @@ class Saturation(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Command", "Wheels"})
-    idle: ClassVar[Mapping[str, object]] = dict.fromkeys(
+    neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(
         ("linear", "angular", "linear_acceleration", "angular_acceleration", "left", "right")
     )
     linear: SpeedLimit | None = None
@@ -158,7 +158,7 @@ class Saturation(Spec, Fault):
     """Maximum speed of the right wheels in both directions; only on `wheels`."""
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Reject sides on targets without sides."""
+        """Return a side and the reason if the target has no sides, or None."""
         for key in ("left", "right"):
             if getattr(self, key) is not None and (finding := inapplicable_side(target, key)):
                 return finding

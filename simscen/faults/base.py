@@ -128,13 +128,13 @@ class Fault(ABC):
     """Specification of a fault in a scenario; `affects` are the kinds of target that it can be applied to.
 
     Kinds are the class names of readings ("Scan", "Odometry", …), "Command" for cmd_vel, "Wheels" for wheels, "Belief"
-    for the localizer, and "Map" for the map. If some keys only apply to some kinds, `keys_of` maps each kind to its
-    keys.
+    for the localizer, and "Map" for the map. If some keys only apply to some kinds, `keys_by_kind` maps each kind to
+    its keys.
     """
 
     affects: ClassVar[frozenset[str]]
-    keys_of: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    idle: ClassVar[Mapping[str, object]] = {}
+    keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    neutral_values: ClassVar[Mapping[str, object]] = {}
     """Values of the keys with which the fault has no effect; {} if it always has one."""
 
     @classmethod
@@ -145,7 +145,7 @@ class Fault(ABC):
         return "" if is_valid else f"its `affects` is not a set of {', '.join(FAULT_TARGET_KINDS)}"
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Return a key that makes no sense on this target ("" for the whole fault) and the reason, or None."""
+        """Return a key that does not apply to the target ("" for the whole fault) and the reason, or None."""
         return None
 
     @abstractmethod

@@ -15,9 +15,9 @@ from simscen.faults.base import Disturbance, Fault, Instance
 
 
 def inapplicable_key(fault: Fault, target: Instance) -> tuple[str, str] | None:
-    """Return a key of the fault that was set but does not apply to the target (see `Fault.keys_of`), and why."""
+    """Return a key of the fault that was set but does not apply to the target (see `Fault.keys_by_kind`), and why."""
     assert isinstance(fault, BaseModel)
-    applicable = fault.keys_of[target.kind]
+    applicable = fault.keys_by_kind[target.kind]
     given = [name for name in type(fault).model_fields if name in fault.model_fields_set]
     wrong = next((name for name in given if name not in applicable), None)
     if wrong is None:
@@ -84,10 +84,13 @@ class OdometryDistortion(Disturbance):
 
     @abstractmethod
     def increment(self, step: Twist) -> Twist:
-        """Return the reported value of a true increment (m, m, rad) or velocity (m/s, m/s, rad/s)."""
+        """Return the distorted value of a true increment (m, m, rad) or velocity (m/s, m/s, rad/s)."""
 
-    def reported(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
-        """Return the reported increment over `ticks` and the reported velocity at its end."""
+    def distort(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
+        """Return the distorted increment over `ticks`, and the distorted velocity at its end.
+
+        The default distorts both with `increment`.
+        """
         return self.increment(step), self.increment(velocity)
 
     def reading(self, reading: Reading) -> Reading | None:
@@ -97,7 +100,7 @@ class OdometryDistortion(Disturbance):
         previous, pose = self._previous.get(reading.sensor, (reading, reading.pose))
         step, velocity = Twist(*previous.pose.between(reading.pose)), reading.twist
         if not self._ended:
-            step, velocity = self.reported(step, velocity, reading.tick - previous.tick)
+            step, velocity = self.distort(step, velocity, reading.tick - previous.tick)
         pose = pose.compose(Pose2(*step))
         self._previous[reading.sensor] = reading, pose
         return replace(reading, pose=pose, twist=velocity)

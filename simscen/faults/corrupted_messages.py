@@ -35,7 +35,7 @@ class Garbage(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Image"})
-    idle: ClassVar[Mapping[str, object]] = {"probability": 0.0}
+    neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     value: Literal["nan", "inf", "zero", "negative", "huge", "empty", "short", "anything"] = "anything"
     """Content of all values of such a message: nan, inf, zero, negative (-1), or huge (1e30). A scan or image can also
     be empty (no values) or short (half of the values). `anything` draws one of these for each message."""

@@ -31,7 +31,7 @@ class Delay(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command", "Belief"})
-    idle: ClassVar[Mapping[str, object]] = {"latency": 0.0, "jitter": 0.0}
+    neutral_values: ClassVar[Mapping[str, object]] = {"latency": 0.0, "jitter": 0.0}
     latency: Duration = 0.0
     """Delay of every message."""
     jitter: Duration = 0.0

@@ -23,7 +23,7 @@ class BeamDropout(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
-    idle: ClassVar[Mapping[str, object]] = {"probability": 0.0}
+    neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     probability: Probability
     """Probability that a beam returns nothing."""
 
@@ -62,7 +62,7 @@ class Sector(Spec, Fault):
         return turn if self.to - self.from_ >= turn - 1e-9 else (self.to - self.from_) % turn
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Reject a sector without width."""
+        """Return `to` and the reason if the sector has no width."""
         return ("to", "the sector ends where it begins") if not self.width else None
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
@@ -92,7 +92,7 @@ class RangeLimit(Spec, Fault):
     """Largest range or depth that is still measured."""
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Require a limit below the sensor's own maximum."""
+        """Return `max` and the reason if it is not below the maximum range of the sensor."""
         own = getattr(target.spec, "max_range", None)
         if own is None or self.max < own:
             return None
@@ -127,7 +127,7 @@ class Ghost(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
-    idle: ClassVar[Mapping[str, object]] = {"probability": 0.0}
+    neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     range: PositiveLength
     """Distance of the ghost; beams that hit something nearer report that instead."""
     direction: Angle = 0.0
@@ -138,7 +138,7 @@ class Ghost(Spec, Fault):
     """Probability that a beam of the window hits the ghost, drawn again for each scan."""
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Require a range that the lidar can measure."""
+        """Return `range` and the reason if the lidar cannot measure it."""
         nearest, farthest = (getattr(target.spec, key, None) for key in ("min_range", "max_range"))
         if nearest is None or farthest is None or nearest <= self.range <= farthest:
             return None

@@ -31,7 +31,7 @@ class Jump(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Belief"})
-    idle: ClassVar[Mapping[str, object]] = {"x": 0.0, "y": 0.0, "yaw": 0.0}
+    neutral_values: ClassVar[Mapping[str, object]] = {"x": 0.0, "y": 0.0, "yaw": 0.0}
     x: Length = 0.0
     """Forward."""
     y: Length = 0.0
@@ -65,7 +65,7 @@ class Shift(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Map"})
-    idle: ClassVar[Mapping[str, object]] = {"x": 0.0, "y": 0.0, "yaw": 0.0}
+    neutral_values: ClassVar[Mapping[str, object]] = {"x": 0.0, "y": 0.0, "yaw": 0.0}
     x: Length = 0.0
     """Along the x axis of the map."""
     y: Length = 0.0
@@ -93,7 +93,7 @@ class Outdated(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Map"})
-    idle: ClassVar[Mapping[str, object]] = {"missing": [], "extra": []}
+    neutral_values: ClassVar[Mapping[str, object]] = {"missing": [], "extra": []}
     missing: Rings = []
     """Polygons, given by their corners, in which the map shows free space."""
     extra: Rings = []

@@ -72,7 +72,7 @@ class Dropout(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = MESSAGES
-    idle: ClassVar[Mapping[str, object]] = {"probability": 0.0}
+    neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     probability: Probability
     """Probability that a message is lost."""
 
@@ -144,7 +144,7 @@ class Slow(Spec, Fault):
     """Messages per second that arrive."""
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Require a rate below that of the target."""
+        """Return `rate` and the reason if it is not below the rate of the target."""
         if not target.rate or self.rate < target.rate:
             return None
         return "rate", f"{self.rate:g} Hz is not slower than its normal rate of {target.rate:g} messages per second"

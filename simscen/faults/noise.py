@@ -36,10 +36,10 @@ class Noise(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Image", "Belief"})
-    idle: ClassVar[Mapping[str, object]] = dict.fromkeys(
+    neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(
         ("std", "colour", "linear", "angular", "gyro", "accelerometer"), 0.0
     )
-    keys_of: ClassVar[Mapping[str, tuple[str, ...]]] = {
+    keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "Scan": ("std",),
         "Image": ("std", "colour"),
         "Odometry": ("linear", "angular"),
@@ -60,7 +60,7 @@ class Noise(Spec, Fault):
     """Standard deviation of the acceleration along each axis."""
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Reject keys that do not apply to the target."""
+        """Return a key that does not apply to the target and the reason, or None."""
         return inapplicable_key(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
@@ -114,7 +114,7 @@ class _NoisyOdometry(OdometryDistortion):
             step.wz + self._noise.angular * math.sqrt(turned) * turn,
         )
 
-    def reported(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
+    def distort(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
         noisy = self.increment(step)
         if not ticks:
             return noisy, velocity

@@ -32,17 +32,18 @@ class Bias(Spec, Fault):
     """A constant error: wrong wheel radii, a gyroscope that was not zeroed, a lidar that is too warm.
 
     Odometry reports a scaled distance and turn, plus a turn for each meter driven; ranges are too long or too short; a
-    gyroscope reports a rotation at rest; a picture is too bright or too dark.
+    gyroscope reports a rotation at rest; a picture is too bright or too dark. To scale all values of a sensor by one
+    factor, use `scale`.
 
     Example: `{sensor: odom, bias: {linear_scale: 1.1, turn_per_metre: 0.05}}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Odometry", "Scan", "Imu", "Image"})
-    idle: ClassVar[Mapping[str, object]] = {
+    neutral_values: ClassVar[Mapping[str, object]] = {
         **dict.fromkeys(("linear_scale", "angular_scale"), 1.0),
         **dict.fromkeys(("turn_per_metre", "range", "gyro", "accelerometer", "brightness"), 0.0),
     }
-    keys_of: ClassVar[Mapping[str, tuple[str, ...]]] = {
+    keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "Odometry": ("linear_scale", "angular_scale", "turn_per_metre"),
         "Scan": ("range",),
         "Imu": ("gyro", "accelerometer"),
@@ -64,7 +65,7 @@ class Bias(Spec, Fault):
     """Added to red, green, and blue of each pixel, relative to full scale."""
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Reject keys that do not apply to the target."""
+        """Return a key that does not apply to the target and the reason, or None."""
         return inapplicable_key(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
@@ -103,14 +104,14 @@ class _BiasedReadings(Disturbance):
 class Scale(Spec, Fault):
     """All values of a sensor are too large or too small by a factor.
 
-    For ranges and depths: a clock that runs fast or slow. For odometry, distances and turns: low tire pressure, or a
-    wrong gear ratio in the driver. For an IMU, gravity included: a wrong full-scale setting.
+    For ranges and depths: the clock that times the echoes runs fast or slow. For odometry, distances and turns: low
+    tire pressure, or a wrong gear ratio in the driver. For an IMU, gravity included: a wrong full-scale setting.
 
     Example: `{sensor: odom, scale: {factor: 105 %}}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Image"})
-    idle: ClassVar[Mapping[str, object]] = {"factor": 1.0}
+    neutral_values: ClassVar[Mapping[str, object]] = {"factor": 1.0}
     factor: Annotated[float, Field(gt=0, le=100), Quantity("ratio")]
     """Reported value over true value."""
 
@@ -143,15 +144,15 @@ class _ScaledReadings(Disturbance):
 class Drift(Spec, Fault):
     """An error that starts at zero and grows with time: electronics that warm up, a gyroscope bias that drifts.
 
-    Odometry reports motion while the robot stands still. The belief moves along the heading that the robot had when
-    the fault began, as with a scan matcher in a corridor without features.
+    Odometry reports motion while the robot stands still. The estimated pose moves along the heading that the robot had
+    when the fault began, as with a scan matcher in a corridor without features.
 
     Example: `{sensor: imu, drift: {gyro: 0.01 rad/s^2}, when: {time: 2 s}, for: 10 s}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Image", "Belief"})
-    idle: ClassVar[Mapping[str, object]] = dict.fromkeys(("range", "linear", "angular", "gyro"), 0.0)
-    keys_of: ClassVar[Mapping[str, tuple[str, ...]]] = {
+    neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(("range", "linear", "angular", "gyro"), 0.0)
+    keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "Scan": ("range",),
         "Image": ("range",),
         "Odometry": ("linear", "angular"),
@@ -161,14 +162,14 @@ class Drift(Spec, Fault):
     range: Speed = 0.0
     """Growth of the error of each range or depth."""
     linear: Speed = 0.0
-    """Forward velocity that the odometry adds, or with which the belief moves."""
+    """Forward velocity that the odometry adds, or with which the estimated pose moves."""
     angular: AngularSpeed = 0.0
-    """Angular velocity that the odometry adds, or with which the belief turns."""
+    """Angular velocity that the odometry adds, or with which the estimated pose turns."""
     gyro: AngularAcceleration = 0.0
     """Growth of the bias of the angular velocity about the vertical axis."""
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Reject keys that do not apply to the target."""
+        """Return a key that does not apply to the target and the reason, or None."""
         return inapplicable_key(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:
@@ -184,7 +185,7 @@ class _DriftingOdometry(OdometryDistortion):
     def increment(self, step: Twist) -> Twist:
         return Twist(step.vx + self._drift.linear, step.vy, step.wz + self._drift.angular)
 
-    def reported(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
+    def distort(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
         seconds = self._clock.seconds(ticks)
         drifted = Twist(step.vx + self._drift.linear * seconds, step.vy, step.wz + self._drift.angular * seconds)
         return drifted, self.increment(velocity)
@@ -227,8 +228,8 @@ class Extrinsic(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Image", "Imu"})
-    idle: ClassVar[Mapping[str, object]] = dict.fromkeys(("x", "y", "z", *ANGLES), 0.0)
-    keys_of: ClassVar[Mapping[str, tuple[str, ...]]] = {
+    neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(("x", "y", "z", *ANGLES), 0.0)
+    keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "Scan": ("x", "y", "z", *ANGLES),
         "Image": ("x", "y", "z", *ANGLES),
         "Imu": ANGLES,
@@ -247,7 +248,7 @@ class Extrinsic(Spec, Fault):
     """Counterclockwise."""
 
     def unsuitable_key(self, target: Instance) -> tuple[str, str] | None:
-        """Reject keys that do not apply to the sensor."""
+        """Return a key that does not apply to the target and the reason, or None."""
         return inapplicable_key(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> Disturbance:

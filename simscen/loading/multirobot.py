@@ -16,7 +16,8 @@ ROBOT_KEYS = ("goals", "faults")
 def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
     """Return the scenario of each robot by name, sorted; empty for a scenario of one robot.
 
-    All parts keep their positions. `expected` stays with the scenario as a whole.
+    All nodes keep their positions in the file. The key `expected` is not copied, because it applies to the scenario as
+    a whole.
     """
     robots = child(tree, ROBOTS)
     entries = robots.entries if isinstance(robots, MappingNode) else {}
@@ -47,7 +48,8 @@ def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
 def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
     """Return a scenario with the selected stack in place of its own stack, or of the stacks of all its robots.
 
-    A command for an external stack that one of the robots already has changes nothing in the tree.
+    If the choice is a command for an external stack that a robot of the scenario already names, the tree is returned
+    unchanged.
     """
     robots = child(tree, ROBOTS)
     if robots is None:
@@ -60,18 +62,24 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
     chosen = {name: replace_stack(part, choice) for name, part in parts.items()}
     if all(chosen[name] is part for name, part in parts.items()):
         return tree
-    own = {name: Entry(entry.key, _with_stack_of(entry.value, chosen[name])) for name, entry in robots.entries.items()}
+    own = {
+        name: Entry(entry.key, _with_complete_stack(entry.value, chosen[name]))
+        for name, entry in robots.entries.items()
+    }
     rest = _without(tree, STACK)
     return MappingNode(
         tree.position, {**rest.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.position, own))}
     )
 
 
-def _with_stack_of(robot: Node, part: MappingNode) -> MappingNode:
-    """Return the tree of a robot with the complete stack of `part`, since the common `stack` is removed."""
+def _with_complete_stack(robot: Node, robot_scenario: MappingNode) -> MappingNode:
+    """Return the tree of a robot with the complete stack of `robot_scenario`.
+
+    The robot needs the complete stack because the common key `stack` is removed.
+    """
     assert isinstance(robot, MappingNode)
     return MappingNode(
-        robot.position, robot.entries | {key: entry for key, entry in part.entries.items() if key == STACK}
+        robot.position, robot.entries | {key: entry for key, entry in robot_scenario.entries.items() if key == STACK}
     )
 
 
@@ -90,13 +98,13 @@ def _without(tree: MappingNode, *keys: str) -> MappingNode:
     return MappingNode(tree.position, {key: entry for key, entry in tree.entries.items() if key not in keys})
 
 
-def missing_in_scenario(tree: MappingNode) -> list[Problem]:
-    """Return problems with missing or contradicting `robot`, `robots` and `pass` in a scenario."""
+def scenario_robot_problems(tree: MappingNode) -> list[Problem]:
+    """Return problems with missing or contradictory `robot`, `robots` and `pass` in a scenario."""
     return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _single_robot_problems(tree))]
 
 
-def missing_in_criteria(tree: MappingNode) -> list[Problem]:
-    """Return problems with missing or contradicting `robots` and `pass` in a file of criteria."""
+def criteria_robot_problems(tree: MappingNode) -> list[Problem]:
+    """Return problems with missing or contradictory `robots` and `pass` in a file of criteria."""
     return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _missing_criteria(tree))]
 
 

@@ -1,4 +1,7 @@
-"""Find the plugins of installed packages that a scenario uses."""
+"""Find which plugins of installed packages a scenario uses, and check that the plugins of a log are installed.
+
+An Entry is one plugin, i.e. an entry point of an installed package.
+"""
 
 from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Any
@@ -29,31 +32,31 @@ def used_by(*specs: Any) -> tuple[Entry, ...]:
     return _sorted(found)
 
 
-def fact_of(entry: Entry) -> str:
-    """Return the key of a plugin in the header of a log."""
+def log_header_key(entry: Entry) -> str:
+    """Return the key of a plugin in the header of a log, e.g. `plugin.criterion.dwell`."""
     return f"{_HEADER_PREFIX}{entry.group}.{entry.name}"
 
 
 def requirement_of(entry: Entry) -> str:
-    """Return package and version of a plugin, as pip writes them."""
+    """Return `package==version` of a plugin."""
     return f"{entry.distribution}=={entry.version}"
 
 
-def missing_plugins(facts: Mapping[str, str], kinds: Container[str]) -> list[Problem]:
-    """Return a problem for each plugin of these kinds that a log used and that is not installed in the same version.
+def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[Problem]:
+    """Return a problem for each plugin that a log used and that is not installed in the same version.
 
-    `facts` are the entries in the header of the log.
+    `header` is the header of the log. Only plugins of the given `groups`, e.g. "criterion", are checked.
     """
     missing = []
-    for fact, recorded in sorted(facts.items()):
-        kind, _, name = fact.removeprefix(_HEADER_PREFIX).partition(".")
-        if not fact.startswith(_HEADER_PREFIX) or kind not in kinds:
+    for key, recorded in sorted(header.items()):
+        group, _, name = key.removeprefix(_HEADER_PREFIX).partition(".")
+        if not key.startswith(_HEADER_PREFIX) or group not in groups:
             continue
-        entry = find(kind, name)
+        entry = find(group, name)
         installed = requirement_of(entry) if entry is not None else ""
         if installed != recorded:
             difference = f"{installed} is installed" if installed else "it is not installed"
-            message = f"the run was judged with {kind} `{name}` of {recorded}, but {difference}"
+            message = f"the run was judged with {group} `{name}` of {recorded}, but {difference}"
             missing.append((message, f"`pip install {recorded}`, or judge with another file: --scenario"))
     return [Problem("", 0, 0, "SC805", message, hint) for message, hint in missing]
 

@@ -37,8 +37,10 @@ def load_scenario(
 ) -> LoadedScenario:
     """Load the scenario in the file `path`; paths in it must lead into `root` or a folder of `world_path`.
 
-    `choice` replaces its stack. `variation` selects one of its variations. Raises InvalidInput with all problems of the
-    scenario and of the files it names, and UsageError if the variation is unknown or missing.
+    `world_path` are the folders in which worlds are searched. `choice` is the stack selected with `--stack`, which
+    replaces the scenario's own. `variation` is the name of one of its variations; "" for a file without variations.
+    Raises InvalidInput with all problems of the scenario and of the files it names, and UsageError if the variation is
+    unknown or missing.
     """
     number = number_of(variation)
     loaded = try_variations(path, root, world_path, choice, None if number is None else [number])
@@ -56,7 +58,7 @@ def load_scenario(
 def try_scenario(
     path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
 ) -> LoadedScenario | list[Problem]:
-    """Return the scenario in a file, or its first variation; or all problems of the file."""
+    """Return the scenario in a file (the first variation if it has several), or all problems of the file."""
     loaded = try_variations(path, root, world_path, choice)
     return loaded if isinstance(loaded, list) else loaded[0]
 
@@ -71,9 +73,9 @@ def try_variations(
 ) -> tuple[LoadedScenario, ...] | list[Problem]:
     """Return all variations of the scenario in a file in order, or all problems of any of them.
 
-    A file without variations yields one scenario whose variation has no name. `numbers` selects variations by their
-    numbers from 1, without those that do not exist or do not meet the conditions in `require`. `unsaved` contains
-    texts that replace those of files.
+    A file without variations yields one scenario whose variation has no name. `numbers` selects variations, counted
+    from 1. Numbers that do not exist, and variations that do not meet the conditions in `require`, are skipped.
+    `unsaved` contains the texts of files that are changed in an editor, but not saved.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     read = _read(path, library, choice)
@@ -84,7 +86,7 @@ def try_variations(
     variations = [variation for variation in expanded if isinstance(variation, Variation)]
     if problems := [problem for problem in expanded if isinstance(problem, Problem)]:
         return library.with_source(sorted(problems))
-    tried = [(variation, _with_choice(variation, library, file, choice)) for variation in variations]
+    tried = [(variation, _load_variation(variation, library, file, choice)) for variation in variations]
     if any(isinstance(found, list) for _, found in tried):
         return merge_problems(
             [VariationProblems(one.name, one.set_by, found if isinstance(found, list) else ()) for one, found in tried]
@@ -108,8 +110,9 @@ def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()
 class ChangedScenario:
     """A scenario file whose content is changed in memory, for example to find a smaller scenario.
 
-    `whole_tree` is the content of the file merged with what it extends and with `defaults.yaml`. `unvaried` is the same
-    without `variations`, and `tree` has the values of one variation (`changes`) as well.
+    `merged_tree` is the content of the file merged with what it extends and with `defaults.yaml`. `base_tree` is
+    `merged_tree` without the key `variations`. `tree` is `base_tree` with the values of the selected variation, which
+    `changes` lists.
     """
 
     def __init__(
@@ -120,7 +123,9 @@ class ChangedScenario:
         choice: StackChoice | None = None,
         variation: str | None = "",
     ) -> None:
-        """Read the file. `variation` None stands for the scenario without its variations.
+        """Read the file.
+
+        `variation` is the name of a variation, "" for a file without variations, or None to ignore its variations.
 
         Raises InvalidInput, and UsageError for an unknown variation.
         """
@@ -130,15 +135,15 @@ class ChangedScenario:
         read = _read(path, self._library, choice)
         if isinstance(read, list):
             raise InvalidInput(read)
-        self.file, self.whole_tree = read
+        self.file, self.merged_tree = read
         self.path = self._library.sandbox.display_name(self.file)
         self.text = self._library.texts[self.path]
-        entries = {key: one for key, one in self.whole_tree.entries.items() if key != VARIATIONS}
-        self.unvaried = self.tree = replace(self.whole_tree, entries=entries)
+        entries = {key: one for key, one in self.merged_tree.entries.items() if key != VARIATIONS}
+        self.base_tree = self.tree = replace(self.merged_tree, entries=entries)
         self.changes: tuple[Change, ...] = ()
         if variation:
             number = number_of(variation)
-            found = expand_variations(self.whole_tree, None if number is None else [number])
+            found = expand_variations(self.merged_tree, None if number is None else [number])
             varied = next(one for one in found if isinstance(one, Variation) and one.name == variation)
             self.tree, self.changes = varied.tree, varied.changes
 
@@ -149,7 +154,7 @@ class ChangedScenario:
             return problems
         entries = {key: entry for key, entry in merged.entries.items() if key != VARIATIONS}
         merged = MappingNode(merged.position, entries)
-        return _with_choice(Variation("", merged), self._library, self.file, self._choice)
+        return _load_variation(Variation("", merged), self._library, self.file, self._choice)
 
 
 def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Path, MappingNode] | list[Problem]:
@@ -169,23 +174,25 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
     if choice is not None:
         library.add(choice.texts, choice.files)
     if problems or not isinstance(tree, MappingNode):
-        wrong = check(ScenarioSpec, tree, multirobot.missing_in_scenario) if tree is not None and not problems else []
+        wrong = (
+            check(ScenarioSpec, tree, multirobot.scenario_robot_problems) if tree is not None and not problems else []
+        )
         return library.with_source(sorted([*problems, *(wrong if isinstance(wrong, list) else ())]))
     return file, tree
 
 
-def _with_choice(
-    one: Variation, library: Library, file: Path, choice: StackChoice | None
+def _load_variation(
+    variation: Variation, library: Library, file: Path, choice: StackChoice | None
 ) -> LoadedScenario | list[Problem]:
     """Load one variation with the selected stack, or with its own if `choice` is None; or return all its problems."""
-    tree = one.tree if choice is None else multirobot.apply_stack_choice(one.tree, choice)
-    if choice is not None and (without_effect := list(_without_effect(one, tree, choice))):
-        return library.with_source(without_effect)
+    tree = variation.tree if choice is None else multirobot.apply_stack_choice(variation.tree, choice)
+    if choice is not None and (ineffective := list(_ineffective_variation_problems(variation, tree, choice))):
+        return library.with_source(ineffective)
     expanded_tree = with_nav2_parameters(tree, library)
     if expanded_tree.problems:
         return library.with_source(sorted(expanded_tree.problems))
     tree = expanded_tree.tree
-    spec = check(ScenarioSpec, tree, multirobot.missing_in_scenario)
+    spec = check(ScenarioSpec, tree, multirobot.scenario_robot_problems)
     if isinstance(spec, list):
         return library.with_source(sorted([*spec, *_problems_of_world(tree, library)]))
     if problems := check_robot_names(spec, tree):
@@ -197,14 +204,14 @@ def _with_choice(
         return loaded
     notes = (*loaded.notes, *library.with_source(expanded_tree.notes), *(choice.notes if choice is not None else ()))
     return replace(loaded, notes=notes).with_changes(
-        choice=choice, variation=one.name, set_by=one.set_by, varied_values=one.values
+        choice=choice, variation=variation.name, set_by=variation.set_by, varied_values=variation.values
     )
 
 
-def _without_effect(one: Variation, tree: MappingNode, choice: StackChoice) -> Iterator[Problem]:
+def _ineffective_variation_problems(variation: Variation, tree: MappingNode, choice: StackChoice) -> Iterator[Problem]:
     """Yield problems with varied values of a stack that `--stack` replaces."""
     each = [tree, *multirobot.split_by_robot(tree).values()] if multirobot.has_multiple_robots(tree) else [tree]
-    for change in one.changes:
+    for change in variation.changes:
         if all(node_at(part, change.target.keys) is not change.value for part in each):
             message = f"{quoted(change.target.path)} changes nothing with --stack {choice.written}"
             hint = "select variations that do not set it with -k or --variation, or choose another stack"
@@ -277,7 +284,7 @@ def _load_single_robot(
         tree=tree,
         sources=dict(library.texts),
         files=dict(library.files),
-        notes=_notes(
+        notes=_map_notes(
             world.map,
             robot_map if robot_map != "none" else None,
             keepout_mask,
@@ -310,13 +317,13 @@ def _map(spec: ScenarioSpec, tree: MappingNode, assets: Assets) -> LoadedMap | L
     return assets.map(node)
 
 
-def _mask(written: str | None, tree: MappingNode, keys: tuple[Key, ...], assets: Assets) -> LoadedMap | None:
+def _mask(mask_path: str | None, tree: MappingNode, keys: tuple[Key, ...], assets: Assets) -> LoadedMap | None:
     """Load the filter mask that the stack names at `keys`."""
     node = node_at(tree, keys)
-    return assets.map(node) if written is not None and isinstance(node, ScalarNode) else None
+    return assets.map(node) if mask_path is not None and isinstance(node, ScalarNode) else None
 
 
-def _notes(*maps: LoadedMap | None) -> tuple[Problem, ...]:
+def _map_notes(*maps: LoadedMap | None) -> tuple[Problem, ...]:
     """Return the notes about the maps, without duplicates."""
     return tuple(dict.fromkeys(note for used in maps if used for note in used.notes))
 

@@ -45,13 +45,13 @@ class CollisionMonitor(Spec):
     source_timeout: PositiveDuration = 0.3
     """Time without lidar data after which the robot stops (Nav2's default is 1 s)."""
     time_before_collision: PositiveDuration = 0.5
-    """APPROACH: minimum time before a collision; the robot slows down to keep it."""
+    """Action APPROACH (slow down): minimum time before a collision; the robot slows down to keep it."""
     simulation_time_step: PositiveDuration | None = None
-    """APPROACH: maximum time between two poses that are compared with the scan; default: an eighth of
-    `time_before_collision` (Nav2: 0.1 s)."""
+    """Action APPROACH: maximum time step of the simulated motion that is checked against the scan; default: an eighth
+    of `time_before_collision` (Nav2: 0.1 s)."""
     stop_margin: NonNegativeLength = 0.02
-    """STOP: minimum distance between the footprint and obstacles in the direction of travel. Nav2 has no such margin.
-    """
+    """Action STOP: minimum distance between the footprint and obstacles in the direction of travel. Nav2 has no such
+    margin."""
     min_points: Annotated[int, Field(ge=1, le=1000)] = 1
     """Minimum number of scan points of an obstacle. Nav2's default is 4, but the leg of a chair may have fewer."""
     hold_timeout: Duration = 1.0

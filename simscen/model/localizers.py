@@ -179,12 +179,12 @@ _Localizers = Annotated[
 Localizer = Annotated[LocalizerSpec, ExtensibleUnion("localizer", _Localizers)]
 
 
-_HERE = "simscen.model.localizers:"
+_MODULE = "simscen.model.localizers:"
 LOCALIZERS = {
-    "amcl": _HERE + "Amcl",
-    "ekf": _HERE + "Ekf",
-    "ground_truth": _HERE + "GroundTruth",
-    "odometry": _HERE + "OdometryOnly",
+    "amcl": _MODULE + "Amcl",
+    "ekf": _MODULE + "Ekf",
+    "ground_truth": _MODULE + "GroundTruth",
+    "odometry": _MODULE + "OdometryOnly",
     "scan_matching_amcl": "simscen.advanced.spec:ScanMatchingAmcl",
     "slip_ekf": "simscen.advanced.spec:SlipEkf",
 }

@@ -98,8 +98,8 @@ class Retrace(BehaviorSpec):
     backup_speed: PositiveSpeed = 0.15
     """Speed."""
     time_allowance: PositiveDuration = 10.0
-    """Time after which the behavior fails with BACKUP_TIMEOUT, or 1.5 times that which `retrace_dist` takes, if longer.
-    """
+    """Time after which the behavior fails with BACKUP_TIMEOUT. It is extended to 1.5 times the duration of driving
+    `retrace_dist` at `backup_speed` if that is longer."""
 
 
 class ClearCostmap(BehaviorSpec):
@@ -121,13 +121,13 @@ _Behaviors = Annotated[
 ]
 
 
-_NamedOrWhole = Annotated[
+_NameOrParameters = Annotated[
     Annotated[RecoveryBehavior, Tag("a name")] | Annotated[_Behaviors, Tag("a behavior")],
     Discriminator(lambda value: "a name" if isinstance(value, str) else "a behavior"),
 ]
 
 
-Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NamedOrWhole, named=True)]
+Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NameOrParameters, named=True)]
 
 
 class Recovery(Spec):
@@ -143,8 +143,9 @@ class Recovery(Spec):
         "PLANNER_TIMEOUT",
         "NO_VALID_PATH",
     ]
-    """Planner errors that start recovery (WouldAPlannerRecoveryHelp); after others the goal fails immediately. The
-    advanced stack adds START_OUTSIDE_MAP, START_OCCUPIED, and GOAL_OCCUPIED."""
+    """Planner errors that start recovery; after others, the goal fails immediately. In Nav2, the condition
+    WouldAPlannerRecoveryHelp decides this. The advanced stack adds START_OUTSIDE_MAP, START_OCCUPIED, and
+    GOAL_OCCUPIED."""
     behaviors: Annotated[list[Behavior], Field(max_length=20)] = [
         "clear_costmap",
         "spin",
@@ -154,9 +155,9 @@ class Recovery(Spec):
     """Behaviors in the order of their use, by name or with parameters."""
     clear_entirely: bool = True
     """Whether `clear_costmap`, and each retry after a planner error, clears the entire global costmap, as in Nav2. With
-    false, `clear_costmap` clears only the area of the local costmap. After a planner error, the entire global costmap
-    is then cleared at most after increasing times (10 s, 20 s, 40 s, …), otherwise only the area of the local costmap.
-    Therefore, the robot does not forget a known dead end and return to it."""
+    false, `clear_costmap` clears only the area of the local costmap, so that the robot does not forget a known dead end
+    and return to it. A retry after a planner error does the same, except the first one and the next ones after at least
+    10 s, 20 s, 40 s, …, which clear the entire global costmap."""
     spin_dist: Angle = 1.57
     """Angle of `spin`."""
     wait_duration: Duration = 5.0
@@ -178,7 +179,8 @@ class Recovery(Spec):
     rotational_acc_lim: PositiveAngularAcceleration | None = None
     """Angular deceleration at the end of `spin`; default: the limit of the robot (Nav2: 3.2 rad/s²)."""
     time_allowance: PositiveDuration = 10.0
-    """Time after which `spin`, `backup`, or `retrace` fails; `retrace` may take longer if `retrace_dist` does."""
+    """Time after which `spin`, `backup`, or `retrace` fails. For `retrace`, it is extended to 1.5 times the duration of
+    driving `retrace_dist` at `backup_speed` if that is longer."""
 
     @property
     def names(self) -> list[str]:
@@ -205,11 +207,11 @@ _SHIPPED: dict[str, type[BehaviorSpec]] = {
 }
 
 
-_HERE = "simscen.model.recovery:"
+_MODULE = "simscen.model.recovery:"
 BEHAVIORS = {
-    "clear_costmap": _HERE + "ClearCostmap",
-    "spin": _HERE + "Spin",
-    "wait": _HERE + "Wait",
-    "backup": _HERE + "BackUp",
-    "retrace": _HERE + "Retrace",
+    "clear_costmap": _MODULE + "ClearCostmap",
+    "spin": _MODULE + "Spin",
+    "wait": _MODULE + "Wait",
+    "backup": _MODULE + "BackUp",
+    "retrace": _MODULE + "Retrace",
 }

@@ -110,7 +110,7 @@ class RobotEntry(Spec):
     """Pose, or name of a place of the world, that the localizer starts with; `unknown`: anywhere on the map. Default:
     the true pose with Nav2's default covariance."""
     payload: Payload | None = None
-    """Load that the robot carries; its motors stay those of the empty robot."""
+    """Load that the robot carries. The motors are not stronger because of it."""
     motor_torque: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
     """Fraction of the nominal motor torque that is available, e.g. because of wear, heat, or a weak battery."""
 
@@ -130,7 +130,7 @@ class GoalEntry(Spec):
     """Heading error within which the goal counts as reached; default: that of the stack's goal checker."""
     expect: Expectation = "succeeded"
     """Expected outcome: `succeeded`, `failed`, or the code of a failure, e.g. `{error_code: GOAL_OCCUPIED}`. The goal
-    passes if and only if this is its outcome."""
+    passes only with this outcome."""
     on_reached: OnReached = by_default()
     """Action of the robot at the goal before it continues."""
 
@@ -185,8 +185,8 @@ class ExpectedFailure(Spec):
     fail: Reason
     """Reason for people, e.g. a ticket and the problem."""
     criteria: Annotated[list[Annotated[Name, ReferenceTo("verdict")]], Field(max_length=200)] = []
-    """Ids of criteria, and names of events and faults that do not happen: all of these must fail, and nothing else may.
-    Default: any criteria may fail, at least one."""
+    """Ids of the criteria that must fail, and names of the events and faults that must not happen. Nothing else may
+    fail. Default: any criteria may fail, at least one."""
 
     @model_validator(mode="before")
     @classmethod

@@ -71,8 +71,8 @@ class PathFollowerSpec(ControllerSpec):
     goal's heading. With 1, as in Nav2, a robot may stop at the tolerance, so that a localization error of a
     centimeter makes it report a false success."""
     max_robot_pose_search_dist: PositiveLength = 1.5
-    """Length of plan beyond the last position that is searched for the point nearest to the robot, so that a plan may
-    cross itself (Nav2: half the size of the local costmap)."""
+    """Distance along the plan, beyond the previous nearest point, in which the point nearest to the robot is searched
+    (Nav2: half the size of the local costmap). The limit makes the robot follow a plan that crosses itself in order."""
 
 
 class Latency(Spec):

@@ -1,6 +1,7 @@
-"""ROS 2 messages of the stack protocol as plain Python classes, read by type name.
+"""ROS 2 messages of the stack protocol as plain Python classes, and functions that read and serialize them.
 
-Definitions: common_interfaces, nav2_msgs and tf2_msgs of ROS 2 Humble. Planar poses are x, y and yaw.
+Definitions: common_interfaces, nav2_msgs and tf2_msgs of ROS 2 Humble. Planar poses are x, y and yaw. A
+function that returns bytes returns a message in the serialization of ROS 2 (CDR).
 """
 
 from __future__ import annotations
@@ -61,7 +62,10 @@ class Odometry(NamedTuple):
 
 
 class Imu(NamedTuple):
-    """sensor_msgs/msg/Imu: rad/s and m/s² about and along x, y, z. The covariances have nine numbers each."""
+    """sensor_msgs/msg/Imu: angular velocity about x, y, z in rad/s, and acceleration along x, y, z in m/s².
+
+    The covariances have nine numbers each.
+    """
 
     stamp: Stamp
     frame: str
@@ -135,8 +139,9 @@ def _header(reader: Reader) -> tuple[Stamp, str]:
 
 def _laser_scan(reader: Reader) -> LaserScan:
     stamp, frame = _header(reader)
-    first, last, step, between, whole, least, most = reader.take("7f")
-    return LaserScan(stamp, frame, first, last, step, between, whole, least, most, reader.numbers("f"))
+    angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max = reader.take("7f")
+    angles = angle_min, angle_max, angle_increment
+    return LaserScan(stamp, frame, *angles, time_increment, scan_time, range_min, range_max, reader.numbers("f"))
 
 
 def _odometry(reader: Reader) -> Odometry:

@@ -12,7 +12,7 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive, motion_st
 from simscen.reconstruction.evidence import Evidence, FoundFault
 from simscen.reconstruction.faults.commands import command_faults
 from simscen.reconstruction.faults.false_returns import false_return_faults, glass_fault
-from simscen.reconstruction.faults.lidar_calibration import mount_fault, range_error_faults, with_mount_error
+from simscen.reconstruction.faults.lidar_calibration import mount_fault, range_error_faults, with_corrected_mount
 from simscen.reconstruction.faults.lidar_readings import (
     invalid_scan_faults,
     missing_beam_faults,
@@ -111,7 +111,7 @@ def _from_scans(
     mount = mount_fault(model, world) if is_calibrated else None
     if mount is not None:
         faults.append(mount)
-        model = with_mount_error(model, world)
+        model = with_corrected_mount(model, world)
     faults += invalid_scan_faults(model, drive.duration)
     faults += missing_beam_faults(model, drive.duration)
     limits = [*range_faults(model, drive.duration, robot.lidar_noise)]

@@ -49,9 +49,9 @@ class _GitHub:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._plain.__exit__(kind, error, trace)
+        self._plain.__exit__(kind, error, traceback)
 
     def __call__(self, event: SessionEvent) -> None:
         """Print the event, with annotations for a finished run, and write the summary at the end."""

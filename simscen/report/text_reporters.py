@@ -46,8 +46,8 @@ INTERRUPTED, NOT_RUN = "interrupted", "not-run"
 class SessionFormatter:
     """Formats events as lines.
 
-    `slow` is the number of slowest runs to list at the end; 0 lists all, None lists no runs. `columns` returns the
-    current width of the terminal, or None for no limit.
+    `slow` is the number of slowest runs to list at the end: 0 lists all runs, as with pytest's `--durations=0`, and
+    None lists none. `columns` returns the current width of the terminal, or None for no limit.
     """
 
     def __init__(self, slow: int | None = None, columns: Callable[[], int | None] = lambda: None) -> None:
@@ -120,7 +120,7 @@ class Reporter(Protocol):
         ...
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         """Restore the terminal."""
         ...
@@ -138,7 +138,7 @@ class PlainReporter:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self._out.flush()
 
@@ -149,7 +149,7 @@ class PlainReporter:
         self._out.flush()
 
     def print_lines(self, lines: Iterable[StyledLine]) -> None:
-        """Print other lines, wrapped to the width of a terminal."""
+        """Print lines that do not belong to an event, wrapped to the width of a terminal."""
         for line in lines:
             for part in wrap_line(line, self._style.columns):
                 self._print(part)

@@ -52,6 +52,7 @@ class Adapter:
         period_s: float,
         answer_limit_s: float,
         filter_info: FilterInfo,
+        restart_reason: str,
     ) -> None:
         """Join the graph and publish the topics.
 
@@ -59,6 +60,7 @@ class Adapter:
             period_s: Control period.
             answer_limit_s: Wall time for the answer to a step once the graph is ready.
             filter_info: Description of the masks among `topics`.
+            restart_reason: Why the launched command was started a second time; empty the first time.
         """
         if not rclpy.ok():
             rclpy.init(args=[])
@@ -70,11 +72,12 @@ class Adapter:
         self._sender: Optional[GoalSender] = None
         self._barrier = NodeBarrier(self._graph, options.answer)
         self._velocity: Tuple[float, ...] = STOP
-        self._ready = False
-        self._continue_after_failure = True
-        self.mode, self._sent = "", 0
+        self.is_ready = False
+        self.mode, self.continue_after_failure = "", True
+        self._sent = 0
         self._planned_goal: Optional[Goal] = None
         self._unused_masks: List[str] = []
+        self.restart_reason = restart_reason
         self._filter_info = filter_info
         self._pending_infos = filter_info.messages(self._graph.names)
         offered = [Topic(CLOCK, "rosgraph_msgs/msg/Clock"), *topics, *filter_info.topics]
@@ -126,10 +129,11 @@ class Adapter:
             about["factor"] = self._options.factor
         if self._barrier.not_in_step:
             about["not_in_step"] = self._barrier.not_in_step
-        warnings = [
+        warnings = [f"the launched command was started again: {self.restart_reason}"] if self.restart_reason else []
+        warnings += [
             f"{node} does not answer, so lockstep does not wait for it" for node in sorted(self._barrier.left_out)
         ]
-        if self._ready and (warnings or self._unused_masks):
+        if self.is_ready and (warnings or self._unused_masks):
             about["warnings"] = [*warnings, *self._unused_masks]
         if self._sender is not None:
             about["goals"] = self._sender.name
@@ -147,11 +151,6 @@ class Adapter:
         """
         if self._bring_up.prepare() and not self._replaced_topics:
             self._begin()
-
-    def start(self, goals: Sequence[Goal], continue_after_failure: bool) -> None:
-        """Take the goals of the run."""
-        self._goals.start(goals)
-        self._continue_after_failure = continue_after_failure
 
     def preempt(self, now: int, goal: Goal) -> None:
         """Send another goal first."""
@@ -172,7 +171,7 @@ class Adapter:
         Raises AdapterError when the graph is not ready or no longer usable.
         """
         self._check_launched()
-        limit_s = min(limit_s, self._answer_limit_s) if self._ready else limit_s
+        limit_s = min(limit_s, self._answer_limit_s) if self.is_ready else limit_s
         messages, self._pending_infos = [*messages, *self._pending_infos], []
         for topic, data in messages:
             self._estimate.take_published(topic, data)
@@ -181,7 +180,7 @@ class Adapter:
         messages = [(topic, self._with_frames(topic, data)) for topic, data in messages]
         messages = self._bring_up.keep_initial_pose(messages)
         warming_up = now < self._options.warm_up * NANOSECONDS
-        if not self._ready:
+        if not self.is_ready:
             warming_up = warming_up or self._bring_up.lacks_scan(now, messages)
             self._bring_up.keep(messages)
             if not warming_up:
@@ -199,7 +198,7 @@ class Adapter:
         answers = sorted((answer for message in received for answer in self._answers(message)), key=lambda a: a[0])
         if due or commanded:
             answers.append((COMMAND, write_twist(self._velocity)))
-        if self._ready:
+        if self.is_ready:
             if isinstance(self._sender, ActionSender):
                 self._recoveries.update_count(self._sender.recoveries)
             self._recoveries.report_clearing(now)
@@ -212,7 +211,7 @@ class Adapter:
 
     def _begin(self) -> None:
         """Subscribe to the topics of the ready graph."""
-        self._ready = True
+        self.is_ready = True
         self._bring_up.end()
         self._unused_masks = self._filter_info.unused_masks(
             lambda topic: bool(self._graph.subscribers_of(self._graph.names(topic)))
@@ -237,7 +236,7 @@ class Adapter:
             if failed is None:
                 self._recoveries.begin_goal()
                 return
-            self._goals.failed(failed.code, failed.message, go_on=self._continue_after_failure)
+            self._goals.failed(failed.code, failed.message, go_on=self.continue_after_failure)
 
     def _next_batch(self) -> List[Goal]:
         """Return the goals for one action: all remaining ones, or up to where the robot must stop or wait.
@@ -258,7 +257,7 @@ class Adapter:
             self._sent -= 1
             if isinstance(outcome, Failed):
                 self._sent -= len(self._goals.ahead)
-                self._goals.failed(outcome.code, outcome.message, go_on=self._continue_after_failure)
+                self._goals.failed(outcome.code, outcome.message, go_on=self.continue_after_failure)
             else:
                 self._goals.reached()
             if self._sent <= 0:
@@ -297,6 +296,8 @@ class Adapter:
     def end(self) -> None:
         """Leave the graph and end the launched command."""
         self._graph.close()
+        if rclpy.ok():
+            rclpy.shutdown()
         if self._launched is not None:
             self._launched.end()
 

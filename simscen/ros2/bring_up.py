@@ -17,7 +17,7 @@ from simscen.ros2.graph import LATCHED, Graph, Topic
 from simscen.ros2.lockstep import Message
 from simscen.ros2.messages import NANOSECONDS, SCAN
 from simscen.ros2.nav2.report import Nav2Report
-from simscen.ros2.options import AdapterError, Options
+from simscen.ros2.options import AdapterError, BringUpAborted, Options
 from simscen.ros2.readiness import MAP, Readiness
 
 INITIAL_POSE = "/initialpose"
@@ -110,8 +110,8 @@ class BringUp:
     def wait(self, now: int, step_limit_s: float) -> None:
         """Publish the latest readings with advancing time until nothing is missing; `now` is the run's time in ns.
 
-        Raises AdapterError with what is missing when `--ready` or `step_limit_s` of wall time is over, or when the
-        lifecycle manager of a launched Nav2 has given up.
+        Raises AdapterError with what is missing when `--ready` or `step_limit_s` of wall time is over, and
+        BringUpAborted when the lifecycle manager of a launched Nav2 has given up.
         """
         remaining_s = self._options.ready - (0.0 if self._options.warm_up else time.monotonic() - self._started_at)
         self._readiness.has_map = MAP in self._latest
@@ -137,7 +137,7 @@ class BringUp:
             if self._report is not None:
                 self._report.follow_log()
                 if missing and self._options.launch and self._report.aborted_bring_up:
-                    raise AdapterError(self._reasons(missing))
+                    raise BringUpAborted(self._reasons(missing))
             if missing or nodes != self._graph.nodes():
                 changed_at, nodes = time.monotonic(), self._graph.nodes()
             return time.monotonic() - changed_at >= self._options.settle

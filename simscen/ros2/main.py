@@ -6,7 +6,8 @@ import shutil
 import signal
 import sys
 import tempfile
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+import time
+from typing import Any, Callable, Dict, List, NamedTuple, Sequence, Tuple
 
 from simscen.peer import messages, wire
 from simscen.peer.goals import Goal, Goals
@@ -14,7 +15,7 @@ from simscen.peer.wire import Connection, Disconnected
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.nav2.filter_info import MASKS, FilterInfo
 from simscen.ros2.nav2.report import ROSOUT
-from simscen.ros2.options import AdapterError, Domain, Options, claim_domain, ros_environment
+from simscen.ros2.options import AdapterError, BringUpAborted, Domain, Options, claim_domain, ros_environment
 
 EVENTS = "/simscen/events"
 DEFAULT_MODE = "navigate_to_pose"
@@ -79,6 +80,16 @@ class Hello(NamedTuple):
         )
 
 
+class ReceivedStep(NamedTuple):
+    """Content of STEP."""
+
+    now: int
+    """Time of the run in nanoseconds."""
+    messages: List[Tuple[str, bytes]]
+    due: bool
+    limit_s: float
+
+
 class AdapterRun:
     """Domain, nodes, and adapter of one run. Leaving the context ends and removes them."""
 
@@ -86,6 +97,8 @@ class AdapterRun:
         self._options = options
         self._cleanup: List[Callable[[], None]] = []
         self.goals = Goals()
+        self._adapter: Any = None
+        self._steps_until_ready: List[ReceivedStep] = []
 
     def __enter__(self) -> "AdapterRun":
         return self
@@ -93,6 +106,8 @@ class AdapterRun:
     def __exit__(self, *_: Any) -> None:
         # simscen sends SIGTERM if nodes take long to end; that must not interrupt ending them.
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        if self._adapter is not None:
+            self._adapter.end()
         for function in reversed(self._cleanup):
             function()
 
@@ -105,11 +120,15 @@ class AdapterRun:
         options = self._options_for(hello.mode)
         if options.nav2:
             require_packages(options)
-        launched = self._start_nodes()
+        self._set_environment()
         topics = [Topic(*topic) for topic in hello.topics.values()]
-        limits = hello.period_s, hello.answer_limit_s
-        adapter = Adapter(options, topics, self.goals, launched, *limits, FilterInfo(hello.zone_masks))
-        self._cleanup.append(adapter.end)
+
+        def make_adapter(restart_reason: str) -> Adapter:
+            launched = LaunchedCommand(options.launch, os.environ) if options.launch else None
+            limits, filter_info = (hello.period_s, hello.answer_limit_s), FilterInfo(hello.zone_masks)
+            return Adapter(options, topics, self.goals, launched, *limits, filter_info, restart_reason)
+
+        adapter = self._adapter = make_adapter("")
         adapter.prepare()
         about = adapter.about()
         welcome = {
@@ -124,9 +143,9 @@ class AdapterRun:
             "about": about,
         }
         connection.send_json(wire.WELCOME, welcome)
-        self._answer_steps(connection, adapter, hello)
+        self._answer_steps(connection, hello, make_adapter)
 
-    def _answer_steps(self, connection: Connection, adapter: Any, hello: Hello) -> None:
+    def _answer_steps(self, connection: Connection, hello: Hello, make_adapter: Callable[[str], Any]) -> None:
         now = 0
         while True:
             kind, body = connection.receive()
@@ -136,15 +155,40 @@ class AdapterRun:
                 self.goals.now = now * 1e-9
                 published = [(hello.topics[number][0], data) for number, data in content]
                 due = bool(header.flags & wire.COMMAND_DUE)
-                received = adapter.step(now, published, due, header.deadline * 1e-3)
+                received = self._step(ReceivedStep(now, published, due, header.deadline * 1e-3), make_adapter)
                 stamp = header.sec, header.nanosec
-                received += [(ROSOUT, messages.log(stamp, *line)) for line in adapter.take_lines()]
+                received += [(ROSOUT, messages.log(stamp, *line)) for line in self._adapter.take_lines()]
                 connection.send(wire.answer_frame(header.tick, self._number_messages(received, hello.stack_topics)))
             elif kind == wire.END:
-                connection.send_json(wire.BYE, {"about": adapter.about()})
+                connection.send_json(wire.BYE, {"about": self._adapter.about()})
                 return
             else:
-                self._process_frame(kind, wire.from_json(body), adapter, now)
+                self._process_frame(kind, wire.from_json(body), now)
+
+    def _step(self, step: ReceivedStep, make_adapter: Callable[[str], Any]) -> List[Tuple[str, bytes]]:
+        """Return the answer to a step. If the bring-up was aborted, start the nodes once more and repeat the steps.
+
+        On a busy machine, the lifecycle manager of Nav2 gives up when a single response is lost.
+        """
+        if self._adapter.is_ready:
+            return list(self._adapter.step(*step))
+        end = time.monotonic() + step.limit_s
+        try:
+            return list(self._adapter.step(*step))
+        except BringUpAborted as error:
+            if self._adapter.restart_reason:
+                raise
+            print(f"simscen ros2: {error}; starting the launched command again", file=sys.stderr)
+            earlier, self._adapter = self._adapter, None
+            earlier.end()
+            self._adapter = make_adapter(str(error))
+            self._adapter.mode, self._adapter.continue_after_failure = earlier.mode, earlier.continue_after_failure
+            self._adapter.prepare()
+            for repeated in self._steps_until_ready:
+                self._adapter.step(*repeated)
+            return list(self._adapter.step(*step._replace(limit_s=end - time.monotonic())))
+        finally:
+            self._steps_until_ready.append(step)
 
     def _options_for(self, mode: str) -> Options:
         """Return the options with the scenario's action. Raises AdapterError if `--goals` names another one."""
@@ -155,14 +199,15 @@ class AdapterRun:
             raise AdapterError(f"the scenario sends goals by {mode}, but --goals is {requested}")
         return self._options._replace(goals=mode)
 
-    def _process_frame(self, kind: int, content: Dict[str, Any], adapter: Any, now: int) -> None:
+    def _process_frame(self, kind: int, content: Dict[str, Any], now: int) -> None:
         if kind == wire.GOAL:
-            adapter.start([Goal.of(goal) for goal in content["goals"]], content["on_goal_failure"] == "continue")
-            adapter.mode = content.get("mode", DEFAULT_MODE)
+            self.goals.start([Goal.of(goal) for goal in content["goals"]])
+            self._adapter.continue_after_failure = content["on_goal_failure"] == "continue"
+            self._adapter.mode = content.get("mode", DEFAULT_MODE)
         elif kind == wire.PREEMPT:
-            adapter.preempt(now, Goal.of(content["goal"]))
+            self._adapter.preempt(now, Goal.of(content["goal"]))
         elif kind == wire.CANCEL:
-            adapter.cancel(now, content["all"])
+            self._adapter.cancel(now, content["all"])
 
     def _number_messages(
         self, received: Sequence[Tuple[str, bytes]], stack_topics: Dict[str, int]
@@ -172,8 +217,8 @@ class AdapterRun:
         events = (json.dumps(event, allow_nan=False) for event in self.goals.take_events())
         return out + [(stack_topics[EVENTS], messages.string(event)) for event in events]
 
-    def _start_nodes(self) -> Optional[LaunchedCommand]:
-        """Claim a domain, set the environment, and start the user's command."""
+    def _set_environment(self) -> None:
+        """Claim a domain, and set the environment of the nodes."""
         options, environment = self._options, dict(os.environ)
         domain = self._claim_domain(options, environment)
         self._cleanup.append(domain.release)
@@ -182,7 +227,6 @@ class AdapterRun:
         os.environ.clear()
         os.environ.update(ros_environment(domain.number, logs, environment))
         os.environ.pop(wire.SOCKET_FD_VARIABLE, None)  # nodes must not use the socket to simscen
-        return LaunchedCommand(options.launch, os.environ) if options.launch else None
 
     @staticmethod
     def _claim_domain(options: Options, environment: Dict[str, str]) -> Domain:

@@ -16,6 +16,10 @@ class AdapterError(Exception):
     """The run cannot continue; the message says what is wrong and what to do."""
 
 
+class BringUpAborted(AdapterError):
+    """The lifecycle manager of a launched Nav2 has given up."""
+
+
 class Options(NamedTuple):
     """Options as `simscen ros2 --help` explains them; times in seconds."""
 

@@ -171,7 +171,7 @@ def run_lockstep(setup: RunSetup) -> Event:
         for robot in robots:
             robot.observe(tick)
         for director in directors:
-            director.direct()
+            director.process_beat()
 
         may_end = tick % setup.truth_period == 0 or tick == time_limit
         for robot in robots:

@@ -18,7 +18,7 @@ from simscen.core.environment.scenery import (
 from simscen.core.environment.world_model import World
 from simscen.core.geometry.meshes import drivable_solids, face_normals, upward_faces
 from simscen.core.geometry.shapes import Body, TriangleMesh
-from simscen.loading.plugins import fact_of, requirement_of
+from simscen.loading.plugins import log_header_key, requirement_of
 from simscen.loading.scenario_text import resolved_text
 from simscen.record.log_header import SCENERY_FILE as SCENERY
 from simscen.record.log_header import STACK_FACT, STACK_NAME_FACT, VARIATION_FACT, LogHeader, scenery_to_json
@@ -54,7 +54,7 @@ def _robot_header(prepared: PreparedScenario) -> LogHeader:
         robot_description=to_urdf(prepared.body),
         frames=sensor_frames(prepared.robot),
         sensors=sensor_kinds(prepared),
-        facts={**_key_facts(prepared), **{fact_of(entry): requirement_of(entry) for entry in prepared.plugins}},
+        facts={**_key_facts(prepared), **{log_header_key(entry): requirement_of(entry) for entry in prepared.plugins}},
     )
 
 

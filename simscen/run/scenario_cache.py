@@ -166,7 +166,7 @@ class CachedWorldBuilder:
         self._files = files
 
     def build(self, world: World, lidar_height: float) -> BuiltWorld:
-        """See built_world.build_world_and_map."""
+        """Return the world with its surface and the map at the height of the lidar in m."""
         if not self._files.is_enabled:
             return build_world_and_map(world, lidar_height)
         mesh = merge_solids(world.solids)
@@ -180,7 +180,7 @@ class CachedWorldBuilder:
         return BuiltWorld(world, mesh, cached)
 
     def legs(self, built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float) -> list[Leg]:
-        """See worlds.routes.shortest_paths.legs_between."""
+        """Return the shortest path of a disc of `radius` m from each pose to its goal."""
         if not self._files.is_enabled or not ends:
             return legs_between(built, ends, radius)
         goals = [(start, goal.name, goal.pose) for start, goal in ends]

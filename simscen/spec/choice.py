@@ -1,6 +1,7 @@
-"""Mappings with exactly one key out of several: shipped keys, and keys added by installed packages.
+"""Base class of mappings in a file that must have exactly one of several keys, such as `{spawn: …}` or `{push: …}`.
 
-Installed packages are searched only if a file uses a key that simscen does not ship, or if all keys are requested.
+simscen ships some of the keys, and installed packages can add others. They are searched only if a file uses a key that
+simscen does not ship, or if all keys are requested.
 """
 
 import contextlib
@@ -18,7 +19,7 @@ class Choice(Spec):
     """Mapping with exactly one key out of several, e.g. `spawn: {…}`, plus optional modifiers.
 
     A subclass has one optional field for each choice; the fields in `modifiers` can be combined with any choice. Unlike
-    for a tagged union, editors and validators can report the exact mistake.
+    for a union with a `type` key, editors and validators can report the exact mistake.
 
     If `group` is a group of the registry, installed packages can add choices. A mapping with an added key becomes an
     instance of an extended class (`with_installed_choices`) that has a field for each of them.
@@ -27,7 +28,7 @@ class Choice(Spec):
     modifiers: ClassVar[frozenset[str]] = frozenset()
     group: ClassVar[str] = ""
     original_class: ClassVar[type["Choice"] | None] = None
-    """Original class of an extended class."""
+    """Class from which an extended class was created; None for any other class."""
 
     @classmethod
     def choices(cls) -> dict[str, str]:
@@ -42,7 +43,7 @@ class Choice(Spec):
 
     @classmethod
     def addresses(cls) -> dict[str, str]:
-        """Return the addresses "module:Class" of the specifications by key, for the keys that have one."""
+        """Return the address "module:Class" of the specification of each key; keys without one are left out."""
         addresses = {key: _address(cls.model_fields[name]) for key, name in cls.choices().items()}
         return {key: address for key, address in addresses.items() if address}
 
@@ -96,7 +97,10 @@ class Choice(Spec):
 
     @property
     def added_by(self) -> str:
-        """Suffix for messages with the package of the choice: " (criterion `dwell` of yardwork 1.2)"; "" if shipped."""
+        """Text to append to a message, which names the package that added the key; "" if simscen ships the key.
+
+        Example: " (criterion `dwell` of yardwork 1.2)"
+        """
         if self.original_class is None:
             return ""
         from simscen.spec.registry import find
@@ -112,7 +116,10 @@ class Choice(Spec):
 
 @cache
 def with_installed_choices(choice: type[Choice]) -> type[Choice]:
-    """Return a subclass with a field for each key that installed packages add, or the class itself if there is none."""
+    """Return the extended class: a subclass with a field for each key that installed packages add.
+
+    Returns the class itself if there are no such keys.
+    """
     from pydantic import create_model
 
     from simscen.spec.extensible_union import PluginSpec
@@ -150,7 +157,10 @@ def installed_choices(choice: type[Choice]) -> dict[str, type[BaseModel]]:
 
 
 def empty_instance(original_class: type[Choice]) -> Choice:
-    """Return an empty instance of an extended class for unpickling; each process creates the class again."""
+    """Return an instance without fields of the extended class, for unpickling.
+
+    Pickle cannot import an extended class by its name, because each process creates the class at run time.
+    """
     extended = with_installed_choices(original_class)
     return extended.__new__(extended)
 

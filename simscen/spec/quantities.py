@@ -89,7 +89,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class AnyQuantity:
-    """Annotation of a float whose dimension depends on another field of the same specification.
+    """Annotation of a float in SI units whose dimension depends on another field of the same specification.
 
     It only adds units to the JSON schema. The specification that contains the field must convert text to a number.
     """
@@ -152,7 +152,7 @@ class Amount(NamedTuple):
 
 @dataclass(frozen=True)
 class _ParsedAmount:
-    """Annotation of an Amount, whose dimension is checked where it is used."""
+    """Annotation of a value that is read as an Amount, of any dimension, and keeps its unit."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(_parse_amount)

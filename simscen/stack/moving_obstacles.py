@@ -1,4 +1,4 @@
-"""Moving obstacles: position, velocity, and their uncertainty at one time."""
+"""Snapshot of moving obstacles: position, velocity, and their uncertainty, with predictions from it."""
 
 import cmath
 import math
@@ -11,9 +11,12 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 
 MAX_UNCERTAINTY_M = 0.8
-"""Largest inflation of an obstacle for its uncertainty."""
+"""Largest inflation of an obstacle for its uncertainty, or for a margin and its uncertainty."""
 MAX_STEP_S, MIN_STEP_S = 0.5, 0.05
-"""Longest and shortest time step of `is_surely_clear`; longer where the distance exceeds MAX_UNCERTAINTY_M."""
+"""Limits of the time steps of `is_surely_clear`.
+
+A step is longer than MAX_STEP_S only if the obstacle stays farther away than MAX_UNCERTAINTY_M during it.
+"""
 CONTACT_DISTANCE_M = 0.03
 """Closer obstacles count as touching."""
 
@@ -36,13 +39,19 @@ class MovingObstacle(NamedTuple):
     velocity_variance: float
 
     def position_std(self, seconds: float, acceleration: float) -> float:
-        """Return the standard deviation in m of the position after `seconds`, with this `acceleration` in m/s²."""
+        """Return the standard deviation in m of the position after `seconds`.
+
+        `acceleration` is the standard deviation of the acceleration in m/s².
+        """
         *_, variance, covariance, velocity_variance = self
         drift = 0.5 * acceleration * seconds * seconds
         return math.sqrt(variance + seconds * (2.0 * covariance + velocity_variance * seconds) + drift * drift)
 
     def min_distance(self, start: complex, speed: float, seconds: float) -> float:
-        """Return a lower bound of the distance in m to anything that leaves `start` at `speed` in any direction."""
+        """Return the smallest distance in m, within `seconds`, to a point that leaves `start` at `speed`.
+
+        The point moves in the worst direction. The distance is negative if the point can get into the obstacle.
+        """
         offset, velocity = self.position - start, self.velocity
         own_speed = abs(velocity)
         if speed >= own_speed:
@@ -56,9 +65,10 @@ class MovingObstacle(NamedTuple):
 
 
 class MovingObstacles:
-    """Moving obstacles in one frame and at one time.
+    """Moving obstacles in one frame at the time of the snapshot. All times are in s after it.
 
-    `acceleration` in m/s² is the assumed change of velocity; the uncertainty of predictions grows with it.
+    `acceleration` is the standard deviation of their acceleration in m/s², with which the uncertainty of predictions
+    grows.
     """
 
     __slots__ = ("acceleration", "obstacles")
@@ -131,8 +141,8 @@ class MovingObstacles:
     def nearness(self, x: Reals, y: Reals, times: Reals, radius: float, margin: float) -> tuple[Reals, Mask]:
         """Return the nearness (…,) of discs at points (…,) to the nearest obstacle at `times`, and whether they touch.
 
-        The nearness is 1 at contact and 0 at the distance `margin` (m) plus one standard deviation of the position,
-        at most MAX_UNCERTAINTY_M; farther away it is negative.
+        The nearness is 1 at contact. It is 0 at the distance `margin` (m) plus one standard deviation of the position,
+        or at MAX_UNCERTAINTY_M if that is less. Farther away it is negative.
         """
         shape = np.broadcast_shapes(x.shape, times.shape)
         nearest, touched = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
@@ -146,9 +156,9 @@ class MovingObstacles:
     def is_surely_clear(
         self, position: Callable[[float], complex], speed: float, radius: float, margin: float, seconds: float
     ) -> bool:
-        """Return True if a disc at `position` (t in s), not faster than `speed`, has a nearness of at most 0.
+        """Return True if the nearness of a moving disc stays at 0 or less for `seconds`; False if that is not certain.
 
-        This is a quick check for the given time in s; False means that it could not decide.
+        This check is quick. The disc is at `position(t)` and not faster than `speed`.
         """
         for obstacle in self.obstacles:
             closing_speed, time = max(speed + abs(obstacle.velocity), 1e-3), 0.0
@@ -183,7 +193,10 @@ class MovingObstacles:
             yield obstacle, dx
 
     def near(self, x: float, y: float, reach: float, speed: float, seconds: float) -> "MovingObstacles":
-        """Return the obstacles that can come within `reach` m of a robot that leaves a point at `speed`."""
+        """Return the obstacles that can get closer than `reach` m to a robot that leaves (x, y) at `speed`.
+
+        Only the next `seconds` count.
+        """
         start = complex(x, y)
         close = [each for each in self.obstacles if each.min_distance(start, speed, seconds) < reach]
         return self if len(close) == len(self.obstacles) else MovingObstacles.of(close, self.acceleration)

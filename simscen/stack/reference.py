@@ -295,7 +295,7 @@ class ReferenceStack:
         """Select the goal and determine the command of this controller period."""
         goal = self._task.goal
         if goal is None:
-            self._events += self._task.next(tick)
+            self._events += self._task.accept_next(tick)
             goal = self._task.goal
         if goal is not None and goal.via:
             goal = self._remove_passed_goals(tick, frames.pose)
@@ -303,7 +303,7 @@ class ReferenceStack:
             self._on_idle(tick, frames.pose)
             return
         self._on_drive()
-        leg = (goal, *self._task.ahead) if goal.via else (goal,)
+        leg = (goal, *self._task.remaining_in_action) if goal.via else (goal,)
         if self._navigator.goal is not leg[-1]:
             self._navigator.pursue(leg[-1])
         self._navigator.via = leg[:-1]
@@ -331,7 +331,7 @@ class ReferenceStack:
         if step.failure is not None:
             self._fail_goal(tick, step.failure)
         elif step.reached:
-            self._events += self._task.reached(tick)
+            self._events += self._task.record_reached(tick)
             self._stop(tick)
         else:
             self._commands.request(tick, self._adjust_controller_command(tick, frames, step.command), periods)
@@ -351,12 +351,12 @@ class ReferenceStack:
         while (goal := self._task.goal) is not None and goal.via:
             if pose.distance(goal.pose) > goal.xy_tolerance:
                 break
-            self._events += self._task.passed(tick)
-            self._events += self._task.next(tick)
+            self._events += self._task.record_passed(tick)
+            self._events += self._task.accept_next(tick)
         return goal
 
     def _fail_goal(self, tick: int, failure: NavigationFailure) -> None:
-        self._events += self._task.failed(tick, failure.code, str(failure))
+        self._events += self._task.record_failed(tick, failure.code, str(failure))
         self._stop(tick)
 
     def _stop(self, tick: int) -> None:

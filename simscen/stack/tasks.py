@@ -10,11 +10,16 @@ Events = tuple[Event, ...]
 class Task:
     """Goals in order. Methods return the events that a client of the action would see.
 
-    Intermediate goals (`via`) and the goal after them are one action: they fail, are canceled, and preempted together.
+    Intermediate goals (`via`) and the goal after them are one action: they fail, are canceled, and are preempted
+    together.
     """
 
     def __init__(self, stop_on_failure: bool, *, clock: Clock | None = None, mode: Mode = "navigate_to_pose") -> None:
-        """Create an empty task. `clock` converts the `wait` times of goals to ticks."""
+        """Create an empty task.
+
+        If `stop_on_failure` is true, a failed goal ends the task. `clock` converts the `wait` times of goals to ticks.
+        `mode` is the action of Nav2 that the task imitates, which determines the error code of a failed task.
+        """
         self._stop_on_failure = stop_on_failure
         self._clock, self._mode = clock or Clock(), mode
         self._waiting: list[Goal] = []
@@ -31,8 +36,8 @@ class Task:
         self._waiting, self.goal, self._failure, self._accepted = list(goals), None, None, 0
         self._wait_until = None
 
-    def next(self, tick: int) -> Events:
-        """Accept the next goal if there is no current one; end the task if none is left."""
+    def accept_next(self, tick: int) -> Events:
+        """End a wait that is over as `end_wait` does, then accept the next goal if there is no current one."""
         events = self.end_wait(tick)
         if self.goal is None and self._wait_until is None and self._waiting:
             self.goal, self.since = self._waiting.pop(0), tick
@@ -44,7 +49,7 @@ class Task:
         return events
 
     @property
-    def waits(self) -> bool:
+    def is_waiting(self) -> bool:
         """Whether the robot waits at a goal."""
         return self._wait_until is not None
 
@@ -53,73 +58,78 @@ class Task:
         if self._wait_until is None or tick < self._wait_until:
             return ()
         self._wait_until = None
-        return () if self._waiting else self._end(tick, TaskResult.SUCCEEDED)
+        return () if self._waiting else self._end_task(tick, TaskResult.SUCCEEDED)
 
     @property
-    def ahead(self) -> tuple[Goal, ...]:
+    def remaining_in_action(self) -> tuple[Goal, ...]:
         """The goals after the current one in the same action."""
         if self.goal is None or not self.goal.via:
             return ()
         last = next((k for k, goal in enumerate(self._waiting) if not goal.via), len(self._waiting) - 1)
         return tuple(self._waiting[: last + 1])
 
-    def reached(self, tick: int) -> Events:
+    def record_reached(self, tick: int) -> Events:
         """Record that the current goal is reached."""
         assert self.goal is not None
         reached = self._event(tick, EventKind.GOAL_REACHED)
         if self.goal.wait > 0:
             self._wait_until, self.goal = tick + self._clock.ticks(self.goal.wait), None
             return (reached,)
-        return (reached, *self._close(tick, TaskResult.SUCCEEDED))
+        return (reached, *self._end_goal(tick, TaskResult.SUCCEEDED))
 
-    def passed(self, tick: int) -> Events:
+    def record_passed(self, tick: int) -> Events:
         """Record that the robot has passed the current, intermediate goal."""
-        return (self._event(tick, EventKind.GOAL_PASSED), *self._close(tick, TaskResult.SUCCEEDED))
+        return (self._event(tick, EventKind.GOAL_PASSED), *self._end_goal(tick, TaskResult.SUCCEEDED))
 
-    def failed(self, tick: int, code: ErrorCode | int, message: str) -> Events:
+    def record_failed(self, tick: int, code: ErrorCode | int, message: str) -> Events:
         """Record that the current goal has failed, and end the task if it stops on failures.
 
         `code` is a number for error codes of foreign stacks without a name.
         """
         details: dict[str, Value] = {"error_code": int(code), "error_name": _name(code), "message": message}
-        dropped = self._drop(tick, EventKind.GOAL_FAILED, **details)
+        dropped = self._end_action(tick, EventKind.GOAL_FAILED, **details)
         self._failure = code
         if self._stop_on_failure:
             if self._mode == "follow_waypoints":
                 self._failure = ErrorCode.STOP_ON_MISSED_WAYPOINT
             self._waiting = []
-        return (*dropped, *self._close(tick, TaskResult.FAILED))
+        return (*dropped, *self._end_goal(tick, TaskResult.FAILED))
 
     def cancel(self, tick: int) -> Events:
         """Cancel the current goal and all after it."""
         if self.goal is None and self._wait_until is None:
             return ()
-        dropped = () if self.goal is None else self._drop(tick, EventKind.GOAL_CANCELED)
+        dropped = () if self.goal is None else self._end_action(tick, EventKind.GOAL_CANCELED)
         self._waiting, self._wait_until = [], None
-        return (*dropped, *self._close(tick, TaskResult.CANCELED))
+        return (*dropped, *self._end_goal(tick, TaskResult.CANCELED))
 
     def preempt(self, tick: int, goal: Goal) -> Events:
-        """Replace the current goal; the goals after it stay. Also ends a wait."""
-        dropped = () if self.goal is None else self._drop(tick, EventKind.GOAL_CANCELED, preempted_by=goal.name)
+        """Replace the current goal, and the other goals of its action, by `goal`. Also ends a wait.
+
+        The goals after that action stay.
+        """
+        dropped = () if self.goal is None else self._end_action(tick, EventKind.GOAL_CANCELED, preempted_by=goal.name)
         self.goal, self._wait_until = None, None
         self._waiting.insert(0, goal)
         return dropped
 
-    def _drop(self, tick: int, kind: EventKind, **details: Value) -> Events:
+    def _end_action(self, tick: int, kind: EventKind, **details: Value) -> Events:
         """End the current goal and the other goals of the same action with one kind of event."""
-        ahead = self.ahead
+        remaining = self.remaining_in_action
         dropped = [self._event(tick, kind, **details)]
-        for goal in ahead:
+        for goal in remaining:
             dropped.append(Event(tick, kind, goal.name, {"index": self._accepted, **details}))
             self._accepted += 1
-        self._waiting = self._waiting[len(ahead) :]
+        self._waiting = self._waiting[len(remaining) :]
         return tuple(dropped)
 
-    def _close(self, tick: int, result: TaskResult) -> Events:
+    def _end_goal(self, tick: int, result: TaskResult) -> Events:
+        """End the current goal, and the task with this result if no goal is left."""
         self.goal = None
-        return () if self._waiting else self._end(tick, result)
+        return () if self._waiting else self._end_task(tick, result)
 
-    def _end(self, tick: int, result: TaskResult) -> Events:
+    def _end_task(self, tick: int, result: TaskResult) -> Events:
+        """End the task with this result, or as failed if a goal has failed."""
         if self._failure is not None:
             result = TaskResult.FAILED
         code = self._failure or ErrorCode.NONE
@@ -128,8 +138,8 @@ class Task:
         return (Event(tick, EventKind.NAVIGATION_ENDED, result.value, details),)
 
     @property
-    def next_goal(self) -> Goal | None:
-        """The next goal."""
+    def upcoming_goal(self) -> Goal | None:
+        """The goal that will be accepted next, or None."""
         return self._waiting[0] if self._waiting else None
 
     def _event(self, tick: int, kind: EventKind, **data: Value) -> Event:

@@ -65,6 +65,26 @@ def test_an_unusable_nav2_is_an_error_that_names_the_node(
     assert alive(tag) == []
 
 
+def test_an_aborted_bring_up_is_started_again_once(with_interfaces, run, tmp_path: Path) -> None:
+    aborted = with_interfaces.node("nav2_like", *ACTION, aborts="behavior_server")
+    complete = with_interfaces.node("nav2_like", *ACTION)
+    launch = f"if mkdir {tmp_path}/tried; then {aborted}; else {complete}; fi"
+    ended = run("nav2", "--launch", launch, scenario="short.scenario.yaml")
+    assert ended.code == 0, ended.said
+    (warning, *_) = ended.about["warnings"]
+    assert "started again" in warning
+    assert "lifecycle_manager has given up the bring-up: the lifecycle node /behavior_server is unconfigured" in warning
+
+
+def test_a_bring_up_that_is_aborted_twice_is_an_error(with_interfaces, run, alive) -> None:
+    tag = f"aborts{os.getpid()}"
+    launch = with_interfaces.node("nav2_like", *ACTION, tag=tag, aborts="behavior_server")
+    ended = run("nav2", "--launch", launch)
+    assert ended.code == 3
+    assert "lifecycle_manager has given up the bring-up" in ended.said
+    assert alive(tag) == []
+
+
 def test_a_server_that_dies_during_the_run_is_named(with_interfaces, run, alive) -> None:
     launch = with_interfaces.node("nav2_like", *ACTION, dies="planner_server", dies_at=2.0)
     ended = run("nav2", "--answer", "2", "--launch", launch, scenario="short.scenario.yaml")

@@ -11,17 +11,17 @@ from simscen.advanced.localizers.scan_memory import METERS_PER_RAD
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.stack.localizers.dead_reckoning import propagate_covariance, rotation_matrix
 
-WINDOW = 36
+WINDOW_SIZE = 36
 """Number of recent corrections that are compared, about 9 m of driving."""
 CORRELATION_LENGTHS_M = np.array((2.0, 2.0, 1.1))
-"""Correlation length of the errors (longitudinal, lateral, yaw) in m driven, rotations included.
+"""Correlation length of the errors (longitudinal, lateral, yaw) in m driven, measured by `_distance`.
 
 The errors of poses 4 m apart have the correlations 0.4, 0.4 and 0.1, both with correct maps and with moved furniture.
 """
 DRIFT_VARIANCE = np.square((0.002, 0.002, 0.0016))
 """Variance (m², m², rad²) of the drift of scan matching per meter, if scans show enough."""
 FORGETTING_FACTOR = 0.99
-"""Factor of the weight of everything learned, for each correction."""
+"""Factor by which each correction reduces the weight of everything learned before."""
 PRIOR_RATIO, PRIOR_WEIGHT = np.array((1.7, 1.7, 1.0)), 20.0
 """Prior of the ratio of the true standard deviations (longitudinal, lateral, yaw) to those of the particles, for beams
 whose residuals are as large as `sigma_hit`, and its weight in corrections."""
@@ -45,8 +45,8 @@ class CovarianceEstimator:
     that is half a cell off, shifts the pose in the same direction for as long as it is in sight, so that the
     covariance of the particles is too small. Two measurements show by which ratio, along each axis of the robot:
 
-    - The scatter of the last WINDOW poses. Scan matching, which does not use the map, propagates each of them to the
-      present. Their differences are due to the errors of both poses, as far as these are independent, and to the
+    - The scatter of the last WINDOW_SIZE poses. Scan matching, which does not use the map, propagates each of them to
+      the present. Their differences are due to the errors of both poses, as far as these are independent, and to the
       drift of scan matching.
     - The residuals of the beams that the map explains (the variance of unit weight of a least-squares adjustment).
       They also show errors that all poses share. How residuals translate to errors of the pose is learned from the
@@ -71,7 +71,7 @@ class CovarianceEstimator:
         self._bases: Array = np.empty((0, 3))
         self._drifts: Array = np.empty((0, 3, 3))  # since each pose, in the frame of the bases
         self._distances, self._weights = np.empty(0), np.empty(0)
-        self._residuals: deque[ScanResiduals] = deque(maxlen=WINDOW)
+        self._residuals: deque[ScanResiduals] = deque(maxlen=WINDOW_SIZE)
         self._base: Pose2 | None = None
 
     def compare(self, matched: Pose2, odometry: Pose2) -> None:
@@ -138,7 +138,7 @@ class CovarianceEstimator:
     def _add(self, pose: Pose2, weight: float) -> None:
         """Add a pose; `weight` in 1/m² is the inverse variance of its particles."""
         assert self._base is not None  # `drive` precedes every correction
-        recent = slice(1 - WINDOW, None)
+        recent = slice(1 - WINDOW_SIZE, None)
         self._poses = np.vstack((self._poses[recent], pose))
         self._bases = np.vstack((self._bases[recent], self._base))
         self._drifts = np.concatenate((self._drifts[recent], np.zeros((1, 3, 3))))
@@ -177,5 +177,5 @@ class CovarianceEstimator:
 
 
 def _distance(step: Pose2) -> float:
-    """Return the length of a step in m, rotations included."""
+    """Return the length of a step in m; a rotation by 1 rad counts as METERS_PER_RAD."""
     return math.hypot(step.x, step.y) + METERS_PER_RAD * abs(step.yaw)

@@ -23,7 +23,7 @@ ENDPOINT_STD_M = 0.2
 MAX_DISTANCE_M = 4 * ENDPOINT_STD_M
 """Distance from obstacles beyond which an endpoint has the score 0."""
 COARSE_CELL_M = 0.2
-HEADINGS = 180
+HEADING_COUNT = 180
 """Number of headings of the coarse grid."""
 COARSE_POINTS, POINTS = 80, 240
 """Maximum number of points that are matched on the coarse grid, and later."""
@@ -33,8 +33,8 @@ COARSE_POSES, REFINED_POSES, MAX_RESULTS = 3000, 250, 40
 """Number of poses that the coarse search and the refinement pass on, and of the results."""
 NEARBY_STEPS, REFINED_NEARBY_POSES = ((6, 0.2), (9, 0.035)), 12
 """Number and size of the steps to each side of a search nearby (m, rad), and number of poses that are refined."""
-DISTINCT = (0.5, 0.2)
-"""Poses that are closer to each other than both of these (m, rad) are the same."""
+MIN_SEPARATION = (0.5, 0.2)
+"""Poses that are closer to each other than both of these distances (m, rad) count as the same."""
 PASSED_SHARES = (0.3, 0.55, 0.8)
 """Positions along a beam, as shares of its length, that must be free."""
 FREE_WEIGHT = 0.5
@@ -155,8 +155,8 @@ class GlobalSearch:
         border = int(MAX_RANGE_M / cell) + 2
         tables = [np.pad(nearness, border), np.pad(open_, border)]
         weights = [4, max(1, round(4 * FREE_WEIGHT * len(view.ends) / max(1, len(view.passed))))]
-        scores = np.empty((HEADINGS, rows, columns), dtype=np.uint16)
-        turns = np.arange(HEADINGS, dtype=np.float64) * (2 * np.pi / HEADINGS)
+        scores = np.empty((HEADING_COUNT, rows, columns), dtype=np.uint16)
+        turns = np.arange(HEADING_COUNT, dtype=np.float64) * (2 * np.pi / HEADING_COUNT)
         for turn, heading_scores in zip(turns.tolist(), scores, strict=True):
             total = np.zeros((rows, columns), dtype=np.uint32)
             for table, points, weight in zip(tables, (view.ends, view.passed), weights, strict=True):
@@ -200,7 +200,7 @@ def _pooled(levels: Levels, factor: int) -> Levels:
 
 
 def distinct(poses: Array, scores: Array, max_count: int) -> tuple[Array, Array]:
-    """Return the best DISTINCT poses of `poses` (n, 3), best first, at most `max_count`, and their scores."""
+    """Return the best of `poses` (n, 3) with MIN_SEPARATION, best first, at most `max_count`, and their scores."""
     order = np.argsort(-scores, kind="stable")
     remaining = poses[order]
     chosen_indices: list[int] = []
@@ -208,7 +208,9 @@ def distinct(poses: Array, scores: Array, max_count: int) -> tuple[Array, Array]
         chosen_indices.append(int(order[0]))
         difference = np.abs(remaining - remaining[0])
         difference[:, 2] = np.abs(wrap_array(difference[:, 2]))
-        other = (np.hypot(difference[:, 0], difference[:, 1]) > DISTINCT[0]) | (difference[:, 2] > DISTINCT[1])
+        other = (np.hypot(difference[:, 0], difference[:, 1]) > MIN_SEPARATION[0]) | (
+            difference[:, 2] > MIN_SEPARATION[1]
+        )
         order, remaining = order[other], remaining[other]
     chosen = np.array(chosen_indices, dtype=np.int64)
     return poses[chosen], scores[chosen]

@@ -109,7 +109,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
 
     @property
     def is_certain(self) -> bool:
-        """The map explains nearly the whole last scan, and the particles are one narrow group."""
+        """Whether the map explains nearly the whole last scan, and the particles are one narrow group."""
         is_mapped = self._map_weight == 1.0 and self.fitting >= CERTAIN_FIT
         return is_mapped and self._is_one_group and self._recovery.share == 0
 

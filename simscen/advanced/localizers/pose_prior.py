@@ -13,18 +13,19 @@ from simscen.stack.localizers.particles import pose_errors
 CERTAIN_STD = (0.1, 0.1, 0.05)
 """Standard deviations (m, m, rad) of a certain pose."""
 ODOMETRY_DRIFT = (0.03, 0.01)
-"""Drift of odometry in m and rad per meter driven, rotations included, if scans do not show the motion."""
-MOVING_SCENE = 0.1, 0.5
-"""Difference between a step by scans and by wheels, in m and as share of the latter, that slip does not explain.
+"""Drift of odometry in m and rad per meter driven, if scans do not show the motion."""
+MAX_SLIP_DIFFERENCE = 0.1, 0.5
+"""Largest difference that slip can cause between a step measured by scans and by wheels: in m, and as a share of the
+wheels' step.
 
-Then people walk next to the robot, and the scans show them. Slipping wheels differ by at most 40 %, except if they spin
-on the spot, where scans show nothing new.
+If both limits are exceeded, the scans show people who walk next to the robot. Slipping wheels differ by at most 40 %,
+except if they spin on the spot. Then scans show nothing new.
 """
 KNOWN_STEP_STD_M = 0.012
-"""Standard deviation of a step above which scans do not determine it.
+"""Largest standard deviation of a step by scans for which the scans determine the step; above it, the wheels do.
 
-Along a corridor that looks the same everywhere, the wheels determine the step. Their slip lasts for some time, so that
-the errors of such steps add up in one direction.
+An example is a step along a corridor that looks the same everywhere. Wheel slip lasts for some time, so that the errors
+of such steps add up in one direction.
 """
 
 
@@ -35,9 +36,10 @@ NO_NOISE: Noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 class ObservedMotion:
     """Motion from one correction to the next.
 
-    disagreement:  of scan matching from odometry, if they disagree; one of them is wrong by this
-    step:          by scan matching; None if scans do not show the motion
-    was_carried:   the last scan hardly overlaps with earlier ones; None if unknown
+    disagreement:  pose by scan matching relative to the pose by odometry, if they disagree; otherwise zero
+    step:          motion by scan matching; None if scans do not show the motion
+    was_carried:   whether the robot was probably carried, because the last scan hardly overlaps with earlier ones;
+                   None if unknown
     """
 
     disagreement: Pose2 = Pose2(0.0, 0.0, 0.0)
@@ -46,17 +48,17 @@ class ObservedMotion:
 
     @property
     def is_scene_moving(self) -> bool:
-        """Scans and wheels differ by more than slip explains, so that what the scans show moves."""
+        """Whether scans and wheels differ by more than slip can cause. Then the scans show moving objects."""
         apart = math.hypot(self.disagreement.x, self.disagreement.y)
-        if self.step is None or apart < MOVING_SCENE[0]:
+        if self.step is None or apart < MAX_SLIP_DIFFERENCE[0]:
             return False
         wheels = self.step.delta.compose(self.disagreement.inverse())
-        return apart > MOVING_SCENE[1] * math.hypot(wheels.x, wheels.y)
+        return apart > MAX_SLIP_DIFFERENCE[1] * math.hypot(wheels.x, wheels.y)
 
     def systematic_error(self, meters: float) -> tuple[float, float]:
         """Return the errors in m and rad that have the same direction in this motion and similar ones.
 
-        `meters` is the distance driven, rotations included.
+        `meters` is the distance driven as returned by `traveled`, in which rotations count as well.
         """
         if self.step is None:
             return ODOMETRY_DRIFT[0] * meters, ODOMETRY_DRIFT[1] * meters
@@ -69,17 +71,18 @@ class ObservedMotion:
 class PosePrior:
     """A certain pose and the errors of the motion since then.
 
-    pose:              in the map, when the base was at `base` in a frame that drifts slowly
-    std (3,):          standard deviations of the pose in m, m and rad
-    covariance (3, 3): of the motion since then, in the frame that drifts, from independent errors
-    systematic:        sum of the errors with the same direction, in m and rad
+    pose:              certain pose in the map
+    base:              pose of the base at the same time in a slowly drifting frame: that of scan matching or odometry
+    std (3,):          standard deviations of `pose` in m, m and rad
+    covariance (3, 3): covariance of the motion since then, from independent errors, in the drifting frame
+    systematic_error:  sum of the errors that always have the same direction, in m and rad
     """
 
     pose: Pose2
     base: Pose2
     std: Array
     covariance: Array
-    systematic: tuple[float, float] = (0.0, 0.0)
+    systematic_error: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
     def at(cls, pose: Array, base: Pose2, std: Array | tuple[float, float, float] = CERTAIN_STD) -> "PosePrior":
@@ -87,20 +90,21 @@ class PosePrior:
         return cls(Pose2(*pose.tolist()), base, np.array(std), np.zeros((3, 3)))
 
     def after(self, before: Pose2, base: Pose2, meters: float, motion: ObservedMotion) -> "PosePrior":
-        """Return the prior after `motion`, in which the base drove `meters`, rotations included, from `before`."""
+        """Return the prior after `motion`, a drive of `meters` (see `traveled`) from `before` to `base`."""
         meter, rad = motion.systematic_error(meters)
+        meter, rad = self.systematic_error[0] + meter, self.systematic_error[1] + rad
         noise = NO_NOISE if motion.step is None else rotate_covariance(motion.step.covariance, before.yaw)
         covariance = propagate_covariance(self.covariance, base.x - before.x, base.y - before.y, noise)
-        return replace(self, covariance=covariance, systematic=(self.systematic[0] + meter, self.systematic[1] + rad))
+        return replace(self, covariance=covariance, systematic_error=(meter, rad))
 
     def expected(self, base: Pose2) -> Array:
-        """Return the pose (3,) in the map if there was no drift."""
+        """Return the pose (3,) in the map of a base at `base`, if there was no drift since the certain pose."""
         return np.array(self.pose.compose(self.base.between(base)))
 
     def negative_log_likelihood(self, poses: Array, base: Pose2) -> Array:
         """Return the negative log-likelihood (n,) of each of the `poses` (n, 3), relative to the expected pose."""
         frame = rotation_matrix(self.pose.yaw - self.base.yaw)
-        meter, rad = self.systematic
+        meter, rad = self.systematic_error
         std = np.square(self.std + np.array((meter, meter, rad)))
         errors = pose_errors(self.expected(base), poses)
         information = np.linalg.inv(frame @ self.covariance @ frame.T + np.diag(std))

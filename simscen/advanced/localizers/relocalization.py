@@ -5,7 +5,7 @@ from collections import deque
 
 import numpy as np
 
-from simscen.advanced.localizers.global_search import DISTINCT, GlobalSearch, View
+from simscen.advanced.localizers.global_search import MIN_SEPARATION, GlobalSearch, View
 from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.pose_prior import CERTAIN_STD, ObservedMotion, PosePrior
 from simscen.advanced.localizers.scan_memory import ScanMemory, traveled
@@ -19,7 +19,7 @@ from simscen.stack.localizers.particles import pose_errors
 
 RECENT_SCANS, MIN_FITTING_SHARE = 5, 0.6
 """The robot may be lost if the mean share of fitting beams in this many scans is below the second value."""
-MIN_MAPPED = 0.6
+MIN_MAPPED_SHARE = 0.6
 """Share of the beams that must end on the mapped area for the fit of a scan to be known."""
 SEARCH_INTERVAL_M, MAX_SEARCH_INTERVAL_M = 0.7, 8.0
 """Distance driven between two searches of the map; doubled after each search without a result, up to the maximum."""
@@ -82,7 +82,7 @@ class Relocalizer:
     ) -> tuple[Array, Array] | None:  # fmt: skip
         """Return poses (k, 3) where the robot may be, with their shares (k,); None if the estimate should be kept.
 
-        base:           pose of the robot when the scan was taken, in a frame that drifts slowly
+        base:           pose of the robot when the scan was taken, in the drifting frame of scan matching or odometry
         estimated:      pose of the robot in the map
         limits:         minimum and maximum range of beams to use, in m
         motion:         motion since the last scan
@@ -97,7 +97,7 @@ class Relocalizer:
             if by_initial_pose is not None:
                 return by_initial_pose
         if fitting_share is None:
-            fitting_share = self._trust.fitting_share(current, ends, MIN_MAPPED)
+            fitting_share = self._trust.fitting_share(current, ends, MIN_MAPPED_SHARE)
         if fitting_share is not None:
             self._fitting_shares.append(fitting_share)
             self._mapped_at = self._driven
@@ -148,7 +148,7 @@ class Relocalizer:
         view, expected = self._memory.view_from(base), initial.expected(base)[None]
         if not len(view.ends) or (score := self._search.score(current, view))[0] > CERTAIN_SCORE:
             return None
-        is_mapped = self._trust.fitting_share(expected, view.ends, MIN_MAPPED) is not None
+        is_mapped = self._trust.fitting_share(expected, view.ends, MIN_MAPPED_SHARE) is not None
         poses, scores = (
             self._search.search_near(view, expected[0]) if is_mapped else (expected, self._search.score(expected, view))
         )
@@ -157,7 +157,7 @@ class Relocalizer:
         best = int(likelihoods.argmax())
         difference = pose_errors(current[0], poses[best : best + 1])[0]
         if likelihoods[best] - own < MIN_LOG_RATIO or (
-            math.hypot(difference[0], difference[1]) < DISTINCT[0] and abs(difference[2]) < DISTINCT[1]
+            math.hypot(difference[0], difference[1]) < MIN_SEPARATION[0] and abs(difference[2]) < MIN_SEPARATION[1]
         ):
             return None
         self._fitting_shares.clear()
@@ -168,7 +168,7 @@ class Relocalizer:
         if min(self._since_check, self._memory.length) < CHECK_INTERVAL_M:
             return None
         self._since_check, view = 0.0, self._memory.view_from(base)
-        if not len(view.ends) or self._trust.fitting_share(current, view.ends, MIN_MAPPED) is None:
+        if not len(view.ends) or self._trust.fitting_share(current, view.ends, MIN_MAPPED_SHARE) is None:
             return None
         score = float(self._reduce_scores(self._search.score(current, view), current, base)[0])
         if score > CERTAIN_SCORE:
@@ -212,12 +212,12 @@ class Relocalizer:
 
     @property
     def _is_unmapped(self) -> bool:
-        """The estimated pose has been outside the mapped area for a long way."""
+        """Whether the estimated pose has been outside the mapped area for a long way."""
         return self._driven - self._mapped_at >= UNMAPPED_DISTANCE_M
 
     @property
     def _has_left_map(self) -> bool:
-        """The robot drove out of the mapped area. If it had been carried there, it could be anywhere."""
+        """Whether the robot drove out of the mapped area. If it had been carried there, it could be anywhere."""
         return self._is_unmapped and self._certain is not None
 
     def _search_map(self, view: View, base: Pose2, current: Array) -> tuple[Array, Array] | None:

@@ -25,7 +25,7 @@ _BEAM_SHARES = np.array([[share] for share in (*PASSED_SHARES, 1.0)])
 
 @dataclass(frozen=True, eq=False)
 class _StoredScan:
-    """A stored scan, taken at `odometry` after `driven` m, rotations included.
+    """A stored scan, taken at `odometry` after `driven` m as returned by `traveled`.
 
     `points` (m, n) are points on the paths of the n beams and, in the last row, their endpoints, in the odometry frame.
     """
@@ -43,7 +43,7 @@ class ScanMemory:
 
     @property
     def length(self) -> float:
-        """Distance in m between the oldest and the newest scan, rotations included."""
+        """Distance driven in m between the oldest and the newest scan, as returned by `traveled`."""
         return self._scans[-1].driven - self._scans[0].driven if self._scans else 0.0
 
     def add(self, scan: Scan, odometry: Pose2, min_range: float, max_range: float) -> Plane:
@@ -79,7 +79,7 @@ class ScanMemory:
 
 
 def traveled(before: Pose2, after: Pose2) -> float:
-    """Return the distance in m between two poses, rotations included."""
+    """Return the distance in m between two poses; a rotation by 1 rad counts as METERS_PER_RAD."""
     return before.distance(after) + METERS_PER_RAD * abs(wrap(after.yaw - before.yaw))
 
 

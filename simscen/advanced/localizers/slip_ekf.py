@@ -1,6 +1,7 @@
-"""Extended Kalman filter of odometry and gyroscope that detects wheel slip in turns, with optional laser odometry.
+"""Extended Kalman filter of odometry and gyroscope that detects wheel slip in turns, with optional scan matching.
 
-Slipping wheels measure a distance that the robot did not drive, which a gyroscope does not show, but scans do.
+If the wheels slip in a turn, the turn rates of wheels and gyroscope disagree. The wheels then also measure a distance
+that the robot did not drive. A gyroscope cannot measure this distance, but scan matching can.
 
 Source: Probabilistic Robotics, section 3.3, with filterpy's ExtendedKalmanFilter. As in robot_localization, the turn
 rate is a state that both sensors measure. The bias of the gyroscope is also a state; it is measured while the robot
@@ -14,7 +15,7 @@ import numpy as np
 from simscen.advanced.localizers.scan_matcher import ScanMatcher
 from simscen.advanced.localizers.slip_model import (
     BIAS,
-    PUSHED_SPEED,
+    PUSHED_SPEED_M_S,
     RATE,
     SLIP_LEVER_M,
     SLIP_X,
@@ -33,7 +34,7 @@ from simscen.stack.frames import OdometryHistory, is_plausible
 from simscen.stack.localizers.dead_reckoning import initial_pose
 
 
-class LaserOdometry:
+class ScanMatchingCorrection:
     """Corrects the translation of dead reckoning between scans of one lidar. The heading is not changed."""
 
     def __init__(self, tick_rate: int) -> None:
@@ -47,10 +48,10 @@ class LaserOdometry:
         self._dead_reckoning.add(tick, Pose2(pose.x - self._x, pose.y - self._y, pose.yaw))
 
     def correction(self, scan: Scan) -> tuple[float, float]:
-        """Return the error of dead reckoning since the last scan, along x and y of the map in m.
+        """Return the translation (x, y) in m, in the map frame, to add to dead reckoning since the last scan.
 
-        It is 0 if scans do not show the motion, or if they differ from dead reckoning by more than slip explains,
-        because then the scans show moving objects.
+        It is 0 if scans do not show the motion. It is also 0 if the difference is too large for slip, because then the
+        scans show moving objects.
         """
         if not self._dead_reckoning:
             return 0.0, 0.0
@@ -70,15 +71,16 @@ class LaserOdometry:
         return x, y
 
 
-MAX_TURN_RATE = 100.0
-"""Turn rate in rad/s above which readings of the gyroscope are ignored as faulty."""
-MIN_RATE_STD = 0.002
-"""Minimum standard deviation in rad/s of the wheels' turn rate, because of the resolution of encoders.
+MAX_TURN_RATE_RAD_S = 100.0
+"""Turn rate above which readings of the gyroscope are ignored as faulty."""
+MIN_RATE_STD_RAD_S = 0.002
+"""Minimum standard deviation of the wheels' turn rate, because of the resolution of encoders.
 
-Without it, locked wheels, or wheels on a turntable, would count as exact.
+Without it, wheels that stand still would exactly measure no rotation, even if the base is rotated.
 """
-_GYRO = np.zeros((1, 7))
-_GYRO[0, [RATE, BIAS]] = 1.0
+_GYRO_MEASUREMENT = np.zeros((1, 7))
+"""Measurement matrix of the gyroscope, which measures the sum of turn rate and bias."""
+_GYRO_MEASUREMENT[0, [RATE, BIAS]] = 1.0
 
 
 class SlipEkfLocalizer:
@@ -109,7 +111,7 @@ class SlipEkfLocalizer:
         self._speed, self._slipped = 0.0, False
         self._slip_detector = SlipDetector()
         self._map_from_odom = pose
-        self._laser = LaserOdometry(self._tick_rate) if self._spec.match_scans else None
+        self._scan_correction = ScanMatchingCorrection(self._tick_rate) if self._spec.match_scans else None
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Predict the state up to an odometry message."""
@@ -122,15 +124,15 @@ class SlipEkfLocalizer:
             self._measure(step)
             self._predict(motion_model(self._spec, self._filter.x, step), apply_step(self._filter.x, step))
         self._readings.clear()
-        if self._laser is not None:
-            self._laser.add_pose(odometry.tick, self.pose)
+        if self._scan_correction is not None:
+            self._scan_correction.add_pose(odometry.tick, self.pose)
         self._map_from_odom = self.pose.compose(odometry.pose.inverse())
 
     def on_scan(self, scan: Scan) -> None:
         """Correct the translation by scan matching, if enabled."""
-        if self._laser is None or self._last is None:
+        if self._scan_correction is None or self._last is None:
             return
-        x, y = self._laser.correction(scan)
+        x, y = self._scan_correction.correction(scan)
         self._filter.x[0] += x
         self._filter.x[1] += y
         self._map_from_odom = self.pose.compose(self._last.pose.inverse())
@@ -138,7 +140,7 @@ class SlipEkfLocalizer:
     def on_imu(self, imu: Imu) -> None:
         """Store the turn rate until the next odometry message."""
         rate = imu.angular_velocity[2]
-        if abs(rate) < MAX_TURN_RATE:
+        if abs(rate) < MAX_TURN_RATE_RAD_S:
             self._readings.append(rate)
 
     @property
@@ -165,21 +167,21 @@ class SlipEkfLocalizer:
         undetected = self._slip_detector.update(innovation, noise, float(self._filter.P[BIAS, BIAS]), seconds)
         if undetected == 0.0:
             return without_slip
-        pushed_speed = PUSHED_SPEED if abs(turn) > abs(pose.yaw / seconds) else 0.0
+        pushed_speed = PUSHED_SPEED_M_S if abs(turn) > abs(pose.yaw / seconds) else 0.0
         possible_speed = max(self._speed, speed, SLIP_LEVER_M * abs(innovation), pushed_speed)
         return Step(pose, seconds, possible_speed, slips=True, undetected_slip=undetected)
 
     def _measure(self, step: Step) -> None:
         """Estimate the turn rate from the wheels, unless they slip, and from the gyroscope."""
         model = rate_model(self._spec, step, self._wheel_noise(step), self._slipped)
-        after = model.f @ self._filter.x
-        after[RATE] = step.pose.yaw / step.seconds
-        self._predict(model, after)
+        predicted = model.f @ self._filter.x
+        predicted[RATE] = step.pose.yaw / step.seconds
+        self._predict(model, predicted)
         if self._readings:
             self._filter.update(
                 np.array([self._turn_rate]),
-                lambda _: _GYRO,
-                lambda state: _GYRO @ state,
+                lambda _: _GYRO_MEASUREMENT,
+                lambda state: _GYRO_MEASUREMENT @ state,
                 R=np.array([[self._gyro_noise]]),
             )
         self._slipped = step.slips
@@ -189,7 +191,7 @@ class SlipEkfLocalizer:
     def _wheel_noise(self, step: Step) -> float:
         """Return the variance of the wheels' turn rate in (rad/s)²."""
         turned = step.length + abs(step.pose.yaw)
-        return self._spec.rotation_noise**2 * turned / step.seconds**2 + MIN_RATE_STD**2
+        return self._spec.rotation_noise**2 * turned / step.seconds**2 + MIN_RATE_STD_RAD_S**2
 
     @property
     def _turn_rate(self) -> float:
@@ -200,10 +202,11 @@ class SlipEkfLocalizer:
     def _gyro_noise(self) -> float:
         return self._spec.gyro_noise**2 / len(self._readings)
 
-    def _predict(self, model: Model, after: Array) -> None:
+    def _predict(self, model: Model, state: Array) -> None:
+        """Predict the filter to `state` (7,), with the covariance of the model."""
         self._filter.F, self._filter.Q = model.f, model.q
-        self._filter.predict(after)
+        self._filter.predict(state)
 
-    def _advance(self, after: Array) -> None:
-        """Replace filterpy's `predict_x`, for nonlinear motion."""
-        self._filter.x = after
+    def _advance(self, state: Array) -> None:
+        """Replace filterpy's `predict_x`, for nonlinear motion: set the predicted `state`."""
+        self._filter.x = state

@@ -58,15 +58,15 @@ Slip is the speed that the wheels do not measure, as a share of the robot's poss
 """
 SLIP_TIME_S = 1.0
 """Correlation time of slip."""
-UNKNOWN_RATE = 10.0
-"""Standard deviation in rad/s of the turn rate while the wheels slip, before the gyroscope measures it."""
+UNKNOWN_RATE_STD_RAD_S = 10.0
+"""Standard deviation of the turn rate while the wheels slip, before the gyroscope measures it."""
 SLIP_LEVER_M = 0.1
 """Distance from the base to the point around which a slipping robot rotates."""
 SLIP_STD = 0.7
 """Standard deviation of slip in both directions while the wheels slip. It would be 0.58 for a uniform distribution up
 to the possible speed, and 1 if slip were always equal to the possible speed."""
-PUSHED_SPEED = 0.3
-"""Possible speed in m/s of a robot that turns faster than its wheels measure, because a slope or a person moves it."""
+PUSHED_SPEED_M_S = 0.3
+"""Possible speed of a robot that turns faster than its wheels measure, because a slope or a person moves it."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Step:
     pose:             motion by the wheels, in the base frame before it
     seconds:          its duration
     speed:            possible speed: the highest plausible speed of the robot in m/s; slip is a share of it
-    slips:            the wheels slip
+    slips:            whether the wheels slip
     undetected_slip:  time in s of slip until the end of the step that was not detected before
     """
 
@@ -103,10 +103,11 @@ class Model:
 def rate_model(spec: SlipEkf, step: Step, noise: float, slipped: bool) -> Model:
     """Return the model of turn rate, bias and slip from one step to the next.
 
-    `noise` is the variance of the wheels' turn rate in (rad/s)²; `slipped`: the wheels slipped in the step before.
+    `noise` is the variance of the wheels' turn rate in (rad/s)²; `slipped` states whether the wheels slipped in the
+    step before.
     """
     f, q = np.eye(7), np.zeros((7, 7))
-    f[RATE, RATE], q[RATE, RATE] = 0.0, UNKNOWN_RATE**2 if step.slips else noise
+    f[RATE, RATE], q[RATE, RATE] = 0.0, UNKNOWN_RATE_STD_RAD_S**2 if step.slips else noise
     q[BIAS, BIAS] = spec.gyro_bias_walk**2 * step.seconds
     if step.slips != slipped:
         f[SLIP_X, SLIP_X] = f[SLIP_Y, SLIP_Y] = 0.0

@@ -221,8 +221,8 @@ LEAVE_DISTANCE_M = 0.15
 """Distance in m from which the robot returns."""
 RETURN_SPEED_RATIO, RETURN_GAIN = 0.3, 1.0
 """Maximum speed of returning relative to full speed, and gain in 1/s of the speed on the distance."""
-RETURN_TURN_RATE = 1.0
-"""Maximum turn rate in rad/s of returning."""
+RETURN_TURN_RATE_RAD_S = 1.0
+"""Maximum turn rate of returning."""
 MAX_BEARING_RAD = 0.4
 """Angle in rad to the line back above which the robot turns before it drives."""
 
@@ -232,7 +232,10 @@ class StandPosition:
 
     def __init__(self, robot: RobotModel, full_speed: float) -> None:
         """Take the robot and its full speed in m/s."""
-        self._speed, self._max_turn_rate = RETURN_SPEED_RATIO * full_speed, min(RETURN_TURN_RATE, robot.max_angular)
+        self._speed, self._max_turn_rate = (
+            RETURN_SPEED_RATIO * full_speed,
+            min(RETURN_TURN_RATE_RAD_S, robot.max_angular),
+        )
         self._can_reverse, self._can_turn_in_place = robot.max_reverse > 0.0, robot.turning_radius == 0.0
         self._home: Pose2 | None = None
         self._is_away = False

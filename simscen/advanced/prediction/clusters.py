@@ -16,13 +16,13 @@ MAX_GAP_M, MAX_GAP_BEAMS = 0.15, 2.5
 MAX_MISSED_BEAMS = 2
 """Maximum number of consecutive beams without a hit within a cluster."""
 MIN_RISE_M = 0.1
-"""Minimum rise of the range in m between two obstacles that are neighbors in the scan."""
+"""Two adjacent obstacles are separated if the range rises by more than this in m between them."""
 BOTH_EDGES = 2
 """Number of visible edges of a completely visible obstacle."""
-RUN_OFFSET_M = 1e3
-"""A distance in m larger than any range."""
+RUN_SEPARATION_M = 1e3
+"""Distance in m added from run to run, to process all runs in one array without mixing them. Larger than any range."""
 MAX_HALF_ANGLE_RAD = math.radians(80.0)
-"""Limit in rad of half the angle that a cluster covers, for computing its radius."""
+"""Largest half of the angle that a cluster covers, in rad, for computing its radius, which is infinite at 90°."""
 MIN_HITS = 3
 """Minimum number of hits of a cluster."""
 ROUNDING_M = 1e-6
@@ -38,9 +38,10 @@ Points = npt.NDArray[np.complex128]
 
 @fast_dataclass(eq=False)
 class Hits:
-    """Hits of a scan in order: indices of `beams`, `ranges`, and `points` (m,).
+    """The m hits of a scan in order: indices of their `beams`, their `ranges`, and `points`, each (m,).
 
-    Two successive hits belong together if their distance is at most `gap_ratio` times the range.
+    Two successive hits belong together if their distance is at most MAX_GAP_M or `gap_ratio` times the range,
+    whichever is larger.
     """
 
     beams: Indices
@@ -49,7 +50,10 @@ class Hits:
     gap_ratio: float
 
     def may_share_run(self, indices: list[int], count: int) -> bool:
-        """Return whether `count` of the hits with these indices, in order, may be in one run."""
+        """Return False if no run can contain `count` of the hits with these indices, which must ascend.
+
+        This is a fast check before the runs are computed.
+        """
         linked = 1
         for one, other in pairwise(indices):
             linked = linked + 1 if self._may_link_next(one) and self._may_link_next(other - 1) else 1
@@ -58,7 +62,7 @@ class Hits:
         return False
 
     def _may_link_next(self, hit: int) -> bool:
-        """Return whether this hit and the next may be in one run, computed with scalars."""
+        """Return whether this hit is close enough to the next one to be in the same run. Uses scalars for speed."""
         point, next_point = self.points.item(hit), self.points.item(hit + 1)
         near = min(self.ranges.item(hit), self.ranges.item(hit + 1))
         return abs(next_point - point) <= max(self.gap_ratio * near, MAX_GAP_M) + ROUNDING_M
@@ -97,17 +101,17 @@ class Cluster(NamedTuple):
         return self.last - self.first + 1
 
 
-def valid_hits(ranges: Array, points: Points, step: float, least: float, most: float) -> Hits:
-    """Return the hits of a scan with ranges between `least` and `most` m.
+def find_valid_hits(ranges: Array, points: Points, step: float, min_range: float, max_range: float) -> Hits:
+    """Return the hits of a scan with ranges between `min_range` and `max_range` in m.
 
-    `points` (n,) are the ends of the beams, which are `step` rad apart.
+    `points` (n,) are the ends of all n beams, which are `step` rad apart.
     """
-    beams = ((ranges >= least) & (ranges <= most)).nonzero()[0]
+    beams = ((ranges >= min_range) & (ranges <= max_range)).nonzero()[0]
     return Hits(beams, ranges[beams], points[beams], MAX_GAP_BEAMS * abs(step))
 
 
-def runs(hits: Hits) -> Runs:
-    """Return the runs of hits. The first and the last run of a full circle are not joined."""
+def divide_into_runs(hits: Hits) -> Runs:
+    """Divide hits into runs. The first and the last run of a full circle are not joined."""
     beams, ranges, points = hits.beams, hits.ranges, hits.points
     gap = np.minimum(ranges[1:], ranges[:-1])
     gap *= hits.gap_ratio
@@ -117,7 +121,7 @@ def runs(hits: Hits) -> Runs:
     return Runs(hits, *_runs_between(is_gap.nonzero()[0], len(ranges)))
 
 
-def clusters(hit_runs: Runs, ranges: Array, start: float, step: float, max_radius: float) -> list[Cluster]:
+def find_clusters(hit_runs: Runs, ranges: Array, start: float, step: float, max_radius: float) -> list[Cluster]:
     """Return the clusters with a radius up to `max_radius` in a scan with these runs and ranges.
 
     The first beam points along `start`; beams are `step` rad apart.
@@ -131,17 +135,17 @@ def clusters(hit_runs: Runs, ranges: Array, start: float, step: float, max_radiu
     is_full_circle = abs(len(ranges) * spacing - 2 * math.pi) < spacing
     found: list[Cluster] = []
     begin, end = hits.beams.take(first).tolist(), hits.beams.take(last).tolist()
-    for one, other, near, first_index, last_index in zip(first, last, nearest, begin, end, strict=True):
-        if other - one + 1 < MIN_HITS:
+    for first_hit, last_hit, near, first_beam, last_beam in zip(first, last, nearest, begin, end, strict=True):
+        if last_hit - first_hit + 1 < MIN_HITS:
             continue
-        sine = math.sin(min((last_index - first_index + 1) * (0.5 * spacing), MAX_HALF_ANGLE_RAD))
+        sine = math.sin(min((last_beam - first_beam + 1) * (0.5 * spacing), MAX_HALF_ANGLE_RAD))
         radius = near * sine / (1.0 - sine)
         if radius <= max_radius:
-            center = cmath.rect(near + radius, start + (0.5 * step) * (first_index + last_index))
-            edges = _has_edge(ranges, first_index, first_index - 1, is_full_circle) + _has_edge(
-                ranges, last_index, last_index + 1, is_full_circle
+            center = cmath.rect(near + radius, start + (0.5 * step) * (first_beam + last_beam))
+            edges = _has_edge(ranges, first_beam, first_beam - 1, is_full_circle) + _has_edge(
+                ranges, last_beam, last_beam + 1, is_full_circle
             )
-            found.append(Cluster(one, other, center, radius, edges))
+            found.append(Cluster(first_hit, last_hit, center, radius, edges))
     return found
 
 
@@ -154,7 +158,7 @@ def _has_edge(ranges: Array, beam: int, neighbor: int, is_full_circle: bool) -> 
     return bool(ranges[neighbor] > ranges[beam])
 
 
-def marked_hits(found: list[Cluster], mask: Mask) -> list[tuple[int, int]]:
+def count_marked_hits(found: list[Cluster], mask: Mask) -> list[tuple[int, int]]:
     """Return for each cluster how many of its hits are marked in `mask` (m,), and how many it has."""
     marks = mask.tobytes()
     return [(marks.count(1, first, last + 1), last + 1 - first) for first, last, *_ in found]
@@ -178,7 +182,7 @@ def _split_runs(ranges: Array, first: Indices, last: Indices) -> tuple[list[int]
     """
     # All runs are processed at once. An offset that increases from run to run keeps them independent.
     count = last - first + 1
-    steps = np.repeat(RUN_OFFSET_M * np.arange(len(first)), count)
+    steps = np.repeat(RUN_SEPARATION_M * np.arange(len(first)), count)
     after = ranges + steps
     after -= np.minimum.accumulate(after[::-1])[::-1]
     before = np.subtract(ranges, steps, out=steps)

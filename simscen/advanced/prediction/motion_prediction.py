@@ -22,8 +22,8 @@ from simscen.stack.frames import HISTORY_S
 from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import CostmapView, RobotModel
 
-MAX_TURN_RATE = 100.0
-"""Turn rate in rad/s above which readings of a broken gyroscope are ignored."""
+MAX_TURN_RATE_RAD_S = 100.0
+"""Turn rate above which readings of the gyroscope are ignored as faulty."""
 MAX_PENDING = 10_000
 """Maximum number of readings that wait for integration."""
 
@@ -65,7 +65,7 @@ class DeadReckoning:
         for reading in self._pending:
             if isinstance(reading, Imu):
                 rate = reading.angular_velocity[2]
-                if -MAX_TURN_RATE < rate < MAX_TURN_RATE:
+                if -MAX_TURN_RATE_RAD_S < rate < MAX_TURN_RATE_RAD_S:
                     rate_sum += rate
                     rate_count += 1
                 continue
@@ -98,7 +98,11 @@ usual speed, at which the robot can still stop for obstacles."""
 
 
 class MotionPrediction:
-    """Moving obstacles around the robot, and commands that avoid them. Tracks are in the frame of DeadReckoning."""
+    """Moving obstacles around the robot, and commands that avoid them. Tracks are in the frame of DeadReckoning.
+
+    While the robot drives, `steer` changes its commands. While it stands, `stand` lets it step aside and return to its
+    position, unless `hold` was called. `on_drive` ends both.
+    """
 
     def __init__(
         self, spec: Prediction, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int, full_speed: float

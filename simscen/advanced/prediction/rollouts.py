@@ -22,8 +22,8 @@ TURN_RATIOS = (0.0, 0.1, 0.3, 0.6, 1.0)
 """First turn rates relative to the maximum, in both directions."""
 SECOND_SPEED_RATIOS = (0.0, 0.5, 1.0)
 """Second speeds relative to full speed, each without a turn and with the opposite of the first turn rate."""
-MAX_TURN_RATE = 3.0
-"""Maximum turn rate in rad/s of candidates."""
+MAX_TURN_RATE_RAD_S = 3.0
+"""Maximum turn rate of candidates."""
 RETURN_TIME_S = 0.7
 """Approximate time constant in s with which a controller returns to its path."""
 
@@ -47,7 +47,7 @@ class TrajectorySampler:
     def __init__(self, robot: RobotModel, full_speed: float) -> None:
         """Take the robot and its full speed in m/s."""
         self._robot = robot
-        max_turn = min(robot.max_angular, MAX_TURN_RATE)
+        max_turn = min(robot.max_angular, MAX_TURN_RATE_RAD_S)
         turns = [0.0, *(sign * part * max_turn for part in TURN_RATIOS[1:] for sign in (1.0, -1.0))]
         rows = []
         for part in SPEED_RATIOS:

@@ -16,11 +16,11 @@ from simscen.advanced.prediction.clusters import (
     Mask,
     Points,
     Runs,
-    clusters,
+    count_marked_hits,
+    divide_into_runs,
+    find_clusters,
+    find_valid_hits,
     fit_circle,
-    marked_hits,
-    runs,
-    valid_hits,
 )
 from simscen.advanced.prediction.tracks import Track, TrackLifecycle
 from simscen.advanced.prediction.visibility import NO_HIT_RANGE_M, CurrentScan, EarlierScan, FreeSpaceMemory, LidarPose
@@ -219,24 +219,24 @@ class Tracker:
     def _compare_clusters(self, current: CurrentScan) -> ScanClusters | None:
         """Compare the clusters of the scan with an earlier one. Return None if there is no track and none starts."""
         scan, earlier, tracks = current.scan, current.earlier, self._tracks
-        hits = valid_hits(scan.ranges, current.ends, scan.angle_increment, scan.range_min, self._max_range(scan))
+        hits = find_valid_hits(scan.ranges, current.ends, scan.angle_increment, scan.range_min, self._max_range(scan))
         comparison = (
             None if earlier is None or not len(hits.beams) else earlier.compare(hits.points, current.lidar_pose)
         )
         free = None if comparison is None else comparison.was_free()
         if not tracks and (free is None or not self._may_start_track(hits, free)):
             return None
-        hit_runs = runs(hits)
+        hit_runs = divide_into_runs(hits)
         new_hits = None if comparison is None or free is None else comparison.has_appeared(free)
         if not tracks and (new_hits is None or not self._starts_track(hit_runs, new_hits)):
             return None
-        found = clusters(hit_runs, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
+        found = find_clusters(hit_runs, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
         appeared = was_occupied = [False] * len(found)
         if comparison is not None and new_hits is not None and found:
-            counts = marked_hits(found, new_hits)
+            counts = count_marked_hits(found, new_hits)
             appeared = [count >= max(MIN_NEW_HITS, MIN_NEW_SHARE * total) for count, total in counts]
             if tracks:
-                counts = marked_hits(found, comparison.was_occupied())
+                counts = count_marked_hits(found, comparison.was_occupied())
                 was_occupied = [count > STATIC_SHARE * total for count, total in counts]
         return ScanClusters(scan.tick, hits.points, found, current.lidar, appeared, was_occupied)
 

@@ -50,8 +50,10 @@ INITIAL_SPEED_STD = 1.5
 
 
 class Update(NamedTuple):
-    """Update of a track: whether it was in formerly free space, and whether earlier scans hit something there.
+    """Update of a track with a cluster of hits.
 
+    `appeared` is True if enough of the hits are in formerly free space, through which beams of earlier scans passed.
+    `was_occupied` is True if most of them are where an earlier scan also hit something. Both can be True.
     `std` is the standard deviation in m of the position along any axis; `edges` is the number of visible edges.
     """
 
@@ -65,18 +67,23 @@ class Update(NamedTuple):
 
 @dataclass(slots=True)
 class Track(ConstantVelocityFilter):
-    """State of a track with its `radius` in m, its first position, and its last updates."""
+    """State of a track with its `radius` in m, its first position, and its last updates.
+
+    `last_fast_tick` is the last tick at which it was faster than the minimum speed of moving obstacles.
+    """
 
     radius: float
     start_position: complex
     last_fast_tick: int
     updates: deque[Update] = field(default_factory=lambda: deque(maxlen=MAX_UPDATES))
     is_moving: bool = False
+    """Whether it is moving now."""
     has_moved: bool = False
-    not_appeared: int = 0
-    """Number of last updates that were not in formerly free space."""
+    """Whether it has been moving at any time."""
+    updates_outside_free_space: int = 0
+    """Number of consecutive updates, up to the newest, that were not in formerly free space."""
     static_updates: int = 0
-    """Number of last updates where something had been hit before."""
+    """Number of consecutive updates, up to the newest, only at positions where something had been hit before."""
 
     @classmethod
     def start(cls, tick: int, position: complex, std: float, radius: float) -> "Track":
@@ -91,7 +98,7 @@ class Track(ConstantVelocityFilter):
     def record_update(self, tick: int, appeared: bool, was_occupied: bool, edges: int, std: float) -> None:
         """Record an update with the standard deviation in m of the position."""
         self.updates.append(Update(tick, self.position, std, appeared, was_occupied, edges))
-        self.not_appeared = 0 if appeared else self.not_appeared + 1
+        self.updates_outside_free_space = 0 if appeared else self.updates_outside_free_space + 1
         self.static_updates = self.static_updates + 1 if was_occupied and not appeared else 0
 
     @property
@@ -105,32 +112,44 @@ class Track(ConstantVelocityFilter):
         return math.sqrt(self.velocity_variance)
 
 
-MIN_SIGNIFICANCE, MIN_TRAVEL_M, MIN_UPDATES = 3.0, 0.15, 3
-"""A track moves if its speed is significant (in standard deviations), it has traveled this distance in m, and this
-many of its last updates were in formerly free space."""
-VISIBLE_TIMEOUT_S, HIDDEN_TIMEOUT_S, NOT_MOVING_TIMEOUT_S = 0.35, 2.5, 0.8
-"""Times in s without a hit after which a track ends: if its position is visible, if it is hidden, and if it was not
-moving."""
+MIN_SIGNIFICANCE = 3.0
+"""Minimum speed or displacement of a moving track in standard deviations."""
+MIN_TRAVEL_M = 0.15
+"""Minimum distance in m that a moving track has traveled."""
+MIN_UPDATES = 3
+"""Minimum number of the last updates of a moving track in formerly free space."""
+VISIBLE_TIMEOUT_S = 0.35
+"""Time in s without a hit after which a moving track ends if its position is visible."""
+HIDDEN_TIMEOUT_S = 2.5
+"""Time in s without a hit after which a moving track ends even if its position is hidden."""
+UNSEEN_STANDING_TIMEOUT_S = 0.8
+"""Time in s without a hit after which a track ends that is not moving."""
 MAX_POSITION_STD_M = 1.2
 """Standard deviation in m of the position above which a track ends."""
 MAX_SPEED = 4.0
 """Speed in m/s above which a track is wrong, because it has changed from one obstacle to another."""
-NEARBY_MIN_VISIBLE, NEARBY_MIN_TRAVEL_M, NEARBY_SPEED_RATIO = 5, 0.4, 1.6
-"""A track that started near another moving obstacle must be completely visible this often, travel this distance in m,
-and exceed the minimum speed by this factor."""
+NEARBY_MIN_VISIBLE_UPDATES = 5
+"""While another obstacle moves: minimum number of updates with a completely visible cluster before a track moves."""
+NEARBY_MIN_TRAVEL_M = 0.4
+"""While another obstacle moves: minimum distance in m that a moving track has traveled."""
+NEARBY_SPEED_RATIO = 1.6
+"""While another obstacle moves: minimum speed of a moving track relative to the minimum speed of moving obstacles."""
 NEARBY_MAX_OCCUPIED_SHARE = 0.2
-"""Maximum share of the last updates of such a track where something was hit before."""
+"""While another obstacle moves: maximum share of the last updates of a moving track where something was hit before."""
 MIN_FREE_SHARE = 0.6
 """Minimum share of the last updates of a moving track in formerly free space. False tracks along a row of posts have
 less."""
 FAR_TRAVEL_M = 0.5
-"""Distance in m beyond twice the largest radius after which a track moves although its origin was never visible. The
-visible part of a wall at the edge of the field of view grows by less."""
-MAX_NOT_APPEARED = 5
+"""A track that has traveled twice the largest radius plus this distance in m counts as moving, even if its first
+position was never visible. The visible part of a wall at the edge of the field of view grows by less."""
+MAX_UPDATES_OUTSIDE_FREE_SPACE = 5
 """Number of updates outside formerly free space after which a track that has not moved ends."""
-NEVER_MOVED_TIMEOUT_S, STANDING_AFTER_S, MOVED_TIMEOUT_S = 0.5, 1.5, 10.0
-"""Times in s of standing after which a track that has never moved ends, a moving track counts as standing, and a track
-that has moved ends."""
+STANDING_AFTER_S = 1.5
+"""Time in s below the minimum speed after which a moving track counts as standing."""
+NEVER_MOVED_TIMEOUT_S = 0.5
+"""Time in s below the minimum speed after which a track ends that has never moved."""
+MOVED_TIMEOUT_S = 10.0
+"""Time in s below the minimum speed after which a standing track ends that has moved before."""
 
 
 class TrackLifecycle:
@@ -141,7 +160,10 @@ class TrackLifecycle:
         self._spec, self._rate = spec, tick_rate
 
     def update_motion(self, track: Track, tick: int, tracks: list[Track], has_left: Callable[[Track], bool]) -> None:
-        """Update whether a track moves, after the scan of a tick. `has_left` checks its old positions."""
+        """Update whether a track moves, after the scan of a tick.
+
+        `has_left(track)` returns whether the obstacle has left its earlier positions.
+        """
         min_speed, speed = self._spec.min_speed, abs(track.velocity)
         if speed > min_speed:
             track.last_fast_tick = tick
@@ -154,18 +176,18 @@ class TrackLifecycle:
         else:
             track.is_moving = track.has_moved = self._is_moving(track, tick, speed, tracks) and has_left(track)
 
-    def has_ended(self, track: Track, tick: int, tracks: list[Track], visible: Callable[[Track], bool]) -> bool:
-        """Return whether a track has ended; `visible` returns whether the lidar sees past its position."""
+    def has_ended(self, track: Track, tick: int, tracks: list[Track], sees_past: Callable[[Track], bool]) -> bool:
+        """Return whether a track has ended; `sees_past(track)` returns whether the lidar sees past its position."""
         unseen_s = (tick - track.last_update_tick) / self._rate
         if abs(track.velocity) >= MAX_SPEED or track.position_std > MAX_POSITION_STD_M:
             return True
         if track.is_moving:
-            return unseen_s > VISIBLE_TIMEOUT_S and (unseen_s > HIDDEN_TIMEOUT_S or visible(track))
+            return unseen_s > VISIBLE_TIMEOUT_S and (unseen_s > HIDDEN_TIMEOUT_S or sees_past(track))
         timeout = MOVED_TIMEOUT_S if track.has_moved else NEVER_MOVED_TIMEOUT_S
         is_at_rest = (tick - track.last_fast_tick) / self._rate > timeout
         return (
             is_at_rest
-            or unseen_s > NOT_MOVING_TIMEOUT_S
+            or unseen_s > UNSEEN_STANDING_TIMEOUT_S
             or (not track.has_moved and (track.static_updates >= MIN_UPDATES or _is_sliding(track, tracks)))
         )
 
@@ -197,12 +219,14 @@ class TrackLifecycle:
             and sum(each.edges > 0 for each in updates) >= MIN_FREE_SHARE * MAX_UPDATES
         ):
             return True
-        return fully_visible >= NEARBY_MIN_VISIBLE and distance > NEARBY_MIN_TRAVEL_M
+        return fully_visible >= NEARBY_MIN_VISIBLE_UPDATES and distance > NEARBY_MIN_TRAVEL_M
 
 
 def _is_sliding(track: Track, tracks: list[Track]) -> bool:
-    """Return whether the last updates of a track were outside formerly free space, while nothing moves.
+    """Return whether a track only seems to move: its last updates were not in formerly free space while nothing moved.
 
-    Such a track is a wall of which different parts become visible. A real moving obstacle starts a new track.
+    Such a track is a wall of which different parts become visible. If a real obstacle is there, it gets a new track.
     """
-    return track.not_appeared >= MAX_NOT_APPEARED and not any(each.is_moving for each in tracks)
+    return track.updates_outside_free_space >= MAX_UPDATES_OUTSIDE_FREE_SPACE and not any(
+        each.is_moving for each in tracks
+    )

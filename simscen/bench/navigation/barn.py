@@ -19,18 +19,19 @@ from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.core.random_streams import Streams
 
 TIME_LIMIT_S = 100.0
-DWA = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
-"""Published results of the dynamic window approach at 0.5 m/s in 50 worlds with 10 runs each."""
+PUBLISHED_DWA_RESULTS = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
+"""Published results of the dynamic window approach (DWA) at 0.5 m/s in 50 worlds with 10 runs each."""
 
 START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
+"""Start of the robot in BARN, and its goal."""
 
-WHEELS = "type: slip_ekf, rotation_noise: 0.5"
-"""Like robot_localization on the Jackal: distance from the wheels, rotation from the gyroscope."""
-LOCALIZER = f"{{{WHEELS}, match_scans: true}}"
-"""WHEELS with a laser scan matcher, which corrects the distance when the wheels slip."""
+ODOMETRY_LOCALIZER = "type: slip_ekf, rotation_noise: 0.5"
+"""Keys of a localizer like robot_localization on the Jackal: distance from the wheels, rotation from the gyroscope."""
+SCAN_MATCHING_LOCALIZER = f"{{{ODOMETRY_LOCALIZER}, match_scans: true}}"
+"""The same localizer with a laser scan matcher, which corrects the distance when the wheels slip."""
 COSTMAP = "{obstacle_max_range: 8 m, raytrace_max_range: 10 m, update_frequency: 10 Hz}"
-TUNED = f"""\
-  localizer: {LOCALIZER}
+TUNED_STACK = f"""\
+  localizer: {SCAN_MATCHING_LOCALIZER}
   costmap: {COSTMAP}
   # Nav2's 0.9 m is for 0.5 m/s; at 2 m/s, this radius gives a lateral acceleration of 2 m/s².
   controller:
@@ -38,22 +39,22 @@ TUNED = f"""\
     desired_linear_vel: 2 m/s
     regulated_linear_scaling_min_radius: 2 m
 """
-"""Stack parameters for the speed of the challenge."""
-TUNED_FOR_MOVING_WORLDS = TUNED.replace(LOCALIZER, f"{{{WHEELS}}}")
-"""TUNED without scan matching, for worlds in which everything that the lidar sees may move."""
-DEFAULT = f"  localizer: {LOCALIZER}\n"
-"""Default parameters: 0.5 m/s."""
+"""Stack parameters for 2 m/s, the speed of the challenge."""
+TUNED_STACK_FOR_MOVING_WORLDS = TUNED_STACK.replace(SCAN_MATCHING_LOCALIZER, f"{{{ODOMETRY_LOCALIZER}}}")
+"""TUNED_STACK without scan matching, for worlds in which everything that the lidar sees may move."""
+DEFAULT_STACK = f"  localizer: {SCAN_MATCHING_LOCALIZER}\n"
+"""Stack parameters with the default controller and its speed of 0.5 m/s."""
 CONTROLLERS = {
-    f"{name} at 0.5 m/s": f"  localizer: {LOCALIZER}\n  costmap: {COSTMAP}\n  controller: {parameters}\n"
+    f"{name} at 0.5 m/s": f"  localizer: {SCAN_MATCHING_LOCALIZER}\n  costmap: {COSTMAP}\n  controller: {parameters}\n"
     for name, parameters in (
         ("regulated pure pursuit", "{type: regulated_pure_pursuit, desired_linear_vel: 0.5 m/s}"),
         ("dwb", "{type: dwb, max_vel_x: 0.5 m/s}"),
         ("mppi", "{type: mppi, vx_max: 0.5 m/s}"),
     )
 }
-"""Stack parameters of each shipped controller at the speed of DWA in the challenge."""
+"""Stack parameters of each shipped controller at 0.5 m/s, the speed of the published results."""
 
-SETUP = """\
+SCENARIO_TEMPLATE = """\
 map: none
 robot: {model: jackal, pose: <start>}
 stack:
@@ -67,7 +68,7 @@ pass:
   - goals_reached: {tolerance: 1 m}
   - collisions: {max: 0}
 """
-"""Scenario without its world, stack parameters, start and goal."""
+"""Scenario without name and world. `<start>`, `<stack>` and `<goal>` are placeholders; the goal is beyond the field."""
 
 
 @dataclass(frozen=True)
@@ -104,10 +105,10 @@ def _parse_rows(file: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorl
         yield BarnWorld(file.parent / f"world_{world}.world", length)
 
 
-def scenario(name: str, world: str, start: Pose2 = START, goal: Pose2 = GOAL, stack: str = TUNED) -> str:
+def scenario(name: str, world: str, start: Pose2 = START, goal: Pose2 = GOAL, stack: str = TUNED_STACK) -> str:
     """Return the text of a scenario. `world` is the value of `world:`, `stack` the lines below `stack:`."""
-    setup = SETUP.replace("<stack>", stack).replace("<start>", _pose(start)).replace("<goal>", _pose(goal))
-    return f"simscen: 1\nname: {name}\nworld: {world}\n{setup}"
+    text = SCENARIO_TEMPLATE.replace("<stack>", stack).replace("<start>", _pose(start)).replace("<goal>", _pose(goal))
+    return f"simscen: 1\nname: {name}\nworld: {world}\n{text}"
 
 
 def _pose(pose: Pose2) -> str:
@@ -115,13 +116,14 @@ def _pose(pose: Pose2) -> str:
 
 
 CELL_SIZE_M = 0.15
-"""Distance between cylinders, which is twice their radius."""
+"""Size of a grid cell. A filled cell contains a cylinder with this diameter."""
 COLUMNS, FIELD_ROWS, ROWS = 30, 30, 64
 """Size of the grid in cells: the lane that the robot drives along has ROWS x COLUMNS.
 
 The field fills the last FIELD_ROWS (largest y). The first and last columns are walls of cylinders.
 """
 HEIGHT_M = 1.0
+"""Height of all cylinders."""
 FILL_RANGE = (0.20, 0.35)
 """Range of the share of cells that are filled at random, before smoothing.
 
@@ -129,7 +131,7 @@ After smoothing, 5 to 22 % of the cells between the walls are filled, as in six 
 """
 FILL_NEIGHBORS, CLEAR_NEIGHBORS = 5, 1
 """Smallest number of filled neighbors, of eight, that fills a cell, and largest number that clears it."""
-GAP_RADIUS_M = 0.37
+CROSSING_RADIUS_M = 0.37
 """Radius of the disc that can cross every field, as it can cross every world of BARN."""
 MAX_ATTEMPTS = 1000
 
@@ -153,17 +155,22 @@ class ObstacleField:
         return float(np.count_nonzero(inside)) / (FIELD_ROWS * (COLUMNS - 2))
 
 
-def obstacle_field(number: int, gap: float = GAP_RADIUS_M, too_wide: float | None = None) -> ObstacleField:
+def obstacle_field(
+    number: int, crossing_radius: float = CROSSING_RADIUS_M, blocked_radius: float | None = None
+) -> ObstacleField:
     """Generate the field with this number (from 1). The result depends on the arguments only.
 
-    Fields are drawn until a disc of radius `gap` can cross one, and a disc of radius `too_wide`, if given, cannot.
-    Raises RuntimeError after MAX_ATTEMPTS, which never happened so far.
+    Fields are drawn until a disc of radius `crossing_radius` (m) can cross one, and a disc of radius `blocked_radius`,
+    if given, cannot. Raises RuntimeError after MAX_ATTEMPTS, which did not happen for any field so far.
     """
-    rng = Streams(number).generator("obstacle field" if gap == GAP_RADIUS_M else f"obstacle field {gap:g}")
+    is_default = crossing_radius == CROSSING_RADIUS_M
+    rng = Streams(number).generator("obstacle field" if is_default else f"obstacle field {crossing_radius:g}")
     for _ in range(MAX_ATTEMPTS):
         centers = _cylinder_centers(_smoothed_field(rng))
-        if _is_crossable(centers, gap, too_wide) and np.isfinite(length := _shortest_path_length(centers, gap)):
-            return ObstacleField(number, centers, length)
+        if _is_crossable(centers, crossing_radius, blocked_radius):
+            length = _shortest_path_length(centers, crossing_radius)
+            if np.isfinite(length):
+                return ObstacleField(number, centers, length)
     raise RuntimeError(f"none of {MAX_ATTEMPTS} fields with number {number} can be crossed")
 
 
@@ -195,8 +202,8 @@ def _cylinder_centers(field: Cells) -> Array:
     return np.column_stack(((columns + 0.5 - COLUMNS) * CELL_SIZE_M, (rows + 0.5) * CELL_SIZE_M))
 
 
-def _is_crossable(centers: Array, gap: float, too_wide: float | None) -> bool:
-    """Return whether the free space of a disc of radius `gap` connects start and goal, and that of `too_wide` does not.
+def _is_crossable(centers: Array, crossing_radius: float, blocked_radius: float | None) -> bool:
+    """Return whether a disc of `crossing_radius` can get from start to goal, and one of `blocked_radius` cannot.
 
     This is faster than a path search. Most fields cannot be crossed.
     """
@@ -213,10 +220,10 @@ def _is_crossable(centers: Array, gap: float, too_wide: float | None) -> bool:
         )
         return bool(start and start == goal)
 
-    return is_connected(gap) and not (too_wide is not None and is_connected(too_wide))
+    return is_connected(crossing_radius) and not (blocked_radius is not None and is_connected(blocked_radius))
 
 
-def _shortest_path_length(centers: Array, gap: float) -> float:
+def _shortest_path_length(centers: Array, radius: float) -> float:
     from simscen.worlds.geometry.triangulation import merge_solids
     from simscen.worlds.routes.shortest_paths import ShortestPaths
 
@@ -224,14 +231,14 @@ def _shortest_path_length(centers: Array, gap: float) -> float:
     mesh = merge_solids(tuple(Solid(pillar, Pose3(x, y, HEIGHT_M / 2), "") for x, y in centers.tolist()))
     # The bounds are as wide as the lane, because a path could lead around the walls, which end with the field.
     bounds = (-COLUMNS * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
-    return ShortestPaths(mesh, bounds, gap).length(START, GOAL)
+    return ShortestPaths(mesh, bounds, radius).length(START, GOAL)
 
 
 ARENA_HALF_WIDTH_M = 10.0
-"""Half of the side length of the square arena."""
-RADIUS_M = 0.5
-COUNT_RANGE = (5, 24)
-"""Smallest and largest number of cylinders."""
+"""Half of the side length of the square arena of DynaBARN."""
+MOVER_RADIUS_M = 0.5
+MOVER_COUNT_RANGE = (5, 24)
+"""Smallest and largest number of moving cylinders."""
 SPEEDS_M_S = (0.74, 1.23, 1.72)
 """Mean speeds of the easy, medium and hard worlds of DynaBARN."""
 MAX_SPEED_DEVIATION_M_S = 0.25
@@ -252,7 +259,7 @@ DYNABARN_START, DYNABARN_GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14
 class Mover:
     """Motion of a cylinder through `points` (n, 2) at `times` (n,) in s, back and forth.
 
-    The run starts `phase` seconds after the start of the motion.
+    At the start of the run, the cylinder is `phase` seconds into this motion.
     """
 
     times: Array
@@ -272,7 +279,7 @@ class DynamicField:
 def dynamic_field(number: int, speed: float) -> DynamicField:
     """Generate the field with this number (from 1) and mean speed in m/s. The result depends on nothing else."""
     rng = Streams(number).generator(f"dynamic field {speed:g}")
-    count = int(rng.integers(COUNT_RANGE[0], COUNT_RANGE[1] + 1))
+    count = int(rng.integers(MOVER_COUNT_RANGE[0], MOVER_COUNT_RANGE[1] + 1))
     return DynamicField(number, speed, tuple(_mover(rng, speed) for _ in range(count)))
 
 
@@ -291,7 +298,7 @@ def _mover(rng: np.random.Generator, speed: float) -> Mover:
 def _path(rng: np.random.Generator) -> Array:
     """Return points (n, 2) about KEYFRAME_DISTANCE_M apart along a polynomial, with random axis and direction.
 
-    Raises RuntimeError after MAX_ATTEMPTS, which never happened so far.
+    Raises RuntimeError after MAX_ATTEMPTS, which did not happen for any field so far.
     """
     for _ in range(MAX_ATTEMPTS):
         curve = _polynomial_in_arena(rng)

@@ -59,7 +59,7 @@ LOCALIZATIONS = ("tour", "start 0.5 m and 20° off", "start unknown", "kidnapped
 
 
 def barn_challenge(
-    folder: Path, dataset: Path, seeds: Sequence[int], variant: str = "", stack: str = barn.TUNED
+    folder: Path, dataset: Path, seeds: Sequence[int], variant: str = "", stack: str = barn.TUNED_STACK
 ) -> Experiment:
     """Return the drives in the worlds of BARN. `stack` are the lines below `stack:`. Raises UsageError for bad data."""
     name = f"BARN, {variant}" if variant else "BARN"
@@ -81,9 +81,9 @@ def narrow_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
     """Return one experiment for each of NARROW_MARGINS_M, with fields whose widest path has this margin."""
     experiments = []
     for margin in NARROW_MARGINS_M:
-        gap, too_wide = (ROBOT_WIDTH_M + margin) / 2, (ROBOT_WIDTH_M + margin + 0.1) / 2
+        crossing_radius, blocked_radius = (ROBOT_WIDTH_M + margin) / 2, (ROBOT_WIDTH_M + margin + 0.1) / 2
         target = folder / f"narrow/{round(100 * margin)}_cm"
-        drives = [_field_drive(target, obstacle_field(number, gap, too_wide)) for number in numbers]
+        drives = [_field_drive(target, obstacle_field(number, crossing_radius, blocked_radius)) for number in numbers]
         experiments.append(Experiment(narrow_name(margin), tuple(drives), folder, mapless=True))
     return experiments
 
@@ -113,7 +113,7 @@ def dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
                 world.name,
                 barn.DYNABARN_START,
                 barn.DYNABARN_GOAL,
-                barn.TUNED_FOR_MOVING_WORLDS,
+                barn.TUNED_STACK_FOR_MOVING_WORLDS,
             )
             length = barn.DYNABARN_START.distance(barn.DYNABARN_GOAL)
             drives.append(Drive(write_scenario(folder / f"{stem}.scenario.yaml", text), [number], length))
@@ -202,7 +202,7 @@ def _moving_world_text(field: barn.DynamicField) -> str:
         )
         x, y = mover.points[0].tolist()
         lines.append(
-            f"  - name: cylinder {number}\n    cylinder: [{barn.RADIUS_M:g}, {barn.HEIGHT_M:g}]\n"
+            f"  - name: cylinder {number}\n    cylinder: [{barn.MOVER_RADIUS_M:g}, {barn.HEIGHT_M:g}]\n"
             f"    pose: {{x: {x:.3f}, y: {y:.3f}}}\n    move:\n      keyframes: [{keyframes}]\n"
             f"      repeat: back_and_forth\n      ease: spline\n      phase: {mover.phase:.3f} s\n"
         )

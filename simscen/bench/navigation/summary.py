@@ -1,4 +1,8 @@
-"""Summary of many runs in the columns of published navigation benchmarks, and comparison of two stacks."""
+"""Summary of many runs in the columns of published navigation benchmarks, and comparison of two stacks.
+
+A drive is a scenario in a world, which is run with several seeds. A trial is one of its runs. The trials of all drives
+of an experiment become one row of the table.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -11,12 +15,13 @@ from simscen.core.records.verdict import Status
 from simscen.core.statistics import MIN_PAIRS, bootstrap_mean_interval, wilson_interval
 from simscen.judge.metrics.compute import barn_score
 
+Interval = tuple[float, float]
 TIME_LIMIT_REACHED = "time limit"
 """Value of `ended` of a run that reached its time limit."""
 
 
 class DriveOutcome(str, Enum):
-    """Outcome of a run in a benchmark table."""
+    """Outcome of a run in a benchmark table. FAILED is any other failure; ERROR is a run that ended with an error."""
 
     SUCCESS = "success"
     COLLISION = "collision"
@@ -39,7 +44,7 @@ class Trial:
 
     @property
     def drive_outcome(self) -> DriveOutcome:
-        """Outcome of the run: collisions have priority over other failures, timeouts over the remaining ones."""
+        """Outcome of the run. Collisions have priority over all other failures, and timeouts over FAILED."""
         if self.run.outcome is Outcome.ERROR:
             return DriveOutcome.ERROR
         if any(v.criterion == "collisions" and v.status is Status.FAIL for v in self.run.result.verdicts):
@@ -79,17 +84,18 @@ class Trial:
 
 @dataclass(frozen=True)
 class Row:
-    """Row of the table. Rates refer to all runs, `seconds` and `path_ratio` to the runs that reached all goals.
+    """Row of the table for the experiment `case`. The names of the fields are keys of the JSON output.
 
-    `path_ratio` is the driven length divided by the shortest length. `sct` is None without goals. `success_interval` is
-    the 95 % interval of the success rate over worlds, or None with fewer than five worlds: seeds sample the noise in a
-    world, but not other worlds.
+    Rates refer to all runs; `seconds` (mean time to the goal) and `path_ratio` (driven divided by shortest length) to
+    the runs that reached all goals. `score` is the mean BARN score. `sct` is None without goals. `success_interval` is
+    the 95 % confidence interval of the success rate from resampling the worlds, or None with fewer than five worlds.
+    Resampling single runs would underestimate it, because runs with other seeds in the same world are not independent.
     """
 
     case: str
     runs: int
     success: float
-    success_interval: tuple[float, float] | None
+    success_interval: Interval | None
     collisions: float
     timeouts: float
     failed: float
@@ -100,14 +106,14 @@ class Row:
     sct: float | None
 
 
-def summarize(case: str, trials: Sequence[Trial]) -> Row:
-    """Return the row of a case. `trials` must not be empty."""
+def summarize(experiment: str, trials: Sequence[Trial]) -> Row:
+    """Return the row of an experiment. `trials` must not be empty."""
     outcomes = [trial.drive_outcome for trial in trials]
     sct_values = [trial.sct for trial in trials]
     successful = [trial for trial in trials if trial.drive_outcome is DriveOutcome.SUCCESS]
     arrived = [trial for trial in successful if trial.metric("time_to_goal") is not None]
     return Row(
-        case=case,
+        case=experiment,
         runs=len(trials),
         success=_rate(outcomes, DriveOutcome.SUCCESS),
         success_interval=success_interval(trials),
@@ -122,11 +128,11 @@ def summarize(case: str, trials: Sequence[Trial]) -> Row:
     )
 
 
-def success_interval(trials: Sequence[Trial]) -> tuple[float, float] | None:
+def success_interval(trials: Sequence[Trial]) -> Interval | None:
     """Return the 95 % interval of the success rate over worlds, or None with fewer than five worlds."""
-    return ClusteredMean.of(
+    return ClusteredMean.from_pairs(
         (trial.world, float(trial.drive_outcome is DriveOutcome.SUCCESS)) for trial in trials
-    ).interval_of_rates()
+    ).rate_interval()
 
 
 def _rate(outcomes: Sequence[DriveOutcome], outcome: DriveOutcome) -> float:
@@ -139,28 +145,25 @@ def mean(values: Sequence[float | None]) -> float | None:
     return sum(known) / len(known) if known else None
 
 
-Interval = tuple[float, float]
-
-
 @dataclass(frozen=True)
 class ClusteredMean:
-    """Values of drives, grouped by world. Every drive has the same weight; the bootstrap resamples whole worlds."""
+    """Values of trials, grouped by world. Every trial has the same weight; the bootstrap resamples whole worlds."""
 
     values_by_world: tuple[tuple[float, ...], ...]
 
     @classmethod
-    def of(cls, values: Iterable[tuple[str, float]]) -> "ClusteredMean":
-        """Group pairs of a world and a value."""
+    def from_pairs(cls, pairs: Iterable[tuple[str, float]]) -> "ClusteredMean":
+        """Group the values in pairs of a world and a value."""
         worlds: dict[str, list[float]] = {}
-        for world, value in values:
+        for world, value in pairs:
             worlds.setdefault(world, []).append(value)
         return cls(tuple(map(tuple, worlds.values())))
 
     @property
     def mean(self) -> float | None:
-        """Mean over all drives, or None without drives."""
-        drives = sum(map(len, self.values_by_world))
-        return sum(map(sum, self.values_by_world)) / drives if drives else None
+        """Mean over all trials, or None without trials."""
+        trials = sum(map(len, self.values_by_world))
+        return sum(map(sum, self.values_by_world)) / trials if trials else None
 
     def interval(self) -> Interval | None:
         """Return the 95 % bootstrap interval of the mean, or None with fewer than five worlds."""
@@ -169,18 +172,21 @@ class ClusteredMean:
             means, Streams(1).generator("worlds"), [len(values) for values in self.values_by_world]
         )
 
-    def interval_of_rates(self) -> Interval | None:
-        """Return the interval of a rate.
+    def rate_interval(self) -> Interval | None:
+        """Return the 95 % interval of a rate.
 
-        If all worlds have the same rate, the bootstrap interval is empty. Then, the result is the Wilson interval with
-        one trial per world.
+        If all worlds have the same rate, the bootstrap interval has zero width. Then, the result is the Wilson interval
+        with one trial per world.
         """
         rate = self._common_mean()
         count = len(self.values_by_world)
         return self.interval() if rate is None else wilson_interval(rate * count, count)
 
-    def interval_of_changes(self) -> Interval | None:
-        """Return the interval of a difference of rates: a Wilson interval if all worlds have the same difference."""
+    def rate_difference_interval(self) -> Interval | None:
+        """Return the 95 % interval of a difference of rates.
+
+        It is a Wilson interval if all worlds have the same difference.
+        """
         change = self._common_mean()
         if change is None:
             return self.interval()
@@ -203,14 +209,16 @@ class Difference:
     """Mean of `other` minus `reference`, and its 95 % interval over worlds, None with fewer than five worlds."""
 
     mean: float
-    interval: tuple[float, float] | None
+    interval: Interval | None
 
 
 @dataclass(frozen=True)
 class DriveComparison:
-    """Differences `other` minus `reference` in success rate, seconds if both arrived, SCT, and BARN score.
+    """Differences `other` minus `reference` for the experiment `case`.
 
-    `better` and `worse` count the runs in which only `other` or only `reference` succeeded.
+    The names of the fields are keys of the JSON output. The differences are in success rate, in seconds to the goal
+    (only pairs in which both succeeded), in SCT, and in BARN score. `better` and `worse` count
+    the pairs in which only `other` or only `reference` succeeded.
     """
 
     case: str
@@ -223,16 +231,16 @@ class DriveComparison:
     score: Difference | None
 
 
-def compare_drives(case: str, reference: Sequence[Trial], other: Sequence[Trial]) -> DriveComparison:
+def compare_drives(experiment: str, reference: Sequence[Trial], other: Sequence[Trial]) -> DriveComparison:
     """Compare trials of the same drives and seeds in the same order. Raises ValueError if they differ."""
     pairs = list(zip(reference, other, strict=True))
     if any(first.world != second.world or first.run.key.seed != second.run.key.seed for first, second in pairs):
-        raise ValueError(f"{case}: the runs are not of the same drives")
+        raise ValueError(f"{experiment}: the runs are not of the same drives")
     completed = [pair for pair in pairs if DriveOutcome.ERROR not in (pair[0].drive_outcome, pair[1].drive_outcome)]
     both_succeeded = [pair for pair in completed if all(map(_has_succeeded, pair))]
     success = _difference(completed, lambda trial: float(_has_succeeded(trial)), rate=True)
     return DriveComparison(
-        case=case,
+        case=experiment,
         pairs=len(completed),
         better=sum(_has_succeeded(second) > _has_succeeded(first) for first, second in completed),
         worse=sum(_has_succeeded(second) < _has_succeeded(first) for first, second in completed),
@@ -252,7 +260,7 @@ def _difference(
 ) -> Difference | None:
     """Return the difference of a measure, or None if no pair has it."""
     both = ((first.world, measure(first), measure(second)) for first, second in pairs)
-    differences = ClusteredMean.of((world, b - a) for world, a, b in both if a is not None and b is not None)
+    differences = ClusteredMean.from_pairs((world, b - a) for world, a, b in both if a is not None and b is not None)
     if differences.mean is None:
         return None
-    return Difference(differences.mean, differences.interval_of_changes() if rate else differences.interval())
+    return Difference(differences.mean, differences.rate_difference_interval() if rate else differences.interval())

@@ -1,4 +1,8 @@
-"""Growth of the CPU time per simulated second: the patrol with more of one quantity at a time, and large worlds."""
+"""Growth of the CPU time per simulated second with the size of a scenario.
+
+Measured are the patrol, a drive among racks and a moving cart in a hall, with more obstacles, beams, robots, and so on,
+one quantity at a time, and drives in large worlds.
+"""
 
 import gc
 import json
@@ -40,7 +44,7 @@ QUANTITIES = {
 ROBOT = PATROL.parent.parent / "robots" / "turtlebot.robot.yaml"
 OBJECTS_PER_ROW = 25
 """Number of objects in a row behind the patrol's hall, 0.6 m apart."""
-UNIT = "ms a simulated second"
+UNIT = "ms per simulated second"
 
 
 def measure_growth(rounds: int, report_progress: ProgressCallback = no_progress) -> Measurements:
@@ -67,7 +71,7 @@ def write_scaled_patrol(folder: Path, quantity: str, count: int) -> Path:
         case "objects":  # these could be pushed
             text = text.replace("  objects:\n", "  objects:\n" + _crates(count, ", mass: 5 kg"))
         case "moving objects":
-            move = ", move: {{through: [[{there}, {y}]], speed: 0.2 m/s, repeat: back_and_forth}}"
+            move = ", move: {{through: [[{end_x}, {y}]], speed: 0.2 m/s, repeat: back_and_forth}}"
             text = text.replace("  objects:\n", "  objects:\n" + _crates(count, move))
         case "beams":
             robot = ROBOT.read_text(encoding="utf-8").replace("beams: 360", f"beams: {count}")
@@ -84,11 +88,11 @@ def write_scaled_patrol(folder: Path, quantity: str, count: int) -> Path:
     return file
 
 
-def _crates(count: int, more: str) -> str:
-    """Return the YAML of crates. `more` are further keys, with {there} for x + 0.2 m and {y}."""
+def _crates(count: int, extra_keys: str) -> str:
+    """Return the YAML of crates. In `extra_keys`, {end_x} stands for x + 0.2 m of the crate, and {y} for its y."""
     return "".join(
         f"    - {{name: crate {n}, box: [0.3, 0.3, 0.4], pose: {{x: {x}, y: {y}}}"
-        f"{more.format(there=round(x + 0.2, 2), y=y)}}}\n"
+        f"{extra_keys.format(end_x=round(x + 0.2, 2), y=y)}}}\n"
         for n, x, y in _crate_positions(count)
     )
 
@@ -136,10 +140,12 @@ pass:
 class Cost:
     """Cost of runs in a world. The names of the fields are keys of the JSON output.
 
-    triangles:    of static solids
+    name:         description of the world
+    triangles:    number of triangles of static solids
     movable:      number of movable bodies
-    milliseconds: CPU time per simulated second
-    preparing:    CPU time in s, once for all runs
+    simulated:    simulated time of a run in s
+    milliseconds: CPU time per simulated second in ms
+    preparing:    CPU time for the preparation in s, once for all runs
     memory:       maximum memory of this process so far in MB
     """
 
@@ -189,7 +195,10 @@ def _peak_memory_mb() -> float:
 
 
 def write_hall(folder: Path) -> Path:
-    """Write a hall of 30 x 20 m with chairs, movable meshes of 432 triangles, as an SDF world; return its scenario."""
+    """Write a hall of 30 x 20 m with chairs, movable meshes of 432 triangles, as an SDF world.
+
+    Returns its scenario file.
+    """
     folder.mkdir()
     for number in range(4):
         (folder / f"mesh_{number}.obj").write_text(_obj_text(_chair(0.4 + 0.05 * number)))
@@ -241,7 +250,7 @@ def _box_model(name: str, x: float, y: float, length: float, width: float) -> st
 
 
 def write_warehouse(folder: Path) -> Path:
-    """Write a warehouse of 100 x 100 m with boxes and drums in rows, and moving carts; return its scenario.
+    """Write a warehouse of 100 x 100 m with boxes and drums in rows, and moving carts; return its scenario file.
 
     The aisles are 2.4 m wide, the cross aisle 8 m. Half of the carts move where the robot drives.
     """
@@ -250,7 +259,8 @@ def write_warehouse(folder: Path) -> Path:
     columns = [*np.arange(4.0, 46.0, 0.75).tolist(), *np.arange(54.5, 96.5, 0.75).tolist()]
     bays = list(product(columns, (row + side for row in range(4, 97, 4) for side in (-0.4, 0.4))))
     stock = [
-        f"  - {{name: unit {n}, {_shape(n)}, pose: {{x: {bays[bay][0]:.2f}, y: {bays[bay][1]:.2f}, yaw: {turn:.2f}}}}}"
+        f"  - {{name: unit {n}, {_box_or_drum(n)},"
+        f" pose: {{x: {bays[bay][0]:.2f}, y: {bays[bay][1]:.2f}, yaw: {turn:.2f}}}}}"
         for n, (bay, turn) in enumerate(
             zip(
                 rng.permutation(len(bays))[:STATIC_COUNT].tolist(),
@@ -270,14 +280,14 @@ def write_warehouse(folder: Path) -> Path:
     return _scenario(folder, "warehouse.world.yaml", ((8.0, 33.8), (48.0, 33.8), (50.0, 42.0)))
 
 
-def _shape(number: int) -> str:
+def _box_or_drum(number: int) -> str:
     """Return the YAML of a box between 0.5 and 0.65 m wide, or of a drum for every fourth number."""
     width = 0.5 + 0.05 * (number % 4)
     return f"cylinder: [{width / 2:.3f}, 1.0]" if number % 4 == 0 else f"box: [{width:.2f}, {width:.2f}, 1.2]"
 
 
 def write_arena(folder: Path) -> Path:
-    """Write a ROS map of 100 x 100 m with 400 blocks and 0.5 % noise, as from SLAM; return its scenario."""
+    """Write a ROS map of 100 x 100 m with 400 blocks and 0.5 % noise, as from SLAM; return its scenario file."""
     folder.mkdir()
     rng = np.random.default_rng(7)
     cells = np.full((MAP_SIDE_CELLS, MAP_SIDE_CELLS), FREE, dtype=np.int8)

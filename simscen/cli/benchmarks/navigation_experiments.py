@@ -148,7 +148,7 @@ def _barn(generated: Path, data: Path, sizes: Sizes) -> Iterator[Experiment]:
     """Yield the BARN challenge at 2 m/s, with default parameters, and with each controller at the same speed."""
     seeds = sizes.seeds_or(5)
     yield experiments.barn_challenge(generated, data, seeds)
-    yield experiments.barn_challenge(generated, data, seeds, "default parameters", barn.DEFAULT)
+    yield experiments.barn_challenge(generated, data, seeds, "default parameters", barn.DEFAULT_STACK)
     for controller, stack in barn.CONTROLLERS.items():
         yield experiments.barn_challenge(generated, data, seeds, controller, stack)
 

@@ -1,4 +1,4 @@
-"""Execution of the experiments of `simscen bench nav` as normal runs."""
+"""Runs the experiments of `simscen bench nav` as ordinary scenario runs."""
 
 import shlex
 import sys
@@ -30,15 +30,16 @@ from simscen.run.sessions.run_session import SessionOptions, run_session
 
 WALL_LIMIT_S = 1800.0
 """Wall-clock limit of a run in seconds; long, because a busy machine is not a failure of the stack."""
-MOMENTS_S = (5.0, 10.0, 20.0, 30.0)
+ANEES_TIMES_S = (5.0, 10.0, 20.0, 30.0)
 """Times in a run, in seconds, at which ANEES is averaged over the runs."""
 
 
 @dataclass(frozen=True)
 class LocalizationAccuracy:
-    """Accuracy of the localization: RMSE in m (mean and worst over runs), and ANEES at MOMENTS_S.
+    """Accuracy of the localization: RMSE in m (mean and worst over runs), and ANEES at ANEES_TIMES_S.
 
-    `bounds` contain the ANEES with 95 % probability if the covariance is consistent.
+    `bounds` is the 95 % interval of the ANEES for a consistent covariance. The names of the fields are keys of the JSON
+    output.
     """
 
     rmse: float | None
@@ -49,7 +50,10 @@ class LocalizationAccuracy:
 
 @dataclass(frozen=True)
 class ExperimentResult:
-    """Result of one experiment: the row of the table, and the accuracy of the localization if it was measured."""
+    """Result of one experiment: the row of the table, and the accuracy of the localization if it was measured.
+
+    The names of the fields are keys of the JSON output.
+    """
 
     tally: Row
     localized: LocalizationAccuracy | None = None
@@ -58,7 +62,9 @@ class ExperimentResult:
 def execute_experiments(
     experiments: Sequence[Experiment], journal: Journal, workers: int
 ) -> tuple[list[list[Trial]], Exit | None]:
-    """Execute all runs of each experiment without a result in the journal; print progress and failures to stderr.
+    """Execute those runs of each experiment that have no result in the journal yet.
+
+    Prints progress and failures to stderr.
 
     Returns the trials of each experiment, and the exit code of an interrupt or None. Raises InvalidInput.
     """
@@ -93,14 +99,14 @@ def _was_interrupted(run: RunFinished) -> bool:
 
 
 ExperimentDrive = tuple[int, Drive]
+"""Index of an experiment, and one of its drives."""
 
 
 def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, ExperimentDrive]]:
     """Return a job for each run, and the experiment and drive of each.
 
     Raises ValueError for two runs with the same key. Only the first scenario of each experiment is checked as by
-    `simscen validate`: the others are generated the same way, and the reachability of their goals was checked when they
-    were drawn.
+    `simscen validate`: the others are generated the same way, and the reachability of their goals was checked then.
     """
     jobs: list[Job] = []
     drives: dict[RunKey, ExperimentDrive] = {}
@@ -162,7 +168,9 @@ def summarize_experiment(experiment: Experiment, trials: list[Trial]) -> Experim
 def _localization_accuracy(trials: list[Trial]) -> LocalizationAccuracy:
     errors = [value for trial in trials if (value := trial.metric("ape_trans_rmse")) is not None]
     traces = [read_log(Path(trial.run.artifacts.mcap)).trace for trial in trials if trial.run.artifacts.mcap]
-    samples = {seconds: [v for trace in traces if (v := nees_at(trace, seconds)) is not None] for seconds in MOMENTS_S}
+    samples = {
+        seconds: [v for trace in traces if (v := nees_at(trace, seconds)) is not None] for seconds in ANEES_TIMES_S
+    }
     return LocalizationAccuracy(
         rmse=mean(errors),
         worst_rmse=max(errors, default=None),

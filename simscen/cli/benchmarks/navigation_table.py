@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
-from simscen.bench.navigation.barn import DWA
+from simscen.bench.navigation.barn import PUBLISHED_DWA_RESULTS
 from simscen.bench.navigation.summary import Difference, DriveComparison, Row
 from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
 from simscen.report.display_text import StyledText, plain_text, wrap_line
@@ -50,8 +50,8 @@ def column_widths(table: Sequence[TableRow]) -> list[int]:
     return [max(map(len, cells)) for cells in zip(*table, strict=True)]
 
 
-PUBLISHED_DWA = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
-    f"{name} {value:.3f}" for name, value in DWA.items()
+PUBLISHED_DWA_LINE = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
+    f"{name} {value:.3f}" for name, value in PUBLISHED_DWA_RESULTS.items()
 )
 COMPARISON_HEAD = ("with minus without --stack", "pairs", "better", "worse", "success", "seconds", "SCT", "score")
 TABLE_HEAD = (
@@ -84,13 +84,13 @@ def as_text(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] =
     if pairs:
         lines += ["", *_comparison_lines(pairs, columns)]
     if any(result.tally.case.startswith("BARN") for result in rows):
-        lines += ["", PUBLISHED_DWA]
+        lines += ["", PUBLISHED_DWA_LINE]
     return "\n".join(wrap_lines(lines, columns))
 
 
 def as_json(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = ()) -> str:
     """Return all numbers, and those of DWA, as JSON."""
-    data = {"experiments": [asdict(row) for row in rows], "dwa_published": DWA}
+    data = {"experiments": [asdict(row) for row in rows], "dwa_published": PUBLISHED_DWA_RESULTS}
     return json.dumps({**data, "versus": [asdict(pair) for pair in pairs]} if pairs else data, indent=2)
 
 

@@ -16,7 +16,7 @@ from simscen.spec.quantities import UNITS
 ROOT = Path(__file__).resolve().parents[3]
 
 
-def generated() -> dict[str, str]:
+def generated_files() -> dict[str, str]:
     """Return the content of all generated files by path in the repository."""
     schemas = {f"simscen/data/schemas/{name}.schema.json": as_text(schema_of(name)) for name in MODELS}
     return {
@@ -29,18 +29,20 @@ def generated() -> dict[str, str]:
     }
 
 
-def outdated(root: Path = ROOT) -> list[str]:
+def outdated_files(root: Path = ROOT) -> list[str]:
     """Return the generated files that are missing or not up to date."""
-    return [name for name, text in generated().items() if not (root / name).is_file() or _read(root / name) != text]
+    return [
+        name for name, text in generated_files().items() if not (root / name).is_file() or _read(root / name) != text
+    ]
 
 
 def main() -> None:
-    """Write the files, or with --check exit with 1 if any is out of date."""
+    """Write the generated files. With --check, exit with 1 if one of them is out of date."""
     if "--check" in sys.argv[1:]:
-        if stale := outdated():
+        if stale := outdated_files():
             sys.exit(f"out of date: {', '.join(stale)}; run `make docs`")
         return
-    for name, text in generated().items():
+    for name, text in generated_files().items():
         (ROOT / name).parent.mkdir(parents=True, exist_ok=True)
         (ROOT / name).write_text(text, encoding="utf-8")
         print(name)
@@ -83,7 +85,7 @@ _HEADINGS = ("What is measured:", "When it fails:", "Why this:", "Source:")
 
 
 def language_page(installed: bool = False) -> str:
-    """Return docs/reference/language.md; with the types of installed packages if `installed`."""
+    """Return docs/reference/language.md, including types from installed plugins if `installed`."""
     parts = [f"{_GENERATED_NOTE}# Language reference\n", _units()]
     for group, members in groupby(_topics(installed), key=lambda topic: topic.group):
         title, text = _GROUPS[group]
@@ -130,7 +132,7 @@ def _units() -> str:
 
 
 def _section(topic: Topic) -> str:
-    parts = [f"### `{topic.name}`\n", *([f"Added by {topic.origin}.\n"] if topic.origin else []), _text(topic.text)]
+    parts = [f"### `{topic.name}`\n", *([f"Added by {topic.origin}.\n"] if topic.origin else []), _markdown(topic.text)]
     if topic.value:
         parts.append(f"\nValue: {topic.value}.")
     if topic.example:
@@ -141,7 +143,7 @@ def _section(topic: Topic) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _text(text: str) -> str:
+def _markdown(text: str) -> str:
     """Return a docstring as Markdown; its headings become a list."""
     lines: list[str] = []
     for line in text.splitlines():

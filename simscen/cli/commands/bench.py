@@ -133,7 +133,7 @@ def suite_text(suite: "Suite") -> str:
         f"  {suite.wall / baseline:.2f} times what PyBullet alone takes on one core to step and scan as long"
         f" ({baseline:.1f} s)",
         f"  CPU time {suite.cpu / baseline:.2f} times that,"
-        f" {1e3 * suite.cpu / suite.simulated:.1f} ms a simulated second",
+        f" {1e3 * suite.cpu / suite.simulated:.1f} ms per simulated second",
         f"  memory of a worker {figures['suite: memory of a worker'].value:.0f} MB,"
         f" of the largest {figures['suite: memory of the largest worker'].value:.0f} MB",
     ])  # fmt: skip
@@ -201,7 +201,7 @@ def _sections(
 
 
 def _patrol_figures(patrol: "Patrol") -> Measurements:
-    scale, unit = 1e3 / patrol.simulated, "ms a simulated second"
+    scale, unit = 1e3 / patrol.simulated, "ms per simulated second"
     return {
         "patrol, times PyBullet alone": Measurement.of(patrol.ratios, ""),
         "patrol": Measurement.of([scale * cpu for cpu in patrol.cpus], unit),
@@ -230,9 +230,9 @@ def _patrol_lines(patrol: "Patrol", rounds: int) -> list[str]:
         f"patrol of {patrol.simulated:g} s, all features, one core",
         f"  {patrol.factor:.0f} times real time ({patrol.cpu:.2f} s of CPU time, median of {rounds})",
         f"  {ratio} ({patrol.bare:.2f} s; {spread})",
-        f"    {'':{width}}  share   ms a simulated second   times PyBullet alone",
+        f"    {'':{width}}  share   ms per simulated second   times PyBullet alone",
         *(
-            f"    {n:{width}} {s / patrol.cpu:6.1%} {1e3 * s / patrol.simulated:23.2f} {s / patrol.bare:22.2f}"
+            f"    {n:{width}} {s / patrol.cpu:6.1%} {1e3 * s / patrol.simulated:25.2f} {s / patrol.bare:22.2f}"
             for n, s in shares
         ),
     ]

@@ -20,15 +20,16 @@ from simscen.ros2.frames import FrameNames
 from simscen.ros2.nav2.parameters import Offer
 from simscen.ros2.options import AdapterError
 
-SOCKET = "SIMSCEN_STACK_FD"
+SOCKET_VARIABLE = "SIMSCEN_STACK_FD"
+"""Environment variable with the file descriptor of the socket to the engine, which is set during a run."""
 _ADAPTER_START = Path(__file__).parents[2] / "ros2" / "start.py"
 _BASE = "base_link"
 
 
-class Graph(str, Enum):
-    """Kind of the ROS 2 graph."""
+class GraphKind(str, Enum):
+    """Kind of the ROS 2 graph: any nodes, or Nav2."""
 
-    GRAPH = "graph"
+    ANY = "graph"
     NAV2 = "nav2"
 
 
@@ -50,7 +51,9 @@ class Goals(str, Enum):
 
 
 def command(
-    what: Annotated[Graph, typer.Argument(help="`nav2` also checks for the nodes that Nav2 needs.")] = Graph.GRAPH,
+    what: Annotated[
+        GraphKind, typer.Argument(help="`nav2` also checks for the nodes that Nav2 needs.")
+    ] = GraphKind.ANY,
     launch: Annotated[
         str | None, typer.Option(help="Command that starts the nodes for each run; they are stopped after it.")
     ] = None,
@@ -82,38 +85,47 @@ def command(
     ] = None,
     warm_up: Annotated[
         float,
-        typer.Option(min=0, max=600, help="Simulated seconds in real time before the goals are sent."),
+        typer.Option(
+            min=0, max=600, help="Simulated time in s that passes at real-time speed before the goals are sent."
+        ),
     ] = 0.0,
     ready: Annotated[float, typer.Option(min=0.1, max=3600, help="Maximum time to wait for the graph, in s.")] = 20.0,
     settle: Annotated[
-        float, typer.Option(min=0, max=60, help="Time without changes of the graph before the run starts, in s.")
+        float,
+        typer.Option(min=0, max=60, help="Time for which the graph must stay unchanged before the run starts, in s."),
     ] = 1.0,
-    answer: Annotated[float, typer.Option(min=0.1, max=3600, help="Maximum time for an answer of a node, in s.")] = 5.0,
+    answer: Annotated[
+        float, typer.Option(min=0.1, max=3600, help="Maximum time to wait for the answer of a node, in s.")
+    ] = 5.0,
     wait: Annotated[
         float, typer.Option(min=0, max=60, help="With lockstep: maximum time to wait for a command, in s.")
     ] = 0.05,
     rounds: Annotated[
         int,
-        typer.Option(min=0, max=100, help="With lockstep: rounds to wait for a command; 0: one per node."),
+        typer.Option(
+            min=0,
+            max=100,
+            help="With lockstep: additional rounds of requests to all nodes to wait for a command; 0: one per node.",
+        ),
     ] = 0,
     wall_time: Annotated[bool, typer.Option(help="Accept nodes that do not use sim time.")] = False,
 ) -> None:
     """Connect a ROS 2 graph, such as Nav2, as the stack of a run.
 
-    Use it as `simscen run SCENARIO --stack mine='simscen ros2 --launch "ros2 launch …"'`. It runs under your own ROS
-    Python with any distribution and RMW, and needs only rclpy there. It publishes sensors, /tf, /map, and /clock,
-    receives commands, and sends goals to Nav2's actions or to /goal_pose. If the graph lacks something that the run
-    needs, the run ends with an error that names it.
+    Use it as `simscen run SCENARIO --stack mine='simscen ros2 --launch "ros2 launch …"'`. The adapter runs
+    with the Python of your ROS installation, of any distribution and with any RMW, and needs only rclpy there. It
+    publishes sensors, /tf, /map, and /clock, receives commands, and sends goals to Nav2's actions or to /goal_pose. If
+    the graph lacks something that the run needs, the run ends with an error that names it.
 
-    Without a run, `simscen ros2 nav2 --params FILE` only checks the parameter file. Exit code 0: Nav2 can work with it;
-    2: it cannot, or the command line is invalid.
+    Without a run, `simscen ros2 nav2 --params FILE` only checks the parameter file. Exit code 0: Nav2 can work with
+    these parameters; 2: it cannot, or the command line is invalid.
     """
     try:
         bases = FrameNames(frame or [], base_frame).bases
     except AdapterError as error:
         raise UsageError(str(error)) from error
-    parameters = _read(params) if params is not None else None
-    if SOCKET not in os.environ:
+    parameters = _read_parameters(params) if params is not None else None
+    if SOCKET_VARIABLE not in os.environ:
         _check_parameters(what, parameters, bases)
         return
     options = {
@@ -128,23 +140,23 @@ def command(
             "answer": answer,
             "wall_time": wall_time,
         },
-        "nav2": what is Graph.NAV2,
+        "nav2": what is GraphKind.NAV2,
         "parameters": parameters.nodes if parameters is not None else None,
         "parameter_file": str(params) if params is not None else "",
     }
     _execute_adapter(python or _find_python(), options)
 
 
-def _read(params: Path) -> Nav2Parameters:
+def _read_parameters(params: Path) -> Nav2Parameters:
     parameters = read_nav2_parameters(params)
     if isinstance(parameters, list):
         raise InvalidInput(relative_to_working_folder(parameters, Path.cwd()))
     return parameters
 
 
-def _check_parameters(what: Graph, parameters: Nav2Parameters | None, bases: list[str]) -> None:
+def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, bases: list[str]) -> None:
     """Check a parameter file. Raises UsageError if there is none, because there is nothing else to do without a run."""
-    if what is not Graph.NAV2 or parameters is None:
+    if kind is not GraphKind.NAV2 or parameters is None:
         command = shlex.join(["simscen", *sys.argv[1:]])
         raise UsageError(f"no run to connect to; use simscen run SCENARIO --stack mine={shlex.quote(command)}")
     problems = parameters.problems(Offer(["/scan"], "/odom", bases))

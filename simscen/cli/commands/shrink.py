@@ -162,7 +162,7 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
         candidates.report = lambda: _show_progress(candidates.runs, _size(shrinking.tree))
     if candidates.first_accepted([tree], failure.occurs_in) is None:
         raise UsageError("the run does not fail any more with this criterion alone; this is a bug in simscen")
-    nominal = {change.target.keys: _value_at(scenario.unvaried, change.target.keys) for change in scenario.changes}
+    nominal = {change.target.keys: _value_at(scenario.base_tree, change.target.keys) for change in scenario.changes}
     shrinking.shrink({keys: value for keys, value in nominal.items() if keys[0] in tree.entries})
     if sys.stderr.isatty():
         print_text("", sys.stderr)

@@ -101,7 +101,7 @@ class Falsification:
         stacks = stacks_of([] if request.stack is None else [request.stack], root_folder, request.world_path)
         choice = next(iter(stacks.chosen), None)
         self._scenario = ChangedScenario(request.file, root_folder, request.world_path, choice, None)
-        space = search_space(self._scenario.whole_tree)
+        space = search_space(self._scenario.merged_tree)
         if not isinstance(space, SearchSpace):
             raise InvalidInput(space)
         self._space = space

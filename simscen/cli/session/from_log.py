@@ -19,7 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FromLogOptions:
-    """Options of `simscen new --from-log`; `out` is the scenario to write."""
+    """Options of `simscen new --from-log`.
+
+    out:     scenario file to write
+    map:     map for the robot, instead of the one in the log
+    world:   world file, instead of a world made from the log
+    robot:   robot model or file, instead of the one in the log
+    truth:   topic of the true pose, or `none`
+    topics:  entries NAME=TOPIC for standard topics that have another name in the log
+    root:    root folder of the recorded scenario, to find its world
+    """
 
     log: Path
     out: Path
@@ -32,7 +41,10 @@ class FromLogOptions:
 
 
 def write_scenario_from_log(options: FromLogOptions, verify: bool) -> None:
-    """Write the scenario, print what it holds, and verify it if `verify`. Raises InvalidInput and UsageError."""
+    """Write the scenario and print a summary; with `verify`, also run it and compare the run with the log.
+
+    Raises InvalidInput and UsageError.
+    """
     if not options.log.exists():
         raise InvalidInput([Problem(str(options.log), 0, 0, "SC001", "no such file or directory")])
     made = _reconstructed(options)

@@ -20,7 +20,7 @@ from simscen.core.geometry import Array
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.stl import operators
 from simscen.criteria.stl.condition import Condition, Window
-from simscen.criteria.stl.operators import Continuation, SampleWindow
+from simscen.criteria.stl.operators import Continuation, SampleWindows
 from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.sampling import usual_period
 
@@ -121,10 +121,10 @@ class _WindowRobustness(Robustness):
     """Robustness of `always` or `eventually`: the first sample of the window with its value decides."""
 
     part: Robustness
-    window: SampleWindow
+    windows: SampleWindows
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        at = _first_equal(self.part.bound(bound), self.bound(bound)[sample], sample, self.window)
+        at = _first_equal(self.part.bound(bound), self.bound(bound)[sample], sample, self.windows)
         return self.part.witness(at, bound)
 
     def parts(self) -> Sequence[Robustness]:
@@ -135,12 +135,12 @@ class _WindowRobustness(Robustness):
 class _UntilRobustness(Robustness):
     hold: Robustness
     release: Robustness
-    window: SampleWindow
+    windows: SampleWindows
 
     def witness(self, sample: int, bound: Bound) -> Witness:
         """Return the witness of the best release, or that of `hold` before it if it is worse."""
-        end = int(self.window.last[sample]) + 1
-        first = int(self.window.first[sample]) - sample
+        end = int(self.windows.last[sample]) + 1
+        first = int(self.windows.first[sample]) - sample
         hold, release = self.hold.bound(bound)[sample:end], self.release.bound(bound)[sample:end]
         before = np.concatenate(([math.inf], np.minimum.accumulate(hold)[:-1]))
         best = np.minimum(before, release)
@@ -171,7 +171,7 @@ class ResponseRobustness(Robustness):
     premise: Robustness
     response: Robustness
     implied: Robustness
-    window: SampleWindow
+    windows: SampleWindows
     condition: Condition
     reach: slice
     required: bool
@@ -188,7 +188,7 @@ class ResponseRobustness(Robustness):
 
     def witness(self, sample: int, bound: Bound) -> Witness:
         """Return the witness of the worst response, with a note when it was due."""
-        at = _first_equal(self.implied.bound(bound), self.bound(bound)[sample], sample, self.window)
+        at = _first_equal(self.implied.bound(bound), self.bound(bound)[sample], sample, self.windows)
         return self.implied.witness(at, bound).with_note(RESPONSE_DUE, at)
 
     def parts(self) -> Sequence[Robustness]:
@@ -206,20 +206,20 @@ class ResponseRobustness(Robustness):
 class EvaluationContext:
     """A run on which conditions are evaluated, at each sample of the truth.
 
-    `over` tells that the run was completed, unlike a truncated log.
+    `run_ended` is False for a truncated log, after which the run may have gone on.
     """
 
     trace: Trace
     case: Case
-    over: bool
+    run_ended: bool
 
     @cached_property
     def period(self) -> int:
         """The usual spacing of samples in ticks: the median."""
         return usual_period(self.trace.truth.ticks)
 
-    def window(self, window: Window) -> SampleWindow:
-        """Return a window as ranges of samples. Raises InvalidTrace if it is shorter than the spacing of samples."""
+    def sample_windows(self, window: Window) -> SampleWindows:
+        """Return the window of each sample. Raises InvalidTrace if it is shorter than the spacing of samples."""
         start, end = window.interval
         rate, last = self.trace.tick_rate, None
         if end is not None:
@@ -230,12 +230,12 @@ class EvaluationContext:
                 raise InvalidTrace(
                     f"the window up to {end:g} s ahead contains no sample: samples are {spacing:g} s apart"
                 )
-        return SampleWindow.over(self.trace.truth.ticks, self.period, round(start * rate), last)
+        return SampleWindows.of_samples(self.trace.truth.ticks, self.period, round(start * rate), last)
 
     @cached_property
-    def rest_of_run(self) -> SampleWindow:
-        """From each sample to the end of the run."""
-        return SampleWindow.over(self.trace.truth.ticks, self.period, 0, None)
+    def rest_of_run(self) -> SampleWindows:
+        """The windows from each sample to the end of the run."""
+        return SampleWindows.of_samples(self.trace.truth.ticks, self.period, 0, None)
 
 
 def robustness(condition: Condition, context: EvaluationContext, begin: int = 0) -> Robustness:
@@ -271,21 +271,21 @@ def windowed_robustness(
     begin: int = 0,
 ) -> Robustness:
     """Return the robustness of `condition` always or eventually in a window."""
-    samples = context.window(window)
-    return _windowed(operator, robustness(condition, context, _start(samples, begin)), samples, context)
+    windows = context.sample_windows(window)
+    return _windowed(operator, robustness(condition, context, _start(windows, begin)), windows, context)
 
 
 def until_robustness(
     hold: Condition, release: Condition, window: Window, context: EvaluationContext, begin: int = 0
 ) -> Robustness:
     """Return the robustness of `hold` until `release` in a window."""
-    samples = context.window(window)
-    holds, releases = robustness(hold, context, begin), robustness(release, context, _start(samples, begin))
+    windows = context.sample_windows(window)
+    holds, releases = robustness(hold, context, begin), robustness(release, context, _start(windows, begin))
     low, high = (
-        operators.until(holds.bound(bound), releases.bound(bound), samples, ahead)
-        for bound, ahead in _continuations(context)
+        operators.until(holds.bound(bound), releases.bound(bound), windows, continuation)
+        for bound, continuation in _continuations(context)
     )
-    return _UntilRobustness(low, high, holds, releases, samples)
+    return _UntilRobustness(low, high, holds, releases, windows)
 
 
 def response_robustness(
@@ -300,34 +300,34 @@ def response_robustness(
 
     If the premise is `required` but never certainly true, `low` is -inf, because nothing was tested.
     """
-    samples = context.rest_of_run if window is None else context.window(window)
-    start = _start(samples, begin)
+    windows = context.rest_of_run if window is None else context.sample_windows(window)
+    start = _start(windows, begin)
     premise_part, response_part = robustness(premise, context, start), robustness(response, context, start)
     negated = _NegationRobustness(-premise_part.high, -premise_part.low, premise_part)
     implied = _combine([negated, response_part], "any")
-    always = _windowed("always", implied, samples, context)
-    end = int(samples.last[begin]) + 1 if begin < len(samples.last) else None
+    always = _windowed("always", implied, windows, context)
+    end = int(windows.last[begin]) + 1 if begin < len(windows.last) else None
     found = ResponseRobustness(
-        always.low, always.high, premise_part, response_part, implied, samples, premise, slice(start, end), required
+        always.low, always.high, premise_part, response_part, implied, windows, premise, slice(start, end), required
     )
     return replace(found, low=np.full_like(found.low, -math.inf)) if required and not found.tested else found
 
 
 def _windowed(
-    operator: Literal["always", "eventually"], part: Robustness, window: SampleWindow, context: EvaluationContext
+    operator: Literal["always", "eventually"], part: Robustness, windows: SampleWindows, context: EvaluationContext
 ) -> Robustness:
     evaluate = operators.always if operator == "always" else operators.eventually
-    low, high = (evaluate(part.bound(bound), window, ahead) for bound, ahead in _continuations(context))
-    return _WindowRobustness(low, high, part, window)
+    low, high = (evaluate(part.bound(bound), windows, continuation) for bound, continuation in _continuations(context))
+    return _WindowRobustness(low, high, part, windows)
 
 
-def _start(window: SampleWindow, begin: int) -> int:
+def _start(windows: SampleWindows, begin: int) -> int:
     """Return the first sample of the window of sample `begin`; beyond the run it is the number of samples."""
-    return int(window.first[begin]) if begin < len(window.first) else len(window.first)
+    return int(windows.first[begin]) if begin < len(windows.first) else len(windows.first)
 
 
 def _continuations(context: EvaluationContext) -> list[tuple[Bound, Continuation]]:
-    return [("low", Continuation(-math.inf, context.over)), ("high", Continuation(math.inf, context.over))]
+    return [("low", Continuation(-math.inf, context.run_ended)), ("high", Continuation(math.inf, context.run_ended))]
 
 
 def _combine(parts: Sequence[Robustness], how: Literal["all", "any"]) -> Robustness:
@@ -364,7 +364,7 @@ def _distances(condition: Condition, values: Array) -> Array:
     return signed
 
 
-def _first_equal(values: Array, value: float, sample: int, window: SampleWindow) -> int:
+def _first_equal(values: Array, value: float, sample: int, windows: SampleWindows) -> int:
     """Return the first sample in the window of `sample` at which `values` has the given value."""
-    begin = int(window.first[sample])
+    begin = int(windows.first[sample])
     return begin + int(np.argmax(values[begin:] == value))

@@ -166,8 +166,8 @@ def _start_time(when: Trigger | None) -> float | None:
 def faults_without_effect(loaded: LoadedScenario) -> Iterator[CheckFinding]:
     """Find faults whose values have no effect."""
     for index, entry in enumerate(loaded.spec.faults):
-        idle = entry.fault.idle
-        if idle and all(getattr(entry.chosen, key) == value for key, value in idle.items()):
+        neutral = entry.fault.neutral_values
+        if neutral and all(getattr(entry.chosen, key) == value for key, value in neutral.items()):
             message = f"fault `{entry.label}` changes nothing with these values"
             yield CheckFinding(("faults", index, entry.kind), message, at_key=True)
 

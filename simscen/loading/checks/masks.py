@@ -1,4 +1,4 @@
-"""Checks of keepout zones and filter masks: do they forbid the start or a goal, do they have any effect?"""
+"""Checks that find keepout zones and filter masks that forbid the start or a goal, or that have no effect."""
 
 from collections.abc import Callable, Iterator, Mapping
 
@@ -13,7 +13,13 @@ from simscen.criteria.keepout import Keepout
 from simscen.criteria.speed import Speed
 from simscen.loading.builders import KEEPOUT_KEYS, SPEED_KEYS, load_criterion_masks, load_masks
 from simscen.loading.checks.registry import CheckFinding, Keys
-from simscen.loading.checks.scene import WORLD, Scene, expects_start_failure
+from simscen.loading.checks.scene import (
+    WORLD,
+    Scene,
+    expected_failure_hint,
+    expects_start_failure,
+    required_failure_hint,
+)
 from simscen.loading.schema.messages import quoted
 
 ZoneTest = Callable[[Pose2, float], bool]
@@ -48,13 +54,15 @@ def check_stack_zones(scene: Scene) -> Iterator[CheckFinding]:
     if keepout is not None:
         zones.append((KEEPOUT_KEYS, "in a cell that the keepout mask forbids", forbidden_test(keepout)))
     for keys, where, forbids in zones:
-        hint = "move one of them, or expect the failure with `result: {status: FAILED, error_code: %s}`"
-        for name in [goal.name for _, goal in scene.targets if forbids(goal.pose, MIN_DEPTH_M)]:
-            message = f"goal `{name}` cannot be reached: it is {where}, which the stack keeps out of"
-            yield CheckFinding(keys, message, hint % "GOAL_OCCUPIED")
+        for goal_keys, goal in scene.targets:
+            if forbids(goal.pose, MIN_DEPTH_M):
+                message = f"goal `{goal.name}` cannot be reached: it is {where}, which the stack keeps out of"
+                hint = f"move one of them, or {expected_failure_hint(goal_keys, 'GOAL_OCCUPIED')}"
+                yield CheckFinding(keys, message, hint)
         if forbids(scene.start, ESTIMATE_ERROR_M) and not expects_start_failure(scene.loaded.spec):
             message = f"the robot starts {where}, which the stack keeps out of"
-            yield CheckFinding(keys, message, hint % "START_OCCUPIED", warning=True)
+            hint = f"move one of them, or {required_failure_hint('START_OCCUPIED')}"
+            yield CheckFinding(keys, message, hint, warning=True)
 
 
 def _inside_region(corners: Polygon) -> ZoneTest:

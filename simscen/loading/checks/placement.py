@@ -1,4 +1,4 @@
-"""Checks of poses: is the robot, a goal, or an object of an event inside an obstacle or outside the map?"""
+"""Checks that find poses of the robot, goals, and objects of events inside an obstacle or outside the map."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,15 @@ from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fas
 from simscen.core.geometry.shapes import MotionPath, Solid
 from simscen.core.messages.navigation import Goal
 from simscen.loading.checks.registry import CheckFinding, Keys
-from simscen.loading.checks.scene import SILL_M, START, TOUCH_M, WORLD, Scene, expects_start_failure
+from simscen.loading.checks.scene import (
+    SILL_M,
+    START,
+    TOUCH_M,
+    WORLD,
+    Scene,
+    expected_failure_hint,
+    expects_start_failure,
+)
 from simscen.loading.yaml.tree import MappingNode
 from simscen.sim.body.outline import radius_and_height
 from simscen.spec.moving_objects import Motion
@@ -24,17 +32,15 @@ from simscen.worlds.geometry.overlaps import first_solid_in_disc, place_polygon,
 from simscen.worlds.geometry.prisms import upright_prism
 
 START_HINT = "move it to free space"
-GOAL_HINT = "move it, or expect the failure with `result: {status: FAILED, error_code: GOAL_OCCUPIED}`"
-OUTSIDE_HINT = GOAL_HINT.replace("GOAL_OCCUPIED", "GOAL_OUTSIDE_MAP")
 TOLERANCE_SHARES = (-0.9, 0.0, 0.9)
-"""Fractions of a goal's tolerances: offsets from the exact pose at which the robot may stop instead."""
+"""Offsets that are tried around the exact pose of a goal, as fractions of its tolerances: just inside of them."""
 
 MotionStop = tuple[Keys, str, tuple[float, float]]
-"""Keys below the motion, name and position of a keyframe or waypoint."""
+"""Keys below those of the motion, description, and position (x, y) of a keyframe or waypoint."""
 
 
 def blocked_poses(scene: Scene) -> dict[Keys, CheckFinding]:
-    """Return the findings for the start, goals and kidnap poses at which the robot cannot be, by their keys."""
+    """Return the findings for start, goals and kidnap poses at which the robot cannot be, by their keys in the file."""
     found = [*_start(scene), *_goals(scene), *_kidnaps(scene)]
     return {finding.keys: finding for finding in found}
 
@@ -53,18 +59,22 @@ def _start(scene: Scene) -> Iterator[CheckFinding]:
 
 def _goals(scene: Scene) -> Iterator[CheckFinding]:
     for keys, goal in scene.targets:
-        hint = OUTSIDE_HINT if scene.area.outside(goal.pose) else GOAL_HINT
+        code = "GOAL_OUTSIDE_MAP" if scene.area.outside(goal.pose) else "GOAL_OCCUPIED"
+        hint = f"move it, or {expected_failure_hint(keys, code)}"
         found = list(_pose_problem(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
         if found and not _fits_nearby(scene, goal):
             yield from found
         position = goal.pose.x, goal.pose.y
         if not found and (thing := first_solid_in_disc(scene.unmoved_bodies, position, TOUCH_M, scene.z_range)):
             message = f"goal `{goal.name}` is inside `{thing}`, and no event moves or removes `{thing}`"
-            yield CheckFinding(keys, message, GOAL_HINT, warning=True)
+            yield CheckFinding(keys, message, hint, warning=True)
 
 
 def _fits_nearby(scene: Scene, goal: Goal) -> bool:
-    """Return whether only the exact pose is blocked and a footprint that is not round fits within the tolerances."""
+    """Return whether the robot fits at another pose within the goal's tolerances, although the exact pose is blocked.
+
+    Only footprints that are not round are tried, and only if no obstacle overlaps the robot's inscribed circle.
+    """
     outside = scene.area.outside(goal.pose)
     if outside or scene.size.radius is not None or scene.circle_conflict(goal.pose, scene.world.solids):
         return False

@@ -6,16 +6,17 @@ error code that it reports:
     @MEANING.check("SC050")
     def impossible_events(loaded: LoadedScenario) -> Iterator[CheckFinding]: ...
 
-Stages, in the order in which they run (a scenario with errors does not reach the next one):
+Stages, in the order in which they run. After errors, later stages are not run:
 
-| stage | subject | needs |
-|---|---|---|
-| ROBOT_NAMES | the scenario as written | nothing |
-| WORLD_FILE | a world file | nothing |
-| NAMES | one robot's view of the scenario | the files that it names |
-| MEANING | one robot's view of the scenario | the files that it names |
-| BUILT_WORLD (`built_world.py`) | a world file | the built world |
-| WORLD, TIMING (`scene.py`) | one robot's view of the scenario | the built world and the size of the robot |
+| stage | subject | finds, for example | needs |
+|---|---|---|---|
+| ROBOT_NAMES | the scenario as written | unknown robots | nothing |
+| WORLD_FILE | a world file | two objects with the same name | nothing |
+| NAMES | one robot's view of the scenario | unknown goals or sensors | the files that it names |
+| MEANING | one robot's view of the scenario | events that cannot happen | the files that it names |
+| BUILT_WORLD (`built_world.py`) | a world file | places inside obstacles | the built world |
+| WORLD (`scene.py`) | one robot's view of the scenario | goals without a route | the built world, the robot's size |
+| TIMING (`scene.py`) | one robot's view of the scenario | time limits that are too short | the same |
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -29,13 +30,15 @@ from simscen.loading.yaml.tree import Key, MappingNode, key_position, value_posi
 from simscen.model.scenario import ScenarioSpec
 
 Keys = tuple[Key, ...]
+"""Keys and indices that lead from the top of a file to a value, e.g. ("goals", 0, "pose")."""
 
 
 class CheckFinding(NamedTuple):
     """A problem found by a check: where it is, what is wrong, and what to do.
 
-    `keys` lead to the value to mark, or to the key itself with `at_key`. They are keys of the checked file, or of
-    `tree` if that is given. A finding with `warning` is a warning even if the check reports errors.
+    `keys` lead to the value to mark; with `at_key`, its key is marked instead. They are keys in the checked file, or in
+    the file of `tree` if that is given, such as the world file of a scenario. A finding with `warning` is a warning
+    even if the check reports errors.
     """
 
     keys: Keys
@@ -46,7 +49,7 @@ class CheckFinding(NamedTuple):
     tree: MappingNode | None = None
 
     def problem(self, code: str, tree: MappingNode, severity: str = "error") -> Problem:
-        """Return the finding as a problem at its position in `tree`, without the text of its line."""
+        """Return the finding as a problem at its position in `tree`; the text of the source line is added later."""
         position_of = key_position if self.at_key else value_position
         position = position_of(self.tree or tree, self.keys)
         return Problem(*position, code, self.message, self.hint, "warning" if self.warning else severity)
@@ -84,7 +87,7 @@ class CheckStage(Generic[S]):
         return register
 
     def problems(self, subject: S) -> list[Problem]:
-        """Return the problems that all checks of this stage find, without the text of lines."""
+        """Return the problems that all checks of this stage find; the text of the source lines is added later."""
         tree = subject.tree
         if tree is None:
             return []
@@ -103,7 +106,7 @@ class WrittenScenario(NamedTuple):
 
 
 class NameScope(NamedTuple):
-    """A scenario and its world; `world` is None until the world has been built."""
+    """Scenario and world in which names are looked up; `world` is None until the world has been built."""
 
     loaded: LoadedScenario
     world: World | None = None

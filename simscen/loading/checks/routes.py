@@ -14,12 +14,11 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.placement import blocked_poses
 from simscen.loading.checks.regions import robot_routes
 from simscen.loading.checks.registry import CheckFinding
-from simscen.loading.checks.scene import START, TIMING, WORLD, Scene, expects_failure
+from simscen.loading.checks.scene import START, TIMING, WORLD, Scene, expected_failure_hint, expects_failure
 from simscen.loading.goals import scenario_goals
 from simscen.model.robot import RobotSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
-NO_ROUTE_HINT = "widen the gap, or expect the failure with `result: {status: FAILED, error_code: NO_VALID_PATH}`"
 GAP_EDGE_M = 0.03
 """Distance from the edge of a gap within which the solid that forms the edge is searched."""
 
@@ -56,7 +55,7 @@ def unreachable_goals(scene: Scene) -> list[tuple[CheckFinding, Gap]]:
         elif len(scene.certain_walls) < len(world) and routes.is_reachable(starts, goal.pose, scene.certain_walls):
             finding = CheckFinding(keys, message, _ramp_hint(scene), warning=True)
         else:
-            finding = CheckFinding(keys, message, NO_ROUTE_HINT)
+            finding = CheckFinding(keys, message, f"widen the gap, or {expected_failure_hint(keys, 'NO_VALID_PATH')}")
         found.append((finding, gap))
     return found
 

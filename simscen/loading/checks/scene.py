@@ -224,6 +224,18 @@ def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
     return failing or any(code != ErrorCode.NONE and name in (None, goal) for code, name in _required_codes(spec))
 
 
+def expected_failure_hint(keys: Keys, code: str) -> str:
+    """Return how a scenario can expect that the goal at `keys` fails with the error code `code`."""
+    if keys[0] == "goals":
+        return f"expect the failure with `expect: {{error_code: {code}}}` at the goal"
+    return required_failure_hint(code)
+
+
+def required_failure_hint(code: str) -> str:
+    """Return how a scenario can require that navigation fails with the error code `code`."""
+    return f"replace `goals_reached` in `pass` by `result: {{status: FAILED, error_code: {code}}}`"
+
+
 def expects_start_failure(spec: ScenarioSpec) -> bool:
     """Return whether the scenario passes if the robot cannot start."""
     return any(code in START_FAILURES for code, _ in _required_codes(spec))

@@ -61,7 +61,7 @@ def load_world_file(
 ) -> LoadedWorld:
     """Load the world in a `*.world.yaml`, a ROS map, or an SDF file. Raises InvalidInput with all problems.
 
-    `unsaved` contains texts that replace those of files.
+    `unsaved` contains the texts of files that are changed in an editor, but not saved.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     file = library.sandbox.resolve_argument(path)
@@ -163,9 +163,9 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
         raise InvalidInput([file])
     tree, problems = library.read(file, defaults=True)
     if problems or not isinstance(tree, MappingNode):
-        spec = [] if problems or tree is None else check(CriteriaSpec, tree, multirobot.missing_in_criteria)
+        spec = [] if problems or tree is None else check(CriteriaSpec, tree, multirobot.criteria_robot_problems)
         raise InvalidInput(library.with_source([*problems, *(spec if isinstance(spec, list) else ())]))
-    spec = check(CriteriaSpec, tree, multirobot.missing_in_criteria)
+    spec = check(CriteriaSpec, tree, multirobot.criteria_robot_problems)
     if isinstance(spec, list):
         raise InvalidInput(library.with_source(spec))
     return _loaded(file, tree, library)

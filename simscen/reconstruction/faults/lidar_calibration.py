@@ -1,4 +1,7 @@
-"""Systematic errors of ranges and of the mount of a lidar, from the differences to the static world."""
+"""Estimates systematic errors of a lidar: a wrong mounting pose, and a bias, a scale, or a drift of its ranges.
+
+The errors follow from the differences between its ranges and those expected in the static world.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +21,10 @@ MAX_SCANS = 40
 STEP_M, STEP_RAD = 0.01, math.radians(0.25)
 """Steps of the numerical derivatives."""
 TRIED_YAWS_RAD = tuple(math.radians(yaw) for yaw in range(-24, 25, 3))
-"""Rotations of the mount from which the estimate may start."""
-MAX_FIT_RATIO = 0.7
-"""Ratio of the median differences below which it starts there and not at the nominal mount."""
+"""Yaw errors of the mount that are tried as starting points of the estimate."""
+MAX_MISFIT_RATIO = 0.7
+"""The estimate starts at a yaw error only if the median difference of the ranges is below this fraction of that at the
+nominal mount."""
 ITERATIONS = 6
 """Number of Gauss-Newton steps."""
 OUTLIER_M = 0.5
@@ -28,7 +32,7 @@ OUTLIER_M = 0.5
 MIN_BEAMS = 200
 """Number of beams that the estimate needs."""
 MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)
-"""Smallest error of a mount that is reported; smaller ones are within the errors of poses and walls."""
+"""Smallest error of a mount that is reported. Smaller ones may be errors of the recorded poses or of the walls."""
 MIN_BIAS_M, MIN_SCALE_ERROR, MIN_DRIFT_M_S = 0.03, 0.015, 0.003
 """Smallest bias, difference of the scale from 1, and drift of ranges that are reported."""
 
@@ -54,7 +58,7 @@ def mount_error(model: ScanModel, world: Surroundings) -> Pose2:
             for yaw in TRIED_YAWS_RAD
         }
     nearest = min(TRIED_YAWS_RAD, key=lambda yaw: (misfit[yaw], abs(yaw)))
-    error = Pose2(0.0, 0.0, nearest if misfit[nearest] < MAX_FIT_RATIO * misfit[0.0] else 0.0)
+    error = Pose2(0.0, 0.0, nearest if misfit[nearest] < MAX_MISFIT_RATIO * misfit[0.0] else 0.0)
     outlier = OUTLIER_M
     for _ in range(ITERATIONS):
         with np.errstate(invalid="ignore"):
@@ -87,7 +91,7 @@ def _shifted(poses: Array, offset: Pose2) -> Array:
 
 
 def mount_fault(model: ScanModel, world: Surroundings) -> FoundFault | None:
-    """Return the fault of a lidar that is not where its mount says, if the poses are a ground truth."""
+    """Return the fault of a lidar that is not where its mount says, or None. The poses must be ground truth."""
     error = mount_error(model, world)
     shift = math.hypot(error.x, error.y)
     if shift < MIN_OFFSET_M and abs(error.yaw) < MIN_OFFSET_RAD:
@@ -102,8 +106,8 @@ def mount_fault(model: ScanModel, world: Surroundings) -> FoundFault | None:
     return FoundFault("lidar", "extrinsic", values, evidence=Evidence(text, None, None, "medium"))
 
 
-def with_mount_error(model: ScanModel, world: Surroundings) -> ScanModel:
-    """Return the model with the lidar where its scans fit the walls."""
+def with_corrected_mount(model: ScanModel, world: Surroundings) -> ScanModel:
+    """Return the model with the lidar moved to its estimated true pose, at which its scans fit the walls."""
     error = mount_error(model, world)
     poses = _shifted(model.poses, error)
     expected = world.ranges_from(poses, model.scans.angles, model.scans.range_max)

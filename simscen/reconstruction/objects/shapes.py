@@ -16,7 +16,7 @@ from simscen.reconstruction.objects.clusters import ScanCluster
 MAX_ROUND_RADIUS_M, MAX_ROUND_ERROR_M = 0.6, 0.035
 """An object is round if its radius is at most this, and its hits are this close to a circle."""
 MAX_HALF_ANGLE_RAD = math.radians(80.0)
-"""Half of the largest angle, seen from the lidar, from which a radius is computed."""
+"""Largest half of the angle that an object covers, in rad, for computing its radius, which is infinite at 90°."""
 MIN_SIDE_M = 0.1
 """Shortest side of a box."""
 SIZE_PERCENTILE = 90.0

@@ -25,7 +25,7 @@ class UnusableLog(ValueError):
 
 @contextmanager
 def unusable_log_as_invalid_input(path: Path) -> Iterator[None]:
-    """Raise InvalidInput, with the file and the reason, for a log that cannot be read or used."""
+    """Context manager that raises InvalidInput, with file and reason, for a log that cannot be read or used."""
     try:
         yield
     except UnusableLog as error:
@@ -179,7 +179,7 @@ class BagMessages:
 
 
 def open_messages(path: Path, topics: Container[str]) -> McapMessages | BagMessages:
-    """Open an MCAP file or a rosbag2 folder for reading at least these topics. Raises UnusableLog."""
+    """Open an MCAP file or a rosbag2 folder; messages of other topics may be left out. Raises UnusableLog."""
     if path.is_dir():
         return BagMessages(path, topics)
     if path.suffix == ".bag":

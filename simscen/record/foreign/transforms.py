@@ -13,13 +13,13 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.records.trace import Ticks
 from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.foreign.timebase import StampedMessages
-from simscen.record.localization_logs.rows import Triple
+from simscen.record.localization_logs.rows import PlanarPose
 from simscen.record.messages.decode import StampedPose
 
 
 @dataclass
 class _Link:
-    """Poses of a frame in its parent frame, with their times in ns."""
+    """Poses of a frame in its parent frame, with the times in ns of their logging and their stamps."""
 
     parent: str
     logged: list[int] = field(default_factory=list)
@@ -47,8 +47,8 @@ class TransformTree:
     def between(self, outer: str, inner: str) -> tuple[StampedMessages, Array] | str:
         """Return the poses (n, 7) of `inner` in `outer` with their times, or the reason why they are unknown.
 
-        There is one pose for each message of the innermost moving transform. The other transforms keep their value from
-        one message to the next, without interpolation.
+        There is one pose for each message of the moving transform that is closest to `inner`. The other transforms keep
+        their value from one message to the next, without interpolation.
         """
         chain = self._chain(outer, inner)
         if isinstance(chain, str):
@@ -114,7 +114,7 @@ _BASE_FRAMES = ("base_link", "base_footprint")
 class LidarMount(NamedTuple):
     """Pose x, y, yaw of a lidar on the base. If the lidar is mounted upside down, its angles have the opposite sign."""
 
-    pose: Triple
+    pose: PlanarPose
     is_upside_down: bool
 
 
@@ -148,7 +148,7 @@ LoggedMessage = tuple[int, int, Any]
 
 
 def parse_frame_pair(name: str) -> tuple[str, str] | None:
-    """Return the parent and child frame of `map:base_link`, or None for the name of a topic."""
+    """Return the parent and child frame of a name such as `map:base_link`; None if it is the name of a topic."""
     outer, colon, inner = name.partition(":")
     return (outer, inner) if colon and not name.startswith("/") else None
 

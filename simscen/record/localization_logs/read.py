@@ -21,9 +21,9 @@ from simscen.record.localization_logs.rows import (
     MAX_TIME_S,
     TICK_RATE_HZ,
     LocalizationRows,
+    PlanarPose,
     PoseRow,
     ScanRow,
-    Triple,
     all_within,
 )
 from simscen.record.log_reader import LOG_READ_ERRORS, invalid_log
@@ -57,7 +57,7 @@ def _numbered_rows(lines: Iterable[str], hint: str) -> Iterator[tuple[int, list[
         raise UnusableLog(f"line {reader.line_num} is not CSV: {error}", hint) from error
 
 
-def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float], mount: Triple) -> None:
+def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float], mount: PlanarPose) -> None:
     match kind:
         case "odom" | "truth":
             time, pose = (values or [math.nan])[0], values[1:]
@@ -79,7 +79,7 @@ def _check_time(time: float) -> None:
         raise ValueError(f"{time} is not a valid time")
 
 
-def _checked_pose(values: list[float], count: int) -> Triple:
+def _checked_pose(values: list[float], count: int) -> PlanarPose:
     if len(values) != count or not all(math.isfinite(value) for value in values):
         raise ValueError(f"expected {count} numbers, got {values}")
     if not all_within(values, MAX_COORDINATE_M):
@@ -143,14 +143,14 @@ def _ranges(words: list[str], count: int) -> np.ndarray[tuple[int, ...], np.dtyp
     return np.array([float(word) for word in words])
 
 
-def _pose(words: list[str]) -> Triple:
+def _pose(words: list[str]) -> PlanarPose:
     x, y, yaw = (_parse_finite(word) for word in words)
     if not all_within((x, y, yaw), MAX_COORDINATE_M):
         raise ValueError(f"invalid coordinates {x:g}, {y:g}")
     return x, y, yaw
 
 
-def _relative_pose(base: Triple, other: Triple) -> Triple:
+def _relative_pose(base: PlanarPose, other: PlanarPose) -> PlanarPose:
     dx, dy, c, s = other[0] - base[0], other[1] - base[1], math.cos(base[2]), math.sin(base[2])
     return c * dx + s * dy, c * dy - s * dx, math.remainder(other[2] - base[2], 2 * math.pi)
 

@@ -22,9 +22,9 @@ from simscen.record.foreign.transforms import (
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
     LocalizationRows,
+    PlanarPose,
     PoseRow,
     ScanRow,
-    Triple,
     all_within,
 )
 from simscen.record.messages.decode import (
@@ -153,7 +153,7 @@ def _scans(topic: str, messages: _Messages, use_log_time: bool, notes: list[str]
         yield ScanRow(_time(logged, scan, use_log_time), index, ranges, layout, pose)
 
 
-def planar_pose(pose: Numbers) -> Triple:
+def planar_pose(pose: Numbers) -> PlanarPose:
     """Return x, y and yaw of x, y, z and a unit quaternion."""
     x, y, _, qx, qy, qz, qw = pose
     return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))

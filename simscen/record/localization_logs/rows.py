@@ -8,7 +8,7 @@ from simscen.core.geometry import Array
 TICK_RATE_HZ = 1000
 MAX_TIME_S, MAX_COORDINATE_M = 1e11, 1e6
 """Limits for valid times and coordinates. Squares of larger numbers, as from broken sensors, could overflow."""
-Triple = tuple[float, float, float]
+PlanarPose = tuple[float, float, float]
 """Pose x, y, yaw."""
 
 
@@ -18,7 +18,7 @@ class PoseRow:
 
     time: float
     order: int
-    pose: Triple
+    pose: PlanarPose
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class ScanRow:
     order: int
     ranges: Array
     layout: tuple[float, float, float, float]
-    mount: Triple = (0.0, 0.0, 0.0)
+    mount: PlanarPose = (0.0, 0.0, 0.0)
 
 
 @dataclass

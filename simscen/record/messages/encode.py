@@ -1,7 +1,8 @@
-"""Encoders of ROS 2 messages without long arrays.
+"""Encoders of ROS 2 messages. Those with long arrays of numbers, except images, are in encode_arrays.py.
 
-Types of fixed size have a Template; the docstring lists the fields that its `packer()` takes. Other types have a
-function that returns the bytes. Definitions: common_interfaces of ROS 2 Humble. Unknown covariances are zeros, as
+For a message of fixed size, a function returns its layout as a Template. `Template.packer()` returns a function that
+takes the fields that the docstring lists, in this order, and returns the bytes. For other messages, a function returns
+the bytes. Definitions: common_interfaces of ROS 2 Humble. Unknown covariances are zeros, as
 REP 145 and the message definitions require. A `stamp` is the time of the measurement. A `twist` is vx, vy, wz.
 """
 
@@ -15,11 +16,11 @@ from simscen.record.messages.cdr import Template
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _TWIST = "2d24xd"
-"""Six numbers with vx, vy and wz."""
+"""Format of six numbers, as in `struct`: vx, vy and wz, and zeros for the other three."""
 _COVARIANCE = "2d24x3d24xd144x2d24xd"
-"""36 numbers with the nine of x, y and yaw."""
+"""Format of 36 numbers: the nine of x, y and yaw, and zeros for the others."""
 _TWIST_VARIANCES = "d48xd216xd"
-"""36 numbers with the variances of vx, vy and wz on the diagonal."""
+"""Format of 36 numbers: the variances of vx, vy and wz on the diagonal, and zeros for the others."""
 
 
 def clock() -> Template:
@@ -92,20 +93,20 @@ def pose_stamped(frame: str) -> Template:
     return _stamped(frame).slot("7d", "*pose")
 
 
-def transforms(links: Sequence[tuple[str, str, str]], packed_count: int = 0, packed_bytes: int = 0) -> Template:
-    """Return the layout of tf2_msgs/msg/TFMessage: stamp, the poses of the links, and packed.
+def transforms(links: Sequence[tuple[str, str, str]], serialized_count: int = 0, serialized_bytes: int = 0) -> Template:
+    """Return the layout of tf2_msgs/msg/TFMessage: stamp, the poses of the links, and serialized.
 
-    Each link is a frame, its child frame, and the name of the field for the child's pose. The field `packed` exists if
-    there are `packed_count` more links that are already serialized, with `packed_bytes` in total.
+    Each link is a frame, its child frame, and the name of the field for the child's pose. The field
+    `serialized` exists if there are `serialized_count` more links as bytes, with the total size `serialized_bytes`.
     """
-    message = Template().put("I", len(links) + packed_count)
+    message = Template().put("I", len(links) + serialized_count)
     for frame, child, pose in links:
         message.slot("iI", "*stamp")
         message.string(frame)
         message.string(child)
         message.slot("7d", f"*{pose}")
-    if packed_count:
-        message.slot(f"{packed_bytes}s", "packed")
+    if serialized_count:
+        message.slot(f"{serialized_bytes}s", "serialized")
     return message
 
 

@@ -177,7 +177,7 @@ class TruthPublisher:
             batch = self._precomputed
             if batch is None or batch.predicted is not poses.predicted:
                 batch = self._precomputed = self._precompute(poses.predicted)
-            batch.layout.write(now, stamp, *fields, batch.packed[poses.row].tobytes())
+            batch.layout.write(now, stamp, *fields, batch.serialized[poses.row].tobytes())
             return
         names = tuple(poses)
         layout = self._layouts.get(names)
@@ -210,9 +210,9 @@ class TruthPublisher:
 
 
 class _PrecomputedBatch(NamedTuple):
-    """Messages for objects whose poses are known in advance; `packed` are the transforms of each tick."""
+    """Messages for objects whose poses are known in advance; `serialized` has the transforms of each tick."""
 
     predicted: PredictedPoses
     transforms: TransformBatchPacker
     layout: BatchWriter
-    packed: Bytes
+    serialized: Bytes

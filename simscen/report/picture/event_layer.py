@@ -190,7 +190,7 @@ def draw_violations(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw a small diamond with the name for each place that is not a goal."""
-    goals = [goal.pose for robot in scene.each for goal in robot.case.every_goal]
+    goals = [goal.pose for robot in scene.per_robot for goal in robot.case.every_goal]
     goal_positions = {(round(pose.x, 3), round(pose.y, 3)) for pose in goals}
     for name, pose in sorted(scene.scenery.places.items()):
         if (round(pose.x, 3), round(pose.y, 3)) not in goal_positions and canvas.shows(pose.x, pose.y):

@@ -89,9 +89,9 @@ def _map(scene: Scene) -> Canvas:
     draw_map(canvas, scene.map)
     draw_grid(canvas)
     labels = [label for draw in _GROUND_LAYERS for label in draw(canvas, scene)]
-    labels += [label for draw in _LAYERS_BELOW_ROBOT for robot in scene.each for label in draw(canvas, robot)]
+    labels += [label for draw in _LAYERS_BELOW_ROBOT for robot in scene.per_robot for label in draw(canvas, robot)]
     labels += [label for draw in _OBJECT_LAYERS for label in draw(canvas, scene)]
-    labels += [label for draw in _LAYERS_ABOVE_ROBOT for robot in scene.each for label in draw(canvas, robot)]
+    labels += [label for draw in _LAYERS_ABOVE_ROBOT for robot in scene.per_robot for label in draw(canvas, robot)]
     labels += event_layer.draw_violations(canvas, scene)
     place_labels(canvas, labels, _walls(canvas, scene))
     return canvas
@@ -109,8 +109,8 @@ def _walls(canvas: Canvas, scene: Scene) -> Array:
 
 def _required_points(scene: Scene) -> Array:
     """Return points that must be on the picture: goals and paths, but not objects that wait outside of the map."""
-    goals = [(goal.pose.x, goal.pose.y) for robot in scene.each for goal in robot.case.every_goal]
-    paths = [robot.trace.truth.values[:, :2] for robot in scene.each]
+    goals = [(goal.pose.x, goal.pose.y) for robot in scene.per_robot for goal in robot.case.every_goal]
+    paths = [robot.trace.truth.values[:, :2] for robot in scene.per_robot]
     return np.vstack((np.array(goals).reshape(-1, 2), *paths))
 
 
@@ -144,7 +144,7 @@ def end_reason(scene: Scene) -> str:
     if scene.result.outcome is Outcome.ERROR and scene.result.error is not None:
         return f"{scene.result.error.kind}: {scene.result.error.message}"
     reasons = [scene.result.ended]
-    for robot in scene.each:
+    for robot in scene.per_robot:
         for event in robot.trace.of_kind(EventKind.NAVIGATION_ENDED)[-1:]:
             text = " ".join(part for part in (event.name, event_layer.error_code_text(event)) if part)
             reasons += [robot.label(text)] if event.name != "SUCCEEDED" else []

@@ -16,13 +16,18 @@ from simscen.core.records.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A finished run to draw.
+    """A finished run to draw, as seen by one robot.
+
+    With several robots, each of them has a scene of its own, and one common scene contains these scenes.
 
     Attributes:
+        trace: Recorded run.
+        case: Goals, regions, and masks of the scenario, by which the run was judged.
         map: Map of the world, which can differ from the robot's map.
+        result: Result of the run with the verdicts.
         scenery: Objects, zones, ramps and places of the world.
         robots: With several robots, the scene of each robot by name.
-        name: Name of the robot; "" for a single robot.
+        robot_name: Name of the robot; "" for a single robot and for the common scene.
     """
 
     trace: Trace
@@ -31,44 +36,45 @@ class Scene:
     result: RunResult
     scenery: Scenery = field(default_factory=Scenery)
     robots: Mapping[str, "Scene"] = field(default_factory=dict)
-    name: str = ""
+    robot_name: str = ""
 
     @property
-    def each(self) -> Sequence["Scene"]:
-        """Scene of each robot."""
+    def per_robot(self) -> Sequence["Scene"]:
+        """The scenes of all robots; only this one for a single robot."""
         return tuple(self.robots.values()) or (self,)
 
     @property
     def robot_index(self) -> int:
         """Index of the robot in the sorted names; 0 for a single robot."""
-        return sorted(self.robots).index(self.name) if self.name in self.robots else 0
+        return sorted(self.robots).index(self.robot_name) if self.robot_name in self.robots else 0
 
     def label(self, text: str) -> str:
         """Return a label, with the name of the robot if there are several."""
-        return f"{self.name}: {text}" if self.name else text
+        return f"{self.robot_name}: {text}" if self.robot_name else text
 
 
 def scene_with_robots(scene: Scene, robots: Mapping[str, tuple[Trace, Case]]) -> Scene:
-    """Return the scene with several robots."""
-    parts = {name: replace(scene, trace=trace, case=case, name=name) for name, (trace, case) in robots.items()}
+    """Return the scene with a scene of its own for each of the `robots`."""
+    parts = {name: replace(scene, trace=trace, case=case, robot_name=name) for name, (trace, case) in robots.items()}
     return replace(scene, robots={name: replace(part, robots=parts) for name, part in parts.items()})
 
 
-_UNKNOWN_RADIUS_M = 0.2
+_DEFAULT_RADIUS_M = 0.2
+"""Radius of an object whose shape is unknown."""
 Outlines = tuple[Array, ...]
 
 
-def object_outlines(trace: Trace, things: Sequence[MovableObject]) -> dict[str, Outlines]:
-    """Return the outlines (n, 2) of all objects, spawned ones and those of the world, in their own frames."""
-    outlines = {thing.name: tuple(map(np.array, thing.outlines)) for thing in things if thing.outlines}
+def object_outlines(trace: Trace, world_objects: Sequence[MovableObject]) -> dict[str, Outlines]:
+    """Return the outlines (n, 2) of all spawned objects and of `world_objects`, in their own frames."""
+    outlines = {thing.name: tuple(map(np.array, thing.outlines)) for thing in world_objects if thing.outlines}
     outlines.update({event.name: outlines_of_event(event) for event in trace.of_kind(EventKind.OBJECT_SPAWNED)})
     for name in trace.objects:
-        outlines.setdefault(name, (_circle(_UNKNOWN_RADIUS_M),))
+        outlines.setdefault(name, (_circle(_DEFAULT_RADIUS_M),))
     return outlines
 
 
 def outlines_of_event(event: Event) -> Outlines:
-    """Return the outlines in an object.spawned event: its parts, or else `shape` with `size` or `points`."""
+    """Return the outlines in an object.spawned event: one for each part, or one from `shape`, `size`, `points`."""
     size, points = _floats(event.data, "size"), event.data.get("points")
     parts = event.data.get("parts")
     if isinstance(parts, list) and parts:
@@ -81,7 +87,7 @@ def outlines_of_event(event: Event) -> Outlines:
         case "polygon" if isinstance(points, list) and len(points) > 2:
             return (np.array(points, dtype=np.float64),)
         case _:
-            return (_circle(_UNKNOWN_RADIUS_M),)
+            return (_circle(_DEFAULT_RADIUS_M),)
 
 
 def spawn_pose(event: Event) -> Pose2:

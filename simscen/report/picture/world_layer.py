@@ -51,7 +51,7 @@ def draw_floors(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw floors with a friction that differs from dry concrete; changes during a run are labeled with their time."""
     for floor in scene.scenery.floors:
         yield from _floor(canvas, floor.region, np.array(floor.outline), f"friction {floor.friction:g}")
-    for event in scene.each[0].trace.of_kind(EventKind.FLOOR_CHANGED):
+    for event in scene.per_robot[0].trace.of_kind(EventKind.FLOOR_CHANGED):
         outline, friction = event.data.get("outline"), event.data.get("friction")
         assert isinstance(outline, list) and isinstance(friction, int | float)
         text = f"friction {friction:g} from {scene.trace.seconds(event.tick):.1f} s"
@@ -95,7 +95,7 @@ def draw_zones(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
     """Yield the zones that were enabled at any time, each with its text."""
-    initial = {(str(zone.filter), zone.region): zone for zone in scene.scenery.zones if zone.robot == scene.name}
+    initial = {(str(zone.filter), zone.region): zone for zone in scene.scenery.zones if zone.robot == scene.robot_name}
     switched: dict[tuple[str, str], list[Event]] = {}
     for event in scene.trace.of_kind(EventKind.ZONE_SWITCHED):
         switched.setdefault((str(event.data["filter"]), event.name), []).append(event)

@@ -1,4 +1,4 @@
-"""Small HTML elements of the report. All text of users is escaped."""
+"""Small HTML elements of the report. All text from scenarios and logs is escaped."""
 
 import base64
 import re
@@ -11,14 +11,13 @@ from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
 from simscen.report.display_text import one_line, relative
 
-SIGNS = {
+OUTCOME_SYMBOLS = {
     Outcome.PASSED: "✓",
     Outcome.FAILED: "✗",
     Outcome.ERROR: "!",
     Outcome.FAILED_AS_EXPECTED: "~",
     Outcome.SKIPPED: "–",
 }
-"""Symbols of outcomes."""
 
 
 def html_text(text: str) -> str:
@@ -34,12 +33,14 @@ def count(number: int, noun: str) -> str:
 def outcome_badge(outcome: Outcome) -> str:
     """Return an outcome with its symbol, so that it does not depend on color."""
     word = outcome.value.replace("-", " ")
-    return f'<span class="pill {outcome.value}"><span aria-hidden="true">{SIGNS[outcome]} </span>{word}</span>'
+    return (
+        f'<span class="pill {outcome.value}"><span aria-hidden="true">{OUTCOME_SYMBOLS[outcome]} </span>{word}</span>'
+    )
 
 
-def outcome_marks(outcomes: Sequence[Outcome | None], label: str) -> str:
+def outcome_symbols(outcomes: Sequence[Outcome | None], label: str) -> str:
     """Return one symbol per outcome, oldest first; None is shown as a dot."""
-    symbols = "".join(SIGNS[outcome] if outcome else "·" for outcome in outcomes)
+    symbols = "".join(OUTCOME_SYMBOLS[outcome] if outcome else "·" for outcome in outcomes)
     words = ", ".join(outcome.value.replace("-", " ") if outcome else "not run" for outcome in outcomes)
     return f'<span class="marks" role="img" aria-label="{label}: {words}">{symbols}</span>'
 

@@ -17,7 +17,7 @@ from simscen.report.comparison_markup import as_html
 from simscen.report.picture.palette import css_variables
 from simscen.report.study_markup import study_html
 from simscen.report.suite import elements
-from simscen.report.suite.elements import SIGNS, anchor, count, html_text, outcome_marks, sparkline
+from simscen.report.suite.elements import OUTCOME_SYMBOLS, anchor, count, html_text, outcome_symbols, sparkline
 from simscen.report.suite.history import PastSession, outcome_change, past_outcomes
 from simscen.report.suite.run_entry import full_run_name, run_element, theme
 
@@ -168,7 +168,7 @@ def _group_element(group: list[RunFinished], session: Session, totals: Totals, p
     changed = sum(outcome_change(run, session.past) != "" for run in group)
     summary = f"{good} of {number} as expected" + (f", {changed} changed" if changed else "")
     opened = "" if good == number else " open"
-    marks = outcome_marks([run.outcome for run in group], "runs") if number <= MAX_MARKS else ""
+    marks = outcome_symbols([run.outcome for run in group], "runs") if number <= MAX_MARKS else ""
     return (
         f'<details class="group many"{opened}><summary><h2 class="name">{html_text(name)}</h2>'
         f'<span class="quiet">{summary}</span>{marks}</summary>\n'
@@ -182,7 +182,7 @@ def _severity_order(run: RunFinished) -> tuple[int, RunKey]:
 
 def _outcome_counts(totals: Totals) -> str:
     return ", ".join(
-        f"{SIGNS[outcome]} {number} {outcome.value.replace('-', ' ')}"
+        f"{OUTCOME_SYMBOLS[outcome]} {number} {outcome.value.replace('-', ' ')}"
         for outcome in Outcome
         if (number := totals.outcomes[outcome]) or outcome is Outcome.PASSED
     )
@@ -212,7 +212,7 @@ def filter_form(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str
     number = Counter(run.outcome for run in runs)
     statuses = "".join(
         f'<label class="{outcome.value}"><input type="checkbox" name="status" value="{outcome.value}" checked> '
-        f"{SIGNS[outcome]} {number[outcome]} {outcome.value.replace('-', ' ')}</label>"
+        f"{OUTCOME_SYMBOLS[outcome]} {number[outcome]} {outcome.value.replace('-', ' ')}</label>"
         for outcome in Outcome
         if number[outcome]
     )

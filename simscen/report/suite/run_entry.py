@@ -18,7 +18,7 @@ from simscen.judge.finding_text import (
 )
 from simscen.report.display_text import escape_control, plain_text, shell_command_text
 from simscen.report.session_lines import violation_lines
-from simscen.report.suite.elements import anchor, html_text, link, outcome_badge, outcome_marks, sparkline
+from simscen.report.suite.elements import anchor, html_text, link, outcome_badge, outcome_symbols, sparkline
 from simscen.report.suite.history import PastOutcome
 from simscen.report.violations import (
     error_details,
@@ -47,7 +47,7 @@ def run_element(
     extra = ", ".join(part for part in (f"seed {run.key.seed}", run.key.stack_name) if part)
     name = (run.key.variation or extra) if is_one_of_many else run.key.test
     outcomes = [None if one is None else one.outcome for one in past]
-    marks = outcome_marks([*outcomes, run.outcome], "earlier sessions and this one") if any(outcomes) else ""
+    marks = outcome_symbols([*outcomes, run.outcome], "earlier sessions and this one") if any(outcomes) else ""
     return (
         f'<details class="run" id="{anchor(run.key)}"{"" if run.outcome.good else " open"} '
         f"{_data_attributes(run, past)}>"

@@ -57,16 +57,16 @@ class GoalTracker:
                 self._accept(tick, name)
             case "goal.reached":
                 self._require_current(kind, name)
-                self._events += self._task.reached(tick)
+                self._events += self._task.record_reached(tick)
             case "goal.passed":
                 self._require_current(kind, name)
                 if self._task.goal is not None and not self._task.goal.via:
                     raise ProtocolViolation(f"goal.passed `{name[:60]}`, which is a goal without `via`")
-                self._events += self._task.passed(tick)
+                self._events += self._task.record_passed(tick)
             case "goal.failed":
                 self._require_current(kind, name)
                 code, message = _to_error_code(data.get("error_code")), str(data.get("message", ""))[:MAX_TEXT_LENGTH]
-                self._events += self._task.failed(tick, code, message)
+                self._events += self._task.record_failed(tick, code, message)
             case "goal.canceled":
                 self._cancel(tick, name)
             case _ if kind in _UNRESTRICTED_KINDS:
@@ -84,7 +84,7 @@ class GoalTracker:
         if goal is None or goal.timeout is None or tick - self._task.since <= goal.timeout * self._rate:
             return False
         self._drop()
-        self._events += self._task.failed(tick, ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over")
+        self._events += self._task.record_failed(tick, ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over")
         return True
 
     def take_events(self) -> tuple[Event, ...]:
@@ -101,13 +101,13 @@ class GoalTracker:
         if self._task.goal is not None:
             raise ProtocolViolation(f"goal.accepted, but goal `{self._task.goal.name}` is active")
         self.advance(tick)
-        if self._task.waits:
+        if self._task.is_waiting:
             raise ProtocolViolation(f"goal.accepted `{name[:60]}`, but the robot must still wait at its last goal")
-        following = self._task.next_goal
+        following = self._task.upcoming_goal
         if following is None or name not in ("", following.name):
             expected = "there is no next goal" if following is None else f"the next goal is `{following.name}`"
             raise ProtocolViolation(f"goal.accepted `{name[:60]}`, but {expected}")
-        self._events += self._task.next(tick)
+        self._events += self._task.accept_next(tick)
 
     def _require_current(self, kind: str, name: str) -> None:
         goal = self._task.goal

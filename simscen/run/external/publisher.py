@@ -1,4 +1,4 @@
-"""Collect the messages for an external stack, in the encoding of the log."""
+"""Collects sensor readings, maps, and masks as messages for an external stack, in the encoding of the log."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ from simscen.run.external.protocol import EXACT_SUFFIX, FLOAT64_ARRAY, INITIAL_P
 if TYPE_CHECKING:
     from simscen.peer.wire import Messages
 
-_START = (0, 0)
+_FIRST_STAMP = (0, 0)
+"""Time stamp at the start of the run: seconds and nanoseconds."""
 
 
 class StepPublisher:
@@ -44,9 +45,9 @@ class StepPublisher:
         self.sensor_topics = self._sensors.declared
 
     def latch(self, grid: OccupancyGrid | None, topic: Topic) -> None:
-        """Publish `grid`, a map or mask, with the first step; None publishes nothing."""
+        """Publish `grid` (a map or mask) once, with the first step. Does nothing if it is None."""
         if grid is not None:
-            self._latched.append((topic, encode_arrays.occupancy_grid(frame_names.MAP, _START, grid)))
+            self._latched.append((topic, encode_arrays.occupancy_grid(frame_names.MAP, _FIRST_STAMP, grid)))
 
     def publish_grid(self, tick: int, grid: OccupancyGrid, topic: Topic) -> None:
         """Publish `grid` with the next step."""
@@ -54,15 +55,15 @@ class StepPublisher:
         self.publish(topic, self._time.nanoseconds(tick), data)
 
     def latch_robot(self, description: str, estimate: Estimate) -> None:
-        """Publish robot description and initial pose with the first step."""
+        """Publish robot description and initial pose once, with the first step."""
         self._latched.append((topics.ROBOT_DESCRIPTION, messages.string(description)))
         if estimate.pose is not None:
             pack_pose = encode.pose_with_covariance(frame_names.MAP).packer()
             covariance = np.diag(np.square(estimate.std)).ravel().tolist()
-            self._latched.append((INITIAL_POSE, pack_pose(_START, Pose3.planar(estimate.pose), covariance)))
+            self._latched.append((INITIAL_POSE, pack_pose(_FIRST_STAMP, Pose3.planar(estimate.pose), covariance)))
 
     def topic_table(self) -> TopicTable:
-        """Return the table of all topics."""
+        """Return the table of all topics on which messages can be sent, and of those on which a stack may publish."""
         sent: list[Topic] = []
         for _, topic in self.sensor_topics:
             sent += [topic, *_exact_topics(topic)]
@@ -70,7 +71,10 @@ class StepPublisher:
         return TopicTable.build([*sent, topics.TF, *known])
 
     def subscribe(self, topic_table: TopicTable, names: Collection[str]) -> None:
-        """Select the topics that the stack requests, and queue the latched messages."""
+        """Select the topics `names` that the stack requests, and queue the latched messages.
+
+        `topic_table` is the table of this publisher, which the stack has received.
+        """
         self._numbers, self._requested_topics = topic_table.numbers, frozenset(names)
         self._requested_sensors = {
             sensor
@@ -82,7 +86,7 @@ class StepPublisher:
             self.publish(topic, 0, data)
 
     def publish_readings(self, tick: int, readings: Readings) -> None:
-        """Publish the readings of a beat."""
+        """Publish the readings that arrive at this tick."""
         now = self._time.nanoseconds(tick)
         for reading in readings:
             if reading.sensor not in self._requested_sensors:
@@ -102,15 +106,15 @@ class StepPublisher:
         return messages
 
     def topic_writer(self, topic: Topic) -> TopicWriter:
-        """Implement record's MessageSink."""
+        """Return a writer for the messages of one topic (part of the protocol MessageSink)."""
         return TopicWriter(lambda: partial(self.publish, topic))
 
     def batch_writer(self, layouts: Layouts) -> BatchWriter:
-        """Implement record's MessageSink."""
+        """Return a writer for messages that are always published together (part of the protocol MessageSink)."""
         return BatchWriter(self, layouts)
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Publish a message if the stack subscribed to its topic (record's MessageSink)."""
+        """Publish a message if the stack subscribed to its topic (part of the protocol MessageSink)."""
         if topic is topics.TF_STATIC and not self._numbers:  # sensor mounts, published before topics are selected
             self._latched.append((topic, data))
         self._enqueue(topic.name, data)
@@ -120,6 +124,7 @@ class StepPublisher:
             self._queue.append((self._numbers[name], data))
 
     def _exact_messages(self, reading: Reading) -> Iterator[tuple[str, bytes]]:
+        """Yield topic name and content of the message with the reading in full precision, if it is requested."""
         match reading:
             case Scan():
                 name = self._sensors.topic_of(reading).name + EXACT_SUFFIX
@@ -134,6 +139,7 @@ class StepPublisher:
 
 
 def _exact_topics(topic: Topic) -> list[Topic]:
+    """Return the topic with the values of `topic` in full precision, if there is one."""
     kinds = {topics.SCAN_TYPE: FLOAT64_ARRAY, topics.ODOMETRY_TYPE: POSE2D}
     return [Topic(topic.name + EXACT_SUFFIX, kinds[topic.type])] if topic.type in kinds else []
 

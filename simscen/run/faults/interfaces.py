@@ -42,7 +42,7 @@ class FaultSettingFactory:
         self._ray_caster_without = cache(lambda names: create_ray_caster(_without(mesh, names), names))
 
     def __call__(self, entry: FaultEntry) -> FaultSetting:
-        """Return the setting for the fault in this entry of the scenario."""
+        """Return the FaultSetting for the fault in this entry of the scenario."""
         sensor = self._robot.sensors.get(entry.sensor)
         return FaultSetting(
             separation=getattr(self._robot.drive, "wheel_separation", 0.0),
@@ -85,7 +85,10 @@ class HypotheticalSensor:
         self._mount = mount if isinstance(mount, Mount) else Mount()
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """See faults.base.Sight."""
+        """Return the ranges (n,) in m if the pose of the lidar differs from its nominal pose by `error`.
+
+        Beams pass through the objects named in `without`.
+        """
         pose = self._view.base_pose().compose(self._assumed_mount(error))
         angles = scan.angles()
         flat = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))
@@ -97,7 +100,7 @@ class HypotheticalSensor:
         return np.minimum(hits, floor_distances(pose.z, directions[:, 2]))
 
     def image(self, error: Pose3) -> Image:
-        """See faults.base.Sight."""
+        """Return the picture if the pose of the camera differs from its nominal pose by `error`."""
         spec = self._spec
         assert isinstance(spec, Camera)
         captured = self._view.image(
@@ -112,6 +115,8 @@ class HypotheticalSensor:
 
 class CommandLink:
     """The cmd_vel connection between stack and base, in which commands can be late or lost.
+
+    At each beat, call `sends_message`, and call `receive` for each message that arrives at the base.
 
     The stack sends one message each `period` ticks, and another one whenever the command changes. The base stops if no
     message arrives for `timeout` ticks, like the drives of ros2_control (`cmd_vel_timeout`). A timeout shorter than one

@@ -46,7 +46,7 @@ class Director:
         """Whether there is any event or fault."""
         return bool(self._steps or self._starts)
 
-    def direct(self) -> None:
+    def process_beat(self) -> None:
         """Perform the events and start and end the faults that are due at this beat."""
         for index, (step, trigger) in enumerate(self._steps):
             situation = self._situations.get(index)
@@ -93,8 +93,8 @@ class Director:
 class TriggerState:
     """Evaluates one trigger at each beat.
 
-    A rising trigger fires at the first beat if its condition holds. A falling trigger fires only after its condition
-    has held.
+    A rising trigger fires when its condition becomes true, also at the first beat. A falling trigger fires when its
+    condition becomes false after it was true.
     """
 
     def __init__(self, trigger: Trigger, rng: np.random.Generator) -> None:
@@ -105,7 +105,7 @@ class TriggerState:
         self._scheduled: list[int] = []
 
     def count_firings(self, now: Situation) -> int:
-        """Return how often the trigger fires at this beat; 0 if it does not."""
+        """Return how often the trigger fires at this beat, in which the run has the state `now`."""
         if self._remaining and self._has_edge(now) and self._passes_probability():
             self._remaining -= 1
             self._scheduled.append(now.tick + now.clock.ticks(self._trigger.delay))
@@ -127,7 +127,10 @@ class TriggerState:
 
 
 class ConditionState:
-    """Tracks how long a condition and each of its parts have held, for `for`. Must be evaluated at every beat."""
+    """Tracks how long a condition and each of its parts have held, as the key `for` requires.
+
+    It must be evaluated at every beat.
+    """
 
     def __init__(self, test: AnyCondition) -> None:
         self._test = test
@@ -159,7 +162,7 @@ class RelativeSituation:
     """View of the run for a step of a sequence: time, distance, and events count from the end of the previous step."""
 
     def __init__(self, now: Situation, others: "dict[str, RelativeSituation] | None" = None) -> None:
-        """Start the view at the state `now`. `others` are the views for the other robots; None creates them."""
+        """Start counting at the state `now`. `others` are the views for the other robots; None creates them."""
         self._now, self._others = now, {} if others is None else others
         if others is None:
             self._others |= {name: RelativeSituation(now.of(name), self._others) for name in now.robots}
@@ -185,9 +188,13 @@ class RelativeSituation:
         return self._now.events[self._initial_event_count :]
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
-        """Return the tick of the last scan that the stack received; the start of the run if there was none."""
+        """Return the tick of the last scan that the stack received, relative to the start of the view.
+
+        It is negative before the start of the view. If there was no scan, the tick of the start of the run is returned.
+        """
         last = self._now.last_scan_tick(sensor)
         return (0 if last is None else last) - self._start_tick
 
     def __getattr__(self, name: str) -> Any:
+        """Return everything else from the state of the run."""
         return getattr(self._now, name)

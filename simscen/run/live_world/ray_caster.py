@@ -29,12 +29,12 @@ class LiveRayCaster(RayCaster):
         self._state: tuple[Iterable[str], Mapping[str, Pose3], Mapping[str, Pose3]] | None = None
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """See core.geometry.ray_fans.RayCaster."""
+        """Return distances (n,) in m along unit `directions` (n, 3) from `origins` (n, 3); inf beyond `reach`."""
         self._update_scene((0.0, 0.0, 0.0), math.inf)
         return self._scene.cast(origins, directions, reach)
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
-        """See core.geometry.ray_fans.RayCaster."""
+        """Return the distances (n,) in m of a fan with its frame at `pose`; values beyond `reach` mean no hit."""
         self._update_scene(pose[:3], reach)
         return self._scene.sweep(fan, pose, reach)
 

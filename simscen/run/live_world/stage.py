@@ -51,7 +51,7 @@ class LiveStage:
         streams: Streams,
         stages: "dict[str, LiveStage]",
     ) -> None:
-        """Take the parts of a run: `filters` are the costmap filters of the stack, `goals` those that events can send.
+        """Take the parts of a run: `filters` are the costmap filters of the stack, `goals` the goals that events send.
 
         The stage adds itself to `stages`, the stages of all robots by name.
         """
@@ -81,7 +81,7 @@ class LiveStage:
     def begin_beat(self, truth: Truth | None, is_due: bool = True) -> None:
         """Update the robot's pose at a beat, from the truth sample if there is one.
 
-        `is_due` states whether the beat is due for this robot. If not, orders wait until the robot's next beat.
+        `is_due` states whether the beat is due for this robot. If it is not, orders wait until a beat that is due.
         """
         self._is_due = is_due
         previous = self._pose
@@ -252,7 +252,7 @@ class LiveStage:
         self.record_event(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
-        """Push the robot or, if `name` is given, an object."""
+        """Push the robot or, if `name` is given, an object, with an impulse in N s that is spread over `seconds`."""
         if name is not None:
             self._simulation.push_object(name, impulse, seconds)
         elif seconds:
@@ -301,7 +301,7 @@ class LiveStage:
         return ""
 
     def record_event(self, event: Event) -> None:
-        """Add an event of this robot; tick 0 stands for now."""
+        """Add an event of this robot. An event with tick 0 gets the current tick."""
         stamped = event if event.tick else replace(event, tick=self.tick)
         self.new_events.append(stamped)
         self._history += (stamped,)
@@ -315,7 +315,7 @@ def path_data(path: MotionPath) -> dict[str, Value]:
 
 
 def body_data(body: Body) -> dict[str, Value]:
-    """Return pose, first shape, and contact outlines (body frame) of a body as event data."""
+    """Return pose, first shape, and contact outlines (in the body frame) of a body as event data."""
     pose = body.pose.plane
     fields: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
     outlines: list[Value] = [

@@ -32,10 +32,12 @@ MAX_MESSAGE_BYTES = 1 << 20
 """Longest valid message of a worker."""
 
 DUMP_TIME_S = 0.5
+"""Time for a run that exceeded its wall limit to dump its stack before SIGTERM."""
 TERM_GRACE_S = 2.0
 """Time between SIGTERM and SIGKILL for a run that exceeded its wall limit."""
 
 TAIL_BYTES = 16_384
+"""Number of bytes at the end of the output of a worker that its exit message contains."""
 _F_SETPIPE_SZ = 1031  # Linux; missing in Python's fcntl before 3.10 and in some builds
 
 _TERMINATION_STEPS = ((signal.SIGUSR1, DUMP_TIME_S), (signal.SIGTERM, TERM_GRACE_S), (signal.SIGKILL, TERM_GRACE_S))
@@ -47,8 +49,9 @@ SendMessage = Callable[[dict[str, Any]], None]
 class WorkerHandle:
     """A worker process, as the fork server supervises it.
 
-    `report` and `output` are pipes from the worker, for messages and for its output, which goes to `log`.
-    `send_message` forwards the progress messages to the supervisor; the final message is kept for `end`.
+    `report` is the pipe for messages of the worker, `output` the pipe for its standard output and error, which are
+    copied to `log`. `send_message` forwards the progress messages to the supervisor; the final message is kept for
+    `exit_message`.
     """
 
     def __init__(self, job: Job, pid: int, report: int, output: int, log: CappedLog, send_message: SendMessage) -> None:
@@ -114,8 +117,8 @@ class WorkerHandle:
         for descriptor in (self.pidfd, self.report, self.output):
             os.close(descriptor)
 
-    def end(self, status: int, cpu: float, peak_bytes: int) -> dict[str, Any]:
-        """Return the exit message for the supervisor. Call this after the worker was reaped.
+    def exit_message(self, status: int, cpu: float, peak_bytes: int) -> dict[str, Any]:
+        """Close the pipes and return the exit message for the supervisor. Call this after the worker was reaped.
 
         `status` is the wait status of the process, `cpu` its processor time in s, and `peak_bytes` its peak memory.
         """
@@ -242,7 +245,7 @@ class ForkServer:
         _, status, usage = os.wait4(child.pid, 0)
         del self._children[child.pid]
         kill_children_except(self._children)
-        self._send(child.end(status, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024))
+        self._send(child.exit_message(status, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024))
         return True
 
     def _select_timeout(self) -> float:
@@ -266,7 +269,7 @@ class ForkServer:
 
 
 def _take_own_output() -> bytes:
-    """Return and remove the output of this process since the last call; standard error is a file.
+    """Return and remove the output of this process since the last call; it is redirected to a file.
 
     Output during the preparation of a scenario belongs to the log of its run.
     """

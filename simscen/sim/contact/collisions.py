@@ -26,7 +26,8 @@ IsGroundContact = Callable[[int, int, float], bool]
 class ContactPoint:
     """Contact of a robot: `point` and unit `normal` towards the robot in the world frame.
 
-    `other` is the body id of what is touched, `impulse` in N s during one tick, `is_static` tells that it never moves.
+    `other` is the body id of the touched object, and `is_static` states whether this object never moves. `impulse` is
+    the impulse in N s during one tick.
     """
 
     name: str
@@ -46,7 +47,12 @@ class BaseMotion(NamedTuple):
 
 
 class PreStepMotion(NamedTuple):
-    """Motion before a step: of the robot, of actors (m/s), and of all robots, the latter two by body id."""
+    """Motion before a step.
+
+    robot:   motion of the robot that touches something
+    actors:  velocities in m/s of scripted moving objects, by body id
+    robots:  motions of all robots, by body id
+    """
 
     robot: BaseMotion
     actors: Mapping[int, Vector]
@@ -69,7 +75,7 @@ class CollisionTracker:
         self._events: list[Event] = []
 
     def has_contact_at(self, tick: int) -> bool:
-        """Return whether anything was touched at the current `tick`."""
+        """Return whether the robot touched anything at `tick`, which must be the newest one."""
         return bool(self._ongoing) and any(collision.last_tick == tick for collision in self._ongoing.values())
 
     @property
@@ -139,7 +145,10 @@ def contact_points(
 
 
 def enclosed_contact(name: str, point: Vector) -> ContactPoint:
-    """Return the contact of a robot that is completely inside an object: from below, so that no motion caused it."""
+    """Return the contact of a robot that is completely inside an object.
+
+    Its normal points up, so that the collision has the speed 0 while the robot drives on a level floor.
+    """
     return ContactPoint(name, NO_BODY, point, (0.0, 0.0, 1.0), 0.0, is_static=True)
 
 

@@ -18,7 +18,10 @@ class RobotState(NamedTuple):
 
     @property
     def twist(self) -> Twist:
-        """The velocity in the base frame, computed as by `geometry.rotated` for the three components that matter."""
+        """The velocity in the base frame: forward, left, and turn rate.
+
+        The values are those of `geometry.rotated`, without its other three components.
+        """
         (_, _, _, x, y, z, w), (a, b, c), (f, g, h) = self
         x, y, z = -x, -y, -z
         p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)

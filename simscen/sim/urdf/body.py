@@ -31,7 +31,7 @@ from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import MIN_GROUND_CLEARANCE_M, RobotBody, assemble
 from simscen.sim.body.undercarriage import Wheel, wheel_inertia
-from simscen.sim.urdf.elements import MeshReader, MeshSource, Tree, build_tree
+from simscen.sim.urdf.elements import LinkTree, MeshReader, MeshSource, build_tree
 from simscen.sim.urdf.wheels import WheelJoint, examine_joints, select_wheels
 from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
 from simscen.sim.urdf.xml_source import CODE, RobotFiles, read_xml
@@ -76,7 +76,7 @@ def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshRead
     return draft.model_copy(update={"sensors": sensors})
 
 
-def _drive(tree: Tree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> Drive:
+def _drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> Drive:
     driven = [wheel for wheel in wheels if not wheel.steered]
     left, right = ([w for w in driven if w.is_left is side] for side in (True, False))
     if not left or len(left) != len(right):
@@ -151,7 +151,7 @@ def _limits(wheels: list[WheelJoint], drive: Drive) -> Limits:
     return Limits(linear=linear, angular=angular, linear_acceleration=1.0, angular_acceleration=2.0)
 
 
-def _lidar_mount(tree: Tree, draft: RobotSpec, wheels: list[WheelJoint]) -> Mount:
+def _lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint]) -> Mount:
     body = body_from_tree(draft, tree)
     ground = min(wheel.bottom for wheel in wheels)
     axle = np.mean([wheel.place for wheel in wheels if not wheel.steered], axis=0)
@@ -178,7 +178,7 @@ def body_from_urdf(
 
 def read_spec_tree(
     spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
-) -> Tree:
+) -> LinkTree:
     """Read the links and joints of `spec.urdf`. Raises InvalidInput."""
     assert spec.urdf is not None
     folder = (file or Path()).resolve().parent
@@ -193,7 +193,7 @@ def read_spec_tree(
 
 def read_tree(
     path: Path, folders: AllowedFolders, read_mesh: MeshReader | None, arguments: Mapping[str, str] | None = None
-) -> Tree:
+) -> LinkTree:
     """Read the links and joints of a URDF or xacro file. Raises InvalidInput."""
     path = folders.named(path)
     robot = read_xml(path, folders)
@@ -214,7 +214,7 @@ def _text(argument: str | float | bool) -> str:
     return str(argument).lower() if isinstance(argument, bool) else str(argument)
 
 
-def body_from_tree(spec: RobotSpec, tree: Tree) -> RobotBody:
+def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
     """Build the robot. Joints that are neither wheels nor steering stay at zero."""
     joints = select_wheels(tree, spec.drive)
     _check_wheels(spec, tree, joints)
@@ -236,7 +236,7 @@ def body_from_tree(spec: RobotSpec, tree: Tree) -> RobotBody:
     return assemble(spec, hull, wheels, _chassis_mass(tree, fixed, base_from_root, scale))
 
 
-def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None:
+def _check_wheels(spec: RobotSpec, tree: LinkTree, wheels: list[WheelJoint]) -> None:
     if isinstance(spec.drive, Omnidirectional):
         return
     if isinstance(spec.drive, Mecanum):
@@ -252,7 +252,7 @@ def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None
     check_front_steering(wheels)
 
 
-def _check_corners(tree: Tree, wheels: list[WheelJoint]) -> None:
+def _check_corners(tree: LinkTree, wheels: list[WheelJoint]) -> None:
     """Raise InvalidInput unless there is one wheel at each corner, as mecanum wheels must be."""
     middle = np.mean([wheel.place[:2] for wheel in wheels], axis=0) if wheels else (0.0, 0.0)
     corners = {(wheel.place[0] > middle[0], wheel.place[1] > middle[1]) for wheel in wheels}
@@ -291,7 +291,7 @@ def _lowest(solid: Solid) -> float:
     return float(solid.pose.apply(hull_points(solid.shape))[:, 2].min())
 
 
-def _scale(spec: RobotSpec, tree: Tree) -> float:
+def _scale(spec: RobotSpec, tree: LinkTree) -> float:
     """Return the factor on all masses for which the robot has the specified mass."""
     total = sum(link.mass.mass for link in tree.links.values() if link.mass is not None)
     if total <= 0:
@@ -299,7 +299,7 @@ def _scale(spec: RobotSpec, tree: Tree) -> float:
     return spec.mass / total if spec.mass is not None else 1.0
 
 
-def _chassis_mass(tree: Tree, links: Sequence[str], base_from_root: Pose3, scale: float) -> MassProperties:
+def _chassis_mass(tree: LinkTree, links: Sequence[str], base_from_root: Pose3, scale: float) -> MassProperties:
     masses = [(tree.poses[name], tree.links[name].mass) for name in links]
     parts = [mass.placed(base_from_root.compose(pose)) for pose, mass in masses if mass is not None and mass.mass > 0]
     if not parts:
@@ -308,7 +308,7 @@ def _chassis_mass(tree: Tree, links: Sequence[str], base_from_root: Pose3, scale
     return MassProperties(whole.mass * scale, whole.center, whole.tensor * scale)
 
 
-def _wheel(tree: Tree, wheel: WheelJoint, base_from_root: Pose3, scale: float, spec: RobotSpec) -> Wheel:
+def _wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale: float, spec: RobotSpec) -> Wheel:
     x, y, _ = base_from_root.compose(Pose3(*wheel.place)).position
     links = [(tree.poses[name], tree.links[name].mass) for name in tree.subtree(wheel.joint.child)]
     parts = [mass.placed(pose) for pose, mass in links if mass is not None and mass.mass > 0]
@@ -324,7 +324,7 @@ def _wheel(tree: Tree, wheel: WheelJoint, base_from_root: Pose3, scale: float, s
     )  # fmt: skip
 
 
-def _without_casters(tree: Tree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
+def _without_casters(tree: LinkTree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
     """Return the hull without casters. Raises InvalidInput if the hull itself would drag over the ground."""
     points = [solid.pose.apply(hull_points(solid.shape)) for solid in hull]
     whole = np.ptp(np.concatenate(points)[:, :2], axis=0)

@@ -17,7 +17,7 @@ from simscen.sim.body.inertia import MassProperties
 from simscen.sim.urdf.xml_source import MAX_MESH_BYTES, Element, InvalidElement
 
 MAX_MESH_EXTENT_M = 20.0
-"""Largest coordinate of a mesh in its own frame in m."""
+"""Largest allowed absolute coordinate of a mesh in its own frame in m."""
 
 MeshReader = Callable[[Path], Mesh]
 
@@ -58,14 +58,15 @@ class Joint:
 class MeshSource:
     """Folders of meshes, and the function that reads them.
 
-    `read` returns the triangles of a file in meters; raises ValueError for an invalid file. `expanded` tells that the
-    URDF was a xacro file.
+    `folder` is that of the URDF, and `folders` are those that may be read. `read` returns the triangles of a file in
+    meters, and raises ValueError for an invalid file; None if meshes cannot be read. `from_xacro` states whether the
+    URDF was generated from a xacro file, which allows absolute paths.
     """
 
     folder: Path
     folders: AllowedFolders
     read: MeshReader | None
-    expanded: bool = False
+    from_xacro: bool = False
 
     def mesh(self, element: Element) -> Mesh:
         """Read the mesh of a `<mesh>` element; raises InvalidElement with its line."""
@@ -91,7 +92,7 @@ class MeshSource:
 
     def _find(self, uri: str) -> Path:
         try:
-            return self.folders.find(uri, self.folder, absolute=self.expanded)
+            return self.folders.find(uri, self.folder, absolute=self.from_xacro)
         except NoSuchFile:
             if uri.startswith(PACKAGE_SCHEMES):  # a missing package gives a more helpful error
                 self.folders.package(uri.partition("://")[2].partition("/")[0], self.folder)
@@ -189,10 +190,10 @@ MAX_LINKS = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Tree:
+class LinkTree:
     """Links and joints by name. `poses` are those of the links in the frame of the `root` link.
 
-    `child_joints` are the joints child_joints each link.
+    `child_joints` are the joints below each link, by the name of the link.
     """
 
     name: str
@@ -210,7 +211,7 @@ class Tree:
             yield from self.subtree(joint.child)
 
 
-def build_tree(robot: Element, meshes: MeshSource) -> Tree:
+def build_tree(robot: Element, meshes: MeshSource) -> LinkTree:
     """Build the tree of a `<robot>`. Raises InvalidInput with all problems of its links and joints."""
     if robot.tag != "robot":
         raise InvalidInput([robot.problem(f"expected <robot>, got <{robot.tag}>")])
@@ -238,7 +239,7 @@ def _add(known: "dict[str, Link] | dict[str, Joint]", item: "Link | Joint", elem
     known[item.name] = item  # type: ignore[assignment]  # callers pass a dictionary of the same type
 
 
-def _join(robot: Element, links: dict[str, Link], joints: dict[str, Joint]) -> Tree:
+def _join(robot: Element, links: dict[str, Link], joints: dict[str, Joint]) -> LinkTree:
     problems = []
     parents: dict[str, Joint] = {}
     child_joints: dict[str, list[Joint]] = {}
@@ -269,4 +270,4 @@ def _join(robot: Element, links: dict[str, Link], joints: dict[str, Joint]) -> T
     if len(poses) < len(links):
         unreachable = next(name for name in links if name not in poses)
         raise InvalidInput([links[unreachable].element.problem(f"link {unreachable!r} is part of a loop of joints")])
-    return Tree(robot.name, roots[0], links, joints, poses, child_joints, robot)
+    return LinkTree(robot.name, roots[0], links, joints, poses, child_joints, robot)

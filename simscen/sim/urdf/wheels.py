@@ -11,7 +11,7 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Cylinder, Mesh, Solid, Sphere
 from simscen.model.robot import Ackermann, Differential, Drive, Omnidirectional
 from simscen.sim.body.outline import hull_points
-from simscen.sim.urdf.elements import Joint, Tree
+from simscen.sim.urdf.elements import Joint, LinkTree
 
 MIN_AXIS_COSINE = 0.99
 """Cosine of the largest angle (8 degrees) between a joint axis and the direction that it is compared with."""
@@ -61,12 +61,12 @@ class WheelJoint:
         return self.steered and self.trail > MIN_CASTER_TRAIL_RADII * self.radius
 
 
-def infer_wheels(tree: Tree) -> list[WheelJoint]:
+def infer_wheels(tree: LinkTree) -> list[WheelJoint]:
     """Return the wheels in a URDF: joints with a lateral axis and a round link that stands on the ground."""
     return examine_joints(tree)[0]
 
 
-def examine_joints(tree: Tree) -> tuple[list[WheelJoint], Mapping[str, list[str]]]:
+def examine_joints(tree: LinkTree) -> tuple[list[WheelJoint], Mapping[str, list[str]]]:
     """Return the wheels in a URDF, and the names of the other movable joints by the reason why they are none."""
     joints = [joint for joint in tree.joints.values() if joint.type != "fixed"]
     steering_joints = [joint for joint in joints if joint.type in ROTARY_JOINT_TYPES and _axis(tree, joint) == "z"]
@@ -97,7 +97,7 @@ def _is_on(ground: float, wheel: WheelJoint) -> bool:
     return wheel.bottom - ground <= MAX_WHEEL_GAP_RADII * wheel.radius
 
 
-def _why_no_wheel(tree: Tree, joint: Joint, wheel: WheelJoint | None) -> str:
+def _why_no_wheel(tree: LinkTree, joint: Joint, wheel: WheelJoint | None) -> str:
     """Return why a joint has no wheel, or "" if it has one."""
     if not _turns_freely(joint):
         return f"{joint.type} joint with limits" if joint.type == "revolute" else f"{joint.type} joint"
@@ -114,7 +114,7 @@ def _turns_freely(joint: Joint) -> bool:
     return joint.type in ROTARY_JOINT_TYPES and joint.limits.upper - joint.limits.lower >= MIN_WHEEL_RANGE_RAD
 
 
-def _with_trail(tree: Tree, wheel: WheelJoint, steering_joints: Sequence[Joint]) -> WheelJoint:
+def _with_trail(tree: LinkTree, wheel: WheelJoint, steering_joints: Sequence[Joint]) -> WheelJoint:
     """Return a wheel with its steering joint, if it has one."""
     for joint in steering_joints:
         if wheel.joint.child in tree.subtree(joint.child):
@@ -122,7 +122,7 @@ def _with_trail(tree: Tree, wheel: WheelJoint, steering_joints: Sequence[Joint])
     return wheel
 
 
-def select_wheels(tree: Tree, drive: Drive) -> list[WheelJoint]:
+def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
     """Return the wheels of a drive: those in its specification, or the inferred ones. Raises InvalidInput."""
     if isinstance(drive, Omnidirectional):
         return []
@@ -151,12 +151,12 @@ def select_wheels(tree: Tree, drive: Drive) -> list[WheelJoint]:
     return given + [w for w in wheels if w.joint.name not in rolling and w.joint.child in turned]
 
 
-def steered_links(tree: Tree, knuckles: Sequence[Joint]) -> set[str]:
+def steered_links(tree: LinkTree, knuckles: Sequence[Joint]) -> set[str]:
     """Return the names of all links below the steering joints."""
     return {link for joint in knuckles for link in tree.subtree(joint.child)}
 
 
-def wheel_joint(tree: Tree, joint: Joint, steered: bool) -> WheelJoint | None:
+def wheel_joint(tree: LinkTree, joint: Joint, steered: bool) -> WheelJoint | None:
     """Return the wheel on a joint by its collision shape, or None if that is not round."""
     for solid in tree.links[joint.child].solids:
         place = tree.poses[joint.child].compose(solid.pose).position
@@ -192,7 +192,7 @@ def _round_mesh(joint: Joint, solid: Solid) -> tuple[Pose3, float, float] | None
     return Pose3(x, y, z), radius, float(np.ptp(along))
 
 
-def _axis(tree: Tree, joint: Joint) -> str:
+def _axis(tree: LinkTree, joint: Joint) -> str:
     """Return the axis of the root frame that a joint axis is parallel to: x, y, z, or "" for none."""
     rotation = tree.poses[joint.child]._replace(x=0.0, y=0.0, z=0.0)
     parts = rotation.compose(Pose3(*joint.axis)).position
@@ -210,7 +210,7 @@ MAX_CASTER_SIZE_M = 0.1
 """Largest length and width of a caster in m."""
 
 
-def alignment_warnings(tree: Tree, drive: Drive) -> list[Problem]:
+def alignment_warnings(tree: LinkTree, drive: Drive) -> list[Problem]:
     """Return warnings about wheels at different heights, and about casters that are too low or too high."""
     wheels = select_wheels(tree, drive)
     if not wheels:
@@ -228,7 +228,7 @@ def _wheel_warnings(wheels: list[WheelJoint], ground: float) -> Iterator[Problem
             yield wheel.joint.element.problem(message, "simscen places all wheels on the ground")
 
 
-def _caster_warnings(tree: Tree, wheels: list[WheelJoint], ground: float, needs_caster: bool) -> Iterator[Problem]:
+def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, needs_caster: bool) -> Iterator[Problem]:
     rolling = {link for wheel in wheels for link in tree.subtree(wheel.joint.child)}
     gaps = {
         name: _lowest(tree, name) - ground for name in tree.links if name not in rolling and tree.links[name].solids
@@ -249,14 +249,14 @@ def _caster_warnings(tree: Tree, wheels: list[WheelJoint], ground: float, needs_
         yield tree.links[nearest].element.problem(message, hint)
 
 
-def _points(tree: Tree, name: str) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
+def _points(tree: LinkTree, name: str) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
     pose = tree.poses[name]
     return np.concatenate([pose.compose(s.pose).apply(hull_points(s.shape)) for s in tree.links[name].solids])
 
 
-def _lowest(tree: Tree, name: str) -> float:
+def _lowest(tree: LinkTree, name: str) -> float:
     return float(_points(tree, name)[:, 2].min())
 
 
-def _is_small(tree: Tree, name: str) -> bool:
+def _is_small(tree: LinkTree, name: str) -> bool:
     return bool((np.ptp(_points(tree, name)[:, :2], axis=0) <= MAX_CASTER_SIZE_M).all())

@@ -189,12 +189,12 @@ def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center
 
 
 Floats = npt.NDArray[np.float32]
-LOCAL_PLAN_SPACING_M = 0.05
+PATH_SPACING_M = 0.05
 """Distance between points: Nav2's planners return one per costmap cell, and its critics count points."""
 
 
 @dataclass(frozen=True, eq=False)
-class LocalPlan:
+class UpcomingPath:
     """Poses (n, 3) from the position of the robot on its path on, `spacing` m apart, and their `length` in m.
 
     They end at the next cusp, at the end of the path, or after the requested length.
@@ -213,7 +213,7 @@ class LocalPlan:
         return (x - pose.x).astype(np.float32), (y - pose.y).astype(np.float32), yaw.astype(np.float32)
 
 
-def local_plan(tracker: PathTracker, max_length: float, spacing: float = LOCAL_PLAN_SPACING_M) -> LocalPlan:
+def upcoming_path(tracker: PathTracker, max_length: float, spacing: float = PATH_SPACING_M) -> UpcomingPath:
     """Return the next `max_length` m of the path with points at most `spacing` m apart."""
     points, along = tracker.ahead(max_length)
     length = float(min(max_length, along[-1]))
@@ -222,4 +222,4 @@ def local_plan(tracker: PathTracker, max_length: float, spacing: float = LOCAL_P
     lengths[-1] = length
     x, y = np.interp(lengths, along, points[:, 0]), np.interp(lengths, along, points[:, 1])
     yaw = points[np.minimum(np.searchsorted(along, lengths + LENGTH_TOLERANCE_M, side="right"), len(points)) - 1, 2]
-    return LocalPlan(np.stack((x, y, yaw), axis=-1), length / steps, length)
+    return UpcomingPath(np.stack((x, y, yaw), axis=-1), length / steps, length)

@@ -29,8 +29,8 @@ from simscen.stack.costmap.layers import (
     Mask,
     StaticLayer,
     empty_layer,
-    free_layer,
-    inflation,
+    layer_without_zones,
+    shared_inflation,
     squared_distances,
     static_distances,
     static_layer,
@@ -228,7 +228,7 @@ class LayeredCostmap:
         if grid is None:
             return empty_layer(window, keepout, mask, unknown)
         if not self._has_keepout:
-            return free_layer(grid, threshold, unknown)
+            return layer_without_zones(grid, threshold, unknown)
         return static_layer(grid, threshold, keepout, mask, unknown)
 
     @property
@@ -353,13 +353,13 @@ def precompute(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> Non
 @cached_on_instance
 def _costs(grid: OccupancyGrid, tables: Inflation, threshold: int, margin: int, tracks_unknown: bool) -> Costs:
     """Return the costs of the cells of a map without zones and readings, computed once for all runs."""
-    unknown = free_layer(grid, threshold, tracks_unknown).unknown if tracks_unknown else None
+    unknown = layer_without_zones(grid, threshold, tracks_unknown).unknown if tracks_unknown else None
     return tables.costs(static_distances(grid, threshold, margin), unknown)
 
 
 def _inflation(spec: CostmapSpec, robot: RobotModel, resolution: float) -> Inflation:
     inscribed, reach = robot.inscribed_radius, _reach(spec, robot)
-    return inflation(resolution, inscribed, spec.inflation_radius, spec.cost_scaling_factor, reach)
+    return shared_inflation(resolution, inscribed, spec.inflation_radius, spec.cost_scaling_factor, reach)
 
 
 def _in_cells(reach: float, resolution: float) -> int:

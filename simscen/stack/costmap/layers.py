@@ -1,6 +1,7 @@
 """Layers and filters of a costmap: static map with keepout zones, inflation, and speed limits by position.
 
-Distances are squared numbers of cells (uint16), so that one table lookup gives the distance in m or the cost.
+Distances are squared numbers of cells (uint16), so that one table lookup gives the distance in m or the cost. The
+largest one, OUT_OF_REACH, is that of 256 cells (12.8 m at 5 cm) and more.
 """
 
 from dataclasses import dataclass
@@ -26,45 +27,43 @@ from simscen.stack.protocols import Surroundings
 
 FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
 """Costs of nav2_costmap_2d (cost_values.hpp)."""
-MAX_SQUARED_CELLS = OUT_OF_REACH
-"""The largest squared distance: that of 256 cells, 12.8 m at 5 cm."""
 
 Squared = npt.NDArray[np.uint16]
 Costs = npt.NDArray[np.uint8]
 
 
-def squared_distances(lethal: npt.NDArray[np.bool_], reach: int) -> Squared:
-    """Return the squared distance of each cell to the nearest lethal cell in cells, exact up to `reach`."""
+def squared_distances(lethal: npt.NDArray[np.bool_], reach_cells: int) -> Squared:
+    """Return the squared distance in cells of each cell to the nearest lethal cell, exact up to `reach_cells`."""
     if not lethal.any():
-        return np.full(lethal.shape, MAX_SQUARED_CELLS, dtype=np.uint16)
-    if reach <= MAX_REACH_CELLS:
-        return squared_distances_within(lethal, reach)
+        return np.full(lethal.shape, OUT_OF_REACH, dtype=np.uint16)
+    if reach_cells <= MAX_REACH_CELLS:
+        return squared_distances_within(lethal, reach_cells)
     squared = np.empty(lethal.shape, dtype=np.uint16)
     for rows, distances in squared_distance_blocks(lethal):
         squared[rows] = np.where(
-            distances <= reach * reach, np.minimum(distances, MAX_SQUARED_CELLS), MAX_SQUARED_CELLS
+            distances <= reach_cells * reach_cells, np.minimum(distances, OUT_OF_REACH), OUT_OF_REACH
         )
     return squared
 
 
 @lru_cache(maxsize=8)
-def inflation(resolution: float, inscribed: float, radius: float, scaling: float, reach: float) -> "Inflation":
-    """Return the lookup tables, which both costmaps of a robot and all its runs share."""
-    return Inflation(resolution, inscribed, radius, scaling, reach)
+def shared_inflation(resolution: float, inscribed: float, radius: float, scaling: float, reach_m: float) -> "Inflation":
+    """Return the cached lookup tables, which both costmaps of a robot and all its runs share."""
+    return Inflation(resolution, inscribed, radius, scaling, reach_m)
 
 
 class Inflation:
     """Tables over squared cell distances: `meters` and nav2's exponential `cost`.
 
     cost = 252 · exp(-cost_scaling_factor · (distance - inscribed_radius)) between the inscribed and the inflation
-    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost). Meters end at `reach`.
+    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost). Distances beyond `reach_m` are given as `reach_m`.
     """
 
     def __init__(
-        self, resolution: float, inscribed: float, inflation_radius: float, scaling: float, reach: float
+        self, resolution: float, inscribed: float, inflation_radius: float, scaling: float, reach_m: float
     ) -> None:
-        distance = np.sqrt(np.arange(MAX_SQUARED_CELLS + 1)) * resolution
-        self.meters: npt.NDArray[np.float32] = np.minimum(distance, reach).astype(np.float32)
+        distance = np.sqrt(np.arange(OUT_OF_REACH + 1)) * resolution
+        self.meters: npt.NDArray[np.float32] = np.minimum(distance, reach_m).astype(np.float32)
         decay = MAX_NON_OBSTACLE * np.exp(-scaling * np.maximum(distance - inscribed, 0.0))
         cost = np.where(distance <= inscribed, INSCRIBED, decay)
         cost = np.where(distance > inflation_radius, FREE, cost)
@@ -72,7 +71,7 @@ class Inflation:
         self.cost: npt.NDArray[np.uint8] = cost.astype(np.uint8)
 
     def costs(self, squared: npt.NDArray[np.integer], unknown: npt.NDArray[np.bool_] | None) -> Costs:
-        """Return the costs of cells. `unknown` ones stay unknown unless an obstacle is within the inscribed radius."""
+        """Return the costs of cells. `unknown` cells stay unknown, except within the inscribed radius of obstacles."""
         cost = self.cost.take(squared)
         if unknown is not None:
             cost[unknown & (cost < INSCRIBED)] = NO_INFORMATION
@@ -96,12 +95,12 @@ def static_layer(
     threshold: int,
     keepout: tuple[Polygon, ...],
     mask: OccupancyGrid | None = None,
-    unknown: bool = True,
+    track_unknown: bool = True,
 ) -> StaticLayer:
     """Return the layer of a map; a rotated map is sampled into an unrotated frame of the same resolution.
 
-    Cells with an occupancy of at least `threshold` percent are lethal. Without tracking of `unknown` space, unknown
-    cells are free, as in Nav2.
+    Cells with an occupancy of at least `threshold` percent are lethal. Without `track_unknown`, unknown cells are
+    free, as in Nav2.
     """
     if abs(grid.origin.yaw) < 1e-9:
         frame = GridFrame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
@@ -110,26 +109,29 @@ def static_layer(
         frame = _bounding_frame(grid)
         cells = grid.values_at(_all_centers(frame)).reshape(frame.shape)
     lethal = np.ascontiguousarray(cells >= threshold) | _keepout_cells(frame, keepout, mask)
-    return StaticLayer(frame, lethal, (cells == UNKNOWN) & ~lethal & unknown)
+    return StaticLayer(frame, lethal, (cells == UNKNOWN) & ~lethal & track_unknown)
 
 
 @cached_on_instance
-def free_layer(grid: OccupancyGrid, threshold: int, unknown: bool) -> StaticLayer:
-    """Return the layer of a map without zones, computed once for all runs, which write into copies."""
-    return static_layer(grid, threshold, (), unknown=unknown)
+def layer_without_zones(grid: OccupancyGrid, threshold: int, track_unknown: bool) -> StaticLayer:
+    """Return the layer of a map without zones. Cached for all runs; copy the result before you modify it."""
+    return static_layer(grid, threshold, (), track_unknown=track_unknown)
 
 
 @cached_on_instance
-def static_distances(grid: OccupancyGrid, threshold: int, reach: int) -> Squared:
-    """Return the squared distances in a layer without zones, computed once for all runs."""
-    return squared_distances(free_layer(grid, threshold, True).lethal, reach)
+def static_distances(grid: OccupancyGrid, threshold: int, reach_cells: int) -> Squared:
+    """Return the squared distances in a layer without zones. Cached for all runs; do not modify the result."""
+    return squared_distances(layer_without_zones(grid, threshold, True).lethal, reach_cells)
 
 
 def empty_layer(
-    frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = False
+    frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, track_unknown: bool = False
 ) -> StaticLayer:
-    """Return the layer of a robot without a map: only keepout zones and masks; the rest is `unknown` or free."""
-    return StaticLayer(frame, _keepout_cells(frame, keepout, mask), np.full(frame.shape, unknown))
+    """Return the layer of a robot without a map: only keepout zones and masks.
+
+    All other cells are unknown with `track_unknown`, and free without.
+    """
+    return StaticLayer(frame, _keepout_cells(frame, keepout, mask), np.full(frame.shape, track_unknown))
 
 
 def _keepout_cells(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
@@ -163,7 +165,7 @@ def _bounding_frame(grid: OccupancyGrid) -> GridFrame:
 
 
 class SpeedFilter:
-    """The current speed zones and speed mask."""
+    """Speed limit at a position, from the current speed zones and speed mask."""
 
     def __init__(self, surroundings: Surroundings) -> None:
         """Start with the zones and the mask that the stack was configured with."""

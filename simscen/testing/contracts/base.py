@@ -1,4 +1,8 @@
-"""Base classes of contracts and promises, and helpers for checks."""
+"""Base classes of contracts and promises, and helpers for checks.
+
+A contract checks that a component, such as a planner, keeps the rules of its protocol. A promise is one of these rules.
+The role is the kind of component, e.g. "planner", and the subject is the component that is checked.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +43,10 @@ def require(condition: object, observation: str) -> None:
 
 @dataclass(frozen=True)
 class Promise:
-    """Promise of one subject. `str(promise)` is a sentence; `check()` raises PromiseBroken if it is broken."""
+    """One promise, to be checked for one subject.
+
+    `str(promise)` is a sentence; `check()` raises PromiseBroken if the promise is broken.
+    """
 
     role: str
     subject: str
@@ -50,20 +57,24 @@ class Promise:
         return f"{self.subject} {self.name}" if self.subject else self.name
 
     def check(self, limit: float = DEFAULT_LIMIT_S) -> None:
-        """Check the promise within `limit` seconds; each check starts with other global random generators."""
+        """Check the promise within `limit` seconds, with differently seeded global random generators in each check."""
         reseed_global_generators()
         with time_limit(limit):
             self.verify()
 
 
 def promise(method: Callable[[T], None]) -> Callable[[T], None]:
-    """Mark a method of a contract as a promise. Its name is the sentence, its docstring states given … then …."""
+    """Mark a method of a contract as a promise.
+
+    The name of the method, with spaces, is the sentence that is reported. Its docstring describes the setup and the
+    expected result: *Given* … *then* ….
+    """
     method.__is_promise__ = True  # type: ignore[attr-defined]
     return method
 
 
 class Contract:
-    """Promises of one role for one subject. Each promise is checked on new components."""
+    """Promises of one role, to be checked for one subject. Each promise is checked on new components."""
 
     role: ClassVar[str]
     subject: str = ""
@@ -118,7 +129,7 @@ class ComponentContract(Contract):
     subject: str = ""
 
     def setting(self) -> Setting:
-        """Return the setting of a component with a new random generator."""
+        """Return what a component is built with besides its specification, with a new random generator."""
         return setting(self.robot, name=self.role)
 
     def build(self) -> Any:
@@ -128,7 +139,7 @@ class ComponentContract(Contract):
 
 
 def call_component(action: str, call: Callable[..., T], *args: Any, **kwargs: Any) -> T:
-    """Return the result of a call. `action` completes "when it …" in messages.
+    """Return the result of a call. `action` describes the call in messages, e.g. "plans" in "raises … when it plans".
 
     Raises PromiseBroken for all exceptions except NavigationFailure with an ErrorCode, which passes through.
     """

@@ -1,4 +1,4 @@
-"""Contract of planners."""
+"""Contract of planners: tests that every planner must pass."""
 
 from __future__ import annotations
 
@@ -57,9 +57,11 @@ class PlannerContract(ComponentContract):
         """Return a copy of the costmap of the house."""
         return copy_costmap(_house_costmap(self.robot))
 
-    def plan(self, planner: Planner, view: CostmapView, seed: int, ends: tuple[Pose2, Pose2] = (START, GOAL)) -> Array:
+    def plan(
+        self, planner: Planner, view: CostmapView, seed: int, start_and_goal: tuple[Pose2, Pose2] = (START, GOAL)
+    ) -> Array:
         """Return the points of a plan, checked for shape and finiteness."""
-        path = call_component("plans", lambda: planner.plan(view, *ends, seed))
+        path = call_component("plans", lambda: planner.plan(view, *start_and_goal, seed))
         require(isinstance(path, Path), f"returns {type(path).__name__}, not a Path")
         points = path.points
         require(isinstance(points, np.ndarray) and points.ndim == 2 and points.shape[1] == 3, "points are not (n, 3)")
@@ -69,7 +71,7 @@ class PlannerContract(ComponentContract):
 
     @promise
     def success_begins_at_the_start_and_ends_near_the_goal(self) -> None:
-        """Given success then the path begins at the start and ends within the tolerance of the goal."""
+        """Given a path then it begins at the start and ends within the tolerance of the goal."""
         for seed in (1, 2, 3):
             points = self.plan(self.build(), self.view(), seed)
             offset = float(np.hypot(*(points[0, :2] - START[:2])))
@@ -82,13 +84,13 @@ class PlannerContract(ComponentContract):
 
     @promise
     def points_are_at_most_a_tenth_of_a_meter_apart(self) -> None:
-        """Given success then consecutive points are at most 0.1 m apart."""
+        """Given a path then consecutive points are at most 0.1 m apart."""
         widest = float(np.hypot(*np.diff(self.plan(self.build(), self.view(), 1)[:, :2], axis=0).T).max())
         require(widest <= MAX_POINT_SPACING_M + 1e-9, f"two points are {widest:.3f} m apart")
 
     @promise
     def the_footprint_is_never_on_a_lethal_cell(self) -> None:
-        """Given success then at no point after the start does the robot's footprint touch a lethal cell."""
+        """Given a path then the footprint touches no lethal cell at any point after the start."""
         footprint = Footprint(self.robot, 0.05)
         for seed in (1, 2, 3):
             view = self.view()
@@ -111,7 +113,7 @@ class PlannerContract(ComponentContract):
 
     @promise
     def the_same_seed_gives_the_same_path_bit_for_bit_whatever_was_planned_before(self) -> None:
-        """Given the same costmap, ends and seed then bit-identical paths, independent of earlier calls."""
+        """Given the same costmap, start, goal and seed then bit-identical paths, independent of earlier calls."""
         first = self.plan(self.build(), self.view(), 7)
         other = self.build()
         self.plan(other, self.view(), 3, (GOAL, START))

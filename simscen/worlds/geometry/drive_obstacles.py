@@ -24,7 +24,7 @@ SAMPLE_OFFSET_M = 0.01
 WALL_THICKNESS_M = 0.01
 """Thickness of the walls and prisms that stand for edges and steep faces."""
 MAX_WALL_NORMAL_Z = 0.5
-"""z component of the unit normal up to which a face is a wall (60°), not a slope."""
+"""z component of the unit normal up to which a face counts as a wall, i.e. is steeper than 60°, not as a slope."""
 
 _PRISM_FACES = np.array(
     [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]], dtype=np.int32
@@ -36,7 +36,8 @@ def drive_obstacles(
 ) -> tuple[Solid, ...]:
     """Return the solids that block a robot; the same tuple if no solid is drivable ground.
 
-    The robot has wheels of `wheel_radius` m and climbs slopes up to `max_slope` rad and steps up to `max_step` m.
+    The robot climbs slopes up to `max_slope` rad and steps up to `max_step` m. Only solids that begin at most
+    `wheel_radius` m above the floor can be ground, because wheels do not reach higher ones.
     """
     if max_slope <= 0 or has_no_drivable_solids(solids, wheel_radius):
         return solids
@@ -49,7 +50,7 @@ def drive_obstacles(
 
 
 def _is_simple(mesh: TriangleMesh, owner: int) -> bool:
-    """Return whether a solid is convex or a height field; other shapes may overhang and remain obstacles."""
+    """Return whether the solid `owner` is convex or a height field; other shapes may overhang and remain obstacles."""
     is_own = mesh.owners == owner
     return is_convex(submesh(mesh.vertices, mesh.faces[is_own])) or bool((face_normals(mesh)[is_own, 2] >= 0).all())
 

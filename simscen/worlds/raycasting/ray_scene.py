@@ -193,7 +193,7 @@ class RayScene(RayCaster):
             self._resting.set_bodies(resting)
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """See core.geometry.ray_fans.RayCaster."""
+        """Return distances (n,) in m along unit `directions` (n, 3) from `origins` (n, 3); inf beyond `reach`."""
         limit = min(reach, _MAX_RANGE_M)
         if not len(origins):
             return np.empty(0)
@@ -203,7 +203,10 @@ class RayScene(RayCaster):
         return result
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
-        """See core.geometry.ray_fans.RayCaster. Runs once per scan, so that each numpy call (1 µs) counts."""
+        """Return the distances (n,) in m of a fan with its frame at `pose`; values beyond `reach` mean no hit.
+
+        This method runs once per scan, so that each numpy call (1 µs) counts.
+        """
         position, (ahead, left) = pose[:3], forward_and_left(pose[3:])
         fan.set_directions(ahead, left)
         fan.set_length(min(reach, _MAX_RANGE_M) * _END_FACTOR)

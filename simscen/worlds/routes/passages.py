@@ -1,4 +1,4 @@
-"""Passages of a path: lines between two solids that a robot has to cross."""
+"""Passages of a path: gaps between two solids that a robot has to cross, such as doors."""
 
 import math
 from collections.abc import Iterator
@@ -13,14 +13,17 @@ from simscen.worlds.routes.clearance import ClearanceField
 
 MAX_WIDTH_M = 4.0
 """Maximum width of a passage."""
-SPACING_M, MAX_LINES = 0.25, 80
-"""Distance between two lines along a path, and maximum number of lines."""
+SPACING_M, MAX_PROBES = 0.25, 80
+"""Distance between two points of the path at which a passage is searched, and their maximum number."""
 NARROW_WIDTH_M = 2.0
 """Width up to which a passage is measured at its narrowest point instead of where the path crosses it."""
 RAY_ROTATIONS = np.array(
     [[[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]] for a in np.radians(np.arange(-60, 61, 10))]
 )
-"""Rotations (n, 2, 2) of the rays towards the other side, which is not exactly opposite at an oblique door."""
+"""Rotations (n, 2, 2) of the rays towards the other side of a passage.
+
+At an oblique door, the other door post is not exactly opposite.
+"""
 MAX_POINTS = 400
 """Maximum number of points of the outline on each side of a passage."""
 
@@ -29,7 +32,7 @@ def find_passages(path: Array, goal: str, field: ClearanceField) -> tuple[Passag
     """Return the passages of a path (n, 2) to `goal`, in its direction. Widths are exact to about 2 cm."""
     if field.outline is None:
         return ()
-    points = resample_polyline(path, max(SPACING_M, polyline_length(path) / MAX_LINES))
+    points = resample_polyline(path, max(SPACING_M, polyline_length(path) / MAX_PROBES))
     found: dict[tuple[int, int], float] = {}
     for point in points:
         places = ((pair, _crossing_index(field.outline.data[list(pair)], points)) for pair in _pairs(point, field))
@@ -56,8 +59,8 @@ def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage
 def _pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
     """Yield pairs of points of the outline, by index, on both sides of a point of the path; the nearest pair first."""
     assert field.outline is not None
-    distance, number = field.outline.query(point)
-    one, apart = int(number), float(distance)
+    distance, index = field.outline.query(point)
+    one, apart = int(index), float(distance)
     if not 0 < apart < MAX_WIDTH_M:
         return
     hits = _hits(point, field.outline.data[one], apart, field)
@@ -118,18 +121,19 @@ def _narrowest(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
     return int(near[j]), int(far[k])
 
 
-def _subsample(numbers: npt.NDArray[np.int64], required: int) -> npt.NDArray[np.int64]:
+def _subsample(indices: npt.NDArray[np.int64], required: int) -> npt.NDArray[np.int64]:
     """Return at most MAX_POINTS of the indices, evenly spaced, and `required`."""
-    return np.append(numbers[:: 1 + len(numbers) // MAX_POINTS], required)
+    return np.append(indices[:: 1 + len(indices) // MAX_POINTS], required)
 
 
-def _name(number: int, field: ClearanceField) -> str:
-    owner = int(field.owners[number])
+def _name(index: int, field: ClearanceField) -> str:
+    """Return the name of the solid at a point of the outline."""
+    owner = int(field.owners[index])
     return field.names[owner] if owner < len(field.names) else ""
 
 
-def _outline_point(number: int, field: ClearanceField) -> Point:
+def _outline_point(index: int, field: ClearanceField) -> Point:
     """Return a point of the outline, rounded to 1 mm to keep logs small."""
     assert field.outline is not None
-    x, y = field.outline.data[number].tolist()
+    x, y = field.outline.data[index].tolist()
     return round(x, 3), round(y, 3)

@@ -39,8 +39,8 @@ class ShortestPaths:
     """Shortest paths of a disc of one radius in one world.
 
     Lengths are exact to about 1 %. If the paths around both sides of an obstacle differ by less than 3 %, the longer
-    one may be chosen. The smallest radius is 0.7 grid cells; a cell is 5 cm wide in worlds of up to 50 x 50 m. A house
-    of 20 x 20 m takes about 30 ms to prepare, and each path around corners 30 ms.
+    one may be chosen. A smaller radius than 0.7 grid cells counts as 0.7 cells; a cell is 5 cm wide in worlds of up to
+    50 x 50 m. A house of 20 x 20 m takes about 30 ms to prepare, and each path around corners 30 ms.
     """
 
     def __init__(
@@ -144,7 +144,7 @@ class ShortestPaths:
         return all(is_line_clear(a, b, self._field, self._min_clearance) for a, b in pairwise(path))
 
     def _free_cell(self, graph: GridGraph, point: Array) -> tuple[int, int] | None:
-        """Return the free cell nearest to a point, whose own cell may be too near a wall; None without one nearby."""
+        """Return the free cell nearest to a point; None without one nearby. The cell of the point may not be free."""
         grid = self._field.grid
         around = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3), indexing="ij"), axis=-1).reshape(-1, 2)
         cells: CellIndices = grid.cell_of(point[None]) + around

@@ -1,8 +1,8 @@
 """Content of links (collision solids with friction, mass), and their grouping into static solids and movable bodies.
 
-Links that are connected by a joint of any type form one rigid body: simscen has no jointed obstacles, and links that
-overlap at a joint would be pushed apart without it. A joint to the world or to a static model makes the whole group
-static. Links that no joint connects are separate bodies, as in Gazebo.
+Links that are connected by a joint of any type form one rigid body: simscen has no jointed obstacles, and the physics
+would push apart separate bodies that overlap at a joint. A joint to the world or to a static model makes the whole
+group static. Links that no joint connects are separate bodies, as in Gazebo.
 """
 
 from collections.abc import Iterator, Sequence
@@ -92,7 +92,10 @@ def _collision_solids(
 
 
 def _friction(collision: Element, report: ImportReport) -> float:
-    """Return `<mu>` of ODE's surface, at most the friction of a wheel: ODE and Gazebo use the lesser of two."""
+    """Return `<mu>` of ODE's surface, at most DEFAULT_FRICTION.
+
+    In a contact, ODE and Gazebo use the lesser friction of the two surfaces, and one of them is a rubber wheel.
+    """
     mu_element: Element | None = collision
     for tag in ("surface", "friction", "ode", "mu"):
         mu_element = mu_element.child(tag) if mu_element is not None else None
@@ -267,6 +270,7 @@ def _movable_mass(group: list[LinkContent], report: ImportReport) -> float:
 
 
 def _is_kinematic(group: list[LinkContent], report: ImportReport) -> bool:
+    """Return whether SDF states for any link of the group that contacts do not move it (`<kinematic>`)."""
     is_kinematic = False
     for content in group:
         element = content.link.frame.element

@@ -1,8 +1,8 @@
 """Tree of models in a world, with every `<include>` replaced by the model that it refers to.
 
 Every model is a scope with the implicit frame `__model__`; the world is a scope with the frame `world`. Names with
-`::` refer to nested models, never to enclosing ones. Source: SDF proposals "Pose Frame Semantics" (1.7, 1.8) and
-sdformat's FrameSemantics.cc.
+`::` refer to nested models; a name cannot refer to an enclosing model. Source: SDF proposals "Pose Frame Semantics"
+(1.7, 1.8) and sdformat's FrameSemantics.cc.
 """
 
 from collections.abc import Iterator
@@ -29,9 +29,10 @@ MODEL_FRAME, WORLD_FRAME = "__model__", "world"
 class Frame:
     """A named frame; a file that is included twice yields two frames.
 
-    `pose` is the `<pose>` element (None = identity), relative to the frame that it names, otherwise to
-    `default_reference`. The frame moves with the link or frame `attached_to`. For a model, `model_scope` holds its
-    frames, and the pose places its frame `placement_frame`.
+    `pose` is the `<pose>` element (None = identity), relative to the frame in its attribute `relative_to`, or to
+    `default_reference` if it has none. The frame moves with the link or frame `attached_to`. Only a model has a
+    `model_scope` with the frames in it. If a model has a `placement_frame`, `pose` is the pose of that frame instead of
+    the model's own frame.
     """
 
     name: str
@@ -47,33 +48,35 @@ class Frame:
 class FrameScope:
     """The frames of one model or of the world.
 
-    `implicit_frame` is the name of the scope's own frame, which moves with the frame `canonical`; "" is the world.
-    The names in `merged_models` (included with merge="true") are visible in this scope too.
+    `implicit_frame` is the name of the scope's own frame. It is attached to the link, frame, or nested model
+    `canonical_link`; "" if it is attached to the world, which does not move. `_frames_in_progress` are the frames whose
+    pose is being computed, to detect cycles. The names in `merged_models` (included with merge="true") are
+    visible in this scope too.
     """
 
     implicit_frame: str = MODEL_FRAME
-    canonical: str = ""
+    canonical_link: str = ""
     frames: dict[str, Frame] = field(default_factory=dict)
     merged_models: list[Frame] = field(default_factory=list)
     _poses: dict[int, Pose3] = field(default_factory=dict)
-    _open_frames: list[int] = field(default_factory=list)
+    _frames_in_progress: list[int] = field(default_factory=list)
 
     def add(self, frame: Frame) -> None:
         """Add a frame; the first of two frames with the same name wins."""
         self.frames.setdefault(frame.name, frame)
 
     def pose_of(self, frame: Frame) -> Pose3:
-        """Return `scope_from_frame`; raises UnusableElement for unknown frames and for cycles."""
+        """Return the pose of a frame in this scope; raises UnusableElement for unknown frames and for cycles."""
         key = id(frame)
         if key not in self._poses:
             referrer = frame.pose or frame.element
-            if key in self._open_frames:
+            if key in self._frames_in_progress:
                 raise referrer.unusable(f"the pose of {frame.name!r} depends on itself")
-            self._open_frames.append(key)
+            self._frames_in_progress.append(key)
             try:
                 self._poses[key] = self._compute_pose(frame, referrer)
             finally:
-                self._open_frames.pop()
+                self._frames_in_progress.pop()
         return self._poses[key]
 
     def _compute_pose(self, frame: Frame, referrer: Element) -> Pose3:
@@ -84,7 +87,10 @@ class FrameScope:
         return pose
 
     def pose_of_name(self, name: str, referrer: Element) -> Pose3:
-        """Return `scope_from_name` for a frame name; raises UnusableElement at `referrer` if there is no such frame."""
+        """Return the pose of the frame `name` in this scope.
+
+        Raises UnusableElement at `referrer` if there is no such frame.
+        """
         if name in ("", self.implicit_frame):
             return Pose3()
         if name in self.frames:
@@ -102,7 +108,7 @@ class FrameScope:
         if name == WORLD_FRAME:
             return None
         if name in ("", self.implicit_frame):
-            return self.link_of_frame(self.canonical, referrer, visited) if self.canonical else None
+            return self.link_of_frame(self.canonical_link, referrer, visited) if self.canonical_link else None
         frame = self.frames.get(name)
         if frame is None:
             model, rest = self._model_with_frame(name)
@@ -141,8 +147,9 @@ MAX_MODELS = 20_000
 class ModelNode:
     """A model, an actor, or the world as the outermost model.
 
-    `parts` are its links (Frame) and nested models in document order. `frame` is the model's own frame in the scope of
-    its parent. If `static`, everything below it is static too, as in Gazebo.
+    `parts` are its links (Frame) and nested models in document order; an actor has links only. `frame` is the model's
+    own frame in the scope of its parent. If `static`, everything below it is static too, as in Gazebo. Only the world
+    has `actors`.
     """
 
     name: str
@@ -192,7 +199,7 @@ class TreeReader:
         frame.placement_frame = placement.text if placement else element.attributes.get("placement_frame", "")
         model = ModelNode(name, element, frame, scope, static or is_static)
         self._read_children(model, "model")
-        scope.canonical = element.attributes.get("canonical_link", "") or scope.canonical
+        scope.canonical_link = element.attributes.get("canonical_link", "") or scope.canonical_link
         return model
 
     def add_model(self, owner: ModelNode, model: ModelNode, merged: bool = False) -> None:
@@ -200,7 +207,7 @@ class TreeReader:
         owner.parts.append(model)
         name = f"_merged__{model.name}__model__" if merged else model.name
         owner.scope.frames.setdefault(name, model.frame)
-        owner.scope.canonical = owner.scope.canonical or name
+        owner.scope.canonical_link = owner.scope.canonical_link or name
         if merged:
             owner.scope.merged_models.append(model.frame)
 
@@ -228,7 +235,7 @@ class TreeReader:
                 frame = Frame(checked_name(child), child, pose)
                 scope.add(frame)
                 owner.parts.append(frame)
-                scope.canonical = scope.canonical or frame.name
+                scope.canonical_link = scope.canonical_link or frame.name
             case "world", "actor":
                 owner.actors.append(self._read_actor(child))
             case "world", "population":

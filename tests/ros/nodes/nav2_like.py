@@ -5,8 +5,9 @@
 - A lifecycle manager activates the servers one after another, on wall time.
 
 Parameters: `after` (simulated seconds until activation starts), `slow` (wall seconds until the nodes exist),
-`misfit` (a server to leave out, or "frame"), `never` (a server that is never activated), `dies` (a server whose process
-is killed) at `dies_at` (simulated seconds), and those of the navigator.
+`misfit` (a server to leave out, or "frame"), `never` (a server that is never activated), `aborts` (a server that cannot
+be activated, so that the lifecycle manager gives up), `dies` (a server whose process is killed) at `dies_at` (simulated
+seconds), and those of the navigator.
 """
 
 import os
@@ -103,10 +104,11 @@ def main():
     parameters.destroy_node()
     time.sleep(slow)
     navigator = Navigator()
-    after, misfit, never, dies = (
+    after, misfit, never, aborts, dies = (
         navigator.declare_parameter(name, default).value
-        for name, default in (("after", 0.0), ("misfit", ""), ("never", ""), ("dies", ""))
+        for name, default in (("after", 0.0), ("misfit", ""), ("never", ""), ("aborts", ""), ("dies", ""))
     )
+    manager = Node("lifecycle_manager")
     dies_at = navigator.declare_parameter("dies_at", 0.0).value
     servers = {
         name: (ControllerServer if name == "controller_server" else Server)(name, values)
@@ -116,7 +118,7 @@ def main():
     if misfit == "frame":
         servers["amcl"].set_parameters([Parameter("base_frame_id", value="base_footprint")])
     kept = [Node(name) for name in NEVER_SPUN]
-    for server in servers.values():
+    for server in (*servers.values(), manager):
         threading.Thread(target=spin, args=(server,), daemon=True).start()
     other = None
     if dies:
@@ -129,6 +131,9 @@ def main():
             time.sleep(0.05)
         for name, server in servers.items():
             if name == never:
+                return
+            if name == aborts:
+                manager.get_logger().error("Failed to bring up all requested nodes. Aborting bringup.")
                 return
             server.activate_soon()
             while rclpy.ok() and server._state_machine.current_state[1] != "active":

@@ -3,7 +3,7 @@ import pytest
 from shapely import MultiPoint, Point, box
 
 from simscen.bench.navigation import barn
-from simscen.bench.navigation.barn import CELL_SIZE_M, GAP_RADIUS_M, GOAL, START, obstacle_field
+from simscen.bench.navigation.barn import CELL_SIZE_M, CROSSING_RADIUS_M, GOAL, START, obstacle_field
 
 
 def test_the_same_number_gives_the_same_field_and_another_one_another() -> None:
@@ -17,7 +17,7 @@ def test_disc_can_pass_according_to_an_independent_library(number: int) -> None:
     field = obstacle_field(number)
     lane = box(-30 * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
     # 2 mm less than the disc: shapely's circles are polygons, and a lattice finds ways to its resolution only.
-    free = lane.difference(MultiPoint(field.centers).buffer(CELL_SIZE_M / 2 + GAP_RADIUS_M - 0.002))
+    free = lane.difference(MultiPoint(field.centers).buffer(CELL_SIZE_M / 2 + CROSSING_RADIUS_M - 0.002))
     pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
     assert pieces and pieces[0].contains(Point(GOAL.x, GOAL.y))
 
@@ -39,8 +39,8 @@ def test_cellular_automaton_removes_isolated_cells_and_fills_crowded_ones() -> N
 
 
 def test_narrow_field_width_matches_an_independent_library() -> None:
-    gap, too_wide = 0.31, 0.36
-    field = obstacle_field(2, gap, too_wide)
+    crossing_radius, blocked_radius = 0.31, 0.36
+    field = obstacle_field(2, crossing_radius, blocked_radius)
     lane = box(-30 * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
 
     def crossable(radius: float) -> bool:
@@ -48,9 +48,9 @@ def test_narrow_field_width_matches_an_independent_library() -> None:
         pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
         return bool(pieces) and bool(pieces[0].contains(Point(GOAL.x, GOAL.y)))
 
-    assert crossable(gap - 0.002)
-    assert not crossable(too_wide + CELL_SIZE_M / 3)  # as fine as the lattice on which that is looked for
+    assert crossable(crossing_radius - 0.002)
+    assert not crossable(blocked_radius + CELL_SIZE_M / 3)  # as fine as the lattice on which that is looked for
 
 
 def test_a_field_of_another_width_leaves_the_usual_ones_as_they_are() -> None:
-    assert obstacle_field(3).shortest == obstacle_field(3, GAP_RADIUS_M).shortest
+    assert obstacle_field(3).shortest == obstacle_field(3, CROSSING_RADIUS_M).shortest

@@ -5,8 +5,8 @@ import pytest
 
 from simscen.bench.navigation.barn import (
     ARENA_HALF_WIDTH_M,
-    COUNT_RANGE,
     MAX_SPEED_DEVIATION_M_S,
+    MOVER_COUNT_RANGE,
     SPEEDS_M_S,
     DynamicField,
     dynamic_field,
@@ -27,7 +27,7 @@ def test_number_and_speed_determine_the_field() -> None:
 
 def test_there_are_5_to_24_cylinders_and_both_ends_occur() -> None:
     counts = [len(field.movers) for field in FIELDS]
-    assert COUNT_RANGE[0] <= min(counts) < 8 and 21 < max(counts) <= COUNT_RANGE[1]
+    assert MOVER_COUNT_RANGE[0] <= min(counts) < 8 and 21 < max(counts) <= MOVER_COUNT_RANGE[1]
 
 
 def test_cylinders_keep_to_the_arena_and_begin_at_different_places_of_their_ways() -> None:

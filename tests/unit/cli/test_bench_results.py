@@ -12,8 +12,8 @@ from simscen.core.errors import UsageError
 
 BEFORE = Result(
     {
-        "patrol": Measurement.of((36.0, 40.0, 35.0), "ms a simulated second"),
-        "log": Measurement.of((3.0, 3.2), "ms a simulated second"),
+        "patrol": Measurement.of((36.0, 40.0, 35.0), "ms per simulated second"),
+        "log": Measurement.of((3.0, 3.2), "ms per simulated second"),
         "suite: runs a minute": Measurement(50.0, "", (), more_is_better=True),
         "scan": Measurement(0.0, "ms"),
     },
@@ -22,8 +22,8 @@ BEFORE = Result(
 )
 AFTER = Result(
     {
-        "patrol": Measurement.of((18.0, 17.0, 20.0), "ms a simulated second"),
-        "log": Measurement.of((3.1, 3.3), "ms a simulated second"),
+        "patrol": Measurement.of((18.0, 17.0, 20.0), "ms per simulated second"),
+        "log": Measurement.of((3.1, 3.3), "ms per simulated second"),
         "suite: runs a minute": Measurement(100.0, "", (), more_is_better=True),
         "step": Measurement(14.0, "µs"),
     },
@@ -32,10 +32,10 @@ AFTER = Result(
 )
 
 TABLE = """\
-                                          before                       after  ratio  rounds before  rounds after
-patrol                  36 ms a simulated second    18 ms a simulated second   0.50        35 … 40       17 … 20  better
-log                    3.1 ms a simulated second  3.2 ms a simulated second   1.03        3 … 3.2     3.1 … 3.3   noise
-suite: runs a minute                          50                        100   2.00              -             -
+                                         before                      after  ratio  rounds before  rounds after
+patrol                 36 ms per simulated second   18 ms per simulated second   0.50   35 … 40   17 … 20  better
+log                   3.1 ms per simulated second  3.2 ms per simulated second   1.03   3 … 3.2  3.1 … 3.3  noise
+suite: runs a minute                           50                          100   2.00         -          -
 only before: scan
 only after: step"""
 
@@ -106,4 +106,4 @@ def test_unreadable_result_is_a_usage_error(tmp_path: Path, there: bool) -> None
 
 def test_results_of_different_commands_cannot_be_compared() -> None:
     with pytest.raises(UsageError, match="no common figure; compare results of the same command"):
-        comparison_text(BEFORE, replace(AFTER, figures={"2 robots": Measurement(80.0, "ms a simulated second")}))
+        comparison_text(BEFORE, replace(AFTER, figures={"2 robots": Measurement(80.0, "ms per simulated second")}))

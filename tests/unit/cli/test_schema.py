@@ -7,7 +7,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from simscen.cli.catalog.generate import ROOT, outdated
+from simscen.cli.catalog.generate import ROOT, outdated_files
 from simscen.cli.catalog.json_schema import MODELS, schema_of
 from simscen.loading.yaml.parser import parse_yaml
 
@@ -24,7 +24,7 @@ FORM = [
 
 
 def test_generated_files_are_up_to_date() -> None:
-    assert outdated() == [], "run `make docs`"
+    assert outdated_files() == [], "run `make docs`"
 
 
 def _plain(text: str) -> Any:

@@ -169,8 +169,8 @@ def test_the_lowest_limit_of_the_zones_one_is_in_counts() -> None:
 def test_a_task_says_how_it_ended_with_the_code_of_the_last_failure() -> None:
     task = Task(False)
     task.start((Goal("a", Pose2(0, 0)), Goal("b", Pose2(1, 0))))
-    failed = *task.next(1), *task.failed(5, ErrorCode.GOAL_OCCUPIED, "in a wall")
-    told = *failed, *task.next(6), *task.reached(9)
+    failed = *task.accept_next(1), *task.record_failed(5, ErrorCode.GOAL_OCCUPIED, "in a wall")
+    told = *failed, *task.accept_next(6), *task.record_reached(9)
     assert [(e.tick, e.kind, e.name) for e in told] == [
         (1, "goal.accepted", "a"),
         (5, "goal.failed", "a"),

@@ -42,14 +42,14 @@ def told(journal: list[Event]) -> list[tuple[int, str, str]]:
 
 def test_poses_are_passed_on_the_way_to_one_that_is_reached():
     drive, journal = task(A, B, C)
-    assert drive.next(1) is A
-    assert drive.ahead == (B, C)
-    drive.passed(2)
-    assert drive.next(2) is B
-    drive.passed(3)
-    assert drive.next(3) is C
-    assert drive.ahead == ()
-    drive.reached(9)
+    assert drive.accept_next(1) is A
+    assert drive.remaining_in_action == (B, C)
+    drive.record_passed(2)
+    assert drive.accept_next(2) is B
+    drive.record_passed(3)
+    assert drive.accept_next(3) is C
+    assert drive.remaining_in_action == ()
+    drive.record_reached(9)
     assert told(journal)[-3:] == [
         (3, "goal.accepted", "c"),
         (9, "goal.reached", "c"),
@@ -60,12 +60,12 @@ def test_poses_are_passed_on_the_way_to_one_that_is_reached():
 
 def test_a_drive_fails_as_a_whole_and_the_next_one_follows():
     drive, journal = task(A, B, C, D, stop=False)
-    drive.next(1)
-    drive.passed(2)
-    drive.next(2)
-    drive.failed(5, ErrorCode.NO_VALID_PATH, "no way")
-    assert drive.next(6) is D
-    drive.reached(7)
+    drive.accept_next(1)
+    drive.record_passed(2)
+    drive.accept_next(2)
+    drive.record_failed(5, ErrorCode.NO_VALID_PATH, "no way")
+    assert drive.accept_next(6) is D
+    drive.record_reached(7)
     assert told(journal)[3:] == [
         (5, "goal.failed", "b"),
         (5, "goal.failed", "c"),
@@ -79,16 +79,16 @@ def test_a_drive_fails_as_a_whole_and_the_next_one_follows():
 @pytest.mark.parametrize("how", ["preempt", "cancel"])
 def test_end_of_a_drive_ends_all_its_goals(how):
     drive, journal = task(A, B, C, D)
-    drive.next(1)
+    drive.accept_next(1)
     drive.preempt(2, Goal("x", Pose2(5, 5))) if how == "preempt" else drive.cancel(2)
     assert [(kind, name) for _, kind, name in told(journal)[1:4]] == [("goal.canceled", each) for each in "abc"]
     if how == "preempt":
         assert {event.data["preempted_by"] for event in journal[1:4]} == {"x"}
-        goal = drive.next(3)
+        goal = drive.accept_next(3)
         assert goal is not None
         assert goal.name == "x"
-        drive.reached(4)
-        assert drive.next(5) is D
+        drive.record_reached(4)
+        assert drive.accept_next(5) is D
     else:
         assert told(journal)[-1] == (2, "navigation.ended", "CANCELED")
 
@@ -96,35 +96,35 @@ def test_end_of_a_drive_ends_all_its_goals(how):
 def test_the_robot_stays_as_long_as_the_goal_says_before_the_next_one_or_the_end():
     waits = Goal("a", Pose2(0, 0), wait=0.5), Goal("b", Pose2(1, 0), wait=0.2)
     tour, journal = task(*waits)
-    tour.next(1)
-    tour.reached(10)
-    assert tour.next(59) is None
+    tour.accept_next(1)
+    tour.record_reached(10)
+    assert tour.accept_next(59) is None
     assert tour.goal is None
-    assert tour.next(60) is waits[1]
-    tour.reached(70)
-    assert tour.next(89) is None
+    assert tour.accept_next(60) is waits[1]
+    tour.record_reached(70)
+    assert tour.accept_next(89) is None
     assert told(journal)[-1] == (70, "goal.reached", "b")
-    assert tour.next(90) is None
+    assert tour.accept_next(90) is None
     assert told(journal)[-1] == (90, "navigation.ended", "SUCCEEDED")
-    assert tour.next(91) is None
+    assert tour.accept_next(91) is None
     assert len(journal) == 5
 
 
 def test_a_wait_ends_when_the_task_is_canceled_or_another_goal_comes():
     stays = Goal("a", Pose2(0, 0), wait=5.0)
     canceled, journal = task(stays, D)
-    canceled.next(1)
-    canceled.reached(2)
+    canceled.accept_next(1)
+    canceled.record_reached(2)
     canceled.cancel(3)
     assert told(journal)[-1] == (3, "navigation.ended", "CANCELED")
-    assert canceled.next(1000) is None
+    assert canceled.accept_next(1000) is None
     preempted, journal = task(stays, D)
-    preempted.next(1)
-    preempted.reached(2)
+    preempted.accept_next(1)
+    preempted.record_reached(2)
     preempted.preempt(3, C)
-    assert preempted.next(3) is C
-    preempted.reached(4)
-    assert preempted.next(4) is D
+    assert preempted.accept_next(3) is C
+    preempted.record_reached(4)
+    assert preempted.accept_next(4) is D
 
 
 @pytest.mark.parametrize(
@@ -137,8 +137,8 @@ def test_a_wait_ends_when_the_task_is_canceled_or_another_goal_comes():
 )
 def test_a_follower_that_stops_says_that_a_waypoint_was_missed(mode, stop, code):
     tour, journal = task(C, stop=stop, mode=mode)
-    tour.next(1)
-    tour.failed(2, ErrorCode.NO_VALID_PATH, "no way")
+    tour.accept_next(1)
+    tour.record_failed(2, ErrorCode.NO_VALID_PATH, "no way")
     assert journal[-2].data["error_name"] == "NO_VALID_PATH"  # of the goal itself
     assert journal[-1].data == {"error_code": int(code), "error_name": code.name}
 
@@ -172,4 +172,4 @@ def test_task_refuses_a_mutable_list_of_goals():
         Task(True, [])
     begun = Task(True)
     begun.start((Goal("a", Pose2(1, 0)),))
-    assert [event.kind for event in begun.next(0)] == ["goal.accepted"]
+    assert [event.kind for event in begun.accept_next(0)] == ["goal.accepted"]

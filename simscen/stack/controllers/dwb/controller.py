@@ -14,13 +14,14 @@ from simscen.stack.controllers.dwb.critics import (
 )
 from simscen.stack.controllers.dwb.trajectory_generator import generate_trajectories, kinematics_of, velocity_window
 from simscen.stack.controllers.path_follower import GoalRotation, PathFollower
-from simscen.stack.controllers.path_handler import local_plan
+from simscen.stack.controllers.path_handler import upcoming_path
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
-PLAN_REACH_RATIO, PLAN_MARGIN_M = 1.2, 0.5
-"""Length of the local plan relative to the distance that the robot drives in `sim_time`, and its margin in m. A shorter
-plan would slow the robot down, and a longer one would lead it straight into a wall after a bend."""
+PLAN_LENGTH_RATIO, PLAN_MARGIN_M = 1.2, 0.5
+"""Length of the part of the plan that the critics see: relative to the distance that the robot drives in `sim_time`,
+and a length in m that is added. A shorter part would slow the robot down, and a longer one would lead it straight into
+a wall after a bend."""
 
 
 class DynamicWindowController(PathFollower):
@@ -72,8 +73,8 @@ class DynamicWindowController(PathFollower):
         )
         ends = trajectories.ends
         driven = (abs(twist.vx) + abs(twist.vy)) * spec.sim_time
-        plan_length = max(spec.prune_distance, PLAN_REACH_RATIO * driven + PLAN_MARGIN_M)
-        plan = local_plan(tracker, plan_length, costmap.resolution).points[:, :2]
+        plan_length = max(spec.prune_distance, PLAN_LENGTH_RATIO * driven + PLAN_MARGIN_M)
+        plan = upcoming_path(tracker, plan_length, costmap.resolution).points[:, :2]
         scores = score_trajectories(spec, costmap, pose, goal.pose, plan, velocities, ends)
         legal, total = self._oscillation.legal(velocities), scores.total
         if is_reached and spec.rotate_to_goal_scale > 0.0:

@@ -29,7 +29,7 @@ from simscen.stack.controllers.mppi.rollouts import (
     predict_velocities,
 )
 from simscen.stack.controllers.path_follower import GoalRotation, PathFollower
-from simscen.stack.controllers.path_handler import LocalPlan, local_plan
+from simscen.stack.controllers.path_handler import UpcomingPath, upcoming_path
 from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
@@ -118,7 +118,7 @@ def shift_sequence(sequence: Floats, steps: float) -> Floats:
 
 
 PLAN_MARGIN_M = 1.0
-"""Margin of the local plan beyond the reach of the rollouts, which PathFollowCritic and PathAngleCritic need."""
+"""Length in m of the path beyond the reach of the rollouts, which PathFollowCritic and PathAngleCritic need."""
 SPEED_STD_RATIO = 0.5
 """Default standard deviation of the sampled speeds relative to the maximum speed. With Nav2's fixed 0.2 m/s, the robot
 settles at about 0.5 m/s regardless of its maximum speed."""
@@ -185,13 +185,13 @@ class MppiController(PathFollower):
             self._reset()
             command = self._goal_rotation.turn_to_goal(pose, goal, twist)
         else:
-            plan = local_plan(tracker, self._plan_length)
+            plan = upcoming_path(tracker, self._plan_length)
             command = self._optimize(twist, lambda rollouts: self._critic_data(rollouts, plan, costmap, goal))
         required = self._spec.command_free_time
         free_time = self._collision_checker.free_time(costmap, pose, command, required)
         return self._collision_checker.slowed(command, free_time, required, required)
 
-    def _critic_data(self, rollouts: Rollouts, plan: LocalPlan, costmap: CostmapView, goal: Goal) -> CriticData:
+    def _critic_data(self, rollouts: Rollouts, plan: UpcomingPath, costmap: CostmapView, goal: Goal) -> CriticData:
         return CriticData(
             rollouts, plan, self._pose, goal.pose.yaw, costmap, self._footprint, self._limits, self._spec.model_dt,
             goal.xy_tolerance,

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.controllers.mppi.rollouts import Rollouts
-from simscen.stack.controllers.path_handler import LocalPlan
+from simscen.stack.controllers.path_handler import UpcomingPath
 from simscen.stack.footprint import CoveringDiscs, Footprint
 from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.moving_obstacles import MAX_UNCERTAINTY_M, MovingObstacles
@@ -47,7 +47,7 @@ class CriticData:
     """
 
     rollouts: Rollouts
-    plan: LocalPlan
+    plan: UpcomingPath
     pose: Pose2
     goal_yaw: float
     costmap: CostmapView

@@ -115,7 +115,7 @@ class VfhPlusStack:
         return Belief(self._pose, np.diag(np.square(spread)), self._map_from_odom or self._start, updated=tick)
 
     def _control(self, tick: int) -> Twist:
-        self._events += self._task.next(tick)
+        self._events += self._task.accept_next(tick)
         goal = self._task.goal
         if goal is None:
             self._begin(None)
@@ -139,12 +139,12 @@ class VfhPlusStack:
         off = wrap(goal.pose.yaw - self._pose.yaw)
         if abs(off) > 0.4 * goal.yaw_tolerance:
             return Twist(0.0, 0.0, math.copysign(min(max(1.5 * abs(off), 0.2), 1.0, self._robot.max_angular), off))
-        self._events += self._task.reached(tick)
+        self._events += self._task.record_reached(tick)
         self._begin(None)
         return STOP
 
     def _fail(self, tick: int, code: ErrorCode, why: str) -> Twist:
-        self._events += self._task.failed(tick, code, why)
+        self._events += self._task.record_failed(tick, code, why)
         self._begin(None)
         return STOP
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.covariance_estimator import WINDOW, CovarianceEstimator
+from simscen.advanced.localizers.covariance_estimator import WINDOW_SIZE, CovarianceEstimator
 from simscen.advanced.localizers.map_trust import ScanResiduals
 from simscen.core.geometry import Array, Pose2
 
@@ -22,7 +22,7 @@ def drive(seed: int, lasting: float, error: Array, particles: Array, misfit: Sca
     """NEES of particles alone and of what is told, at the end and 9 m before; `lasting`: the correlation of one error
     (ahead, aside, in heading) with the next."""
     nees = []
-    for wrong, covariance in list(corrections(seed, lasting, error, particles, misfit))[WINDOW - 1 :: WINDOW]:
+    for wrong, covariance in list(corrections(seed, lasting, error, particles, misfit))[WINDOW_SIZE - 1 :: WINDOW_SIZE]:
         nees += [float(wrong @ np.linalg.solve(one, wrong)) for one in (particles, covariance)]
     return nees
 
@@ -34,7 +34,7 @@ def corrections(
     rng, scatter = np.random.default_rng(seed), CovarianceEstimator()
     truth, off = Pose2(3.0, -2.0, 1.0), error * rng.standard_normal(3)
     start = truth
-    for _ in range(2 * WINDOW):
+    for _ in range(2 * WINDOW_SIZE):
         truth = truth.compose(STEP)
         off = lasting * off + np.sqrt(1 - lasting**2) * error * rng.standard_normal(3)
         c, s = np.cos(truth.yaw), np.sin(truth.yaw)
@@ -66,8 +66,8 @@ def test_common_errors_of_all_poses_are_detected_by_beam_residuals() -> None:
             Pose2(0.0, 0.0, 0.0),
             TOO_SURE,
         )
-        for k in range(2 * WINDOW):
-            base, learning = base.compose(Pose2(0.25, 0.0, 0.0)), k < WINDOW
+        for k in range(2 * WINDOW_SIZE):
+            base, learning = base.compose(Pose2(0.25, 0.0, 0.0)), k < WINDOW_SIZE
             x = base.x + (0.05 * float(rng.standard_normal()) if learning else 0.1)
             scatter.drive(base, MATCHED)
             covariance = scatter.estimate(Pose2(x, 0.0, 0.0), TOO_SURE, AS_MAPPED if learning else misfit)
@@ -98,7 +98,7 @@ def test_drift_of_matched_scans_is_not_a_pose_error() -> None:
             Pose2(0.0, 0.0, 0.0),
             TOO_SURE,
         )
-        for k in range(2 * WINDOW):
+        for k in range(2 * WINDOW_SIZE):
             base = base.compose(Pose2(0.25 + 0.05 * float(rng.standard_normal()), 0.0, 0.0))
             scatter.drive(base, doubt)
             covariance = scatter.estimate(Pose2(0.25 * k, 0.0, 0.0), TOO_SURE, AS_MAPPED)

@@ -1,6 +1,6 @@
 """Tests of the life cycle of tracks."""
 
-from simscen.advanced.prediction.tracks import MAX_NOT_APPEARED, Track, TrackLifecycle
+from simscen.advanced.prediction.tracks import MAX_UPDATES_OUTSIDE_FREE_SPACE, Track, TrackLifecycle
 from simscen.model.guards import Prediction
 from simscen.testing.flatland import RATE
 
@@ -21,12 +21,15 @@ def ended(*tracks: Track) -> list[bool]:
 
 
 def test_track_that_is_no_longer_in_free_space_ends() -> None:
-    slides, comes = [True] + [False] * MAX_NOT_APPEARED, [True] * 4 + [False] * (MAX_NOT_APPEARED - 1) + [True]
+    slides, comes = (
+        [True] + [False] * MAX_UPDATES_OUTSIDE_FREE_SPACE,
+        [True] * 4 + [False] * (MAX_UPDATES_OUTSIDE_FREE_SPACE - 1) + [True],
+    )
     assert ended(track(*slides)) == [True]
     assert ended(track(*comes)) == [False]
 
 
 def test_track_next_to_a_moving_obstacle_continues() -> None:
-    beside = track(*[True] * (MAX_NOT_APPEARED + 1))
+    beside = track(*[True] * (MAX_UPDATES_OUTSIDE_FREE_SPACE + 1))
     beside.is_moving = True
-    assert ended(track(True, *[False] * MAX_NOT_APPEARED), beside) == [False, False]
+    assert ended(track(True, *[False] * MAX_UPDATES_OUTSIDE_FREE_SPACE), beside) == [False, False]

@@ -7,7 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from simscen.advanced.prediction.clusters import CONVERGED_STEP_M, clusters, fit_circle, runs, valid_hits
+from simscen.advanced.prediction.clusters import (
+    CONVERGED_STEP_M,
+    divide_into_runs,
+    find_clusters,
+    find_valid_hits,
+    fit_circle,
+)
 from simscen.advanced.prediction.tracker import Tracker
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
@@ -240,8 +246,8 @@ def test_no_motion_of_posts_is_reported_when_the_robot_skids() -> None:
 
 def test_last_segment_of_a_scan_has_the_range_of_its_last_hit() -> None:
     ranges, step = np.array([50.0] * 10 + [2.0, 1.95, 1.9]), 0.01
-    found = runs(valid_hits(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0))
-    (piece,) = clusters(found, ranges, 0.0, step, 1.0)
+    found = divide_into_runs(find_valid_hits(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0))
+    (piece,) = find_clusters(found, ranges, 0.0, step, 1.0)
     sine = math.sin(1.5 * step)
     assert piece.radius == pytest.approx(1.9 * sine / (1.0 - sine))
     assert abs(piece.center) == pytest.approx(1.9 + piece.radius)
@@ -252,10 +258,10 @@ def test_quick_check_never_separates_hits_of_one_segment() -> None:
     for _ in range(400):
         ranges = np.repeat(rng.uniform(1.0, 6.0, 18), 4) + rng.normal(0.0, 0.04, 72)
         ranges[rng.random(72) < 0.1] = np.inf
-        hits = valid_hits(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
+        hits = find_valid_hits(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
         which = rng.random(len(hits.beams)) < 0.15
-        told.append((runs(hits).share_run(which, 3), hits.may_share_run(which.nonzero()[0].tolist(), 3)))
-        first, last = runs(hits).first, runs(hits).last
+        told.append((divide_into_runs(hits).share_run(which, 3), hits.may_share_run(which.nonzero()[0].tolist(), 3)))
+        first, last = divide_into_runs(hits).first, divide_into_runs(hits).last
         assert told[-1][0] == any(which[one : other + 1].sum() >= 3 for one, other in zip(first, last, strict=True))
     assert (True, False) not in told
     assert min(told.count((True, True)), told.count((False, False))) > 50

@@ -26,7 +26,7 @@ def test_decided_verdict_holds_for_every_continuation(formula, p, data):
     more = horizon(formula) + 1
     longer = [values + data.draw(st.lists(NUMBERS, min_size=more, max_size=more)) for values in (p, q)]
     short, whole = (
-        robustness(validated(formula), EvaluationContext(run(*pq), CASE, over=True)) for pq in ((p, q), longer)
+        robustness(validated(formula), EvaluationContext(run(*pq), CASE, run_ended=True)) for pq in ((p, q), longer)
     )
     assert short.low[0] <= whole.low[0] == whole.high[0] <= short.high[0]
 
@@ -78,14 +78,16 @@ def test_a_run_that_begins_later_is_judged_alike(formula, p, later):
             for name in ("truth", "velocity", "clearance")
         },
     )
-    one, other = (robustness(validated(formula), EvaluationContext(some, CASE, over=True)) for some in (trace, moved))
+    one, other = (
+        robustness(validated(formula), EvaluationContext(some, CASE, run_ended=True)) for some in (trace, moved)
+    )
     assert one.low.tolist() == other.low.tolist()
     assert one.high.tolist() == other.high.tolist()
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3])
 def test_a_run_may_be_of_few_samples(samples):
-    scene = EvaluationContext(run([1.0] * samples, [0.0] * samples), CASE, over=True)
+    scene = EvaluationContext(run([1.0] * samples, [0.0] * samples), CASE, run_ended=True)
     assert len(robustness(validated({"signal": "clearance", "op": ">", "value": 0}), scene).low) == samples
 
 
@@ -93,7 +95,7 @@ def test_a_run_may_be_of_few_samples(samples):
 def test_uneven_samples_are_judged_at_their_own_times(late):
     trace = run([1.0, 1.0, -1.0, 1.0, 1.0], [0.0] * 5)
     trace = replace(trace, truth=Samples(trace.truth.ticks + np.array(late), trace.truth.values))
-    context = EvaluationContext(trace, CASE, over=True)
+    context = EvaluationContext(trace, CASE, run_ended=True)
     formula = {"always": {"signal": "yaw_rate", "op": "<=", "value": 1, "within": 2.0}}
     found = robustness(validated(formula), context)
     assert found.low.tolist()[:2] == [1.0, 1.0]
@@ -101,22 +103,22 @@ def test_uneven_samples_are_judged_at_their_own_times(late):
 
 
 def test_a_window_without_a_sample_is_refused():
-    scene = EvaluationContext(run([1.0] * 5, [0.0] * 5), CASE, over=True)
+    scene = EvaluationContext(run([1.0] * 5, [0.0] * 5), CASE, run_ended=True)
     with pytest.raises(InvalidTrace, match=r"the window up to 1.9 s ahead contains no sample: samples are 1 s apart"):
-        scene.window(Window(between=[1.1, 1.9]))
-    window = scene.window(Window(between=[1.1, 2.0]))
+        scene.sample_windows(Window(between=[1.1, 1.9]))
+    window = scene.sample_windows(Window(between=[1.1, 2.0]))
     assert (window.first[0], window.last[0]) == (2, 2)
 
 
 def test_of_a_single_sample_the_next_one_may_be_a_tick_away():
-    window = EvaluationContext(run([1.0], [0.0]), CASE, over=True).window(Window(within=1 / 240))
-    assert (window.first.tolist(), window.last.tolist(), window.exceeds.tolist()) == ([0], [0], [True])
+    window = EvaluationContext(run([1.0], [0.0]), CASE, run_ended=True).sample_windows(Window(within=1 / 240))
+    assert (window.first.tolist(), window.last.tolist(), window.past_end.tolist()) == ([0], [0], [True])
 
 
 def test_an_answer_below_other_conditions_is_due_from_the_first_sample_on():
     premise, answer = ({"signal": name, "op": ">=", "value": 0.5} for name in ("clearance", "yaw_rate"))
     formula = validated({"all": [{"whenever": premise, "then": answer}]})
-    scene = EvaluationContext(run([1.0, 0.0, 0.0], [-1.0, 1.0, 1.0]), CASE, over=True)
+    scene = EvaluationContext(run([1.0, 0.0, 0.0], [-1.0, 1.0, 1.0]), CASE, run_ended=True)
     assert robustness(formula, scene).low.tolist() == [-0.5, 0.5, 0.5]
 
 
@@ -125,7 +127,7 @@ def test_a_premise_may_have_held_by_little_when_the_run_ends(clearance: float, m
     later = {"eventually": {"signal": "yaw_rate", "op": ">", "value": 5, "within": 9}}
     premise = {"all": [{"signal": "clearance", "op": ">", "value": 0.5}, later]}
     formula = validated({"whenever": premise, "then": {"signal": "yaw_rate", "op": "<", "value": 9}})
-    found = robustness(formula, EvaluationContext(run([clearance] * 3, [0.0] * 3), CASE, over=True))
+    found = robustness(formula, EvaluationContext(run([clearance] * 3, [0.0] * 3), CASE, run_ended=True))
     assert isinstance(found, ResponseRobustness)
     assert not found.tested
     assert found.may_have_held is may_have_held
@@ -137,7 +139,7 @@ def test_a_signal_that_is_no_number_is_named_with_its_first_moment():
     with pytest.raises(InvalidTrace, match=r"plan_deviation is not a number at t = 2.00 s"):
         robustness(
             validated({"signal": "plan_deviation", "op": "<", "value": 1.0}),
-            EvaluationContext(trace, CASE, over=True),
+            EvaluationContext(trace, CASE, run_ended=True),
         )
 
 
@@ -151,7 +153,7 @@ def test_the_witness_of_until_has_its_value_at_each_sample(values, window, ended
     """Where the sign is known, the comparison that decides is as far from its bound as the value of `until` says."""
     p, q = ([float(value) for value in side] for side in zip(*values, strict=True))
     words = {"until": {"hold": HOLD, "release": RELEASE, "between": list(window)}}
-    result = robustness(validated(words), EvaluationContext(run(p, q, ended), CASE, over=ended))
+    result = robustness(validated(words), EvaluationContext(run(p, q, ended), CASE, run_ended=ended))
     for sample in range(len(p)):
         for bound in ("low", "high"):
             value = result.bound(bound)[sample]
@@ -168,5 +170,5 @@ def test_the_witness_of_until_has_its_value_at_each_sample(values, window, ended
 def test_a_response_in_a_window_beyond_the_run_is_undecided():
     premise, answer = ({"signal": name, "op": ">=", "value": 0.5} for name in ("clearance", "yaw_rate"))
     formula = validated({"eventually": {"all": [{"whenever": premise, "then": answer}], "between": [10.0, 11.0]}})
-    found = robustness(formula, EvaluationContext(run([1.0] * 3, [1.0] * 3), CASE, over=True))
+    found = robustness(formula, EvaluationContext(run([1.0] * 3, [1.0] * 3), CASE, run_ended=True))
     assert found.low[0] < 0 < found.high[0]

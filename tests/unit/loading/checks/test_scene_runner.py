@@ -1,5 +1,6 @@
 """Tests of semantic checks for scenarios with expected failures."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -88,3 +89,24 @@ def test_message_names_the_error_code_that_can_be_expected(tmp_path, x, code):
     file.write_text(text.format(criteria="{goals_reached: {}}", start=1, events=""))
     (problem,) = check_in_world(load_scenario(file, tmp_path))
     assert f"error_code: {code}}}" in (problem.hint or "")
+
+
+def test_hint_for_a_goal_in_an_obstacle_makes_the_scenario_valid(tmp_path):
+    file = tmp_path / "a.scenario.yaml"
+    text = SCENARIO.format(criteria="goals_reached: {}", start=1, events="on_goal_failure: continue")
+    file.write_text(text)
+    (problem,) = check_in_world(load_scenario(file, tmp_path))
+    (key,) = re.findall(r"`(expect: .*)`", problem.hint)
+    file.write_text(text.replace("x: 4, y: 4}}\n", f"x: 4, y: 4}}, {key}}}\n"))
+    assert check_in_world(load_scenario(file, tmp_path)) == []
+
+
+def test_hint_for_a_new_goal_in_an_obstacle_makes_the_scenario_valid(tmp_path):
+    file = tmp_path / "a.scenario.yaml"
+    event = "events: [{when: {time: 1}, do: {new_goal: {name: detour, pose: {x: 5, y: 4}}}}]"
+    text = SCENARIO.format(criteria="goals_reached: {}", start=1, events=event)
+    file.write_text(text.replace("  - {name: crate, pose: {x: 4, y: 4}}\n", ""))
+    (problem,) = check_in_world(load_scenario(file, tmp_path))
+    (criterion,) = re.findall(r"`(result: .*)`", problem.hint)
+    file.write_text(file.read_text().replace("goals_reached: {}", criterion))
+    assert check_in_world(load_scenario(file, tmp_path)) == []

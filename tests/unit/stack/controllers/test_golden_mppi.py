@@ -14,7 +14,7 @@ from simscen.stack.controllers.mppi.controller import apply_limits, sample_weigh
 from simscen.stack.controllers.mppi.critic_data import CriticData
 from simscen.stack.controllers.mppi.critics import CriticManager
 from simscen.stack.controllers.mppi.rollouts import integrate_velocities, predict_velocities
-from simscen.stack.controllers.path_handler import LocalPlan
+from simscen.stack.controllers.path_handler import UpcomingPath
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.protocols import CostmapView
@@ -41,7 +41,7 @@ def scene(given: dict[str, Any], sampled: np.ndarray, limits: VelocityLimits) ->
     view = CostmapView(costs, free, 0.05, (-4.0, -4.0))
     angle, along = given["yaw"] + given["bend"], 0.05 * np.arange(given["points"])
     points = np.column_stack((along * math.cos(angle), along * math.sin(angle), np.full_like(along, angle)))
-    plan = LocalPlan(points, 0.05, float(along[-1]))
+    plan = UpcomingPath(points, 0.05, float(along[-1]))
     footprint = Footprint(round_robot(), 0.05)
     return CriticData(rolled, plan, Pose2(0.0, 0.0, given["yaw"]), given["goal"], view, footprint, limits, DT, 0.25)
 

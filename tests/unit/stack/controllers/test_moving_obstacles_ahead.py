@@ -18,7 +18,7 @@ from simscen.stack.controllers.mppi import critics
 from simscen.stack.controllers.mppi.controller import MppiController
 from simscen.stack.controllers.mppi.critic_data import COLLISION_DECAY_S, MOVING_CLEARANCE_M, CriticData
 from simscen.stack.controllers.mppi.rollouts import Rollouts
-from simscen.stack.controllers.path_handler import LocalPlan
+from simscen.stack.controllers.path_handler import UpcomingPath
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit as Rpp
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import VelocityLimits
@@ -102,7 +102,7 @@ def test_mppi_scores_the_pose_of_each_step_against_the_places_of_that_step() -> 
     x = np.column_stack((0.0 * times, 0.5 * times))
     none = np.zeros_like(x)
     limits = VelocityLimits((0.0,) * 3, (1.0,) * 3, (9.0,) * 3, (-9.0,) * 3, 0.0)
-    plan = LocalPlan(np.column_stack((HERE.x + 0.5 * times, none)).astype(np.float64), 0.05, 0.5)
+    plan = UpcomingPath(np.column_stack((HERE.x + 0.5 * times, none)).astype(np.float64), 0.05, 0.5)
     rolled = Rollouts(x, none, none, np.stack((np.diff(x, axis=0, prepend=0) / 0.1, none)))
     for disc in (GONE, COMES):
         seen = CriticData(rolled, plan, HERE, 0.0, among(disc), Footprint(ROBOT, 0.05), limits, 0.1, 0.25)

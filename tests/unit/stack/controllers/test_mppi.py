@@ -21,7 +21,7 @@ from simscen.stack.controllers.mppi.rollouts import (
     integrate_velocities,
     predict_velocities,
 )
-from simscen.stack.controllers.path_handler import LocalPlan
+from simscen.stack.controllers.path_handler import UpcomingPath
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import VelocityLimits, poses_along
@@ -136,7 +136,7 @@ def test_a_sequence_moves_on_by_parts_of_a_step() -> None:
 def scene(velocities: np.ndarray, view: CostmapView | None = None, length: float = 3.0, **more: Any) -> CriticData:
     """Rollouts (axes, steps, n) at 0.1 s from the origin, and a plan along x with points 5 cm apart."""
     robot = round_robot()
-    plan = LocalPlan(straight(length), 0.05, length)
+    plan = UpcomingPath(straight(length), 0.05, length)
     rolled = integrate_velocities(velocities.astype(np.float32), 0.0, 0.1)
     told = {"pose": Pose2(0.0, 0.0), "goal_yaw": 0.0, "limits": LIMITS, "dt": 0.1, "tolerance": 0.25, **more}
     return CriticData(rolled, plan, costmap=view or view_of(), footprint=Footprint(robot, 0.05), **told)
