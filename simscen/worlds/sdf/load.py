@@ -11,25 +11,19 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import Body, Solid
 from simscen.worlds.geometry.prisms import mesh_bounds_2d
-from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.map_size import Bounds, map_size_error
 from simscen.worlds.sdf.actors import read_actor
 from simscen.worlds.sdf.bodies import read_link, split_model, with_unique_names
 from simscen.worlds.sdf.elements import Element
 from simscen.worlds.sdf.files import IncludedFiles, WorldFiles
+from simscen.worlds.sdf.floors import floor_height
 from simscen.worlds.sdf.link_poses import ModelState, WorldState, place_links, read_state
 from simscen.worlds.sdf.model_tree import ModelNode, TreeReader
 from simscen.worlds.sdf.report import ImportReport, UnusableElement
-from simscen.worlds.sdf.shapes import MIN_LEVEL_NORMAL_Z, ShapeReader
+from simscen.worlds.sdf.shapes import ShapeReader
 
 MAX_OUTLIER_SHARE = 0.05
 """Fraction of the models (rounded down, plus one) that may be outliers; with more, the world is regarded as large."""
-MAX_FLOOR_HEIGHT_M = 0.3
-"""Height up to which a level face can be the floor instead of a platform."""
-MIN_FLOOR_HEIGHT_M = 0.001
-"""Height up to which a floor is treated as lying at z = 0."""
-MIN_FLOOR_SHARE = 0.8
-"""Fraction of the world's extent that a floor must cover."""
 
 Placed = TypeVar("Placed", Solid, Body)
 
@@ -118,7 +112,8 @@ class _WorldImporter:
             self._report_empty_world(element)
         name = element.name or Path(element.source.name).stem
         solids, bodies, bounds = self._without_outliers(with_unique_names(self._bodies, self._report, element))
-        height = floor_height(solids, bounds)
+        placed = [*solids, *(replace(s, pose=body.pose.compose(s.pose)) for body in bodies for s in body.solids)]
+        height = floor_height(placed, bounds, self._shapes.has_ground)
         if height:
             self._report.note(
                 element.place, f"its floor is {height:.3f} m above z = 0; the world is lowered by that height"
@@ -197,24 +192,3 @@ def outliers(extents: Mapping[str, Array]) -> dict[str, float]:
         if map_size_error((left, bottom, right, top)) is None:
             return {names[k]: float(distance[k]) for k in farthest_first[:count]}
     return {}
-
-
-def floor_height(solids: Sequence[Solid], bounds: Bounds) -> float:
-    """Return the height in meters of the floor on which everything in `bounds` stands; 0 if it is the ground plane.
-
-    A world may model its floor as geometry. For example, the floor of AWS's small_warehouse is a plate whose top is
-    2.7 cm above Gazebo's ground plane.
-    """
-    mesh = merge_solids(solids)
-    corners: Array = mesh.vertices[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    areas = np.linalg.norm(normals, axis=1)
-    top = corners[:, :, 2].max(axis=1)
-    is_level = normals[:, 2] >= MIN_LEVEL_NORMAL_Z * areas
-    is_candidate = is_level & (top > MIN_FLOOR_HEIGHT_M) & (top <= MAX_FLOOR_HEIGHT_M)
-    heights_mm = np.round(top[is_candidate] * 1000).astype(np.int64)
-    min_area = MIN_FLOOR_SHARE * (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
-    floors = [h for h in np.unique(heights_mm) if areas[is_candidate][heights_mm == h].sum() >= min_area]
-    if not floors:
-        return 0.0
-    return float(top[is_candidate][heights_mm == floors[-1]].max())

@@ -3,10 +3,13 @@
 import pytest
 
 
-def slab(x, y, z, name="floor", height=0.1):
+def slab(x, y, z, name="floor", height=0.1, at="0 0"):
     size = f"<size>{x} {y} {height}</size>"
     link = f"<link name='a'><collision name='c'><geometry><box>{size}</box></geometry></collision></link>"
-    return f"<model name='{name}'><static>1</static><pose>0 0 {z} 0 0 0</pose>{link}</model>"
+    return f"<model name='{name}'><static>1</static><pose>{at} {z} 0 0 0</pose>{link}</model>"
+
+
+GROUND = "<include><uri>model://ground_plane</uri></include>"
 
 
 CRATE = (
@@ -25,6 +28,22 @@ def test_everything_is_lowered_by_the_height_of_the_floor_and_a_note_says_so(loa
 
 
 @pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(GROUND + slab(10, 8, 0) + CRATE, id="a covering on a ground plane"),
+        pytest.param(GROUND + slab(10, 8, 0) + slab(0.2, 8, 1, height=2, at="5.5 0"), id="a wall beside a covering"),
+        pytest.param(slab(20, 20, 0), id="a wide plate"),
+        pytest.param(slab(2, 2, 0) + slab(0.1, 2, 0.5, height=0.9), id="a plate that carries a wall"),
+        pytest.param(slab(5, 8, 0, at="-2.5 0") + slab(5, 8, 0, at="2.5 0") + CRATE, id="tiles"),
+    ],
+)
+def test_slab_that_everything_stands_on_is_the_floor(load, content):
+    world = load(content)
+    assert world.solids[0].pose.z == pytest.approx(-0.05)
+    assert len(world.notes) == 1
+
+
+@pytest.mark.parametrize(
     ("content", "places"),
     [
         pytest.param(slab(10, 8, -0.05), [-0.05], id="its top is the ground already"),
@@ -33,6 +52,29 @@ def test_everything_is_lowered_by_the_height_of_the_floor_and_a_note_says_so(loa
         ),
         pytest.param(slab(10, 8, 2), [2], id="a roof"),
         pytest.param(slab(10, 8, -0.4), [-0.4], id="below the ground"),
+        pytest.param(GROUND + slab(1, 4, 0.1, height=0.2), [0.1], id="a block on a ground plane"),
+        pytest.param(slab(1, 4, 0.1, height=0.2), [0.1], id="a block without a ground plane"),
+        pytest.param(GROUND + slab(2, 0.3, 0.025, height=0.05), [0.025], id="a curb on a ground plane"),
+        pytest.param(
+            GROUND + slab(10, 6, 0.125, height=0.25) + slab(0.2, 6, 0.1, height=0.2, at="-5.6 0"),
+            [0.125, 0.1],
+            id="a stage and a curb on a ground plane",
+        ),
+        pytest.param(
+            GROUND + slab(10, 6, 0.125, height=0.25) + slab(1, 1, 0.75, height=1),
+            [0.125, 0.75],
+            id="a stage with a crate on a ground plane",
+        ),
+        pytest.param(
+            GROUND + slab(8, 10, 0) + slab(10, 0.1, 0.5, height=1, at="1 5"),
+            [0, 0.5],
+            id="a thin slab next to ground on which robots can drive",
+        ),
+        pytest.param(
+            slab(6, 6, 0) + slab(6, 6, 0) + slab(0.1, 8, 1, height=2, at="8 0"),
+            [0, 0, 1],
+            id="two tiles in the same place",
+        ),
     ],
 )
 def test_world_without_a_floor_is_not_moved(load, content, places):
