@@ -7,7 +7,9 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import Solid, TriangleMesh
+from simscen.worlds.extent import top_height
 from simscen.worlds.geometry.cross_section import CrossSection
+from simscen.worlds.geometry.prisms import bounding_rectangle
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.map_size import Bounds
 from simscen.worlds.maps.rasterization import filled_cells
@@ -50,6 +52,12 @@ def floor_height(placed: Sequence[Solid], bounds: Bounds, has_ground: bool) -> f
         if _is_floor(mesh, faces, bounds, has_ground):
             return float(top[faces].max())
     return 0.0
+
+
+def could_be_floor(solid: Solid) -> bool:
+    """Return whether a solid is low and wide enough to be a floor."""
+    left, bottom, right, top = bounding_rectangle(solid)
+    return min(right - left, top - bottom) >= MIN_COVERING_WIDTH_M and top_height(solid) <= MAX_FLOOR_HEIGHT_M
 
 
 def _level_faces(mesh: TriangleMesh) -> Mask:

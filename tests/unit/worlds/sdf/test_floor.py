@@ -81,3 +81,29 @@ def test_world_without_a_floor_is_not_moved(load, content, places):
     world = load(content)
     assert [solid.pose.z for solid in world.solids] == places
     assert not world.notes
+
+
+def test_floor_too_large_for_a_map_is_not_part_of_the_bounds(load):
+    world = load(slab(199, 199, 0) + slab(0.2, 2, 0.55, "wall", 1, at="3 0"))
+    assert world.bounds == pytest.approx((2.9, -1, 3.1, 1))
+    assert world.has_open_ground
+    assert [solid.pose.z for solid in world.solids] == pytest.approx([-0.05, 0.5])
+
+
+def test_tiles_that_are_together_too_large_for_a_map_are_not_part_of_the_bounds(load):
+    tiles = [slab(100, 100, 0, f"tile{k}", at=f"{100 * (k % 3)} {100 * (k // 3)}") for k in range(9)]
+    world = load("".join(tiles) + slab(0.2, 2, 0.55, "wall", 1, at="3 0"))
+    assert world.bounds == pytest.approx((2.9, -1, 3.1, 1))
+    assert len(world.solids) == 10
+
+
+def test_floor_of_a_common_size_is_part_of_the_bounds(load):
+    world = load(slab(10, 8, 0) + slab(0.2, 2, 0.55, "wall", 1, at="3 0"))
+    assert world.bounds == pytest.approx((-5, -4, 5, 4))
+    assert not world.has_open_ground
+
+
+def test_building_that_is_too_large_for_a_map_is_not_left_out_as_far_away(load):
+    world = load(GROUND + slab(500, 500, 1, "hall", 2) + slab(1, 1, 0.5, "crate", 1, at="9 0"))
+    assert len(world.solids) == 2
+    assert not world.notes
