@@ -231,6 +231,8 @@ class TreeReader:
                 scope.canonical = scope.canonical or frame.name
             case "world", "actor":
                 owner.actors.append(self._read_actor(child))
+            case "model", "state":
+                self._report.note(child.place, "ignored: only the <state> of a world is applied")
             case "world", "population":
                 raise child.unusable("<population> is not supported", "place its models one by one")
             case _:
