@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from simscen.core.environment.world_model import World
+from simscen.core.geometry.meshes import FLOOR_HEIGHT_M
 from simscen.core.geometry.shapes import Body, Solid
 from simscen.worlds.geometry.prisms import bounding_rectangle, upright_prism
 from simscen.worlds.maps.map_size import Bounds, map_size_error
@@ -41,15 +42,16 @@ def top_height(solid: Solid) -> float:
 def oversize_hint(world: World) -> str:
     """Return what makes the map of a world too large, as a hint."""
     if name := _largest_model(world):
-        return f'the model "{name}" makes it large; move or remove it'
+        return f'"{name}" makes it large; move or remove it'
     return "move the start and the goals closer together"
 
 
 def _largest_model(world: World) -> str:
-    """Return the model without which the world has the smallest area; "" if its models fit on a map."""
+    """Return the model without which the world has the smallest area; "" if all models but floors fit on a map."""
     rectangles: dict[str, list[Bounds]] = {}
     for solid in placed_solids(world.solids, world.bodies):
-        rectangles.setdefault(model_name(solid), []).append(bounding_rectangle(solid))
+        if top_height(solid) > FLOOR_HEIGHT_M:
+            rectangles.setdefault(model_name(solid), []).append(bounding_rectangle(solid))
     extents = {name: union(parts) for name, parts in rectangles.items()}
     if map_size_error(union(extents.values())) is None:
         return ""
