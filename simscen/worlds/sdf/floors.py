@@ -35,18 +35,18 @@ SAMPLES = 64
 Mask = npt.NDArray[np.bool_]
 
 
-def floor_height(placed: Sequence[Solid], bounds: Bounds, has_ground: bool) -> float:
+def floor_height(placed: Sequence[Solid], static_count: int, bounds: Bounds, has_ground: bool) -> float:
     """Return the height in meters of the floor on which everything in `bounds` stands; 0 if it is at z = 0.
 
-    `placed` are the solids in the world frame, including those of movable bodies. A level slab is the floor if it
-    covers nearly all of `bounds`, and is either thin and wide, or carries other geometry in a world without a ground
-    plane. A block that stands on a ground plane is therefore never the floor. For example, the floor of AWS's
-    small_warehouse is a plate whose top is 3.4 cm above z = 0.
+    `placed` are the solids in the world frame: `static_count` static ones, then those of movable bodies. A static level
+    slab is the floor if it covers nearly all of `bounds`, and is either thin and wide, or carries other geometry in a
+    world without a ground plane. A block that stands on a ground plane is therefore never the floor. For example, the
+    floor of AWS's small_warehouse is a plate whose top is 3.4 cm above z = 0.
     """
     mesh = merge_solids(placed)
     top, is_level = mesh.vertices[mesh.faces, 2].max(axis=1), _level_faces(mesh)
     heights_mm = np.round(top * 1000).astype(np.int64)
-    is_candidate = is_level & (top > MIN_FLOOR_HEIGHT_M) & (top <= MAX_FLOOR_HEIGHT_M)
+    is_candidate = is_level & (top > MIN_FLOOR_HEIGHT_M) & (top <= MAX_FLOOR_HEIGHT_M) & (mesh.owners < static_count)
     for height_mm in np.unique(heights_mm[is_candidate])[::-1]:
         faces = is_candidate & (heights_mm == height_mm)
         if _is_floor(mesh, faces, bounds, has_ground):

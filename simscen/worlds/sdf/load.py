@@ -115,7 +115,7 @@ class _WorldImporter:
         solids, bodies = self._without_outliers(with_unique_names(self._bodies, self._report, element))
         placed = placed_solids(solids, bodies)
         bounds = union(map(bounding_rectangle, placed))
-        height = floor_height(placed, bounds, self._shapes.has_ground)
+        height = floor_height(placed, len(solids), bounds, self._shapes.has_ground)
         if height:
             self._report.note(
                 element.place, f"its floor is {height:.3f} m above z = 0; the world is lowered by that height"

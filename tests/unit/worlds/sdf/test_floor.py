@@ -51,6 +51,7 @@ def test_slab_that_everything_stands_on_is_the_floor(load, content):
             slab(4, 4, 0) + slab(0.2, 8, 1, height=2) + slab(10, 0.2, 1, height=2), [0, 1, 1], id="a platform"
         ),
         pytest.param(slab(10, 8, 2), [2], id="a roof"),
+        pytest.param(slab(10, 8, 0).replace("<static>1</static>", "") + slab(1, 1, 0.5), [0.5], id="a movable plate"),
         pytest.param(slab(10, 8, -0.4), [-0.4], id="below the ground"),
         pytest.param(GROUND + slab(1, 4, 0.1, height=0.2), [0.1], id="a block on a ground plane"),
         pytest.param(slab(1, 4, 0.1, height=0.2), [0.1], id="a block without a ground plane"),
