@@ -9,7 +9,7 @@ from pathlib import Path
 
 from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.environment.world_model import BuiltWorld
+from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.errors import Problem
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import TriangleMesh
@@ -28,6 +28,7 @@ from simscen.loading.builders import (
 from simscen.loading.files.single_files import LoadedCriteria
 from simscen.loading.goals import event_goals, expected_failures, scenario_goals
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.open_ground import with_stops
 from simscen.loading.plugins import plugins_of
 from simscen.loading.robot_size import blocking_solids, inscribed_radius
 from simscen.loading.scenario_text import disturbances_of
@@ -42,6 +43,7 @@ from simscen.spec.registry import Entry
 from simscen.triggers.robot_state import ClearanceBelow
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.maps.map_size import MAP_RESOLUTION_M, fitting_resolution
 from simscen.worlds.routes.shortest_paths import Leg, legs_between
 from simscen.worlds.world_file import world_from_spec
 
@@ -95,7 +97,14 @@ FindLegs = Callable[[BuiltWorld, Sequence[tuple[Pose2, Goal]], float], list[Leg]
 
 def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
     """Build the world of a scenario without a cache."""
-    return build_world_and_map(load_world(loaded), height)
+    world = with_stops(load_world(loaded), loaded)
+    return build_world_and_map(world, height, map_resolution(loaded, world))
+
+
+def map_resolution(loaded: LoadedScenario, world: World) -> float:
+    """Return the resolution in m of the world's map: coarser in a large world if no robot drives with this map."""
+    is_used = any(view.map is None for view in loaded.robot_views.values())
+    return MAP_RESOLUTION_M if is_used else fitting_resolution(world.bounds)
 
 
 def prepare(
@@ -107,9 +116,9 @@ def prepare(
     parts: dict[str, PreparedScenario] = {}
     built_by_height: dict[float, BuiltWorld] = {}
 
-    def build_once(view: LoadedScenario, height: float) -> BuiltWorld:
+    def build_once(_view: LoadedScenario, height: float) -> BuiltWorld:
         if height not in built_by_height:
-            built_by_height[height] = build(view, height)
+            built_by_height[height] = build(loaded, height)
         return built_by_height[height]
 
     for name, view in loaded.robots.items():

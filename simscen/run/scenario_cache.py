@@ -27,7 +27,8 @@ from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Goal
 from simscen.loading.builders import load_world
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.preparation import PreparedScenario, prepare
+from simscen.loading.open_ground import with_stops
+from simscen.run.preparation import PreparedScenario, map_resolution, prepare
 from simscen.run.reproducibility import arithmetic_fingerprints, software_versions, source_digest
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import merge_solids
@@ -165,17 +166,17 @@ class CachedWorldBuilder:
     def __init__(self, files: DiskCache) -> None:
         self._files = files
 
-    def build(self, world: World, lidar_height: float) -> BuiltWorld:
+    def build(self, world: World, lidar_height: float, resolution: float = MAP_RESOLUTION_M) -> BuiltWorld:
         """Return the world with its surface and the map at the height of the lidar in m."""
         if not self._files.is_enabled:
-            return build_world_and_map(world, lidar_height)
+            return build_world_and_map(world, lidar_height, resolution)
         mesh = merge_solids(world.solids)
         places = [tuple(pose) for pose in world.places.values()]
         grid = world.grid and (world.grid.cells, world.grid.resolution, world.grid.origin)
-        key = cache_key("map", _surface(mesh), world.bounds, places, grid, lidar_height, MAP_RESOLUTION_M)
+        key = cache_key("map", _surface(mesh), world.bounds, places, grid, lidar_height, resolution)
         cached = _map_from_bytes(self._files.get(key))
         if cached is None:
-            cached = draw_map(world, mesh, lidar_height)
+            cached = draw_map(world, mesh, lidar_height, resolution)
             self._files.put(key, _map_to_bytes(cached))
         return BuiltWorld(world, mesh, cached)
 
@@ -254,7 +255,8 @@ class ScenarioCache:
     def __init__(self, builder: CachedWorldBuilder) -> None:
         """`builder` uses the disk cache of earlier sessions."""
         self._builder = builder
-        self._worlds: dict[str, BuiltWorld] = {}
+        self._worlds: dict[str, World] = {}
+        self._built: dict[tuple[str, float, float], BuiltWorld] = {}
         self._scenarios: dict[tuple[str, str, str], PreparedScenario] = {}
 
     def prepared(self, loaded: LoadedScenario) -> PreparedScenario:
@@ -270,10 +272,17 @@ class ScenarioCache:
     def clear(self) -> None:
         """Remove all entries."""
         self._worlds.clear()
+        self._built.clear()
         self._scenarios.clear()
 
     def _world(self, loaded: LoadedScenario, height: float) -> BuiltWorld:
-        key = hashlib.sha256(pickle.dumps((replace(loaded.world, tree=None), height))).hexdigest()
-        if key not in self._worlds:
-            self._worlds[key] = self._builder.build(load_world(loaded), height)
-        return self._worlds[key]
+        digest = hashlib.sha256(pickle.dumps(replace(loaded.world, tree=None))).hexdigest()
+        if digest not in self._worlds:
+            self._worlds[digest] = load_world(loaded)
+        world = with_stops(self._worlds[digest], loaded)
+        key = digest, height, map_resolution(loaded, world)
+        if world is not self._worlds[digest]:  # the map belongs to the stops of this scenario
+            return self._builder.build(world, *key[1:])
+        if key not in self._built:
+            self._built[key] = self._builder.build(world, *key[1:])
+        return self._built[key]

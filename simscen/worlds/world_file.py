@@ -52,7 +52,7 @@ def world_from_spec(
         regions={**base.regions, **regions},
         friction=spec.friction,
         doors={door.name: _panel_poses(door) for door in spec.doors},
-        bounds=_bounds(solids, bodies, places.values(), grid),
+        bounds=_bounds(solids[len(base.solids) :], bodies[len(base.bodies) :], places.values(), grid, base.bounds),
         grid=grid or base.grid,
         notes=(*base.notes, *notes),
     )
@@ -105,12 +105,17 @@ def _door(door: Door) -> Body:
 
 
 def _bounds(
-    solids: Iterable[Solid], bodies: Iterable[Body], places: Iterable[Pose2], grid: OccupancyGrid | None
+    solids: Iterable[Solid],
+    bodies: Iterable[Body],
+    places: Iterable[Pose2],
+    grid: OccupancyGrid | None,
+    base: tuple[float, float, float, float],
 ) -> tuple[float, float, float, float]:
-    """Return (min x, min y, max x, max y) of everything in m; zeros for an empty world."""
+    """Return (min x, min y, max x, max y) of everything in m, with the bounds `base`; zeros for an empty world."""
     corners = [(place.x, place.y) for place in places]
     rectangles = [bounding_rectangle(solid) for solid in solids]
     rectangles += [bounding_rectangle(solid, body.pose) for body in bodies for solid in body.solids]
+    rectangles += [base] if any(base) else []
     corners += [corner for left, bottom, right, top in rectangles for corner in ((left, bottom), (right, top))]
     if grid is not None:
         corners += _grid_corners(grid)

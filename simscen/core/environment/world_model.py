@@ -23,8 +23,8 @@ class World:
 
     `doors` maps the name of a door, which is also the name of its body, to the poses of the body when closed and open.
     `friction` maps names of `regions` to the friction of their floor; it is 1 elsewhere. `bounds` is (min x, min y, max
-    x, max y) in m. `grid` is set if the world has its own occupancy map (a ROS map). `notes` are warnings of the
-    importer, each with file and element.
+    x, max y) in m. With `has_open_ground`, the level ground reaches beyond `bounds`. `grid` is set if the world has its
+    own occupancy map (a ROS map). `notes` are warnings of the importer, each with file and element.
     """
 
     name: str
@@ -35,6 +35,7 @@ class World:
     doors: Mapping[str, tuple[Pose2, Pose2]] = field(default_factory=dict)
     friction: Mapping[str, float] = field(default_factory=dict)
     bounds: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    has_open_ground: bool = False
     grid: OccupancyGrid | None = None
     notes: tuple[str, ...] = ()
 

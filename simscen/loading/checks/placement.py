@@ -28,10 +28,13 @@ from simscen.sim.body.outline import radius_and_height
 from simscen.spec.moving_objects import Motion
 from simscen.triggers.base import Trigger
 from simscen.triggers.timing import Time
+from simscen.worlds.extent import top_height
 from simscen.worlds.geometry.overlaps import first_solid_in_disc, place_polygon, polygons_overlap
 from simscen.worlds.geometry.prisms import upright_prism
 
 START_HINT = "move it to free space"
+MAX_PLATFORM_HEIGHT_M = 0.3
+"""Height up to which an obstacle in a Gazebo world may be meant as the floor."""
 TOLERANCE_SHARES = (-0.9, 0.0, 0.9)
 """Offsets that are tried around the exact pose of a goal, as fractions of its tolerances: just inside of them."""
 
@@ -99,7 +102,20 @@ def _pose_problem(
 ) -> Iterator[CheckFinding]:
     conflict = scene.area.outside(pose) or scene.footprint_conflict(pose, solids)
     if conflict:
+        if scene.loaded.world.sdf is not None:
+            hint = _hint_in_gazebo_world(scene, pose, solids, hint)
         yield CheckFinding(keys, f"{what} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
+
+
+def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], hint: str) -> str:
+    """Return the hint for a pose beside the world, or on a low slab that may be meant as the floor."""
+    if scene.area.outside(pose):
+        return f"{hint}; or drive with `map: none`"
+    position = pose.x, pose.y
+    solid = next((each for each in solids if first_solid_in_disc([each], position, TOUCH_M, scene.z_range)), None)
+    if solid is None or (top := top_height(solid)) > MAX_PLATFORM_HEIGHT_M:
+        return hint
+    return f"robots start at z = 0, below its top: if it is the floor, lower all models by {top:g} m; otherwise {hint}"
 
 
 @WORLD.check("SC304")

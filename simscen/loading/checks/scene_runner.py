@@ -16,8 +16,10 @@ from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.checks.scene import TIMING, WORLD, Scene
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
+from simscen.loading.open_ground import with_stops
 from simscen.loading.robot_size import blocking_world, robot_size
 from simscen.loading.world_cache import WorldCache
+from simscen.worlds.extent import oversize_hint
 from simscen.worlds.geometry.overlaps import place_polygon
 from simscen.worlds.maps.map_size import map_size_error
 
@@ -34,19 +36,19 @@ def check_in_world(
     to that folder. Raises InvalidInput for unusable files, and UsageError for a picture that cannot be written.
     """
     cache = cache or WorldCache()
+    world = with_stops(cache.world(loaded), loaded)
     if not loaded.robots:
-        return _check_robot(loaded, cache, pictures)
-    found = [problem for view in loaded.robots.values() for problem in _check_robot(view, cache, pictures)]
+        return _check_robot(loaded, world, cache, pictures)
+    found = [problem for view in loaded.robots.values() for problem in _check_robot(view, world, cache, pictures)]
     problems = list(dict.fromkeys(found))  # the robots share most problems
     if not _has_errors(problems):
-        world, views = cache.world(loaded), [_with_robot_spec(view) for view in loaded.robots.values()]
+        views = [_with_robot_spec(view) for view in loaded.robots.values()]
         problems += placement.check_robots_apart([Scene(view, world, robot_size(view), cache) for view in views])
     return problems
 
 
-def _check_robot(loaded: LoadedScenario, cache: WorldCache, pictures: Path | None) -> list[Problem]:
+def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictures: Path | None) -> list[Problem]:
     """Return the problems of a scenario of one robot, or as one of several robots sees it."""
-    world = cache.world(loaded)
     loaded = _with_robot_spec(loaded)
     blocking = blocking_world(loaded, world)
     problems = [*_check_names_again(loaded, world), *_oversized_map(loaded, world)]
@@ -111,9 +113,8 @@ def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
 
 
 def _oversized_map(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
-    message = map_size_error(world.bounds) if world.grid is None else None
-    if message:
-        yield loaded.problem(("world",), "SC330", message, "is something far away from everything else?")
+    if world.grid is None and loaded.map is None and (message := map_size_error(world.bounds)):
+        yield loaded.problem(("world",), "SC330", message, f"{oversize_hint(world)}, or drive with `map: none`")
 
 
 def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:

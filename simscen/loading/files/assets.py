@@ -26,6 +26,7 @@ Model = TypeVar("Model", bound=BaseModel)
 Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
 
 SDF_SUFFIXES = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
+XML_STARTS = ("<?xml", "<sdf", "<!--")
 URDF_SUFFIXES = (".urdf", ".xacro")
 ROBOT_SUFFIX = ".robot.yaml"
 
@@ -46,6 +47,12 @@ class Assets:
         """Load the world in a file: SDF by suffix, a ROS map by its keys, else a world file of simscen."""
         if path.name.endswith(SDF_SUFFIXES):
             return LoadedWorld(path.name.split(".")[0], path, sdf=path)
+        name = self.library.sandbox.display_name(path)
+        text = read_text(path, name)
+        if isinstance(text, str) and text.lstrip().startswith(XML_STARTS):
+            hint = "if it is SDF, rename it to .sdf or .world"
+            self.problems.append(Problem(name, 1, 1, "SC004", "this is an XML file, expected a world in YAML", hint))
+            return None
         tree = self._tree(path)
         if is_ros_map(tree):
             loaded = self._ros_map(tree, path)

@@ -36,3 +36,11 @@ def map_size_error(bounds: Bounds, resolution: float = MAP_RESOLUTION_M) -> str 
     if size.width * size.height <= MAX_MAP_CELLS:
         return None
     return f"map too large: {size.width} x {size.height} cells of {resolution:g} m, more than {MAX_MAP_CELLS} cells"
+
+
+def fitting_resolution(bounds: Bounds) -> float:
+    """Return the default resolution in meters, doubled until a map over `bounds` has at most MAX_MAP_CELLS cells."""
+    resolution = MAP_RESOLUTION_M
+    while map_size_error(bounds, resolution):
+        resolution *= 2
+    return resolution

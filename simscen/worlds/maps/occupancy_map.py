@@ -8,6 +8,7 @@ from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.shapes import Mesh, Solid, TriangleMesh
+from simscen.worlds.extent import oversize_hint
 from simscen.worlds.geometry.cross_section import CrossSection, cross_section
 from simscen.worlds.maps.map_size import MAP_RESOLUTION_M, Bounds, map_size, map_size_error
 from simscen.worlds.maps.rasterization import Cells, filled_cells, touched_cells
@@ -25,7 +26,10 @@ def draw_map(world: World, mesh: TriangleMesh, height: float, resolution: float 
         cells = world.grid.cells.copy()
         cells[occupied_cells(world.grid, section)] = OCCUPIED
         return OccupancyGrid(cells, world.grid.resolution, world.grid.origin)
-    grid = empty_grid(_map_bounds(world, section.segments), resolution, world.name)
+    bounds = _map_bounds(world, section.segments)
+    if message := map_size_error(bounds, resolution):
+        raise InvalidInput([Problem(world.name, 0, 0, "SC330", message, oversize_hint(world))])
+    grid = empty_grid(bounds, resolution, world.name)
     occupied = occupied_cells(grid, section)
     cells = np.where(occupied, np.int8(OCCUPIED), np.int8(FREE))
     cells[_cells_outside_building(occupied, _cells_of_places(world, grid))] = UNKNOWN

@@ -8,28 +8,23 @@ from typing import TypeVar
 import numpy as np
 
 from simscen.core.environment.world_model import World
-from simscen.core.geometry import Array
+from simscen.core.geometry.meshes import FLOOR_HEIGHT_M
 from simscen.core.geometry.shapes import Body, Solid
-from simscen.worlds.geometry.prisms import mesh_bounds_2d
-from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.extent import model_name, placed_solids, top_height, union
+from simscen.worlds.geometry.prisms import bounding_rectangle
 from simscen.worlds.maps.map_size import Bounds, map_size_error
 from simscen.worlds.sdf.actors import read_actor
 from simscen.worlds.sdf.bodies import read_link, split_model, with_unique_names
 from simscen.worlds.sdf.elements import Element
 from simscen.worlds.sdf.files import IncludedFiles, WorldFiles
+from simscen.worlds.sdf.floors import could_be_floor, floor_height
 from simscen.worlds.sdf.link_poses import ModelState, WorldState, place_links, read_state
 from simscen.worlds.sdf.model_tree import ModelNode, TreeReader
 from simscen.worlds.sdf.report import ImportReport, UnusableElement
-from simscen.worlds.sdf.shapes import MIN_LEVEL_NORMAL_Z, ShapeReader
+from simscen.worlds.sdf.shapes import ShapeReader
 
 MAX_OUTLIER_SHARE = 0.05
 """Fraction of the models (rounded down, plus one) that may be outliers; with more, the world is regarded as large."""
-MAX_FLOOR_HEIGHT_M = 0.3
-"""Height up to which a level face can be the floor instead of a platform."""
-MIN_FLOOR_HEIGHT_M = 0.001
-"""Height up to which a floor is treated as lying at z = 0."""
-MIN_FLOOR_SHARE = 0.8
-"""Fraction of the world's extent that a floor must cover."""
 
 Placed = TypeVar("Placed", Solid, Body)
 
@@ -117,30 +112,38 @@ class _WorldImporter:
         if not self._solids and not self._bodies and not self._report.has_problems:
             self._report_empty_world(element)
         name = element.name or Path(element.source.name).stem
-        solids, bodies, bounds = self._without_outliers(with_unique_names(self._bodies, self._report, element))
-        height = floor_height(solids, bounds)
+        solids, bodies = self._without_outliers(with_unique_names(self._bodies, self._report, element))
+        placed = placed_solids(solids, bodies)
+        bounds = union(map(bounding_rectangle, placed))
+        height = floor_height(placed, len(solids), bounds, self._shapes.has_ground)
         if height:
             self._report.note(
                 element.place, f"its floor is {height:.3f} m above z = 0; the world is lowered by that height"
             )
         solids, bodies = _lowered_by(solids, height), _lowered_by(bodies, height)
-        return World(name, solids, bodies, bounds=bounds, notes=self._report.notes)
+        # Beside a floor that is above the ground plane, the ground is too low for robots.
+        has_open_ground = self._shapes.has_ground and not height
+        if map_size_error(bounds):
+            raised = [solid for solid in placed if top_height(solid) > height + FLOOR_HEIGHT_M]
+            has_open_ground = has_open_ground or len(raised) < len(placed)
+            bounds = union(map(bounding_rectangle, raised))
+        return World(name, solids, bodies, bounds=bounds, has_open_ground=has_open_ground, notes=self._report.notes)
 
-    def _without_outliers(self, bodies: tuple[Body, ...]) -> tuple[tuple[Solid, ...], tuple[Body, ...], Bounds]:
-        """Return the solids and bodies without those far away from all others, and the bounds of the rest."""
-        extents: dict[str, list[Array]] = {}
+    def _without_outliers(self, bodies: tuple[Body, ...]) -> tuple[tuple[Solid, ...], tuple[Body, ...]]:
+        """Return the solids and bodies without those far away from all others; a slab like a floor is never far."""
+        extents: dict[str, list[Bounds]] = {}
         for solid in self._solids:
-            extents.setdefault(_model_name(solid), []).append(mesh_bounds_2d(solid))
+            if not could_be_floor(solid):
+                extents.setdefault(model_name(solid), []).append(bounding_rectangle(solid))
         for body in bodies:
-            extents.setdefault(body.name, []).extend(mesh_bounds_2d(solid, body.pose) for solid in body.solids)
-        far_models = outliers({name: np.array(_union(boxes)).reshape(2, 2) for name, boxes in extents.items()})
+            extents.setdefault(body.name, []).extend(bounding_rectangle(solid, body.pose) for solid in body.solids)
+        far_models = outliers({name: union(boxes) for name, boxes in extents.items()})
         for name, distance in far_models.items():
             message = f"left out: {name!r} is {distance:.0f} m away from the median of all models, too far for a map"
             self._report.note(self._root.element.place, message)
         return (
-            tuple(solid for solid in self._solids if _model_name(solid) not in far_models),
+            tuple(solid for solid in self._solids if model_name(solid) not in far_models),
             tuple(body for body in bodies if body.name not in far_models),
-            _union([box for name, boxes in extents.items() if name not in far_models for box in boxes]),
         )
 
     def _report_empty_world(self, element: Element) -> None:
@@ -160,29 +163,15 @@ class _WorldImporter:
         self._report.add_error(element.unusable(message, "load it with --lenient if the world should be empty"))
 
 
-def _model_name(solid: Solid) -> str:
-    """Return the name of the outermost model that a solid belongs to."""
-    return solid.name.partition("::")[0]
-
-
 def _lowered_by(placed: Sequence[Placed], height: float) -> tuple[Placed, ...]:
     return tuple(replace(each, pose=each.pose._replace(z=each.pose.z - height)) for each in placed)
 
 
-def _union(boxes: list[Array]) -> Bounds:
-    """Return the bounds of rectangles, each given by its corners (2, 2); zeros if there is none."""
-    if not boxes:
-        return 0.0, 0.0, 0.0, 0.0
-    low = np.min([corners[0] for corners in boxes], axis=0)
-    high = np.max([corners[1] for corners in boxes], axis=0)
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
-
-
-def outliers(extents: Mapping[str, Array]) -> dict[str, float]:
+def outliers(extents: Mapping[str, Bounds]) -> dict[str, float]:
     """Return the models to leave out so that the others fit on a map, with their distances from the median in meters.
 
-    `extents` are the corners (2, 2) of the rectangle around each model. The result is empty if all models fit, or if
-    more than MAX_OUTLIER_SHARE of them would have to be left out.
+    `extents` are the rectangles around the models. The result is empty if all models fit, if more
+    than MAX_OUTLIER_SHARE of them would have to be left out, or if one of them is large instead of far away.
     """
     names, corners = list(extents), np.array(list(extents.values())).reshape(-1, 2, 2)
     if not names:
@@ -195,26 +184,7 @@ def outliers(extents: Mapping[str, Array]) -> dict[str, float]:
         left, bottom = kept[:, 0].min(axis=0).tolist()
         right, top = kept[:, 1].max(axis=0).tolist()
         if map_size_error((left, bottom, right, top)) is None:
-            return {names[k]: float(distance[k]) for k in farthest_first[:count]}
+            left_out = corners[farthest_first[:count]]
+            overlaps = ((left_out[:, 1] > (left, bottom)) & (left_out[:, 0] < (right, top))).all(axis=1)
+            return {} if overlaps.any() else {names[k]: float(distance[k]) for k in farthest_first[:count]}
     return {}
-
-
-def floor_height(solids: Sequence[Solid], bounds: Bounds) -> float:
-    """Return the height in meters of the floor on which everything in `bounds` stands; 0 if it is the ground plane.
-
-    A world may model its floor as geometry. For example, the floor of AWS's small_warehouse is a plate whose top is
-    2.7 cm above Gazebo's ground plane.
-    """
-    mesh = merge_solids(solids)
-    corners: Array = mesh.vertices[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    areas = np.linalg.norm(normals, axis=1)
-    top = corners[:, :, 2].max(axis=1)
-    is_level = normals[:, 2] >= MIN_LEVEL_NORMAL_Z * areas
-    is_candidate = is_level & (top > MIN_FLOOR_HEIGHT_M) & (top <= MAX_FLOOR_HEIGHT_M)
-    heights_mm = np.round(top[is_candidate] * 1000).astype(np.int64)
-    min_area = MIN_FLOOR_SHARE * (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
-    floors = [h for h in np.unique(heights_mm) if areas[is_candidate][heights_mm == h].sum() >= min_area]
-    if not floors:
-        return 0.0
-    return float(top[is_candidate][heights_mm == floors[-1]].max())

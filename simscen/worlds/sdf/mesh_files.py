@@ -6,6 +6,7 @@ exchange functions without creating `Trimesh` objects, which would compute norma
 
 import io
 import logging
+import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ MAX_FACES = 1_000_000
 MAX_NODES = 10_000
 STL_HEADER_BYTES, STL_TRIANGLE_BYTES = 84, 50
 MATERIAL_ELEMENTS = {"library_materials", "library_effects", "library_images", "bind_material"}
+INSTANCE_ELEMENTS = {"instance_geometry", "instance_controller", "instance_node"}
 UNSUPPORTED_ELEMENTS = {"tristrips", "trifans", "convex_mesh", "spline", "instance_controller"}
 
 # trimesh logs tracebacks of formats that it tries; without any handler, Python would print them to stderr.
@@ -111,7 +113,9 @@ def _parts_from_trimesh(load: Callable[[], Mapping[str, Any]], file_format: str)
     from trimesh.geometry import triangulate_quads
 
     try:
-        loaded = load()
+        with warnings.catch_warnings():  # NumPy warns about texture coordinates, which are not used
+            warnings.simplefilter("ignore", RuntimeWarning)
+            loaded = load()
         geometries: Mapping[str, Any] = loaded.get("geometry", {"": loaded})
         parts = [
             MeshPart((name,) if name else (), np.asarray(mesh["vertices"], float), triangulate_quads(mesh["faces"]))
@@ -133,7 +137,7 @@ def _read_dae(data: bytes) -> Iterator[MeshPart]:
     try:
         # Infinite or huge numbers in transformations raise FloatingPointError instead of a warning.
         with np.errstate(divide="raise", over="raise", invalid="raise"):
-            document = collada.Collada(io.BytesIO(_without_materials(data)), ignore=[collada.DaeError])
+            document = collada.Collada(io.BytesIO(_geometry_only(data)), ignore=[collada.DaeError])
             meters_per_unit = float(document.assetInfo.unitmeter or 1.0)
             nodes = document.scene.nodes if document.scene else []
             _check_complete(document)
@@ -150,12 +154,22 @@ def _read_dae(data: bytes) -> Iterator[MeshPart]:
         yield MeshPart(part.names, part.vertices * meters_per_unit, part.faces)
 
 
-def _without_materials(data: bytes) -> bytes:
-    """Return the file without materials: pycollada drops every geometry whose material or image is missing."""
+def _geometry_only(data: bytes) -> bytes:
+    """Return the file without materials and without the nodes of its scenes that have no geometry.
+
+    pycollada drops every geometry whose material or image is missing. Exporters write invalid matrices for lights and
+    cameras.
+    """
     root = ET.fromstring(data)
-    for parent in list(root.iter()):
-        for child in [child for child in parent if _local_name(child) in MATERIAL_ELEMENTS]:
-            parent.remove(child)
+    with_geometry: set[ET.Element] = set()
+    for parent in reversed(list(root.iter())):  # children come before their parents
+        is_in_scene = _local_name(parent) in ("visual_scene", "node")
+        for child in list(parent):
+            is_empty_node = is_in_scene and _local_name(child) == "node" and child not in with_geometry
+            if _local_name(child) in MATERIAL_ELEMENTS or is_empty_node:
+                parent.remove(child)
+        if _local_name(parent) in INSTANCE_ELEMENTS or any(child in with_geometry for child in parent):
+            with_geometry.add(parent)
     return ET.tostring(root)
 
 

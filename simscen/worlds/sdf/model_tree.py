@@ -238,6 +238,8 @@ class TreeReader:
                 scope.canonical_link = scope.canonical_link or frame.name
             case "world", "actor":
                 owner.actors.append(self._read_actor(child))
+            case "model", "state":
+                self._report.note(child.place, "ignored: only the <state> of a world is applied")
             case "world", "population":
                 raise child.unusable("<population> is not supported", "place its models one by one")
             case _:

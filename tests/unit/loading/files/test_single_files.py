@@ -46,11 +46,13 @@ def test_sdf_worlds_and_ros_maps_are_recognized_by_content(tmp_path: Path) -> No
         (".", "not a regular file"),
         ("bad.world.yaml", "unknown key `wals`"),
         ("../outside.world.yaml", "outside the scenario root"),
+        ("hall.model", "this is an XML file"),
     ],
 )
 def test_invalid_world_is_reported(tmp_path: Path, name: str, told: str) -> None:
     (tmp_path / "root").mkdir()
     (tmp_path / "outside.world.yaml").write_text("simscen: 1\n")
     (tmp_path / "root/bad.world.yaml").write_text("simscen: 1\nwals: []\n")
+    (tmp_path / "root/hall.model").write_text("\n<?xml version='1.0'?><sdf version='1.6'/>")
     with pytest.raises(InvalidInput, match=told):
         load_world_file(tmp_path / "root" / name, tmp_path / "root")

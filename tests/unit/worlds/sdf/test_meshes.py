@@ -1,5 +1,6 @@
 import struct
 import tracemalloc
+import warnings
 
 import numpy as np
 import pytest
@@ -25,6 +26,9 @@ TRIANGLES = """<triangles count="1"><input semantic="VERTEX" source="#{id}v" off
 QUAD = """<polylist count="1"><input semantic="VERTEX" source="#{id}v" offset="0"/><vcount>4</vcount>
  <p>0 1 2 3</p></polylist>"""
 NODE = """<node id="{id}n" name="{name}">{transform}<instance_geometry url="#{id}"/>{inner}</node>"""
+
+INVALID_MATRIX = "<matrix>INF NaN NaN -2938.633 NaN INF NaN 0 NaN NaN INF 0 0 0 0 1</matrix>"
+"""Matrix that SketchUp writes for its last view."""
 
 
 def geometry(name, points=((0, 0, 0), (1, 0, 0), (0, 1, 0)), primitive=TRIANGLES):
@@ -85,6 +89,15 @@ class TestCollada:
         inner = node("inner", transform="<translate>0 0 3</translate>")
         outer = f"<node><rotate>0 0 1 90</rotate><translate>5 0 0</translate>{inner}</node>"
         np.testing.assert_allclose(corners(mesh(dae(nodes=outer)))[1], (0, 6, 3), atol=1e-6)
+
+    def test_invalid_matrix_of_a_node_without_geometry_is_ignored(self, mesh):
+        empty = f"<node id='camera'>{INVALID_MATRIX}<node>{INVALID_MATRIX}</node></node>"
+        shape = mesh(dae(nodes=empty + node("part", inner=empty)))
+        np.testing.assert_allclose(corners(shape)[1], (1, 0, 0))
+
+    def test_invalid_matrix_above_geometry_is_an_error(self, broken):
+        nodes = f"<node>{INVALID_MATRIX}{node('part')}</node>"
+        assert "is not a finite number" in broken(dae(nodes=nodes)).message
 
     def test_polygons_are_cut_into_triangles(self, mesh):
         shape = mesh(dae(geometry("g", [(0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0)], QUAD)))
@@ -251,3 +264,12 @@ def test_a_mesh_may_be_read_by_itself(tmp_path):
         read_mesh(tmp_path / "x.stl")
     with pytest.raises(InvalidInput, match=r"y\.stl: no such file"):
         read_mesh(tmp_path / "y.stl")
+
+
+def test_texture_coordinates_of_an_obj_file_cause_no_warning(mesh):
+    """NumPy warns about vertices without texture coordinates of an object that is not the first."""
+    first = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+    second = "o b\nv 2 0 0\nv 3 0 0\nv 2 1 0\nf 4/1 5/2 6/3\n"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        assert len(mesh(first + second, name="x.obj").faces) == 2

@@ -94,3 +94,12 @@ def test_a_saved_scale_multiplies_sizes_and_moves_nothing(load, written, expecte
     (solid,) = world.solids
     assert solid.shape == expected
     assert solid.pose.position == (1.5, 0, 0)
+
+
+def test_state_in_a_model_is_ignored_with_a_note(load):
+    state = "<state world_name='w'><model name='m'><pose>5 0 0 0 0 0</pose><scale>3 3 3</scale></model></state>"
+    world = load(f"<model name='m'><static>1</static><link name='a'>{BOX}</link>{state}</model>")
+    assert [solid.pose.x for solid in world.solids] == [0]
+    assert [note.partition("/state: ")[2] for note in world.notes] == [
+        "ignored: only the <state> of a world is applied"
+    ]

@@ -1,0 +1,36 @@
+"""Start and goals on open ground: the map of a world with a ground plane covers them."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from simscen.actions.robot import Kidnap
+from simscen.core.environment.world_model import World
+from simscen.core.geometry import Pose2
+from simscen.loading.checks.scene import expects_failure
+from simscen.loading.goals import event_goals, scenario_goals
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.world_cache import extend_bounds
+
+
+def with_stops(world: World, loaded: LoadedScenario) -> World:
+    """Return the world with bounds that contain the stops of all robots if it has open ground; else the same object.
+
+    Stops are start poses, goals, and poses to which events kidnap a robot, without goals that are expected to fail.
+    """
+    if not world.has_open_ground or world.grid is not None or loaded.map is not None:
+        return world
+    stops = [stop for view in loaded.robot_views.values() for stop in _stops(view)]
+    first = stops[0][:2]
+    bounds = extend_bounds(world.bounds if any(world.bounds) else (*first, *first), stops)
+    return world if bounds == world.bounds else replace(world, bounds=bounds)
+
+
+def _stops(loaded: LoadedScenario) -> Iterator[Pose2]:
+    spec = loaded.spec
+    yield spec.only_robot.pose.pose
+    for goal in (*scenario_goals(spec), *event_goals(spec, loaded.includes_robot).values()):
+        if not expects_failure(spec, goal.name):
+            yield goal.pose
+    for _, action in (placed for step in spec.steps for placed in step.located_actions()):
+        if isinstance(action.chosen, Kidnap) and loaded.includes_robot(action.robot):
+            yield action.chosen.pose.pose

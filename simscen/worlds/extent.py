@@ -1,0 +1,65 @@
+"""Extent of a world and of its parts, and the model that makes a map too large."""
+
+from collections.abc import Iterable, Sequence
+
+from simscen.core.environment.world_model import World
+from simscen.core.geometry.meshes import FLOOR_HEIGHT_M
+from simscen.core.geometry.shapes import Body, Solid
+from simscen.worlds.geometry.prisms import bounding_rectangle, upright_prism
+from simscen.worlds.maps.map_size import Bounds, map_size_error
+
+
+def placed_solids(solids: Sequence[Solid], bodies: Sequence[Body]) -> list[Solid]:
+    """Return the solids, and those of the bodies at their initial poses with the names of the bodies."""
+    moved = (Solid(solid.shape, body.pose.compose(solid.pose), body.name) for body in bodies for solid in body.solids)
+    return [*solids, *moved]
+
+
+def model_name(solid: Solid) -> str:
+    """Return the name of the outermost model that a solid belongs to."""
+    return solid.name.partition("::")[0]
+
+
+def union(rectangles: Iterable[Bounds]) -> Bounds:
+    """Return the bounds of rectangles; zeros if there is none."""
+    sides = list(zip(*rectangles, strict=True))
+    if not sides:
+        return 0.0, 0.0, 0.0, 0.0
+    left, bottom, right, top = sides
+    return min(left), min(bottom), max(right), max(top)
+
+
+def top_height(solid: Solid) -> float:
+    """Return the height in m of the highest point of a solid."""
+    prism = upright_prism(solid)
+    if prism is not None:
+        return prism.top
+    from simscen.worlds.geometry.triangulation import triangulate
+
+    return float(solid.pose.apply(triangulate(solid.shape).vertices)[:, 2].max())
+
+
+def oversize_hint(world: World) -> str:
+    """Return what makes the map of a world too large, as a hint."""
+    if name := _largest_model(world):
+        return f'"{name}" makes it large; move or remove it'
+    return "move the start and the goals closer together"
+
+
+def _largest_model(world: World) -> str:
+    """Return the model without which the world has the smallest area; "" if all models but floors fit on a map."""
+    rectangles: dict[str, list[Bounds]] = {}
+    for solid in placed_solids(world.solids, world.bodies):
+        if top_height(solid) > FLOOR_HEIGHT_M:
+            rectangles.setdefault(model_name(solid), []).append(bounding_rectangle(solid))
+    extents = {name: union(parts) for name, parts in rectangles.items()}
+    if map_size_error(union(extents.values())) is None:
+        return ""
+    # Only a model at an edge of the world can make the world larger.
+    edges = [choose(extents, key=lambda name: extents[name][side]) for side, choose in enumerate((min, min, max, max))]
+    return min(edges, key=lambda name: _area(union(rest for other, rest in extents.items() if other != name)))
+
+
+def _area(bounds: Bounds) -> float:
+    left, bottom, right, top = bounds
+    return (right - left) * (top - bottom)
