@@ -93,7 +93,7 @@ def test_file_without_a_yaml_mapping_is_an_error(with_scenario, folder: Path, te
         pytest.param("seed: 7", "physics: {solver_iterations: 1001}", "2:30", "must be at most 1000", id="iterations"),
         pytest.param("seed: 7", "stack: {planner: {type: rrt_connect, max_iterations: 1000001}}", "2:54", "1000000",
                      id="limit of planning"),
-        pytest.param("seed: 7", "stack: {localizer: {min_particles: 3000}}", "2:20",
+        pytest.param("seed: 7", "stack: {localizer: {min_particles: 3000}}", "2:36",
                      "`min_particles` 3000 is greater than `max_particles` 2000", id="a minimum above its maximum"),
         pytest.param("seed: 7", "physics: {tick_rate: 1}", "2:22", "must be at least 60", id="limit of rates"),
         pytest.param("seed: 7", "stack: {localizer: {type: amcl, max_particles: 50001}}", "2:48", "50000",

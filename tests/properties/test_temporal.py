@@ -37,5 +37,5 @@ def test_robustness_matches_rtamt_on_long_traces(formula, data):
     spec.spec = f"out = {as_rtamt(formula)}"
     spec.parse()
     theirs = spec.evaluate({"time": list(range(length)), "p": p, "q": q})[0][1]
-    ours = robustness(validated(formula), EvaluationContext(run(p, q), CASE, over=True))
+    ours = robustness(validated(formula), EvaluationContext(run(p, q), CASE, run_ended=True))
     assert ours.low[0] == ours.high[0] == pytest.approx(theirs, abs=1e-12)
