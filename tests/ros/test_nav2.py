@@ -76,6 +76,7 @@ def test_an_aborted_bring_up_is_started_again_once(with_interfaces, run, tmp_pat
     assert "lifecycle_manager has given up the bring-up: the lifecycle node /behavior_server is unconfigured" in warning
 
 
+@pytest.mark.slow
 def test_a_bring_up_that_is_aborted_twice_is_an_error(with_interfaces, run, alive) -> None:
     tag = f"aborts{os.getpid()}"
     launch = with_interfaces.node("nav2_like", *ACTION, tag=tag, aborts="behavior_server")
