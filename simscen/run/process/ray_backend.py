@@ -88,7 +88,7 @@ class RayBackend:
         here = ray.get_runtime_context().get_node_id()
         self._queue = (
             ray.remote(JobQueue)
-            .options(num_cpus=0, scheduling_strategy=NodeAffinitySchedulingStrategy(here, soft=True))
+            .options(num_cpus=0, scheduling_strategy=NodeAffinitySchedulingStrategy(here, soft=False))
             .remote()
         )
         return self

@@ -19,6 +19,7 @@ from simscen.run.process.jobs import Ended, ForkServerDeath, Job, ProcessEnd, St
 pytest.importorskip("ray")
 pytestmark = pytest.mark.slow
 
+import ray  # noqa: E402
 from ray.cluster_utils import Cluster  # noqa: E402
 
 from simscen.run.process.ray_backend import RayBackend, connect  # noqa: E402
@@ -43,8 +44,7 @@ pass: [{goals_reached: {}}]
 @pytest.fixture
 def cluster() -> Iterator[Any]:
     made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
-    made.add_node(num_cpus=1)
-    made.last = made.add_node(num_cpus=1)
+    made.others = [made.add_node(num_cpus=1) for _ in range(2)]
     yield made
     made.shutdown()
 
@@ -103,7 +103,9 @@ def test_jobs_of_a_killed_node_are_run_again_on_another_one(cluster, jobs) -> No
         for update in backend.run(made):
             updates.append(update)
             if len(updates) == 10:
-                cluster.remove_node(cluster.last, allow_graceful=False)
+                here = ray.get_runtime_context().get_node_id()  # any node of this machine
+                victim = next(node for node in cluster.others if node.node_id != here)
+                cluster.remove_node(victim, allow_graceful=False)
     ends = [one for one in updates if isinstance(one, Ended)]
     assert sorted(one.job.number for one in ends) == list(range(30))
     assert all(isinstance(one.end, ProcessEnd) and one.end.code == 0 for one in ends)
