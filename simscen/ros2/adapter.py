@@ -129,7 +129,9 @@ class Adapter:
             about["factor"] = self._options.factor
         if self._barrier.not_in_step:
             about["not_in_step"] = self._barrier.not_in_step
-        warnings = [f"the launched command was started again: {self.restart_reason}"] if self.restart_reason else []
+        warnings = (
+            [f"the launched command was started again, because {self.restart_reason}"] if self.restart_reason else []
+        )
         warnings += [
             f"{node} does not answer, so lockstep does not wait for it" for node in sorted(self._barrier.left_out)
         ]

@@ -137,7 +137,7 @@ class BringUp:
             if self._report is not None:
                 self._report.follow_log()
                 if missing and self._options.launch and self._report.aborted_bring_up:
-                    raise BringUpAborted(self._reasons(missing))
+                    raise BringUpAborted(self._reasons(missing), self._report.aborted_bring_up)
             if missing or nodes != self._graph.nodes():
                 changed_at, nodes = time.monotonic(), self._graph.nodes()
             return time.monotonic() - changed_at >= self._options.settle

@@ -181,7 +181,7 @@ class AdapterRun:
             print(f"simscen ros2: {error}; starting the launched command again", file=sys.stderr)
             earlier, self._adapter = self._adapter, None
             earlier.end()
-            self._adapter = make_adapter(str(error))
+            self._adapter = make_adapter(f"{error.manager} had given up the bring-up")
             self._adapter.mode, self._adapter.continue_after_failure = earlier.mode, earlier.continue_after_failure
             self._adapter.prepare()
             for repeated in self._steps_until_ready:

@@ -17,7 +17,11 @@ class AdapterError(Exception):
 
 
 class BringUpAborted(AdapterError):
-    """The lifecycle manager of a launched Nav2 has given up."""
+    """The lifecycle manager of a launched Nav2 has given up. `manager` is its name."""
+
+    def __init__(self, message: str, manager: str) -> None:
+        super().__init__(message)
+        self.manager = manager
 
 
 class Options(NamedTuple):

@@ -72,8 +72,9 @@ def test_an_aborted_bring_up_is_started_again_once(with_interfaces, run, tmp_pat
     ended = run("nav2", "--launch", launch, scenario="short.scenario.yaml")
     assert ended.code == 0, ended.said
     (warning, *_) = ended.about["warnings"]
-    assert "started again" in warning
-    assert "lifecycle_manager has given up the bring-up: the lifecycle node /behavior_server is unconfigured" in warning
+    assert warning == "the launched command was started again, because lifecycle_manager had given up the bring-up"
+    log = next(ended.out.rglob("stack.log")).read_text()
+    assert "lifecycle_manager has given up the bring-up: the lifecycle node /behavior_server is unconfigured" in log
 
 
 @pytest.mark.slow
