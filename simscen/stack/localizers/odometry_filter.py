@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 from filterpy.kalman import KalmanFilter
+from scipy.linalg import lapack
 
-from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.model import localizers as model
@@ -50,6 +51,7 @@ class OdometryFilter:
         self._rejection_threshold = spec.odom0_twist_rejection_threshold
         self._gyro = GyroscopeIntegral(tick_rate)
         self._filter = KalmanFilter(dim_x=4, dim_z=4)
+        self._filter.inv = _inverse
         self._filter.x = np.zeros(4)
         self._filter.P = np.diag([0.0, 0.0, 0.0, spec.gyro_bias**2])
         self._covariance = np.zeros((7, 7))  # of the pose and the state together
@@ -120,12 +122,10 @@ class OdometryFilter:
             else:
                 measurement, matrix = [*wheels, rate], _WHEELS_AND_GYRO
                 variances.append(variance)
-        noise = _IDENTITIES[len(variances)] * variances  # a diagonal matrix, in half of the time of np.diag
-        self._filter.update(np.array(measurement), R=noise, H=matrix)
+        self._filter.update(np.array(measurement), R=_diagonal_matrix(variances), H=matrix)
         # The update corrects the state, but not the pose: only the covariance between both changes.
         cross = self._cross_covariance
         cross -= cross.dot(self._filter.K.dot(matrix).T)
-        self._covariance[3:, :3] = cross.T
 
     def _slips(self, difference: float, variance: float) -> bool:
         """Return whether wheels and gyroscope disagree about the yaw rate by more than their errors explain."""
@@ -143,11 +143,24 @@ class OdometryFilter:
         self._pose = Pose2(x + dx, y + dy, wrap(yaw + wz * seconds))
         jacobian, covariance = self._jacobian, self._covariance
         jacobian[:, 2:6] = (-dy, c, -s, -dy * half), (dx, s, c, dx * half), (1.0, 0.0, 0.0, seconds)
-        covariance[3:, 3:] = self._filter.P
+        covariance[3:, 3:], covariance[3:, :3] = self._filter.P, self._cross_covariance.T
         moved = jacobian.dot(covariance)
         self._pose_covariance[:] = moved.dot(jacobian.T)
         self._cross_covariance[:] = moved[:, 3:]
-        covariance[3:, :3] = moved[:, 3:].T
+
+
+def _inverse(matrix: Array) -> Array:
+    """Return the inverse of a small matrix, in a quarter of the time of numpy.linalg.inv, which also calls dgesv."""
+    inverse: Array = lapack.dgesv(matrix, _IDENTITIES[len(matrix)])[2]
+    return inverse
+
+
+def _diagonal_matrix(values: list[float]) -> Array:
+    """Return the diagonal matrix of some values, in a fifth of the time of numpy.diag."""
+    size = len(values)
+    flat = np.zeros(size * size)
+    flat[:: size + 1] = values
+    return flat.reshape(size, size)
 
 
 class GyroscopeIntegral:

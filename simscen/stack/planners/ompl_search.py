@@ -5,8 +5,9 @@ is made. OMPL logs a warning about the repeated seed, although the seed takes ef
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain, repeat
 from typing import Any
 
 from ompl import base as ob
@@ -35,6 +36,8 @@ DEFAULT_RANGE_M = 1.0
 """Default of the parameter `range` in the plane."""
 DEFAULT_BIT_STAR_REWIRE_FACTOR = 1.3
 """Default of the parameter `rewire_factor` of BIT*."""
+CHECK_PERIOD = 16
+"""Iterations between two evaluations of the condition that ends a search."""
 PERTURBATIONS_M = (0.5, 0.15)
 """Distances by which states are moved to reduce the cost of the path, one pass each."""
 ou.setLogLevel(ou.LOG_NONE)
@@ -60,6 +63,14 @@ class _MotionValidator(ob.MotionValidator):  # type: ignore[misc] # ompl has no 
     def checkMotion(self, a: Any, b: Any) -> bool:
         """Return whether the straight motion is possible."""
         return self.motion(a[0], a[1], b[0], b[1]) < math.inf
+
+
+class _CheckedByCost(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
+    """Validity of motions for BIT*, which first computes the cost of a motion and drops those that cost inf."""
+
+    def checkMotion(self, _a: Any, _b: Any) -> bool:
+        """Return True: the motion has a finite cost."""
+        return True
 
 
 class _CostBeyondLength(ob.OptimizationObjective):  # type: ignore[misc] # ompl has no types
@@ -137,6 +148,7 @@ class OmplSearch:
     def _solve(self, simplify: bool) -> list[Point] | None:
         ou.RNG.setSeed(self.seed)
         problem, information = self.problem, self._make_information()
+        motions = information.getMotionValidator()
         ends = _state(information, problem.start), _state(information, problem.goal)
         if not all(information.satisfiesBounds(end) and information.isValid(end) for end in ends):
             return None  # a planner would wait for a better goal, 5 ms per iteration
@@ -146,6 +158,8 @@ class OmplSearch:
         definition.setOptimizationObjective(objective)
         planner = PLANNERS[self.spec.type](information)
         self._configure(planner)
+        if self.spec.type == "bit_star":
+            information.setMotionValidator(_CheckedByCost(information))
         planner.setProblemDefinition(definition)
         planner.setup()
         planner.solve(ob.PlannerTerminationCondition(self._make_termination(planner)))
@@ -153,6 +167,7 @@ class OmplSearch:
             return None
         path = definition.getSolutionPath()
         if simplify:
+            information.setMotionValidator(motions)
             _simplify(og.PathSimplifier(information, definition.getGoal(), objective), path, self.spec.simplify_steps)
         return [(state[0], state[1]) for state in path.getStates()]
 
@@ -243,12 +258,16 @@ def _state(information: Any, point: Point) -> Any:
 
 
 def stop_after(iterations: int, is_done: Termination = lambda: False, least: int = 0) -> Termination:
-    """Return a termination condition: stop after so many iterations, or after at least `least` when it `is_done`."""
-    remaining = iterations
+    """Return a termination condition: stop after so many iterations, or when it `is_done` after at least `least`.
 
-    def should_stop() -> bool:
-        nonlocal remaining
-        remaining -= 1
-        return remaining < 0 or (iterations - remaining > least and is_done())
+    `is_done` is evaluated once per `CHECK_PERIOD` iterations. In between, itertools answers without running Python code.
+    """
 
-    return should_stop
+    def answers() -> Iterator[Iterable[bool]]:
+        for start in range(0, iterations, CHECK_PERIOD):
+            yield repeat(False, min(CHECK_PERIOD, iterations - start))
+            if start + CHECK_PERIOD > least and is_done():
+                break
+        yield repeat(True)
+
+    return chain.from_iterable(answers()).__next__
