@@ -13,7 +13,7 @@ from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Solid, TriangleMesh
 from simscen.worlds.geometry.cross_section import CrossSection, cross_section, winds_around
 from simscen.worlds.geometry.triangulation import merge_solids
-from simscen.worlds.maps.rasterization import Cells, expand_ranges, filled_cells, touched_cells
+from simscen.worlds.maps.rasterization import CellMask, expand_ranges, filled_cells, touched_cells
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -40,7 +40,7 @@ class ClearanceField:
 
     grid: OccupancyGrid
     rough: Array
-    inside: Cells
+    inside: CellMask
     outline: "cKDTree | None"
     owners: npt.NDArray[np.int32]
     names: tuple[str, ...] = ()
@@ -58,10 +58,10 @@ class ClearanceField:
         has_clearance[undecided] = self.exact(points[undecided]) >= distance
         return has_clearance
 
-    def free_cells(self, distance: float) -> Cells:
+    def free_cells(self, distance: float) -> CellMask:
         """Return the cells whose center is at least `distance` m away from all solids."""
         slack = HALF_DIAGONAL_CELLS * self.grid.resolution
-        free: Cells = (self.rough >= distance + slack) & ~self.inside
+        free: CellMask = (self.rough >= distance + slack) & ~self.inside
         undecided = (np.abs(self.rough - distance) < slack) & ~self.inside
         free[undecided] = self.exact(self.grid.center_of(np.argwhere(undecided))) >= distance
         return free
