@@ -13,9 +13,12 @@ from simscen.spec.places import DisturbanceName, GoalName, MovableName, ObjectNa
 from simscen.triggers.base import Condition
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
+COMPLETED = frozenset({EventKind.GOAL_REACHED, EventKind.GOAL_PASSED})
+"""Kinds of events that complete a waypoint."""
 
 
 def _count_events(now: Situation, kind: EventKind, name: str | None) -> int:
+    """Return the number of logged events of this kind and name; None counts all names."""
     return sum(e.kind == kind and name in (None, e.name) for e in now.events)
 
 
@@ -103,9 +106,6 @@ class GoalStatus(Spec, Condition):
         """Return whether enough such reports have been logged."""
         kind = EventKind(f"goal.{self.status}")
         return sum(e.kind == kind and matches_goal_name(e.name, self.name) for e in now.events) >= self.count
-
-
-COMPLETED = frozenset({EventKind.GOAL_REACHED, EventKind.GOAL_PASSED})
 
 
 class Waypoint(Spec, Condition):

@@ -33,7 +33,7 @@ class ScanAge(Spec, Condition):
     """
 
     above: PositiveDuration
-    """Age in seconds."""
+    """Age that the scan must exceed."""
     sensor: Name | None = None
     """Name of the lidar in the robot's `sensors`; default: the lidar whose scan arrived last."""
 
