@@ -219,6 +219,7 @@ class _Rectangle(NamedTuple):
 
 
 def _bounding_rectangle(corners: Polygon) -> _Rectangle:
+    """Return the smallest axis-aligned rectangle that contains a polygon."""
     xs, ys = zip(*corners, strict=True)
     return _Rectangle(
         (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2, (max(xs) - min(xs)) / 2, (max(ys) - min(ys)) / 2

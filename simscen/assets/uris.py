@@ -15,7 +15,9 @@ _FUEL = re.compile(
     r"https?://(?P<server>(?:fuel|app|api)\.(?:gazebosim|ignitionrobotics)\.org)/(?:\d+\.\d+/)?"
     r"(?P<owner>[^/]+)/(?P<kind>models|worlds)/(?P<name>[^/]+)(?:/(?P<version>\d+|tip))?(?:/(?:files/)?(?P<rest>.*))?"
 )
+"""URI of a model or world on Gazebo Fuel, on the website or its API, or of a file in the model or world."""
 _BUILTIN_MODELS = {"sun", "ground_plane"}
+"""Models that Gazebo installs."""
 
 
 @dataclass(frozen=True)

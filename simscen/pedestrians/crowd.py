@@ -336,8 +336,8 @@ def _nearest_points(
 ) -> tuple[Indices, Array]:
     """Return pedestrians near an outline, as indices (k,), and the points (k, 2) of the outline nearest to them.
 
-    Only the pedestrians `indices` are examined, and only points within OBSTACLE_RANGE_M count. `segments` (n, 2, 2) form
-    the outline. There is one point for each pedestrian or, with `of_each_segment`, for each pedestrian and segment.
+    Only the pedestrians `indices` are examined, and only points within OBSTACLE_RANGE_M count. The outline consists of
+    `segments` (n, 2, 2). There is one point per pedestrian or, with `of_each_segment`, per pedestrian and segment.
     """
     repeated = np.repeat(indices, len(segments))
     points = nearest_points_on(np.tile(segments, (len(indices), 1, 1)), positions[repeated])

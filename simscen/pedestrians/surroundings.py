@@ -35,7 +35,7 @@ class ObservedRobot:
 
     pose:     pose of the base in the world
     velocity: velocity of the base in m/s along the world's x and y axes
-    radius:   radius in m of a disc that stands for the robot in the social force model
+    radius:   radius in m of a disc around the origin of the base frame that contains the body
     outline:  corners (n, 2) of the body in the base frame
     """
 

@@ -109,6 +109,8 @@ def kinematics_of(drive: Drive) -> Kinematics:
 
 
 def _two_sided_kinematics(radius: float, separation: float) -> Kinematics:
+    """Return the kinematics of driven wheels of `radius` m on two sides, `separation` m apart."""
+
     def motion(increment: EncoderIncrement) -> Twist:
         left, right = increment[0] * radius, increment[1] * radius
         return _new(Twist, ((left + right) / 2, 0.0, (right - left) / separation))

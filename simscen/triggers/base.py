@@ -124,7 +124,7 @@ def any_holds(conditions: list[AnyCondition], now: Situation) -> bool:
 
 
 class Trigger(AnyCondition):
-    """Value of `when`: a condition, and how often and how late it starts an event."""
+    """A condition, and how often, with which delay, and with which probability it starts an event."""
 
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot", "edge", "delay", "times", "probability"})
 

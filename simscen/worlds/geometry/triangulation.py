@@ -42,6 +42,7 @@ _BOX_FACES = np.array(
     ],
     dtype=np.int32,
 )  # fmt: skip
+"""Corners (8, 3) and triangles (12, 3) of a cube of side 1 around the origin."""
 
 
 def merge_solids(solids: Iterable[Solid]) -> TriangleMesh:

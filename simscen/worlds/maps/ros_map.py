@@ -36,6 +36,7 @@ UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 205, 254, 0
 MAX_DISTANCE_M = 1e4
 """Maximum distance of map cells from the origin of the map frame, as for coordinates in all files."""
 
+# Header of a PGM: P2 or P5, width, height, and maxval, separated by white space or comments.
 _PNM_SEPARATOR = rb"(?:\s|#[^\r\n]*[\r\n])+"
 _PNM_HEADER = re.compile(
     rb"(P[25])" + _PNM_SEPARATOR + rb"(\d{1,10})" + _PNM_SEPARATOR + rb"(\d{1,10})" + _PNM_SEPARATOR + rb"(\d{1,10})\s"
@@ -110,11 +111,13 @@ def _decode_pgm(data: bytes) -> Grays16:
 
 
 def _binary_samples(raster: bytes, count: int, maximum: int) -> npt.NDArray[np.generic]:
+    """Return the first `count` samples of a P5 raster, or fewer if it is truncated; `maximum` determines their size."""
     sample = np.dtype(">u2" if maximum > 255 else "u1")
     return np.frombuffer(raster, dtype=sample, count=min(count, len(raster) // sample.itemsize))
 
 
 def _ascii_samples(raster: bytes) -> npt.NDArray[np.generic]:
+    """Return all samples of a P2 raster. Raises UnreadableImage if it contains something else than numbers."""
     text = re.sub(rb"#[^\r\n]*", b"", raster)
     if re.search(rb"[^\d\s]", text):
         raise UnreadableImage("the PGM contains something that is not a number")
@@ -147,6 +150,7 @@ def _decode_png_or_bmp(data: bytes) -> MapImage:
 
 
 def _bmp_size(data: bytes) -> tuple[int, int]:
+    """Return the width and the height in the header of a BMP."""
     (header,) = struct.unpack("<I", data[14:18])
     width, height = struct.unpack("<HH" if header == 12 else "<ii", data[18 : 22 if header == 12 else 26])
     return width, abs(height)

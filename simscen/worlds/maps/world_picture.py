@@ -20,11 +20,16 @@ if TYPE_CHECKING:
 Color = tuple[int, int, int, int]
 """Red, green, blue and opacity, 0 to 255."""
 
-BACKGROUND, FREE_GROUND, UNKNOWN_GROUND = (226, 230, 236, 255), (255, 255, 255, 255), (226, 230, 236, 255)
-MAPPED_WALL, WALL = (147, 178, 214, 255), (16, 42, 82, 255)
-BODY, PLACE, REGION, SCALE_BAR = (214, 102, 20, 255), (20, 128, 74, 255), (122, 82, 178, 255), (120, 128, 140, 255)
-MARKER = (200, 24, 40, 255)
-"""Color of footprints and gaps."""
+BACKGROUND_COLOR = UNKNOWN_COLOR = (226, 230, 236, 255)
+FREE_COLOR = (255, 255, 255, 255)
+OCCUPIED_COLOR = (147, 178, 214, 255)
+WALL_COLOR = (16, 42, 82, 255)
+BODY_COLOR = (214, 102, 20, 255)
+PLACE_COLOR = (20, 128, 74, 255)
+REGION_COLOR = (122, 82, 178, 255)
+SCALE_BAR_COLOR = (120, 128, 140, 255)
+MARKER_COLOR = (200, 24, 40, 255)
+"""Color of footprints and of rings around gaps."""
 
 MAX_SIDE_PIXELS = 1200
 """Length of the longer side of the picture."""
@@ -69,17 +74,21 @@ def draw_world(
     from PIL import Image, ImageDraw
 
     view = _viewport(built.map)
-    canvas = Image.new("RGBA", view.size, BACKGROUND)
+    canvas = Image.new("RGBA", view.size, BACKGROUND_COLOR)
     canvas.alpha_composite(_map_layer(built.map, view))
     overlay = Image.new("RGBA", view.size, (0, 0, 0, 0))
     pen = ImageDraw.Draw(overlay)
     for polygon in built.world.regions.values():
-        pen.polygon(view.pixels(np.array(polygon)), fill=(*REGION[:3], 40), outline=REGION, width=SUPERSAMPLING)
-    _draw_segments(pen, view, section_segments(built.mesh, height), WALL)
+        pen.polygon(
+            view.pixels(np.array(polygon)), fill=(*REGION_COLOR[:3], 40), outline=REGION_COLOR, width=SUPERSAMPLING
+        )
+    _draw_segments(pen, view, section_segments(built.mesh, height), WALL_COLOR)
     for body in built.world.bodies:
-        _draw_segments(pen, view, _body_outline(body, height), BODY)
+        _draw_segments(pen, view, _body_outline(body, height), BODY_COLOR)
     for outline in footprints:
-        pen.polygon(view.pixels(np.array(outline)), fill=(*MARKER[:3], 60), outline=MARKER, width=SUPERSAMPLING + 1)
+        pen.polygon(
+            view.pixels(np.array(outline)), fill=(*MARKER_COLOR[:3], 60), outline=MARKER_COLOR, width=SUPERSAMPLING + 1
+        )
     _draw_names(pen, view, built)
     for x, y in view.pixels(np.array(gaps).reshape(-1, 2)):
         pen.ellipse(
@@ -89,7 +98,7 @@ def draw_world(
                 x + GAP_RING_RADIUS_PIXELS,
                 y + GAP_RING_RADIUS_PIXELS,
             ),
-            outline=MARKER,
+            outline=MARKER_COLOR,
             width=2 * SUPERSAMPLING,
         )
     _draw_scale_bar(pen, view)
@@ -115,7 +124,7 @@ def _map_layer(grid: OccupancyGrid, view: Viewport) -> "Image.Image":
     """Return an image of the canvas size with the cells of the map."""
     from PIL import Image
 
-    shades = np.array([UNKNOWN_GROUND, FREE_GROUND, MAPPED_WALL], dtype=np.uint8)
+    shades = np.array([UNKNOWN_COLOR, FREE_COLOR, OCCUPIED_COLOR], dtype=np.uint8)
     kind = np.where(grid.cells < 0, 0, np.where(grid.cells == FREE, 1, 2))
     cells = Image.fromarray(shades[kind], "RGBA")
     # Pillow needs the transform from pixels to cells: canvas -> world -> frame of the grid -> cells.
@@ -123,7 +132,9 @@ def _map_layer(grid: OccupancyGrid, view: Viewport) -> "Image.Image":
     zero, right, down = grid.origin.inverse().apply(ends) / grid.resolution
     across, along = right - zero, down - zero
     matrix = (across[0], along[0], zero[0], across[1], along[1], zero[1])
-    return cells.transform(view.size, Image.Transform.AFFINE, matrix, Image.Resampling.NEAREST, fillcolor=BACKGROUND)
+    return cells.transform(
+        view.size, Image.Transform.AFFINE, matrix, Image.Resampling.NEAREST, fillcolor=BACKGROUND_COLOR
+    )
 
 
 def _body_outline(body: Body, height: float) -> Array:
@@ -148,16 +159,16 @@ def _draw_segments(pen: "ImageDraw.ImageDraw", view: Viewport, segments: Array, 
 def _draw_names(pen: "ImageDraw.ImageDraw", view: Viewport, built: BuiltWorld) -> None:
     for name, polygon in built.world.regions.items():
         upper_left = np.array([[min(x for x, _ in polygon), max(y for _, y in polygon)]])
-        _draw_text(pen, view.pixels(upper_left)[0], name, REGION)
+        _draw_text(pen, view.pixels(upper_left)[0], name, REGION_COLOR)
     for body in built.world.bodies:
-        _draw_text(pen, view.pixels(np.array([body.pose.position[:2]]))[0], body.name, BODY)
+        _draw_text(pen, view.pixels(np.array([body.pose.position[:2]]))[0], body.name, BODY_COLOR)
     for name, place in built.world.places.items():
         tip = place.apply(np.array([[0.0, 0.0], [0.3, 0.0]]))
         (x, y), end = view.pixels(tip)
         radius = 4 * SUPERSAMPLING
-        pen.line(((x, y), end), fill=PLACE, width=2 * SUPERSAMPLING)
-        pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=PLACE)
-        _draw_text(pen, (x, y), name, PLACE)
+        pen.line(((x, y), end), fill=PLACE_COLOR, width=2 * SUPERSAMPLING)
+        pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=PLACE_COLOR)
+        _draw_text(pen, (x, y), name, PLACE_COLOR)
 
 
 def _draw_text(pen: "ImageDraw.ImageDraw", point: tuple[float, float], text: str, color: Color) -> None:
@@ -175,5 +186,5 @@ def _draw_scale_bar(pen: "ImageDraw.ImageDraw", view: Viewport) -> None:
     power = 10.0 ** math.floor(math.log10(max_length))
     meters = max(step * power for step in (1, 2, 5) if step * power <= max_length)
     x, y = 14 * SUPERSAMPLING, view.size[1] - 14 * SUPERSAMPLING
-    pen.line((x, y, x + meters * view.scale, y), fill=SCALE_BAR, width=3 * SUPERSAMPLING)
-    _draw_text(pen, (x - 6 * SUPERSAMPLING, y - 24 * SUPERSAMPLING), f"{meters:g} m", SCALE_BAR)
+    pen.line((x, y, x + meters * view.scale, y), fill=SCALE_BAR_COLOR, width=3 * SUPERSAMPLING)
+    _draw_text(pen, (x - 6 * SUPERSAMPLING, y - 24 * SUPERSAMPLING), f"{meters:g} m", SCALE_BAR_COLOR)

@@ -202,6 +202,7 @@ class MovingMesh:
             self._sweep_packets(fan, packets, pose, axes)
 
     def _sweep_packets(self, fan: RayFan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
+        """Transform the rays in the packets of this range to the frame of the mesh, and shorten them."""
         (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
         inverse = -i, -j, -k, w
         fan.set_directions(rotated(inverse, ahead), rotated(inverse, left), packets)

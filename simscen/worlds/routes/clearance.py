@@ -175,6 +175,7 @@ def footprint_overlaps_solid(solid: Solid, corners: Polygon, z_range: tuple[floa
 
 
 def _overlaps_outline(segments: Array, corners: Polygon) -> bool:
+    """Return whether a footprint overlaps the cross section of a solid, given by its segments (n, 2, 2)."""
     if not len(segments):
         return False
     if winds_around(segments, corners[0]):

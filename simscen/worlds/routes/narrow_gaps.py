@@ -64,12 +64,8 @@ def _clearances(field: ClearanceField, max_clearance: float) -> Array:
     """Return the clearance of each cell's center in m, negative in solids and at most `max_clearance`."""
     clearance: Array = np.minimum(field.rough, max_clearance)
     near = field.rough < max_clearance
-    clearance[near] = np.minimum(field.exact(_centers(field.grid, near)), max_clearance)
+    clearance[near] = np.minimum(field.exact(field.grid.center_of(np.argwhere(near))), max_clearance)
     return clearance
-
-
-def _centers(grid: OccupancyGrid, cells: npt.NDArray[np.bool_]) -> Array:
-    return grid.center_of(np.argwhere(cells))
 
 
 def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:

@@ -53,6 +53,7 @@ def passage_between(sides: tuple[Point, ...], goal: str, field: ClearanceField) 
 
 
 def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage:
+    """Return the passage between two points of the outline, given by their indices."""
     one, other = pair
     return Passage(
         goal,

@@ -251,6 +251,7 @@ GEOMETRIC = SHAPES | {
 }
 """Elements that add or move solids, by parent. A misspelling of one of them is an error."""
 
+# Tags for which `report_unknown` looks in unknown elements and in `experimental:params`.
 _ADDS_SOLIDS = {"model", "include", "actor", "population", "link", "collision", "geometry"}
 _ADDS_NO_SOLIDS = {"visual", "light", "sensor", "plugin", "particle_emitter", "projector", "audio_source", "audio_sink"}
 _XACRO_DEFINITIONS = ("xacro:arg", "xacro:property", "xacro:macro")

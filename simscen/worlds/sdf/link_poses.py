@@ -82,6 +82,7 @@ def read_state(world: Element, report: ImportReport) -> WorldState:
 
 
 def _read_model_state(element: Element, report: ImportReport) -> ModelState:
+    """Read a `<model>` of a `<state>`; unusable values are added to the report and left out."""
     links: dict[str, Pose3] = {}
     models: dict[str, ModelState] = {}
     pose, scale = None, (1.0, 1.0, 1.0)

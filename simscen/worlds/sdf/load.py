@@ -97,9 +97,10 @@ class _WorldImporter:
                 self._bodies += [body] if body else []
         for joint in self._root.joints:
             self._report.note(joint.location, "a joint between models is ignored")
-        return self._world()
+        return self._build_world()
 
     def _add_model(self, model: ModelNode, state: WorldState) -> None:
+        """Collect the solids and bodies of a top-level model."""
         saved = state.models.get(model.name, ModelState())
         pose = saved.pose or self._root.scope.pose_of(model.frame)
         links = place_links(model, pose, self._report, saved)
@@ -108,7 +109,8 @@ class _WorldImporter:
         self._solids += solids
         self._bodies += bodies
 
-    def _world(self) -> World:
+    def _build_world(self) -> World:
+        """Return the world of the collected solids and bodies, without outliers and with its floor at z = 0."""
         element = self._root.element
         if not self._solids and not self._bodies and not self._report.has_problems:
             self._report_empty_world(element)
@@ -168,6 +170,7 @@ class _WorldImporter:
 
 
 def _lower(placed: Sequence[Placed], height: float) -> tuple[Placed, ...]:
+    """Return solids or bodies moved down by `height` m."""
     return tuple(replace(each, pose=each.pose._replace(z=each.pose.z - height)) for each in placed)
 
 

@@ -122,6 +122,7 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def _mesh_request(element: Element, path: Path) -> MeshRequest:
+    """Read scale and submesh from a `<mesh>` whose file is `path`. Raises UnusableElement."""
     scale_element, submesh = element.child("scale"), element.child("submesh")
     scale = read_numbers(scale_element, 3) if scale_element else (1.0, 1.0, 1.0)
     if scale_element and 0.0 in scale:
@@ -135,6 +136,7 @@ def _mesh_request(element: Element, path: Path) -> MeshRequest:
 
 
 def _select_submesh(parts: tuple[MeshPart, ...], request: MeshRequest, element: Element) -> tuple[MeshPart, ...]:
+    """Return the parts with the requested name, or all parts. Raises UnusableElement if there are none."""
     selected = tuple(part for part in parts if not request.submesh or request.submesh in part.names)
     if not selected:
         known = sorted({part.names[0] for part in parts if part.names})
@@ -158,6 +160,7 @@ def _largest_coordinate(parts: tuple[MeshPart, ...], request: MeshRequest) -> fl
 
 
 def _merge_parts(parts: tuple[MeshPart, ...], request: MeshRequest) -> Mesh:
+    """Return one read-only mesh of all parts, centered and scaled as requested."""
     vertices = np.vstack([part.vertices for part in parts])
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     faces = np.vstack([part.faces + start for part, start in zip(parts, starts, strict=True)]).astype(np.int32)

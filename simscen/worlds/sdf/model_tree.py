@@ -264,6 +264,7 @@ class TreeReader:
                 report_unknown(child, kind, self._report)
 
     def _read_actor(self, element: Element, include: Element | None = None) -> ModelNode:
+        """Read an `<actor>`; name and pose of `include` override those of the actor."""
         name = _checked_name(element, include.child("name") if include else None)
         pose = (include.child("pose") if include else None) or element.child("pose")
         scope = FrameScope(MODEL_FRAME)
