@@ -1,6 +1,7 @@
 """Find the obstacles of a robot that can climb: the static solids without the ground that its wheels can drive on.
 
-A ramp is no obstacle for such a robot. Its sides are obstacles where they are higher than the robot's maximum step.
+A ramp is no obstacle for such a robot. Its sides are obstacles where they are higher than the robot's maximum step. The
+line that an upright face of the ground forms, seen from above, is called an edge here.
 """
 
 import math
@@ -18,7 +19,7 @@ from simscen.worlds.geometry.prisms import has_no_drivable_solids
 from simscen.worlds.geometry.triangulation import merge_solids
 
 EDGE_PIECE_M = 0.1
-"""Maximum length of a piece of an edge. The height of the step is measured once per piece."""
+"""Maximum length of the pieces into which edges are divided. The height of the step is measured once per piece."""
 SAMPLE_OFFSET_M = 0.01
 """Distance to both sides of an edge at which the ground height is measured."""
 WALL_THICKNESS_M = 0.01
@@ -96,7 +97,7 @@ def _walls_at_edges(mesh: TriangleMesh, ground: Owners, max_step: float) -> Iter
 
 
 class _EdgePiece(NamedTuple):
-    """A piece of an upright face, seen from above.
+    """A piece of an edge.
 
     start, end (2,):  ends of the piece in m
     outward (2,):     unit vector away from the solid
@@ -123,7 +124,7 @@ class _EdgePiece(NamedTuple):
 
 
 def _edge_pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_EdgePiece]:
-    """Divide the upright `faces` (indices) into pieces of at most EDGE_PIECE_M; faces above each other count once."""
+    """Divide the edges of upright `faces` (indices) into pieces; an edge that several faces form counts once."""
     seen = set()
     horizontal_normals = face_normals(mesh)[:, :2]
     for face in faces.tolist():

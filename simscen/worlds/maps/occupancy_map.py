@@ -79,7 +79,7 @@ def _cells_of_places(world: World, grid: OccupancyGrid) -> npt.NDArray[np.int64]
 
 
 def _cells_outside_building(occupied: CellMask, places: npt.NDArray[np.int64]) -> CellMask:
-    """Return the mask of the free cells outside the building; empty if the world is not a building.
+    """Return the mask of the free cells outside the building; all False if the world is not a building.
 
     Free cells are outside if they are connected to the edge of the map. A world is a building if the enclosed free area
     is larger than the outside area within the convex hull of all walls, and none of the `places` (row, column) lies

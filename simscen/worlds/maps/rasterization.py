@@ -19,13 +19,13 @@ INWARD_OFFSET_CELLS = 1e-6
 """Distance by which outlines are moved inwards, so that a wall that ends at the edge of a cell does not touch it."""
 
 
-def touched_cells(cut: CrossSection, shape: tuple[int, int]) -> CellMask:
+def touched_cells(section: CrossSection, shape: tuple[int, int]) -> CellMask:
     """Return the mask of `shape` (rows, columns) of the cells that overlap solids in any part.
 
-    `cut` contains the outlines of the solids, in cells. Compare `filled_cells`, which tests only the centers of cells.
+    `section` contains the outlines of the solids, in cells. Compare `filled_cells`, which only tests centers of cells.
     """
-    cells = filled_cells(cut, shape)
-    rows, columns = _outline_cells(cut.segments)
+    cells = filled_cells(section, shape)
+    rows, columns = _outline_cells(section.segments)
     inside = (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
     cells[rows[inside], columns[inside]] = True
     return cells
@@ -60,15 +60,15 @@ def _outline_cells(segments: Array) -> tuple[Integers, Integers]:
     return cells[:, 1], cells[:, 0]
 
 
-def filled_cells(cut: CrossSection, shape: tuple[int, int]) -> CellMask:
+def filled_cells(section: CrossSection, shape: tuple[int, int]) -> CellMask:
     """Return the mask of `shape` (rows, columns) of the cells whose center is inside a solid.
 
     A center is inside if the winding number of the outlines around it is positive. Rows in which the outline of a solid
     is not closed (a mesh with holes) are not filled, nor are solids with inverted faces, e.g. a room that is modeled as
     a box seen from inside.
     """
-    rows, columns, signs, owners = _crossings(cut, shape)
-    keep = _is_balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_is_inside_out(cut)[owners]
+    rows, columns, signs, owners = _crossings(section, shape)
+    keep = _is_balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_is_inside_out(section)[owners]
     flat = rows[keep] * (shape[1] + 1) + np.clip(columns[keep], 0, shape[1])
     steps = np.bincount(flat, weights=signs[keep], minlength=shape[0] * (shape[1] + 1))
     winding = np.cumsum(steps.reshape(shape[0], shape[1] + 1), axis=1)[:, :-1]
@@ -76,13 +76,15 @@ def filled_cells(cut: CrossSection, shape: tuple[int, int]) -> CellMask:
     return inside
 
 
-def _crossings(cut: CrossSection, shape: tuple[int, int]) -> tuple[Integers, Integers, Array, npt.NDArray[np.int32]]:
+def _crossings(
+    section: CrossSection, shape: tuple[int, int]
+) -> tuple[Integers, Integers, Array, npt.NDArray[np.int32]]:
     """Return row, column, sign, and owner (n,) of each crossing of an outline with the center line of a row.
 
     The column is the first one whose center is at the crossing or at larger x. The sign is 1 if the solid begins there
     and continues towards larger x, and -1 if the solid ends there. The owner is the index of the solid.
     """
-    (x0, y0), (x1, y1) = cut.segments[:, 0].T, cut.segments[:, 1].T
+    (x0, y0), (x1, y1) = section.segments[:, 0].T, section.segments[:, 1].T
     first = np.clip(np.ceil(np.minimum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
     last = np.clip(np.ceil(np.maximum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
     which, rows = expand_ranges(first, last)
@@ -90,7 +92,7 @@ def _crossings(cut: CrossSection, shape: tuple[int, int]) -> tuple[Integers, Int
     x = x0[which] + (rows + 0.5 - y0[which]) * slope
     # A solid is on the left of its outline: beyond an upward segment (at larger x) is the outside.
     signs = np.where((y1 > y0)[which], -1.0, 1.0)
-    return rows, np.ceil(x - 0.5).astype(np.int64), signs, cut.owners[which]
+    return rows, np.ceil(x - 0.5).astype(np.int64), signs, section.owners[which]
 
 
 def _is_balanced(keys: Integers, signs: Array) -> Flags:
@@ -103,17 +105,17 @@ def _is_balanced(keys: Integers, signs: Array) -> Flags:
     return balanced
 
 
-def _is_inside_out(cut: CrossSection) -> Flags:
+def _is_inside_out(section: CrossSection) -> Flags:
     """Return for each solid, by its index, whether its outline is clockwise."""
-    if not len(cut.owners):
+    if not len(section.owners):
         return np.zeros(0, dtype=np.bool_)
-    (x0, y0), (x1, y1) = cut.segments[:, 0].T, cut.segments[:, 1].T
-    clockwise: Flags = np.bincount(cut.owners, weights=x0 * y1 - x1 * y0) < 0
+    (x0, y0), (x1, y1) = section.segments[:, 0].T, section.segments[:, 1].T
+    clockwise: Flags = np.bincount(section.owners, weights=x0 * y1 - x1 * y0) < 0
     return clockwise
 
 
 def expand_ranges(first: Integers, stop: Integers) -> tuple[Integers, Integers]:
-    """Return all integers of the ranges first[k], …, stop[k] - 1 as a pair: the index k of each, and the integers."""
+    """Concatenate the ranges first[k], …, stop[k] - 1. Return the index k of each integer, and the integers."""
     lengths = np.maximum(stop - first, 0)
     which = np.repeat(np.arange(len(first)), lengths)
     offsets = np.arange(len(which)) - np.repeat(np.cumsum(lengths) - lengths, lengths)

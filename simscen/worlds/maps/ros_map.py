@@ -172,7 +172,7 @@ def _to_8_bits(quanta: Grays16) -> Grays8:
 
 
 def load_map(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[str, ...]]:
-    """Return the map that its YAML file (`spec`) and its image describe, and warnings about suspicious values.
+    """Return the map that a YAML file (its content is `spec`) and an image describe, and warnings for the user.
 
     As in map_server, only the 8-bit gray of a pixel counts, and the occupancy is computed in single precision. In the
     modes trinary and scale, pixels that are not opaque are unknown. Raises InvalidInput for an image that cannot be

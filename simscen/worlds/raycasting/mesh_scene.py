@@ -1,8 +1,10 @@
 """Cast rays against one mesh, static or moving, by direct calls of the Embree library in packets of 16 rays.
 
 The embreex package contains the library, but its own Python functions are slow: they copy triangles number by number,
-and cast rays one by one. To sweep a fan means to cast its rays: each ray is shortened to end at the first triangle that
-it hits, so that several scenes can be swept one after another.
+and cast rays one by one.
+
+A fan contains the rays of a planar lidar (see `RayFan`). To sweep a fan means to cast its rays: each ray is shortened so
+that it ends at the first triangle that it hits. Several scenes can therefore be swept one after another.
 """
 
 import ctypes

@@ -31,7 +31,7 @@ NO_POSES: Mapping[str, Pose3] = MappingProxyType({})
 _MAX_RANGE_M = 1e30
 """Maximum length of a ray: an infinite one would overflow in single precision."""
 _END_FACTOR = 1.001
-"""Length of a ray without a hit, as a multiple of its range, so that a hit at exactly the range is distinguished."""
+"""Initial length of a ray as a multiple of its range: a ray that is longer than its range at the end has no hit."""
 _HEIGHT_MARGIN_M, _ROUNDING_MARGIN_M = 0.1, 0.01
 """Minimum margin of the height range from which triangles are taken, and upper bound of rounding errors."""
 

@@ -41,7 +41,8 @@ class ClearanceField:
 
     grid:                   grid without yaw; only its size, resolution, and origin are used
     rough (rows, columns):  distance in m from the center of a cell to the center of the nearest cell that a solid
-                            touches, 0 for such cells; its error is at most HALF_DIAGONAL_CELLS
+                            touches, 0 for such cells; differs from the exact clearance of the center by at most
+                            HALF_DIAGONAL_CELLS
     inside:                 mask of the cells whose center is in a solid
     outline:                points of the outlines of all solids; None without solids
     owners (n,):            index in `names` of the solid that each point of `outline` belongs to

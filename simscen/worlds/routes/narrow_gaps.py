@@ -1,4 +1,7 @@
-"""Find the gap that is too narrow for a robot: the narrowest point of the widest path between two positions."""
+"""Find the gap that is too narrow for a robot: the narrowest point of the widest path between two positions.
+
+The widest path is the path whose narrowest point is as wide as possible.
+"""
 
 from dataclasses import dataclass
 
@@ -41,9 +44,10 @@ def narrowest_gap(
     radius: float,
     z_range: tuple[float, float],
 ) -> Gap:
-    """Return the gap that blocks a disc of `radius` m on its way between two `ends`. Its width is exact to about 2 cm.
+    """Return the gap that blocks a disc of `radius` m on its way from one of the two `ends` to the other.
 
-    Only the part of `mesh` between the heights `z_range` counts. `bounds` are those of the world.
+    The width of the gap is exact to about 2 cm. Only the part of `mesh` between the heights `z_range` counts. `bounds`
+    are those of the world.
     """
     return narrowest_gap_in(clearance_field(mesh, search_grid(bounds, radius), z_range), ends, radius)
 

@@ -1,4 +1,7 @@
-"""Find the passages of a path: gaps between two solids that a robot has to cross, such as doors."""
+"""Find the passages of a path: gaps between two solids that a robot has to cross, such as doors.
+
+The sides of a passage are points of the outline: the points on all solids that a `ClearanceField` contains.
+"""
 
 import math
 from collections.abc import Iterator
@@ -38,7 +41,9 @@ def find_passages(path: Array, goal: str, field: ClearanceField) -> tuple[Passag
     points = resample_polyline(path, max(SPACING_M, polyline_length(path) / MAX_PROBES))
     found: dict[tuple[int, int], float] = {}
     for point in points:
-        crossings = ((pair, _crossing_index(field.outline.data[list(pair)], points)) for pair in _pairs(point, field))
+        crossings = (
+            (pair, _crossing_index(field.outline.data[list(pair)], points)) for pair in _candidate_pairs(point, field)
+        )
         pair, index = next(((pair, index) for pair, index in crossings if index is not None), (None, None))
         if pair is not None and index is not None:
             found.setdefault((min(pair), max(pair)), index)
@@ -62,7 +67,7 @@ def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage
     )
 
 
-def _pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
+def _candidate_pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
     """Yield pairs of points of the outline, by index, that may be the two sides of a passage at a point of the path.
 
     The pair that is nearest to the point comes first.
@@ -72,18 +77,18 @@ def _pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
     one, apart = int(index), float(distance)
     if not 0 < apart < MAX_WIDTH_M:
         return
-    hits = _hits(point, field.outline.data[one], apart, field)
+    hits = _ray_hits(point, field.outline.data[one], apart, field)
     reached = np.flatnonzero(np.isfinite(hits[:, 0]))
     if not len(reached):
         return
     nearest = reached[np.argmin(np.linalg.norm(hits[reached] - point, axis=1))]
     for hit in dict.fromkeys((int(nearest), int(reached[np.argmin(np.abs(reached - len(RAY_ROTATIONS) // 2))]))):
         other = int(field.outline.query(hits[hit])[1])
-        yield _narrowest(one, other, field)
+        yield _narrowest_pair(one, other, field)
         yield one, other
 
 
-def _hits(point: Array, side: Array, distance: float, field: ClearanceField) -> Array:
+def _ray_hits(point: Array, side: Array, distance: float, field: ClearanceField) -> Array:
     """Return for each of the RAY_ROTATIONS the point (n, 2) where a ray from `point` hits a solid; nan without a hit.
 
     The rays point away from `side`, which is `distance` m from `point`. Passages are at most MAX_WIDTH_M wide.
@@ -116,7 +121,7 @@ def _crossing_index(ends: Array, path: Array) -> float | None:
     return first + (before / (before + after) if before + after else 0.0)
 
 
-def _narrowest(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
+def _narrowest_pair(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
     """Return the two sides of a passage where it is narrowest near `one` and `other`; all are indices of the outline.
 
     If `one` and `other` are more than NARROW_WIDTH_M apart, returns them unchanged.
