@@ -82,7 +82,7 @@ class Sensor(Protocol):
     """Takes readings of one quantity at a fixed rate.
 
     *Given* the same world and generator *then* the same readings, bit for bit.
-    *Given* noise *then* no two scans or inertial readings of a robot at rest are equal; without noise all are.
+    *Given* noise *then* no two scans or inertial readings of a robot at rest are equal; without noise, all are equal.
     *Given* a reading *then* nothing changes it later.
     """
 

@@ -3,8 +3,8 @@
 The embreex package contains the library, but its own Python functions are slow: they copy triangles number by number,
 and cast rays one by one.
 
-A fan contains the rays of a planar lidar (see `RayFan`). To sweep a fan means to cast its rays: each ray is shortened so
-that it ends at the first triangle that it hits. Several scenes can therefore be swept one after another.
+A fan contains the rays of a planar lidar (see `RayFan`). To sweep a fan means to cast its rays: each ray is shortened
+to end at the first triangle that it hits. Several scenes can therefore be swept one after another.
 """
 
 import ctypes

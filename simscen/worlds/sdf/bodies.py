@@ -170,7 +170,7 @@ def _link_mass(inertial: Element | None, collisions: Sequence[tuple[Element, Seq
 
 
 def _density(collision: Element, inertial: Element) -> float:
-    """Return the density in kg/m³ of a collision, or else of its link."""
+    """Return the density in kg/m³ that a collision or else the `<inertial>` of its link states, or the default."""
     owner = next((owner for owner in (collision, inertial) if owner.child("density")), None)
     return read_positive(owner, "density") if owner else DEFAULT_DENSITY_KG_M3
 

@@ -1,4 +1,7 @@
-"""Read values from the XML elements of SDF files, and report elements that the importer does not read."""
+"""Read values from the XML elements of SDF files, and report elements that the importer does not read.
+
+All functions that read a value raise UnusableElement at the element that holds an invalid value.
+"""
 
 import difflib
 import math
@@ -67,9 +70,6 @@ def _printable(name: str) -> str:
     """Return a name with control characters escaped and at most MAX_SHOWN_NAME_LENGTH characters."""
     printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
     return printable if len(printable) <= MAX_SHOWN_NAME_LENGTH else f"{printable[:MAX_SHOWN_NAME_LENGTH]}…"
-
-
-# Values: each function raises UnusableElement at the element that holds an invalid value.
 
 
 def read_numbers(element: Element, *counts: int) -> tuple[float, ...]:
