@@ -13,10 +13,8 @@ from simscen.pedestrians.forces import Indices
 CELL_M = 1.0
 """Size of the grid cells for which nearby walls are cached."""
 OBSTACLE_RANGE_M = 1.2
-"""Distance from the center of a pedestrian within which walls and objects act.
-
-At this distance, a gap of 1 m remains, and the force is only 0.00014 m/s².
-"""
+"""Distance from the center of a pedestrian within which walls and objects act: at a gap of 1 m from the body, their
+force is only 0.00014 m/s²."""
 SIGHT_CELL_M = 0.1
 """Cell size of the visibility grid; larger if it would have more than MAX_SIGHT_CELLS."""
 MAX_SIGHT_CELLS = 4_000_000
