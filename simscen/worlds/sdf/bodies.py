@@ -230,7 +230,7 @@ def _link_groups(model: ModelNode, links: list[PlacedLink], report: ImportReport
     numbers = {id(link.frame): number for number, link in enumerate(links)}
     for number, link in enumerate(links):
         groups.root(number)
-        if link.model.static:
+        if link.model.is_static:
             groups.join(_WORLD, number)
     for owner in model.models():
         for joint in owner.joints:

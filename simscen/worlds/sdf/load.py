@@ -86,7 +86,7 @@ class _WorldImporter:
         """Return the world with the saved `state` applied; `tree` reads the models that the state inserts."""
         for element in state.inserted:
             with self._report.skip_unusable():
-                tree.add_model(self._root, tree.read_model(element, static=False))
+                tree.add_model(self._root, tree.read_model(element, is_parent_static=False))
         for model in self._root.parts:
             if isinstance(model, ModelNode) and model.name not in state.deleted:
                 with self._report.skip_unusable():

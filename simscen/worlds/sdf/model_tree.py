@@ -157,19 +157,19 @@ class FrameScope:
 class ModelNode:
     """A model, an actor, or the world as the outermost model.
 
-    frame:   the model's own frame, in the scope of its parent
-    scope:   the frames in the model
-    static:  True if the model or a model around it is static, as in Gazebo
-    parts:   links (their frames) and nested models, in document order; an actor has only links
-    joints:  `<joint>` elements
-    actors:  actors of the world; empty for models
+    frame:      the model's own frame, in the scope of its parent
+    scope:      the frames in the model
+    is_static:  True if the model or a model around it is static, as in Gazebo
+    parts:      links (their frames) and nested models, in document order; an actor has only links
+    joints:     `<joint>` elements
+    actors:     actors of the world; empty for models
     """
 
     name: str
     element: Element
     frame: Frame
     scope: FrameScope
-    static: bool = False
+    is_static: bool = False
     parts: "list[Frame | ModelNode]" = field(default_factory=list)
     joints: list[Element] = field(default_factory=list)
     actors: "list[ModelNode]" = field(default_factory=list)
@@ -196,8 +196,8 @@ class TreeReader:
         self._read_children(world, "world")
         return world
 
-    def read_model(self, element: Element, static: bool, include: Element | None = None) -> ModelNode:
-        """Read a `<model>`; `static` states whether a model around it is static.
+    def read_model(self, element: Element, is_parent_static: bool, include: Element | None = None) -> ModelNode:
+        """Read a `<model>`, which is static if it or its parent is static.
 
         The children name, pose, static and placement_frame of `include` override those of the model, as the
         specification allows. Raises UnusableElement.
@@ -208,24 +208,24 @@ class TreeReader:
         overrides = {child.tag: child for child in include.children} if include else {}
         name = _checked_name(element, overrides.get("name"))
         is_static = read_bool(overrides.get("static", element.child("static")))
-        if include is not None and _is_merged(include):
+        if include is not None and _has_merge(include):
             is_static = False
         scope = FrameScope(MODEL_FRAME)
         frame = Frame(name, element, overrides.get("pose", element.child("pose")), model_scope=scope)
         placement = overrides.get("placement_frame")
         frame.placement_frame = placement.text if placement else element.attributes.get("placement_frame", "")
-        model = ModelNode(name, element, frame, scope, static or is_static)
+        model = ModelNode(name, element, frame, scope, is_parent_static or is_static)
         self._read_children(model, "model")
         scope.canonical_link = element.attributes.get("canonical_link", "") or scope.canonical_link
         return model
 
-    def add_model(self, owner: ModelNode, model: ModelNode, merged: bool = False) -> None:
-        """Add a nested model to its owner. The frames of a `merged` model are visible in the owner too."""
+    def add_model(self, owner: ModelNode, model: ModelNode, is_merged: bool = False) -> None:
+        """Add a nested model to its owner. The frames of a merged model are visible in the owner too."""
         owner.parts.append(model)
-        name = f"_merged__{model.name}__model__" if merged else model.name
+        name = f"_merged__{model.name}__model__" if is_merged else model.name
         owner.scope.frames.setdefault(name, model.frame)
         owner.scope.canonical_link = owner.scope.canonical_link or name
-        if merged:
+        if is_merged:
             owner.scope.merged_models.append(model.frame)
 
     def _read_children(self, owner: ModelNode, kind: str) -> None:
@@ -241,7 +241,7 @@ class TreeReader:
                 attached_to = child.attributes.get("attached_to", "")
                 scope.add(Frame(checked_name(child), child, pose, attached_to, attached_to))
             case "world" | "model", "model":
-                self.add_model(owner, self.read_model(child, owner.static))
+                self.add_model(owner, self.read_model(child, owner.is_static))
             case "world" | "model", "include":
                 self._read_include(owner, child)
             case "world" | "model", "joint":
@@ -285,7 +285,7 @@ class TreeReader:
                 self._report.note(root.location, "contains more than one model; only the first is included")
             first = entities[0]
             if first.tag == "model":
-                self.add_model(owner, self.read_model(first, owner.static, include), _is_merged(include))
+                self.add_model(owner, self.read_model(first, owner.is_static, include), _has_merge(include))
             elif first.tag == "actor":
                 owner.actors.append(self._read_actor(first, include))
         finally:
@@ -297,5 +297,5 @@ def _checked_name(element: Element, override: Element | None) -> str:
     return checked_name(override, override.text) if override else checked_name(element)
 
 
-def _is_merged(include: Element) -> bool:
+def _has_merge(include: Element) -> bool:
     return parse_bool(include.attributes.get("merge", "0"), include)
