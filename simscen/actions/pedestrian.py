@@ -64,7 +64,7 @@ class _WalkSettings(Spec):
     height: Annotated[PositiveLength, Field(ge=0.5, le=2.5)] = 1.7
     """Height of the cylinder."""
     blind_to: list[Unseen] = []
-    """What they do not notice, like a person who looks at a phone; they always notice walls."""
+    """What the person does not notice, e.g. while looking at a phone; everybody notices walls."""
 
     @model_validator(mode="after")
     def _check_reaction(self) -> _WalkSettings:
@@ -117,8 +117,8 @@ class Pedestrian(_WalkSettings, WorldAction):
     pose: PlaceOrPose
     """Initial pose, or a place by name."""
     goals: Annotated[list[PlaceOrPoint], Field(max_length=1000)] = []
-    """Goals in order: points [x, y] in the world frame, or places by name. Without goals, they stand still;
-    if they step aside, they return to their place."""
+    """Goals in order: points [x, y] in the world frame, or places by name. Without goals, the person
+    stands still, and returns to the initial position after stepping aside."""
     group: Name | None = None
     """Members of the same group walk side by side."""
 
@@ -148,7 +148,7 @@ class Crowd(_WalkSettings, WorldAction):
     start: RegionName
     """Region of the initial positions; each is drawn from its free space."""
     goals: Annotated[list[RegionName], Field(max_length=100)] = []
-    """Regions of the goals in order; each person has one point in each. Without goals, they stand."""
+    """Regions of the goals in order; each person has one goal in each. Without goals, all stand still."""
     group_size: Annotated[int, Field(ge=1, le=6)] = 1
     """Number of people who walk together to the same goals."""
 

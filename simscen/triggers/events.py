@@ -44,7 +44,7 @@ class EventStatus(Spec, Condition):
 
 
 class Replan(Spec, Condition):
-    """True once the robot has replanned this often because its plan was blocked or outdated.
+    """True once the robot has replanned `count` times because its plan was blocked or outdated.
 
     Example: `when: {replan: {count: 2}}`
     """
@@ -58,7 +58,7 @@ class Replan(Spec, Condition):
 
 
 class RecoveryStatus(Spec, Condition):
-    """True once a recovery behavior has started or ended this often.
+    """True once a recovery behavior has started or ended `count` times.
 
     Example: `when: {recovery: {status: started}}`
     """
@@ -109,7 +109,7 @@ class GoalStatus(Spec, Condition):
 
 
 class Waypoint(Spec, Condition):
-    """True once the robot has reported this many waypoints as reached or passed.
+    """True once the robot has reported `count` waypoints as reached or passed.
 
     Use it for disturbances at a certain point of a tour, whether the robot stops at its waypoints or not: after the
     second shelf, a door closes. The count continues over all loops of the tour.
