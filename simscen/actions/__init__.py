@@ -1,1 +1,1 @@
-"""Actions that events of a scenario perform on the world, each with its specification and implementation."""
+"""Actions that events of a scenario perform. Each class is both the YAML specification and the implementation."""

@@ -1,4 +1,4 @@
-"""Base classes of actions, and the choice of an action by its key.
+"""Base classes of actions, the choice of an action by its YAML key, and the check of actions from plugins.
 
 A stage is the interface through which an action reads and changes the running simulation (simscen.core.stage).
 """
@@ -10,14 +10,20 @@ from dataclasses import replace
 from typing import Annotated, Any, ClassVar, cast
 
 from simscen.core.errors import BROKEN_COMPONENT, RunError
+from simscen.core.geometry import Pose2, wrap
 from simscen.core.stage import Effect, Situation, Stage
 from simscen.spec.base import LazySpec
 from simscen.spec.choice import Choice
 from simscen.spec.places import RobotName
 
+POSE_TOLERANCE_M_RAD = 1e-3
+"""Difference in position (m) and heading (rad) below which two poses count as equal."""
+_QUERIES = frozenset({*dir(Situation), "has_room", "rng", "door", "motion", "mass"})
+"""Members of a stage that only return information; all others change the run."""
+
 
 class Action(ABC):
-    """Change that an event of a scenario makes to the running world."""
+    """Change that an event of a scenario makes to the running simulation."""
 
     @property
     def is_robot_specific(self) -> bool:
@@ -30,7 +36,7 @@ class Action(ABC):
 
 
 class WorldAction(Action):
-    """Action that is the same for all robots."""
+    """Action on the world, whose effect is the same for all robots."""
 
     @property
     def is_robot_specific(self) -> bool:
@@ -39,7 +45,7 @@ class WorldAction(Action):
 
 
 class AnyAction(Choice):
-    """One action, chosen by its key."""
+    """One action, chosen by its YAML key."""
 
     group: ClassVar[str] = "action"
     modifiers: ClassVar[frozenset[str]] = frozenset({"robot"})
@@ -66,7 +72,10 @@ class AnyAction(Choice):
     """The robot that the action is for, if there are several; default: the only one."""
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether it can do what actions of these kinds do; an action of a plugin can do anything."""
+        """Return whether the action is of one of these `kinds` or from a plugin, which may do anything.
+
+        Without `kinds`, returns whether the action is from a plugin.
+        """
         return self.kind in kinds or self.original_class is not None
 
     def perform(self, stage: Stage) -> Effect:
@@ -82,14 +91,17 @@ class AnyAction(Choice):
         return action.perform(stage) if self.original_class is None else perform_checked(action, stage, self.added_by)
 
 
-_QUERIES = frozenset({*dir(Situation), "has_room", "rng", "door", "motion", "mass"})
-"""Members of a stage that only return information; all others change the run."""
+def is_same_pose(first: Pose2, second: Pose2) -> bool:
+    """Return whether two poses are equal within POSE_TOLERANCE_M_RAD."""
+    is_same_position = first.distance(second) < POSE_TOLERANCE_M_RAD
+    return is_same_position and abs(wrap(first.yaw - second.yaw)) < POSE_TOLERANCE_M_RAD
 
 
 def perform_checked(action: Action, stage: Stage, origin: str) -> Effect:
-    """Perform an action of a plugin; raises RunError if its effect is invalid or contradicts what it did.
+    """Perform an action of a plugin and return its effect.
 
-    `origin` names the plugin at the end of a message.
+    Raises RunError if the effect is not valid, or states a change although the action changed nothing. `origin` names
+    the plugin at the end of the message.
     """
     observed = _ObservedStage(stage)
     effect: object = action.perform(cast(Stage, observed))

@@ -1,4 +1,4 @@
-"""`mark`: gives the current moment a name in the log."""
+"""`mark`: records a name for the current time in the log."""
 
 from typing import Annotated
 
@@ -12,16 +12,16 @@ from simscen.spec.places import Name
 
 
 class Mark(Spec, WorldAction):
-    """Give the current moment a name in the log; nothing else changes.
+    """Record a name for the current time in the log; nothing else changes.
 
-    The trigger `event` and criteria with `after` can refer to the name, and pictures show where the robot was. Several
-    events can set the same mark.
+    The trigger `event` and criteria with `after` can refer to the name. Pictures of the run show where the robot was at
+    this time. Several events can set the same mark.
 
     Example: `do: {mark: {name: in the aisle}}`
     """
 
     name: Name
-    """Name of the moment."""
+    """Name of the mark."""
     note: Annotated[str, Field(max_length=1000)] = ""
     """A remark for people who read the log."""
 

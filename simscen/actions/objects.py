@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from simscen.actions.base import Action, WorldAction
+from simscen.actions.base import Action, WorldAction, is_same_pose
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.core.messages.navigation import Path
@@ -18,8 +18,10 @@ from simscen.spec.moving_objects import Motion, Shaped
 from simscen.spec.places import DoorName, MovableName, Name, PlaceOrPose
 from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength, PositiveDuration, Ratio
 
-POSE_TOLERANCE_M_RAD = 1e-3
-"""Meters and radians within which an object is already at the requested pose."""
+SWING_SEGMENTS = 16
+"""Straight segments of a swing. The edge of the panel then deviates from its arc by less than 0.2 %."""
+TRAVEL_TOLERANCE = 1e-6
+"""Fraction of its full travel within which a door has reached its target."""
 
 
 class Spawn(Shaped, Action):
@@ -56,7 +58,7 @@ class Spawn(Shaped, Action):
         return self.pose is None
 
     def perform(self, stage: Stage) -> Effect:
-        """Spawn the object; without a plan for `on_plan`, spawn it ahead of the robot."""
+        """Add the object; without a plan for `on_plan`, straight ahead of the robot, which counts as failed."""
         is_as_requested = self.on_plan is None or _has_plan(stage)
         pose = self._spawn_pose(stage)
         stage.spawn(Body(self.name, (self.solid(self.name),), Pose3.planar(pose), self.mass))
@@ -79,7 +81,10 @@ def _has_plan(stage: Stage) -> bool:
 
 
 def pose_on_plan(plan: Path, robot: Pose2, distance: float) -> Pose2:
-    """Return the pose on `plan` that is `distance` meters beyond the point nearest to the robot, along the plan."""
+    """Return the pose on `plan` that is `distance` m along the plan beyond the point that is nearest to the robot.
+
+    The heading is the direction of the plan. The pose is at the end of the plan if the plan is shorter.
+    """
     points = plan.points[:, :2]
     steps = np.hypot(*np.diff(points, axis=0).T)
     lengths = np.concatenate(([0.0], np.cumsum(steps)))
@@ -112,9 +117,9 @@ class Remove(Spec, WorldAction):
 class Move(Motion, WorldAction):
     """Move an object through waypoints at a speed, or along timed keyframes.
 
-    It does not stop for the robot, and from then on nothing can push it. Use it for a cart, a forklift, or a person on
-    a fixed course, and for worlds with moving obstacles like DynaBARN (Nair et al., 2022), which give the pose of each
-    obstacle over time.
+    The object does not stop for the robot, and nothing can push it from then on. Use this action for a cart, a
+    forklift, or a person on a fixed course, and for worlds with moving obstacles like DynaBARN (Nair et al., 2022),
+    which give the pose of each obstacle over time.
 
     Example: `do: {move: {name: cart, keyframes: [[0, 4, 1, 0], [3, 4, 5, 90 deg], [6, 4, 1, 0]], repeat: loop}}`
     """
@@ -137,8 +142,8 @@ class Move(Motion, WorldAction):
 class Teleport(Spec, WorldAction):
     """Move an object to another pose, at once and at rest. For the robot, use `kidnap`.
 
-    Use it for changes that the robot does not see: the pallet of this morning is now one aisle further, and the costmap
-    still shows it at its old place. A scripted motion of the object ends.
+    A scripted motion of the object ends. Use this action for changes that the robot does not see, for example a pallet
+    that is now in the next aisle while the costmap still shows it at its old position.
 
     Example: `do: {teleport: {name: pallet, pose: {x: 4, y: 2, yaw: 90 deg}}}`
     """
@@ -153,19 +158,15 @@ class Teleport(Spec, WorldAction):
         current, target = stage.object(self.name), self.pose.pose
         if current is None:
             return Effect(False, f"there is nothing called {self.name}")
-        distance, is_moving = current.distance(target), stage.motion(self.name) is not None
-        if (
-            distance < POSE_TOLERANCE_M_RAD
-            and abs(wrap(current.yaw - target.yaw)) < POSE_TOLERANCE_M_RAD
-            and not is_moving
-        ):
+        if is_same_pose(current, target) and stage.motion(self.name) is None:
             return Effect(False, f"{self.name} was already there")
         stage.place(self.name, target)
+        distance = current.distance(target)
         return Effect(True, f"moved {self.name} by {distance:.2f} m to ({target.x:.2f}, {target.y:.2f})")
 
 
 class Stop(Spec, WorldAction):
-    """Stop a moving object, pedestrian, or door; with `for`, its motion continues afterwards where it was.
+    """Stop a moving object, pedestrian, or door; with `for`, the motion continues after this time.
 
     Use it for a person who stops in front of the robot, a cart that waits, or a door that jams.
 
@@ -175,7 +176,7 @@ class Stop(Spec, WorldAction):
     name: MovableName
     """The object to stop."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
-    """How long it stops; default: until another action moves it."""
+    """Duration of the stop; default: until another action moves the object."""
 
     def perform(self, stage: Stage) -> Effect:
         """Stop the object; has no effect if it does not exist or no script moves it."""
@@ -193,12 +194,6 @@ class Stop(Spec, WorldAction):
         return Effect(True, f"stopped {self.name} for {self.for_:g} s")
 
 
-SWING_SEGMENTS = 16
-"""Straight segments of a swing. The edge of the panel then deviates from its arc by less than 0.2 %."""
-TRAVEL_TOLERANCE = 1e-6
-"""Share of its travel within which a door has reached its target."""
-
-
 class OpenDoor(Spec, WorldAction):
     """Open a door of the world from its current position; it swings or slides.
 
@@ -210,7 +205,7 @@ class OpenDoor(Spec, WorldAction):
     duration: PositiveDuration = 1.5
     """Time from fully closed to fully open; proportionally less for a shorter travel."""
     to: Annotated[Ratio, Field(gt=0, le=1)] = 1.0
-    """Share of its travel: 100 % is fully open, 30 % ajar."""
+    """Fraction of the full travel: 100 % is fully open, 30 % ajar."""
 
     def perform(self, stage: Stage) -> Effect:
         """Start the motion; has no effect if the door is already there or on its way there."""
@@ -237,15 +232,19 @@ class CloseDoor(Spec, WorldAction):
 
 
 def _move_door(stage: Stage, name: str, target: Pose2, full_duration: float, state: str) -> Effect:
+    """Start the motion of a door to `target` and return the effect.
+
+    `full_duration` is the time in s for the full travel; `state` describes the target in messages, e.g. "open".
+    """
     pose = stage.object(name)
     if pose is None:
         return Effect(False, f"{name} does not exist any more")
     closed, opened = stage.door(name)
-    remaining = _travel_share(pose, target, closed, opened)
+    remaining = _travel_fraction(pose, target, closed, opened)
     if remaining < TRAVEL_TOLERANCE:
         return Effect(False, f"{name} was already {state}")
     motion, verb = stage.motion(name), "swings" if wrap(opened.yaw - closed.yaw) else "slides"
-    if motion is not None and _travel_share(motion[0].poses[-1], target, closed, opened) < TRAVEL_TOLERANCE:
+    if motion is not None and _travel_fraction(motion[0].poses[-1], target, closed, opened) < TRAVEL_TOLERANCE:
         return Effect(False, f"{name} already {verb} {state}")
     duration = full_duration if remaining > 1 - TRAVEL_TOLERANCE else full_duration * remaining
     stage.move(name, panel_path(pose, target, duration))
@@ -255,17 +254,18 @@ def _move_door(stage: Stage, name: str, target: Pose2, full_duration: float, sta
 def panel_path(start: Pose2, target: Pose2, duration: float) -> MotionPath:
     """Return the path of a door panel from one pose to another within `duration` seconds."""
     segments = SWING_SEGMENTS if wrap(target.yaw - start.yaw) else 1
-    shares = [segment / segments for segment in range(segments + 1)]
-    times = tuple(share * duration for share in shares)
-    return MotionPath(times, tuple(_interpolate(start, target, share) for share in shares))
+    fractions = [segment / segments for segment in range(segments + 1)]
+    times = tuple(fraction * duration for fraction in fractions)
+    return MotionPath(times, tuple(_interpolate(start, target, fraction) for fraction in fractions))
 
 
-def _travel_share(start: Pose2, end: Pose2, closed: Pose2, opened: Pose2) -> float:
-    """Return the distance between two poses of the panel as a share of the whole travel of the door."""
+def _travel_fraction(start: Pose2, end: Pose2, closed: Pose2, opened: Pose2) -> float:
+    """Return the travel between two poses of a panel as a fraction of the full travel from `closed` to `opened`."""
     turn, slide = abs(wrap(opened.yaw - closed.yaw)), opened.distance(closed)
     return abs(wrap(end.yaw - start.yaw)) / turn if turn else start.distance(end) / slide
 
 
-def _interpolate(start: Pose2, end: Pose2, share: float) -> Pose2:
-    x, y = start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)
-    return Pose2(x, y, wrap(start.yaw + share * wrap(end.yaw - start.yaw)))
+def _interpolate(start: Pose2, end: Pose2, fraction: float) -> Pose2:
+    """Return the pose after a fraction of the way, with the shorter rotation."""
+    x, y = start.x + fraction * (end.x - start.x), start.y + fraction * (end.y - start.y)
+    return Pose2(x, y, wrap(start.yaw + fraction * wrap(end.yaw - start.yaw)))

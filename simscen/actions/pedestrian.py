@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     import numpy as np
 
 Point = tuple[float, float]
+"""(x, y) in m in the world frame."""
 MEAN_SPEED_M_S, SPEED_STD_M_S = 1.29, 0.19
-"""Distribution of preferred walking speeds (Moussaïd et al. 2009)."""
+"""Mean and standard deviation of preferred walking speeds (Moussaïd et al. 2009)."""
 MAX_SPEED_STDS = 2.0
 """Preferred speeds deviate from the mean by at most this many standard deviations."""
 REACTIONS: dict[str, tuple[float, float]] = {
@@ -32,9 +33,9 @@ REACTIONS: dict[str, tuple[float, float]] = {
     "scared": (3.0, 40.0),
     "threatening": (4.0, 40.0),
 }
-"""Distance in m at which each reaction starts and its duration in s, from the behavior trees of HuNavSim."""
+"""Distance in m from the robot at which each reaction starts, and its duration in s (behavior trees of HuNavSim)."""
 MAX_DRAWS = 200
-"""Random positions tried for a pedestrian before the region counts as full."""
+"""Number of random positions that are tried for a pedestrian before the region counts as full."""
 GROUP_HALF_WIDTH_M = 1.0
 """Largest initial distance along x and y between the first pedestrian of a group and the others."""
 INITIAL_CLEARANCE_M = 0.1
@@ -42,7 +43,7 @@ INITIAL_CLEARANCE_M = 0.1
 
 
 class _WalkSettings(Spec):
-    """Keys that `pedestrian` and `crowd` share."""
+    """Keys that `pedestrian` and `crowd` have in common."""
 
     repeat: Literal["once", "loop", "back_and_forth"] = "once"
     """After the last goal: stay (`once`), walk to the first goal again (`loop`), or walk back through the goals
@@ -63,7 +64,7 @@ class _WalkSettings(Spec):
     height: Annotated[PositiveLength, Field(ge=0.5, le=2.5)] = 1.7
     """Height of the cylinder."""
     blind_to: list[Unseen] = []
-    """What they do not notice, like a person who looks at a phone; they always notice walls."""
+    """What the person does not notice, e.g. while looking at a phone; everybody notices walls."""
 
     @model_validator(mode="after")
     def _check_reaction(self) -> _WalkSettings:
@@ -98,7 +99,7 @@ class _WalkSettings(Spec):
 
 
 def _stream_owner(name: str, group: str | None) -> str:
-    """Return the prefix of the names of the random streams of a pedestrian."""
+    """Return the prefix of the names of random streams: that of the group, or of the person without a group."""
     return f"person {name}" if group is None else f"group {group}"
 
 
@@ -116,13 +117,13 @@ class Pedestrian(_WalkSettings, WorldAction):
     pose: PlaceOrPose
     """Initial pose, or a place by name."""
     goals: Annotated[list[PlaceOrPoint], Field(max_length=1000)] = []
-    """Goals in order: points [x, y] in the world frame, or places by name. Without goals, they stand still;
-    if they step aside, they return to their place."""
+    """Goals in order: points [x, y] in the world frame, or places by name. Without goals, the person
+    stands still, and returns to the initial position after stepping aside."""
     group: Name | None = None
     """Members of the same group walk side by side."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Add the pedestrian. Does not count as having happened if there is no free space."""
+        """Add the pedestrian; has no effect if there is no free space."""
         pose = self.pose.pose
         if not stage.has_room((pose.x, pose.y), self.radius):
             return Effect(False, f"there is no free space for {self.name} at ({pose.x:.2f}, {pose.y:.2f})")
@@ -147,7 +148,7 @@ class Crowd(_WalkSettings, WorldAction):
     start: RegionName
     """Region of the initial positions; each is drawn from its free space."""
     goals: Annotated[list[RegionName], Field(max_length=100)] = []
-    """Regions of the goals in order; each person has one point in each. Without goals, they stand."""
+    """Regions of the goals in order; each person has one goal in each. Without goals, all stand still."""
     group_size: Annotated[int, Field(ge=1, le=6)] = 1
     """Number of people who walk together to the same goals."""
 
@@ -157,7 +158,7 @@ class Crowd(_WalkSettings, WorldAction):
         return [f"{self.name}-{number}" for number in range(1, self.count + 1)]
 
     def perform(self, stage: Stage) -> Effect:
-        """Add the people. Does not count as having happened if there is not enough free space for all."""
+        """Add the people; if there is not enough free space for all, add fewer, which counts as failed."""
         added, group_start = 0, None
         for index in range(self.count):
             is_follower = index % self.group_size > 0
@@ -171,19 +172,22 @@ class Crowd(_WalkSettings, WorldAction):
         return Effect(True, f"added {added} people in {self.start}")
 
     def _draw_start(self, stage: Stage, index: int, group_start: Point | None) -> Point | None:
-        """Return a free point of the start region, near the first of the group if given; None if none was found."""
+        """Return a free point of the start region; None if none was found.
+
+        The point is near `group_start`, the position of the first member of the group, unless that is None.
+        """
         rng, corners = stage.rng(f"person {self.names[index]}, start"), stage.region(self.start)
         if group_start is None:
-            box = _bounding_box(corners)
+            area = _bounding_rectangle(corners)
         else:
-            box = Box(*group_start, GROUP_HALF_WIDTH_M, GROUP_HALF_WIDTH_M)
-        for point in box.random_points(rng):
+            area = _Rectangle(*group_start, GROUP_HALF_WIDTH_M, GROUP_HALF_WIDTH_M)
+        for point in area.random_points(rng):
             if polygon_contains(corners, point) and stage.has_room(point, self.radius + INITIAL_CLEARANCE_M):
                 return point
         return None
 
     def _add(self, stage: Stage, index: int, start: Point) -> bool:
-        """Add one person; return False if a goal region has no free space."""
+        """Add the person with this index at `start`; return False if a goal region has no free space."""
         name, group = self.names[index], None
         if self.group_size > 1:
             group = f"{self.name} group {index // self.group_size + 1}"
@@ -199,8 +203,8 @@ class Crowd(_WalkSettings, WorldAction):
         return True
 
 
-class Box(NamedTuple):
-    """Axis-aligned rectangle: center and half of its side lengths in meters."""
+class _Rectangle(NamedTuple):
+    """Axis-aligned rectangle: center and half of its side lengths in m."""
 
     x: float
     y: float
@@ -214,14 +218,20 @@ class Box(NamedTuple):
             yield self.x + x * self.half_width, self.y + y * self.half_height
 
 
-def _bounding_box(corners: Polygon) -> Box:
+def _bounding_rectangle(corners: Polygon) -> _Rectangle:
+    """Return the smallest axis-aligned rectangle that contains a polygon."""
     xs, ys = zip(*corners, strict=True)
-    return Box((min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2, (max(xs) - min(xs)) / 2, (max(ys) - min(ys)) / 2)
+    return _Rectangle(
+        (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2, (max(xs) - min(xs)) / 2, (max(ys) - min(ys)) / 2
+    )
 
 
 def _draw_goal(stage: Stage, rng: np.random.Generator, corners: Polygon, radius: float) -> Point | None:
-    """Return a point of the region that is clear of walls, or None if none was found."""
-    inside = (point for point in _bounding_box(corners).random_points(rng) if polygon_contains(corners, point))
+    """Return a random point of the region with these corners that is clear of walls; None if none was found.
+
+    `radius` is that of the pedestrian in m.
+    """
+    inside = (point for point in _bounding_rectangle(corners).random_points(rng) if polygon_contains(corners, point))
     return next(
         (point for point in inside if stage.has_room(point, radius + INITIAL_CLEARANCE_M, walls_only=True)), None
     )

@@ -112,5 +112,6 @@ class SwitchSpeedZone(Spec, Action):
 
 
 def _switch_zone(stage: Stage, order: ZoneSwitch, zone: str) -> Effect:
+    """Send a command to the stack and return the effect; `zone` describes the zone in the message."""
     refusal = stage.switch_zone(order)
     return Effect(not refusal, refusal or f"switched {zone} {'on' if order.enabled else 'off'}")

@@ -7,15 +7,11 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from simscen.actions.base import Action
-from simscen.core.geometry import wrap
+from simscen.actions.base import Action, is_same_pose
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
 from simscen.spec.places import MovableName, Name, PlaceOrPose
 from simscen.spec.quantities import Force, Impulse, PositiveAngle, PositiveDuration, PositiveLength
-
-POSE_TOLERANCE_M_RAD = 1e-3
-"""Meters and radians within which the robot is already at the requested pose."""
 
 
 class Kidnap(Spec, Action):
@@ -32,10 +28,10 @@ class Kidnap(Spec, Action):
     def perform(self, stage: Stage) -> Effect:
         """Move the robot; has no effect if it is already there."""
         current, target = stage.robot, self.pose.pose
-        distance = current.distance(target)
-        if distance < POSE_TOLERANCE_M_RAD and abs(wrap(current.yaw - target.yaw)) < POSE_TOLERANCE_M_RAD:
+        if is_same_pose(current, target):
             return Effect(False, "the robot was already there")
         stage.place_robot(target)
+        distance = current.distance(target)
         return Effect(True, f"moved the robot by {distance:.2f} m to ({target.x:.2f}, {target.y:.2f})")
 
 
@@ -67,7 +63,7 @@ class Push(Spec, Action):
 
     @property
     def is_robot_specific(self) -> bool:
-        """Whether it pushes the robot rather than an object."""
+        """True if the robot is pushed, False for an object."""
         return self.name is None
 
     def perform(self, stage: Stage) -> Effect:
@@ -87,11 +83,11 @@ class Push(Spec, Action):
 
 
 class NewGoal(Spec, Action):
-    """Send another goal. It preempts the current goal; the remaining goals come after the new one.
+    """Send another goal. The new goal preempts the current one; the remaining goals follow after the new one.
 
-    Criteria judge it like any other goal of the scenario. They neither require the preempted goal nor count it as
-    failed. The name must differ from the names of all other goals. If the event happens twice, the goal is sent twice,
-    and the robot must reach it twice.
+    Criteria judge the new goal like any other goal of the scenario. They neither require the preempted goal nor count
+    it as failed. The name must differ from the names of all other goals. If the event happens twice, the goal is sent
+    twice, and the robot must reach it twice.
 
     Example: `do: {new_goal: {name: detour, pose: {x: 1, y: 4}}}`
     """

@@ -1,1 +1,1 @@
-"""Files of worlds and robots: XML parser, URI resolution, and the restriction to allowed folders."""
+"""Files that worlds and robots refer to: an XML parser, URI resolution, and the restriction to allowed folders."""

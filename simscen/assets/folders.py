@@ -1,4 +1,4 @@
-"""Access to the files that worlds and robots refer to, restricted to the folders that the user allowed."""
+"""Find and read the files that worlds and robots refer to, only in the folders that the user allowed."""
 
 import errno
 import os
@@ -20,10 +20,14 @@ from simscen.assets.uris import (
 from simscen.core.files import record_read_file
 
 MAX_PATH_LENGTH = 1000
+"""Maximum number of characters of a path or URI."""
+MESH_SUFFIXES = (".dae", ".stl", ".obj")
+"""Suffixes of mesh files. References to a mesh often have the wrong one."""
+_NOT_FOUND = "no such file or directory"
 
 
 class UnusableFile(Exception):
-    """A file cannot be used: the reason and a hint. The message never contains content of the file."""
+    """A file cannot be found, is not allowed, or cannot be read. The message never contains content of the file."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.hint = hint
@@ -31,14 +35,15 @@ class UnusableFile(Exception):
 
 
 class NoSuchFile(UnusableFile):
-    """No file in the allowed folders matches."""
+    """A file does not exist in the allowed folders."""
 
 
 @dataclass(frozen=True)
 class AllowedFolders:
-    """Absolute real paths of the folders that files must be in: the root of the scenarios first, then the world paths.
+    """The folders in which files may be read.
 
-    `packages` are the known folders of ROS packages by name, which are used without a search.
+    roots:     absolute paths without symbolic links: the root of the scenarios first, then those of `--world-path`
+    packages:  folders of ROS packages by name, which are used without a search
     """
 
     roots: tuple[Path, ...]
@@ -46,22 +51,24 @@ class AllowedFolders:
 
     @classmethod
     def of(cls, roots: Sequence[Path], packages: Mapping[str, Path] | None = None) -> Self:
-        """Return the allowed folders with symbolic links resolved."""
+        """Create an instance from folders whose paths may be relative or contain symbolic links."""
         return cls(tuple(Path(os.path.realpath(root)) for root in roots), packages or {})
 
     @property
-    def search(self) -> tuple[Path, ...]:
-        """The folders besides the root, in which files are searched that are not next to the referring file."""
+    def search_folders(self) -> tuple[Path, ...]:
+        """All `roots` but the first: files that are not next to the file that refers to them are searched there."""
         return self.roots[1:]
 
-    def shown(self, path: Path) -> str:
-        """Return the path of a file for messages: relative to the root if it is below it, otherwise absolute."""
+    def display_path(self, path: Path) -> str:
+        """Return a path for messages: relative to the first root if the file is in it, otherwise absolute."""
         return path.relative_to(self.roots[0]).as_posix() if path.is_relative_to(self.roots[0]) else str(path)
 
     def find(self, uri: str, base: Path, *, absolute: bool = False) -> Path:
-        """Return the real path of a URI or path in a file of the folder `base`; see `uris.candidate_paths`.
+        """Return the real path of the file or folder to which a URI or a path refers; see `uris.candidate_paths`.
 
-        `absolute`: accept absolute paths, which xacro creates from `$(find package)` and which Gazebo saves in worlds.
+        base:      folder of the file that contains the URI
+        absolute:  accept absolute paths, which xacro creates from `$(find package)`, and which Gazebo saves in worlds
+
         Raises UnusableFile, or NoSuchFile if the file does not exist.
         """
         if not uri or not uri.isprintable():
@@ -78,7 +85,7 @@ class AllowedFolders:
         real_base, tried = Path(os.path.realpath(base)), []
         for folder, candidate in candidate_paths(uri, real_base, self.roots, self.packages):
             # Other folders could be links, and hints must not reveal their content.
-            if folder in (real_base, *self.search):
+            if folder in (real_base, *self.search_folders):
                 tried.append((folder, candidate))
             try:
                 return self.resolve(candidate)
@@ -87,17 +94,23 @@ class AllowedFolders:
         raise NoSuchFile(_NOT_FOUND, self._hint(uri, tried))
 
     @staticmethod
-    def named(path: Path) -> Path:
-        """Return the path of a file with the links of its folder resolved, but not a link in its last component."""
+    def resolve_parent(path: Path) -> Path:
+        """Return a path with the symbolic links of its folder resolved; the file itself may still be a link."""
         return Path(os.path.realpath(path.parent)) / path.name
 
-    def package(self, name: str, near: Path) -> Path:
-        """Return the folder of a ROS package for a file in the folder `near`; raises UnusableFile or NoSuchFile."""
+    def package_folder(self, name: str, near: Path) -> Path:
+        """Return the folder of the ROS package `name`, to which a file in the folder `near` refers.
+
+        Raises UnusableFile, or NoSuchFile if there is no such package.
+        """
         if name in self.packages:
             return self.packages[name]
         if not is_package_name(name):
             raise UnusableFile(f"{name[:60]!r} is not the name of a package")
-        for folder in (*(folder / name for folder in self.search), *package_folder_candidates(name, near, self.roots)):
+        for folder in (
+            *(folder / name for folder in self.search_folders),
+            *package_folder_candidates(name, near, self.roots),
+        ):
             real = Path(os.path.realpath(folder))
             if self._contains(real) and real.is_dir():
                 return real
@@ -105,7 +118,10 @@ class AllowedFolders:
         raise NoSuchFile(f"there is no package {name!r}", hint + f"`packages: {{{name}: path}}` in the *.robot.yaml")
 
     def resolve(self, path: Path) -> Path:
-        """Return the real path of an existing file in the allowed folders; raises UnusableFile or NoSuchFile."""
+        """Return the path of a file or folder without symbolic links.
+
+        Raises UnusableFile if it is not in an allowed folder, or NoSuchFile if it does not exist.
+        """
         if len(str(path)) > MAX_PATH_LENGTH or "\0" in str(path):
             raise UnusableFile("not a usable path")
         # Check the path without access to the disk first, so that it does not reveal whether files outside exist.
@@ -117,8 +133,8 @@ class AllowedFolders:
         self._require_inside(real)
         return real
 
-    def check(self, path: Path, limit: int) -> Path:
-        """Return the real path of a regular file of at most `limit` bytes; raises UnusableFile.
+    def check_file(self, path: Path, max_bytes: int) -> Path:
+        """Return the real path of a file. Raises UnusableFile if it is not a regular file of at most `max_bytes`.
 
         Bullet would abort on a folder and wait forever for a pipe.
         """
@@ -129,13 +145,13 @@ class AllowedFolders:
             raise _to_unusable_file(error) from error
         if not stat.S_ISREG(status.st_mode):
             raise UnusableFile("not a regular file")
-        if status.st_size > limit:
-            raise UnusableFile(f"larger than {limit // 2**20} MiB")
+        if status.st_size > max_bytes:
+            raise UnusableFile(f"larger than {max_bytes // 2**20} MiB")
         return real
 
-    def open(self, path: Path, limit: int) -> tuple[Path, bytes]:
-        """Return the real path and the content of a regular file of at most `limit` bytes; raises UnusableFile."""
-        real = self.check(path, limit)
+    def read_file(self, path: Path, max_bytes: int) -> tuple[Path, bytes]:
+        """Return the real path and the content of a file. Raises UnusableFile as `check_file` does."""
+        real = self.check_file(path, max_bytes)
         record_read_file(real)
         try:
             return real, real.read_bytes()
@@ -150,16 +166,14 @@ class AllowedFolders:
             raise UnusableFile("outside the scenario root and the world paths")
 
     def _hint(self, uri: str, tried: list[tuple[Path, Path]]) -> str:
+        """Return a hint for a URI that was not found in the `tried` pairs (allowed folder, path in it)."""
         similar = next((found for folder, path in tried if (found := find_similar_name(folder, path))), None)
         if similar:
             return f"did you mean `{similar}`?"
-        if parse_fuel_uri(uri) and not self.search:
+        if parse_fuel_uri(uri) and not self.search_folders:
             return "allow Fuel's cache with --world-path ~/.gz/fuel, or a folder that holds the downloaded model"
-        searched = ", ".join(dict.fromkeys(self.shown(folder) or "." for folder, _ in tried)) or "no folder"
+        searched = ", ".join(dict.fromkeys(self.display_path(folder) or "." for folder, _ in tried)) or "no folder"
         return f"looked in {searched}; allow its folder with --world-path"
-
-
-_NOT_FOUND = "no such file or directory"
 
 
 def _to_unusable_file(error: OSError) -> UnusableFile:
@@ -173,14 +187,11 @@ def _to_unusable_file(error: OSError) -> UnusableFile:
     return UnusableFile(reasons.get(error.errno or 0, error.strerror or "cannot be read"))
 
 
-MESH_SUFFIXES = (".dae", ".stl", ".obj")
-"""Suffixes that published files confuse with each other."""
-
-
 def find_similar_name(folder: Path, path: Path) -> str | None:
-    """Return the file or folder below `folder` that `path` probably means, relative to it, or None.
+    """Return the existing path in `folder` that the misspelled `path` probably means, relative to `folder`, or None.
 
-    Symbolic links are not followed, so that messages do not reveal names outside the folder.
+    Capitalization and the suffix of a mesh may differ. Symbolic links are not followed, so that messages do not reveal
+    names outside the folder.
     """
     current, parts = folder, path.relative_to(folder).parts if path.is_relative_to(folder) else ("..",)
     for part in parts:
@@ -192,7 +203,7 @@ def find_similar_name(folder: Path, path: Path) -> str | None:
 
 
 def _match_entry(folder: Path, name: str) -> str | None:
-    """Return the entry of a folder with this name, or with other capitalization, or the mesh in another format."""
+    """Return the entry of a folder with this name, other capitalization, or another mesh suffix; None without one."""
     try:
         entries = sorted(entry.name for entry in folder.iterdir())
     except OSError:

@@ -1,4 +1,4 @@
-"""XML parser that keeps line numbers and rejects everything that refers to data outside the file.
+"""Parse XML with line numbers, and reject everything that refers to data outside the file.
 
 The standard library's ElementTree forgets line numbers, so the tree is built here from expat's events. A document
 type declaration is rejected, which prevents entity bombs and external entities (CWE-776, CWE-611).
@@ -13,15 +13,21 @@ from xml.parsers import expat
 from typing_extensions import Self
 
 MAX_DEPTH = 100
+"""Maximum number of elements that are nested in each other."""
 MAX_ELEMENTS = 200_000
-"""Worlds of BARN have 13,000 elements. The limit prevents that 20 MB of `<a/>` take gigabytes of memory."""
+"""Maximum number of elements. Worlds of BARN have 13,000; without a limit, 20 MB of `<a/>` take gigabytes of memory."""
 MAX_SHOWN_LINE_BYTES = 300
+"""Length up to which messages show the line with the problem."""
 _COMMENT = re.compile(rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)|<!--(?P<text>.*?)(?:-->|\Z)", re.DOTALL)
 """A comment; CDATA sections and processing instructions match too, so that no comment is found inside them."""
 
 
 class MalformedXml(Exception):
-    """A text is not well-formed or not allowed XML: the reason, and its line and column, both from 1."""
+    """A text is not well-formed XML, or contains XML that is not allowed.
+
+    line, col:  position of the problem, both from 1
+    source:     text of the line, "" if it is not shown
+    """
 
     def __init__(self, message: str, line: int, col: int, source: str = "", hint: str = "") -> None:
         self.message, self.line, self.col, self.source, self.hint = message, line, col, source, hint
@@ -30,7 +36,7 @@ class MalformedXml(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A file that was read: its name for messages, and the folder to which its relative paths refer."""
+    """A file that was read: its name for messages, the folder to which its relative paths refer, and its lines."""
 
     name: str
     folder: str = ""
@@ -38,18 +44,18 @@ class Source:
 
     @classmethod
     def of(cls, data: bytes, name: str, folder: str = "") -> "Source":
-        """Return the source with its lines, which messages show."""
+        """Create an instance from the content of a file."""
         return cls(name, folder, tuple(data.split(b"\n")))
 
     def line(self, number: int) -> str:
-        """Return the text of a line for a message with a caret; empty if it is too long."""
+        """Return the text of a line for messages, counted from 1; "" if there is no such line or it is too long."""
         text = self.lines[number - 1] if 0 < number <= len(self.lines) else b""
         return text.decode("utf-8", "replace").rstrip("\r") if len(text) <= MAX_SHOWN_LINE_BYTES else ""
 
 
 @dataclass(eq=False, slots=True)
 class Element:
-    """An element with its position in the file. `children` are in document order; `text_parts` form its own text."""
+    """An XML element with its position in the file. Line and column count from 1; joined `text_parts` are its text."""
 
     tag: str
     attributes: dict[str, str]
@@ -78,7 +84,7 @@ E = TypeVar("E", bound=Element)
 
 
 def refuse_doctype(data: bytes) -> None:
-    """Check XML that another library will parse. Raises MalformedXml if it has a DOCTYPE or is not well-formed."""
+    """Check XML before another library parses it. Raises MalformedXml if it has a DOCTYPE or is not well-formed."""
     _run(expat.ParserCreate(), data, Source(""))
 
 
@@ -117,9 +123,9 @@ def parse(data: bytes, source: Source, kind: type[E]) -> E:
 
 
 def blank_hyphens_in_comments(data: bytes) -> bytes:
-    """Return the text with spaces for the hyphens inside comments; all positions stay the same.
+    """Return the XML text with hyphens in comments replaced by spaces; all positions stay the same.
 
-    XML forbids `--` in comments and expat refuses it, but the parsers of Gazebo and ROS (tinyxml2) accept it, so many
+    XML forbids `--` in comments, and expat rejects it. The parsers of Gazebo and ROS (tinyxml2) accept it, so that many
     published files contain it.
     """
 
@@ -134,6 +140,8 @@ def blank_hyphens_in_comments(data: bytes) -> bytes:
 
 
 def _run(parser: expat.XMLParserType, data: bytes, source: Source) -> None:
+    """Parse an XML text with the handlers of a parser. Raises MalformedXml."""
+
     def doctype(*_: object) -> None:
         line, col = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1
         hint = "remove the document type declaration and its entities"

@@ -1,4 +1,4 @@
-"""Resolution of Gazebo and ROS URIs: the paths at which a file may be found."""
+"""List the paths at which the file of a Gazebo or ROS URI may be found (model://, package://, file://, Fuel)."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,18 +7,27 @@ from pathlib import Path
 from urllib.parse import unquote
 
 PACKAGE_SCHEMES = ("package://", "model://")
-"""Schemes of ROS and Gazebo for a folder of a package or model."""
+"""Schemes of ROS and Gazebo whose first path component is the name of a package or model."""
 SCHEMES = (*PACKAGE_SCHEMES, "file://")
+MAX_MANIFEST_BYTES = 1 << 16
+"""Bytes of a package.xml that are read to find its `<name>`."""
 _FUEL = re.compile(
     r"https?://(?P<server>(?:fuel|app|api)\.(?:gazebosim|ignitionrobotics)\.org)/(?:\d+\.\d+/)?"
     r"(?P<owner>[^/]+)/(?P<kind>models|worlds)/(?P<name>[^/]+)(?:/(?P<version>\d+|tip))?(?:/(?:files/)?(?P<rest>.*))?"
 )
+"""URI of a model or world on Gazebo Fuel, on the website or its API, or of a file in the model or world."""
 _BUILTIN_MODELS = {"sun", "ground_plane"}
+"""Models that Gazebo installs."""
 
 
 @dataclass(frozen=True)
 class FuelUri:
-    """URI of a model on Gazebo Fuel. Only local copies are used; simscen never connects to the server."""
+    """URI of a model on Gazebo Fuel. Only local copies are used; simscen never connects to the server.
+
+    kind:     "models" or "worlds"
+    version:  number, "tip" for the newest version, or "" if the URI has none
+    rest:     path of a file in the model; "" for the model itself
+    """
 
     server: str
     owner: str
@@ -28,7 +37,10 @@ class FuelUri:
     rest: str
 
     def candidate_paths_in(self, folder: Path) -> Iterator[Path]:
-        """Yield its possible paths in a folder: as in Fuel's cache (~/.gz/fuel), newest version first, or by name."""
+        """Yield the paths at which `folder` may contain a copy of the model or file.
+
+        The folder may be a cache of Fuel (~/.gz/fuel), whose newest version comes first, or contain models by name.
+        """
         spellings = [self.name, self.name.lower()]
         for name in dict.fromkeys([*spellings, *(name.replace(" ", "_") for name in spellings)]):
             for owner in dict.fromkeys((self.owner, self.owner.lower())):
@@ -37,6 +49,7 @@ class FuelUri:
             yield folder / name / self.rest
 
     def _versions(self, cached: Path) -> list[Path]:
+        """Return the folders of the requested version, or of all versions, of a model in a cache of Fuel."""
         if self.version not in ("", "tip"):
             return [cached / self.version]
         try:
@@ -47,7 +60,7 @@ class FuelUri:
 
 
 def parse_fuel_uri(uri: str) -> FuelUri | None:
-    """Return the Fuel address of a URI, or None if it is not one."""
+    """Return the parts of a Fuel URI; None for another URI, or if a part is "." or ".."."""
     match = _FUEL.fullmatch(uri.rstrip("/"))
     if match is None:
         return None
@@ -69,12 +82,16 @@ def builtin_model_name(uri: str) -> str | None:
 def candidate_paths(
     uri: str, base: Path, roots: Sequence[Path], packages: Mapping[str, Path]
 ) -> Iterator[tuple[Path, Path]]:
-    """Yield pairs of an allowed folder and a path in it, in the order in which they are tried for a URI.
+    """Yield pairs (folder, path in it) in the order in which they are to be tried for a URI.
 
-    `base` is the folder of the file that refers to the URI. model:// and package:// refer to one of `packages`;
-    otherwise to all `roots` but the first, and then to possible packages of this name around `base` or below the roots.
-    file:// and bare paths are relative to `base`, then to the roots but the first, whose own name may come first
-    (`file://models/crate` in a folder called `models`).
+    `base` is the folder of the file that contains the URI; `roots` are the allowed folders, see `AllowedFolders`.
+
+    - model:// and package:// with a name in `packages`: only that folder.
+    - model:// and package:// with another name: in all roots but the first, then in folders that may be a package of
+      this name, around `base` or below the roots.
+    - file:// and paths: relative to `base`, then to all roots but the first. The path of a file:// URI may start with
+      the name of the root itself (`file://models/crate` in a root called `models`).
+    - Fuel: in all roots but the first.
     """
     address, search = parse_fuel_uri(uri), roots[1:]
     if address is not None:
@@ -97,6 +114,7 @@ def candidate_paths(
 def _in_packages(
     path: str, base: Path, roots: Sequence[Path], packages: Mapping[str, Path]
 ) -> Iterator[tuple[Path, Path]]:
+    """Yield the pairs of `candidate_paths` for the path of a model:// or package:// URI."""
     name, _, below = path.partition("/")
     if name in packages:
         yield packages[name], packages[name] / below.lstrip("/")
@@ -106,19 +124,16 @@ def _in_packages(
         yield from ((folder, folder / below.lstrip("/")) for folder in package_folder_candidates(name, base, roots))
 
 
-MAX_MANIFEST_BYTES = 1 << 16
-"""Bytes of a package.xml that are read to find its `<name>`."""
-
-
 def is_package_name(name: str) -> bool:
-    """Return whether this is a valid name of a ROS package (REP 144) and therefore not a path."""
+    """Return whether a word consists of the characters of ROS package names (REP 144), and is therefore not a path."""
     return name.replace("_", "").replace("-", "").isalnum()
 
 
 def package_folder_candidates(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
-    """Yield possible folders of a package, for a file in `near`: around it, in the roots, and up to two levels below.
+    """Yield folders that may be the ROS package `name`, to which a file in the folder `near` refers.
 
-    A workspace contains repositories, which contain packages, possibly in a folder that groups them.
+    First come folders of this name: at `near` and its parents, in the roots, and up to two levels below the roots,
+    because a workspace contains repositories that contain packages. Then come folders whose package.xml has this name.
     """
     for folder in (near, *near.parents):
         if folder.name == name:
@@ -134,7 +149,7 @@ def package_folder_candidates(name: str, near: Path, roots: Sequence[Path]) -> I
 
 
 def _folders_by_manifest(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
-    """Yield folders whose package.xml contains this package name; the folder name may differ."""
+    """Yield folders whose package.xml contains this package name, whatever the name of the folder."""
     for folder in (near, *near.parents):
         if not any(folder.is_relative_to(root) for root in roots):
             break

@@ -1,1 +1,1 @@
-"""Pedestrians: the social force model and reactions to robots. Imports only simscen.core."""
+"""Simulation of pedestrians: the social force model and reactions to robots. Imports only simscen.core."""

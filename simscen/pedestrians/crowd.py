@@ -1,4 +1,4 @@
-"""All pedestrians of a world, stepped together with the social force model."""
+"""Move all pedestrians of a world together, step by step, with the social force model."""
 
 import math
 from collections.abc import Callable
@@ -13,39 +13,42 @@ from simscen.pedestrians import forces
 from simscen.pedestrians.forces import RELAXATION_TIME_S, Indices, MoveLimits, clip_moves, move_limits
 from simscen.pedestrians.pedestrian import SCARED_FORCE_M2_S2, THREATENING_SPEED_M_S, Intent, Pedestrian
 from simscen.pedestrians.surroundings import (
-    REACH_M,
+    OBSTACLE_RANGE_M,
     NearestPoints,
     ObservedRobot,
     Surroundings,
     WallMap,
     edges,
-    nearest_on,
+    nearest_points_on,
 )
 
 INTERACTION_RANGE_M = 10.0
-"""Distance beyond which pedestrians do not react to each other (HuNavSim's max_dist_view)."""
+"""Distance beyond which social forces do not act (HuNavSim's max_dist_view)."""
 MIN_SOCIAL_FORCE_M_S2 = 0.05
-"""Weaker social forces count as 0, so that a new pedestrian does not change others far away."""
+"""Weaker social forces count as 0, so that a new pedestrian does not change the motion of others far away."""
 VIEW_CHECK_STEPS = 20
 """Number of steps between two checks whether the next corner of a path is still in view."""
 MIN_SPEED_M_S = 0.01
 """Pedestrians that would walk more slowly stand still."""
 REFERENCE_RADIUS_M = 0.25
-"""Radius of the pedestrians with whom the parameters of the model were determined."""
+"""Radius of the pedestrians for whom the parameters of the model were determined."""
 
 Point = tuple[float, float]
-Flags = npt.NDArray[np.bool_]
-PlanPath = Callable[[Point, Point, float], list[Point]]
-"""Returns the corners of a path around walls from a start to a goal, which is the last, for a radius in m."""
+"""(x, y) in m in the world frame."""
+PathPlanner = Callable[[Point, Point, float], list[Point]]
+"""Function (start, goal, radius in m) that returns the corners of a path around walls; the last corner is the goal."""
 
 
-def straight_path(_start: Point, goal: Point, _radius: float) -> list[Point]:
-    """Return a straight path, for pedestrians without a map."""
+def plan_straight_path(_start: Point, goal: Point, _radius: float) -> list[Point]:
+    """Plan a straight path, for worlds without walls."""
     return [goal]
 
 
 class _Neighbors(NamedTuple):
-    """All pedestrians, then all robots; `extra_radii` in m compared with REFERENCE_RADIUS_M."""
+    """Everyone whom a pedestrian may evade: all pedestrians, then all robots.
+
+    positions (n, 2) in m, velocities (n, 2) in m/s, extra_radii (n,): radius in m minus REFERENCE_RADIUS_M
+    """
 
     positions: Array
     velocities: Array
@@ -53,9 +56,9 @@ class _Neighbors(NamedTuple):
 
 
 class Crowd:
-    """All pedestrians of a world, sorted by name. Deterministic: it uses no random numbers."""
+    """All pedestrians of a world, sorted by name. Their motion is deterministic: it uses no random numbers."""
 
-    def __init__(self, walls: WallMap, plan_path: PlanPath = straight_path) -> None:
+    def __init__(self, walls: WallMap, plan_path: PathPlanner = plan_straight_path) -> None:
         self._walls, self._plan_path = walls, plan_path
         self._people: dict[str, Pedestrian] = {}
         self._steps = 0
@@ -64,16 +67,16 @@ class Crowd:
         return len(self._people)
 
     def add(self, spec: WalkingPedestrian) -> None:
-        """Add a pedestrian, or replace the one with the same name."""
+        """Add a pedestrian at its initial pose, or replace the one with the same name."""
         self._people[spec.name] = Pedestrian.at_start(spec)
         self._people = dict(sorted(self._people.items()))
 
     def remove(self, name: str) -> bool:
-        """Remove a pedestrian. Return whether it existed."""
+        """Remove a pedestrian, and return whether it existed."""
         return self._people.pop(name, None) is not None
 
     def poses(self) -> dict[str, Pose2]:
-        """Return the poses of all pedestrians."""
+        """Return the poses of all pedestrians by name."""
         return {name: person.pose for name, person in self._people.items()}
 
     def radius(self, name: str) -> float:
@@ -86,13 +89,16 @@ class Crowd:
         return max(forces.MAX_SPEED_RATIO * spec.speed, THREATENING_SPEED_M_S)
 
     def step(self, surroundings: Surroundings, seconds: float) -> list[PedestrianAction]:
-        """Move all pedestrians, each in a straight line. Return their actions."""
+        """Move all pedestrians by one step of `seconds`, each in a straight line.
+
+        Returns what they did: started or ended a reaction, or reached a goal.
+        """
         people = list(self._people.values())
         if not people:
             return []
         reacting, actions = self._reactions(people, surroundings, seconds)
         for number, person in enumerate(people):
-            self._plan(person, number)
+            self._update_path(person, number)
         intents = [person.intent(robot) for person, robot in zip(people, reacting, strict=True)]
         positions = np.array([person.position for person in people])
         velocities = np.array([person.velocity for person in people])
@@ -111,7 +117,7 @@ class Crowd:
     def _reactions(
         self, people: list[Pedestrian], surroundings: Surroundings, seconds: float
     ) -> tuple[list[ObservedRobot | None], list[PedestrianAction]]:
-        """Return the robot that each pedestrian reacts to, and their actions."""
+        """Update all reactions. Return the robot that each pedestrian reacts to (or None), and the actions."""
         reacting: list[ObservedRobot | None] = []
         actions: list[PedestrianAction] = []
         for person in people:
@@ -123,10 +129,14 @@ class Crowd:
         return reacting, actions
 
     def _in_view(self, person: Pedestrian, robot: ObservedRobot) -> bool:
+        """Return whether no wall hides a robot from a pedestrian."""
         return bool(self._walls.visible(np.array([person.position]), np.array([robot.pose[:2]]))[0])
 
-    def _plan(self, person: Pedestrian, number: int) -> None:
-        """Plan a path to the goal: for a new goal, or if the next corner is out of view after a push."""
+    def _update_path(self, person: Pedestrian, number: int) -> None:
+        """Plan a path to the goal if the goal is new, or if others have pushed the pedestrian out of view of its path.
+
+        `number` is the index of the pedestrian, so that not all check their view in the same step.
+        """
         goal = person.destination
         is_outdated = person.planned_for != goal
         if not is_outdated and person.path and (self._steps + number) % VIEW_CHECK_STEPS == 0:
@@ -144,11 +154,11 @@ class Crowd:
         surroundings: Surroundings,
         walls: NearestPoints,
     ) -> Array:
-        """Return the external forces (n, 2) on all pedestrians, without their own driving force."""
+        """Return the external forces (n, 2) in m/s² on all pedestrians: all but their own driving force."""
         force = self._social_forces(people, reacting, positions, velocities, surroundings)
         force += self._obstacle_forces(people, positions, surroundings, walls)
         for members in _groups(people):
-            force[members] += forces.group(positions[members], velocities[members])
+            force[members] += forces.group_forces(positions[members], velocities[members])
         for number, (person, robot, intent) in enumerate(zip(people, reacting, intents, strict=True)):
             if intent.is_immovable:
                 force[number] = 0.0
@@ -166,13 +176,14 @@ class Crowd:
         velocities: Array,
         surroundings: Surroundings,
     ) -> Array:
+        """Return the forces (n, 2) in m/s² by which pedestrians evade each other and robots."""
         others = _neighbors(people, positions, velocities, surroundings)
         towards = others.positions[np.newaxis] - positions[:, np.newaxis]
         interacts = np.hypot(towards[..., 0], towards[..., 1]) <= INTERACTION_RANGE_M
         np.fill_diagonal(interacts, False)
         interacts &= _interactions(people, reacting, surroundings)
         person, other = np.nonzero(interacts)
-        force = forces.social(
+        force = forces.social_forces(
             towards[person, other], velocities[person] - others.velocities[other], others.extra_radii[other]
         )
         is_strong = np.hypot(force[:, 0], force[:, 1]) > MIN_SOCIAL_FORCE_M_S2
@@ -183,7 +194,10 @@ class Crowd:
     def _obstacle_forces(
         self, people: list[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
     ) -> Array:
-        """Return the forces (n, 2) of the nearest points of walls, objects, and robots that count as objects."""
+        """Return the forces (n, 2) in m/s² of walls, of objects, and of robots on those who treat them as objects.
+
+        Each wall, object, and robot acts at the point that is nearest to the pedestrian.
+        """
         person, owner, nearest = walls
         first = _nearest_by_owner(person, owner, np.hypot(*(nearest - positions[person]).T))
         contacts = [(person[first], nearest[first])]
@@ -198,13 +212,16 @@ class Crowd:
         away = positions[person] - np.concatenate([points for _, points in contacts])
         distance = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
         radii = np.array([p.spec.radius for p in people])
-        force = forces.wall(away / distance[:, np.newaxis], distance - radii[person])
+        force = forces.wall_forces(away / distance[:, np.newaxis], distance - radii[person])
         return _sum_by_person(person, force, len(people))
 
     def _limits(
         self, people: list[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
     ) -> list[MoveLimits]:
-        """Return the limits of a step that keep pedestrians apart from obstacles and from each other."""
+        """Return limits of the moves of one step that keep pedestrians apart from obstacles and from each other.
+
+        A pedestrian may use the entire gap to a wall, but only half of the gap to what can move as well.
+        """
         radii = np.array([person.spec.radius for person in people])
         indices, _, nearest = walls
         limits = [_limits_towards(indices, nearest, positions, radii, 1.0)]
@@ -213,17 +230,18 @@ class Crowd:
             *(("robots", (robot.pose.apply(robot.outline),)) for robot in surroundings.robots),
         ]:
             aware = np.array([k for k, person in enumerate(people) if kind not in person.spec.blind_to], np.int64)
-            near, points = _nearest_points(aware, positions, edges(outlines), each=True)
+            near, points = _nearest_points(aware, positions, edges(outlines), of_each_segment=True)
             limits.append(_limits_towards(near, points, positions, radii, 0.5))
         towards = positions[np.newaxis] - positions[:, np.newaxis]
         distance = np.hypot(towards[..., 0], towards[..., 1])
-        one, other = np.nonzero((distance < 2 * REACH_M) & ~np.eye(len(people), dtype=np.bool_))
+        one, other = np.nonzero((distance < 2 * OBSTACLE_RANGE_M) & ~np.eye(len(people), dtype=np.bool_))
         length = np.maximum(distance[one, other], 1e-9)
         unit = towards[one, other] / length[:, np.newaxis]
         return [*limits, move_limits(one, unit, length - radii[one] - radii[other], 0.5)]
 
 
 def _neighbors(people: list[Pedestrian], positions: Array, velocities: Array, surroundings: Surroundings) -> _Neighbors:
+    """Return the pedestrians at `positions` with `velocities`, and the robots."""
     robots = surroundings.robots
     radii = [*(p.spec.radius - REFERENCE_RADIUS_M for p in people), *(r.radius - REFERENCE_RADIUS_M for r in robots)]
     return _Neighbors(
@@ -233,8 +251,13 @@ def _neighbors(people: list[Pedestrian], positions: Array, velocities: Array, su
     )
 
 
-def _interactions(people: list[Pedestrian], reacting: list[ObservedRobot | None], surroundings: Surroundings) -> Flags:
-    """Return whether each pedestrian (rows) evades each pedestrian and each robot (columns) as a person."""
+def _interactions(
+    people: list[Pedestrian], reacting: list[ObservedRobot | None], surroundings: Surroundings
+) -> npt.NDArray[np.bool_]:
+    """Return a matrix: whether each pedestrian (rows) evades each pedestrian and each robot (columns) like a person.
+
+    Columns are in the order of `_Neighbors`.
+    """
     evades = np.ones((len(people), len(people) + len(surroundings.robots)), dtype=np.bool_)
     for number, (person, reacts_to) in enumerate(zip(people, reacting, strict=True)):
         if "people" in person.spec.blind_to:
@@ -247,7 +270,10 @@ def _interactions(people: list[Pedestrian], reacting: list[ObservedRobot | None]
 
 
 def _groups(people: list[Pedestrian]) -> list[Indices]:
-    """Return the members of each group. A pedestrian that reacts to a robot leaves its group during the reaction."""
+    """Return the indices of the members of each group; groups of one are left out.
+
+    A pedestrian that reacts to a robot does not belong to its group during the reaction.
+    """
     names = sorted({person.spec.group for person in people if person.spec.group is not None})
     groups = [[k for k, p in enumerate(people) if p.spec.group == name and p.reacts_to is None] for name in names]
     return [np.array(members) for members in groups if len(members) > 1]
@@ -256,7 +282,10 @@ def _groups(people: list[Pedestrian]) -> list[Indices]:
 def _integrate(
     intents: list[Intent], positions: Array, velocities: Array, external: Array, seconds: float
 ) -> tuple[Array, Array]:
-    """Return moves and velocities under constant forces: dv/dt = (intended - v) / τ + external, solved exactly."""
+    """Return moves (n, 2) in m and velocities (n, 2) in m/s after a step of `seconds` under constant forces.
+
+    They are the exact solution of dv/dt = (intended velocity - v) / τ + external force, limited to the maximum speeds.
+    """
     intended = np.zeros_like(positions)
     for number, intent in enumerate(intents):
         if intent.target is not None:
@@ -274,19 +303,26 @@ def _integrate(
 
 
 def _limit_lengths(vectors: Array, limits: Array) -> Array:
+    """Return vectors (n, 2), shortened to at most `limits` (n,)."""
     lengths = np.hypot(vectors[:, 0], vectors[:, 1])
     limited: Array = vectors * np.minimum(1.0, limits / np.maximum(lengths, 1e-12))[:, np.newaxis]
     return limited
 
 
 def _sum_by_person(person: Indices, force: Array, count: int) -> Array:
-    """Return the sum of forces (n, 2) for each of `count`, added in order, so that rounding is reproducible."""
+    """Return the sums (count, 2) of the forces (n, 2) on each of `count` pedestrians; `person` (n,) are their indices.
+
+    The forces are added in order, so that rounding is reproducible.
+    """
     sums = [np.bincount(person, force[:, axis], minlength=count) for axis in (0, 1)]
     return np.stack(sums, axis=1).astype(np.float64)  # without any force, bincount returns integers
 
 
 def _nearest_by_owner(person: Indices, owner: Indices, distance: Array) -> Indices:
-    """Return the index of the nearest entry for each pair of a pedestrian and an owner."""
+    """Return the index of the entry with the least distance for each pair of a pedestrian and an owner.
+
+    Entry k is a point of the solid `owner[k]`, `distance[k]` m away from the pedestrian `person[k]`.
+    """
     order = np.lexsort((distance, owner, person))
     pairs = np.stack((person[order], owner[order]), axis=1)
     is_first = np.ones(len(order), dtype=np.bool_)
@@ -295,18 +331,28 @@ def _nearest_by_owner(person: Indices, owner: Indices, distance: Array) -> Indic
     return first
 
 
-def _nearest_points(indices: Indices, positions: Array, segments: Array, each: bool = False) -> tuple[Indices, Array]:
-    """Return the pedestrians within REACH_M of an outline, and its nearest points or those of `each` segment."""
+def _nearest_points(
+    indices: Indices, positions: Array, segments: Array, of_each_segment: bool = False
+) -> tuple[Indices, Array]:
+    """Return pedestrians near an outline, as indices (k,), and the points (k, 2) of the outline nearest to them.
+
+    Only the pedestrians `indices` are examined, and only points within OBSTACLE_RANGE_M count. The outline consists of
+    `segments` (n, 2, 2). There is one point per pedestrian or, with `of_each_segment`, per pedestrian and segment.
+    """
     repeated = np.repeat(indices, len(segments))
-    points = nearest_on(np.tile(segments, (len(indices), 1, 1)), positions[repeated])
+    points = nearest_points_on(np.tile(segments, (len(indices), 1, 1)), positions[repeated])
     distance = np.hypot(*(points - positions[repeated]).T)
-    near = np.flatnonzero(distance <= REACH_M)
-    if not each:
+    near = np.flatnonzero(distance <= OBSTACLE_RANGE_M)
+    if not of_each_segment:
         near = near[_nearest_by_owner(repeated[near], np.zeros_like(near), distance[near])]
     return repeated[near], points[near]
 
 
-def _limits_towards(indices: Indices, points: Array, positions: Array, radii: Array, share: float) -> MoveLimits:
+def _limits_towards(indices: Indices, points: Array, positions: Array, radii: Array, ratio: float) -> MoveLimits:
+    """Return limits of moves towards `points` (k, 2): a `ratio` of the gap between each point and a pedestrian.
+
+    `indices` (k,) are the pedestrians; `positions` (n, 2) and `radii` (n,) are those of all pedestrians.
+    """
     towards = points - positions[indices]
     distance = np.maximum(np.hypot(towards[:, 0], towards[:, 1]), 1e-9)
-    return move_limits(indices, towards / distance[:, np.newaxis], distance - radii[indices], share)
+    return move_limits(indices, towards / distance[:, np.newaxis], distance - radii[indices], ratio)

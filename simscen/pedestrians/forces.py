@@ -1,4 +1,6 @@
-"""Forces of the social force model, as accelerations in m/s², vectorized over pedestrians.
+"""Compute the forces of the social force model, as accelerations in m/s², and clip moves that would cause contact.
+
+All functions are vectorized over pedestrians.
 
 Sources: [HM95] Helbing and Molnár, Social force model for pedestrian dynamics, Physical Review E 51, 1995.
 [M09] Moussaïd, Helbing, Garnier, Johansson, Combe, Theraulaz, Experimental study of the behavioral mechanisms
@@ -19,16 +21,16 @@ from simscen.core.geometry import Array
 Indices = npt.NDArray[np.int64]
 
 RELAXATION_TIME_S = 0.54
-"""τ in s [M09: 0.54 ± 0.05]."""
+"""Time constant with which pedestrians reach their intended velocity, τ [M09: 0.54 ± 0.05]."""
 MAX_SPEED_RATIO = 1.3
 """Ratio of the maximum speed to the preferred speed [HM95]."""
 
 SOCIAL_STRENGTH_M_S2 = 4.5
 """Largest social force, A [M09]."""
 VELOCITY_WEIGHT_S_PER_M = 2.0
-"""Weight of the relative velocity relative to the direction to the other, λ [M09]."""
+"""Weight λ of the relative velocity in the interaction vector D = λ (v - v_other) + unit vector to the other [M09]."""
 RANGE_PER_INTERACTION_M = 0.35
-"""Range of the interaction relative to its vector D: B = γ|D| [M09]."""
+"""Range of the interaction divided by the length of the interaction vector, γ: B = γ|D| [M09]."""
 TURN_DECAY_PER_M, BRAKE_DECAY_PER_M = 2.0, 3.0
 """Angular decay of the turning and of the braking force, n and n′ [M09]."""
 HEAD_ON_BIAS_RAD_PER_M = 0.005
@@ -43,13 +45,16 @@ HALF_VISION_RAD = math.pi / 2
 """Angle to each side in which a pedestrian sees its group without turning the head [M10]."""
 MIN_GROUP_GAP_M = 0.8
 """Distance between the centers of two members of a group below which they repel each other [M10]."""
+MAX_PROJECTIONS = 8
+"""Maximum number of limits that a move is projected onto before it is scaled down."""
 
 
-def social(towards: Array, closing: Array, extra_radii: Array) -> Array:
-    """Return the social forces (n, 2) on pedestrians that others approach: deceleration along D, and evasion.
+def social_forces(towards: Array, closing: Array, extra_radii: Array) -> Array:
+    """Return the forces (n, 2) that make pedestrians brake and turn to evade others, one for each pair.
 
-    `towards` (n, 2) points from the pedestrian to the other in m, `closing` (n, 2) is the pedestrian's velocity minus
-    the other's in m/s, and `extra_radii` (n,) is the additional radius in m of the other compared with a pedestrian.
+    towards (n, 2):    vector in m from the pedestrian to the other
+    closing (n, 2):    velocity of the pedestrian minus that of the other in m/s
+    extra_radii (n,):  radius of the other in m minus that of a normal pedestrian
     """
     separation = np.hypot(towards[:, 0], towards[:, 1])
     distance = np.maximum(separation, 1e-6)
@@ -69,14 +74,20 @@ def social(towards: Array, closing: Array, extra_radii: Array) -> Array:
     return force
 
 
-def wall(directions: Array, gaps: Array) -> Array:
-    """Return the repulsive forces (n, 2) of walls and objects `gaps` (n,) in m away, along `directions` (n, 2)."""
+def wall_forces(directions: Array, gaps: Array) -> Array:
+    """Return the repulsive forces (n, 2) of walls and objects, one for each pair of a pedestrian and a wall.
+
+    `directions` (n, 2) are unit vectors away from the wall, `gaps` (n,) the distances in m between wall and body.
+    """
     force: Array = (WALL_STRENGTH_M_S2 * np.exp(-np.maximum(gaps, 0.0) / WALL_RANGE_M))[:, np.newaxis] * directions
     return force
 
 
-def group(positions: Array, velocities: Array) -> Array:
-    """Return the forces (n, 2) that keep the members of a group together, computed with scalars for small groups."""
+def group_forces(positions: Array, velocities: Array) -> Array:
+    """Return the forces (n, 2) that keep the members of one group together, from their positions and velocities (n, 2).
+
+    The forces are computed with Python floats, which is faster for small groups.
+    """
     points, point_velocities = positions.tolist(), velocities.tolist()
     count = len(points)
     mx, my = sum(x for x, _ in points) / count, sum(y for _, y in points) / count
@@ -96,18 +107,19 @@ def group(positions: Array, velocities: Array) -> Array:
 
 
 def _head_turn(vx: float, vy: float, x: float, y: float) -> float:
-    """Return by how many rad a pedestrian with velocity (vx, vy) must turn the head to see (x, y)."""
+    """Return by how many rad a pedestrian with velocity (vx, vy) must turn the head to see in the direction (x, y)."""
     if (vx == 0 and vy == 0) or (x == 0 and y == 0):
         return 0.0
     return max(0.0, abs(math.atan2(vx * y - vy * x, vx * x + vy * y)) - HALF_VISION_RAD)
 
 
-MAX_PROJECTIONS = 8
-"""Maximum number of limits that a move is projected onto before it is scaled down."""
-
-
 class MoveLimits(NamedTuple):
-    """Maximum displacement `limits` (n,) in m of `pedestrians` (n,) along unit vectors `towards` (n, 2)."""
+    """Limits of the moves of one step.
+
+    pedestrians (n,):  index of the pedestrian that each limit applies to
+    towards (n, 2):    unit vector along which the move is limited
+    limits (n,):       maximum displacement in m along this vector
+    """
 
     pedestrians: Indices
     towards: Array
@@ -115,7 +127,7 @@ class MoveLimits(NamedTuple):
 
 
 def move_limits(pedestrians: Indices, towards: Array, gaps: Array, ratio: float = 1.0) -> MoveLimits:
-    """Return limits of a `ratio` of the `gaps` (n,) in m to obstacles; 0 if they touch.
+    """Return the limits that allow each pedestrian to use a `ratio` of the gap (m) to an obstacle; 0 if they touch.
 
     A pedestrian within these limits stays on its side of the plane between it and a convex obstacle.
     """
@@ -123,7 +135,7 @@ def move_limits(pedestrians: Indices, towards: Array, gaps: Array, ratio: float 
 
 
 def clip_moves(moves: Array, all_limits: Iterable[MoveLimits]) -> Array:
-    """Return the moves (n, 2) restricted to the limits, sliding along the limits where possible."""
+    """Return the moves (n, 2) in m restricted to the limits; pedestrians slide along obstacles where possible."""
     parts = list(all_limits)
     pedestrians = np.concatenate([each.pedestrians for each in parts])
     towards = np.concatenate([each.towards for each in parts])
@@ -137,6 +149,7 @@ def clip_moves(moves: Array, all_limits: Iterable[MoveLimits]) -> Array:
 
 
 def _clip_move(move: Array, towards: Array, limits: Array) -> Array:
+    """Return a move (2,) restricted to the limits (k,) along the unit vectors `towards` (k, 2)."""
     for _ in range(MAX_PROJECTIONS):
         excess: Array = (towards * move).sum(axis=1) - limits
         worst = int(np.argmax(excess))

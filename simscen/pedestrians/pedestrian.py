@@ -11,7 +11,7 @@ from simscen.pedestrians.surroundings import ObservedRobot
 GOAL_RADIUS_M = 0.3
 """Distance at which a goal counts as reached (HuNavSim's goal_radius)."""
 CORNER_RADIUS_M = 0.5
-"""Distance at which a corner counts as passed."""
+"""Distance at which a corner of the path counts as passed."""
 HALF_FIELD_OF_VIEW_RAD = math.pi / 2 + 0.17
 """Field of view to each side (HuNavSim's lineOfSight)."""
 MAX_TURN_RATE_RAD_S = math.pi
@@ -21,24 +21,28 @@ MIN_TURNING_SPEED_M_S = 0.1
 LOST_RANGE_RATIO = 1.5
 """Hysteresis: a reaction ends at this multiple of the distance at which it begins."""
 CURIOUS_SPEED_M_S, CURIOUS_DISTANCE_M = 1.8, 1.5
-"""Speed at which curious pedestrians approach, slower when nearer, and distance at which they stop."""
+"""Speed at which curious pedestrians approach from afar (slower when nearer), and distance at which they stop."""
 SCARED_SPEED_M_S, SCARED_FORCE_M2_S2 = 0.6, 4.0
-"""Maximum speed of scared pedestrians, and their repelling force times the gap to the robot (20 x 0.2)."""
+"""Maximum speed of scared pedestrians, and product of the force that repels them and their gap to the robot.
+
+In HuNavSim, the product is 20 x 0.2.
+"""
 THREATENING_SPEED_M_S, BLOCKING_DISTANCE_M, STARING_RANGE_M = 2.0, 1.1, 1.2
 """Maximum speed of threatening pedestrians, their distance in front of the robot, and the distance within which
 they look at it."""
 STOPPING_DISTANCE_M = 0.05
-"""Distance from the place to stand within which a pedestrian stops walking."""
+"""Distance from the target position within which a pedestrian stops walking."""
 
 
 @dataclass(frozen=True)
 class Intent:
-    """Motion that a pedestrian intends.
+    """Motion that a pedestrian intends in the next step.
 
-    target:        point to walk to at `speed` m/s; None to stand
-    max_speed:     maximum in m/s, also under the forces of others
+    target:        point to walk to; None to stand still
+    speed:         intended speed in m/s
+    max_speed:     maximum speed in m/s, also under the forces of others
     looks_at:      point to turn to; None for the direction of motion
-    is_immovable:  forces of others have no effect
+    is_immovable:  whether the forces of others have no effect
     """
 
     target: tuple[float, float] | None
@@ -50,22 +54,30 @@ class Intent:
 
 @dataclass
 class Pedestrian:
-    """Pedestrian and its state in the world frame. `velocity` is in m/s; `path` are the corners up to the goal."""
+    """A pedestrian with its current state in the world frame."""
 
     spec: WalkingPedestrian
     x: float
     y: float
     yaw: float
     velocity: tuple[float, float] = (0.0, 0.0)
+    """In m/s along x and y."""
     goal_index: int = 0
-    forward: bool = True
+    """Index of the current goal in `spec.goals`."""
+    is_forward: bool = True
+    """With `repeat: back_and_forth`, whether the goals are visited in order, not in reverse."""
     has_arrived: bool = False
+    """Whether the last goal was reached; True without goals."""
     path: list[tuple[float, float]] = field(default_factory=list)
+    """Corners that are still ahead; the last one is the current goal."""
     planned_for: tuple[float, float] | None = None
+    """Goal for which `path` was planned."""
     reacts_to: str | None = None
+    """Name of the robot to which the pedestrian reacts now."""
     reaction_time: float = 0.0
     """Total time in s of reactions so far."""
     has_lost_interest: bool = False
+    """Whether the full duration of the reaction has passed. Only scared pedestrians react again afterwards."""
 
     @classmethod
     def at_start(cls, spec: WalkingPedestrian) -> "Pedestrian":
@@ -90,16 +102,17 @@ class Pedestrian:
     # Goals
 
     def update_goal(self) -> list[PedestrianAction]:
-        """Advance to the next corner or goal where one is reached. Return the action if it is a goal."""
+        """Advance to the next corner or goal if the current one is reached. Return [action] if a goal was reached."""
         while len(self.path) > 1 and math.dist(self.position, self.path[0]) <= CORNER_RADIUS_M:
             self.path.pop(0)
         if self.has_arrived or math.dist(self.position, self.destination) > GOAL_RADIUS_M:
             return []
         action = PedestrianAction(self.spec.name, "reached", str(self.goal_index + 1))
-        self._next_goal()
+        self._advance_goal()
         return [action]
 
-    def _next_goal(self) -> None:
+    def _advance_goal(self) -> None:
+        """Set the next goal, according to `repeat`."""
         count = len(self.spec.goals)
         if self.spec.repeat == "once" or (count == 1 and self.spec.repeat == "loop"):
             self.has_arrived = self.goal_index == count - 1
@@ -109,21 +122,24 @@ class Pedestrian:
         elif count == 1:
             self.has_arrived = True
         else:
-            last = count - 1 if self.forward else 0
-            self.forward ^= self.goal_index == last
-            self.goal_index += 1 if self.forward else -1
+            last = count - 1 if self.is_forward else 0
+            self.is_forward ^= self.goal_index == last
+            self.goal_index += 1 if self.is_forward else -1
 
     # Reaction to robots
 
     def sees(self, robot: ObservedRobot) -> bool:
-        """Return whether the robot is in range and in the field of view, regardless of walls."""
+        """Return whether a robot is within the reaction distance and in the field of view, regardless of walls."""
         if math.dist(self.position, robot.pose[:2]) > self.spec.reacts_within:
             return False
         bearing = math.atan2(robot.pose.y - self.y, robot.pose.x - self.x)
         return abs(wrap(bearing - self.yaw)) <= HALF_FIELD_OF_VIEW_RAD
 
     def update_reaction(self, visible: dict[str, ObservedRobot], seconds: float) -> list[PedestrianAction]:
-        """Begin, continue, or end a reaction. `visible` are the robots that no wall hides. Return the actions."""
+        """Begin, continue, or end a reaction in a step of `seconds`. Return [action] if a reaction began or ended.
+
+        `visible` are the robots that no wall hides, by name.
+        """
         if self.reacts_to is not None:
             self.reaction_time += seconds
             robot = visible.get(self.reacts_to)
@@ -146,7 +162,7 @@ class Pedestrian:
         return [PedestrianAction(self.spec.name, "reacted", self.reacts_to)]
 
     def intent(self, robot: ObservedRobot | None) -> Intent:
-        """Return the intended motion. `robot` is the robot to react to."""
+        """Return the intended motion. `robot` is the robot to which the pedestrian reacts now; None for no reaction."""
         if robot is None:
             return self._intent_to_goal()
         robot_position = robot.pose[:2]
@@ -166,12 +182,14 @@ class Pedestrian:
                 return self._intent_to_goal()
 
     def _intent_to_goal(self) -> Intent:
+        """Return the intent to walk along the path, and to stop at the last goal."""
         speed, max_speed = self.spec.speed, MAX_SPEED_RATIO * self.spec.speed
         if self.has_arrived or (self.spec.repeat == "once" and self.goal_index == len(self.spec.goals) - 1):
-            speed = min(speed, _braking(math.dist(self.position, self.destination)))
+            speed = min(speed, _braking_speed(math.dist(self.position, self.destination)))
         return Intent(self._target(), speed, max_speed)
 
     def _target(self) -> tuple[float, float]:
+        """Return the next corner of the path, or the goal without a path."""
         return self.path[0] if self.path else self.destination
 
     def _blocking_intent(self, robot: ObservedRobot) -> Intent:
@@ -180,13 +198,16 @@ class Pedestrian:
         yaw = robot.pose.yaw
         target = robot.pose.x + gap * math.cos(yaw), robot.pose.y + gap * math.sin(yaw)
         is_near = math.dist(self.position, robot.pose[:2]) <= max(STARING_RANGE_M, gap + STOPPING_DISTANCE_M)
-        speed = min(THREATENING_SPEED_M_S, _braking(math.dist(self.position, target)))
+        speed = min(THREATENING_SPEED_M_S, _braking_speed(math.dist(self.position, target)))
         return Intent(target, speed, THREATENING_SPEED_M_S, robot.pose[:2] if is_near else None)
 
     # Motion
 
     def move(self, displacement: Array, velocity: Array, looks_at: tuple[float, float] | None, seconds: float) -> None:
-        """Apply a displacement (2,) in m and a velocity (2,), and turn to `looks_at` or to the direction of motion."""
+        """Apply the displacement (2,) in m of a step of `seconds`, set the velocity (2,) in m/s, and turn.
+
+        The pedestrian turns to the point `looks_at` or, if that is None, to the direction of motion.
+        """
         self.x, self.y = self.x + float(displacement[0]), self.y + float(displacement[1])
         self.velocity = float(velocity[0]), float(velocity[1])
         facing = self.yaw
@@ -198,6 +219,6 @@ class Pedestrian:
         self.yaw = wrap(self.yaw + max(-max_turn, min(max_turn, turn)))
 
 
-def _braking(distance: float) -> float:
-    """Return the speed from which a pedestrian can stop within a distance in m; 0 within STOPPING_DISTANCE_M."""
+def _braking_speed(distance: float) -> float:
+    """Return the speed in m/s from which a pedestrian stops within a distance in m; 0 within STOPPING_DISTANCE_M."""
     return distance / RELAXATION_TIME_S if distance > STOPPING_DISTANCE_M else 0.0

@@ -1,4 +1,4 @@
-"""Surroundings of pedestrians: walls, and the robots and objects at one point in time."""
+"""What pedestrians perceive: walls that block them and their view, and the robots and objects of the current step."""
 
 import math
 from collections.abc import Sequence
@@ -10,10 +10,32 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.pedestrians.forces import Indices
 
+CELL_M = 1.0
+"""Size of the grid cells for which nearby walls are cached."""
+OBSTACLE_RANGE_M = 1.2
+"""Distance from the center of a pedestrian within which walls and objects act: at a gap of 1 m from the body, their
+force is only 0.00014 m/s²."""
+SIGHT_CELL_M = 0.1
+"""Cell size of the visibility grid; larger if it would have more than MAX_SIGHT_CELLS."""
+MAX_SIGHT_CELLS = 4_000_000
+"""Maximum number of cells of the visibility grid."""
+SIGHT_MARGIN_M = 0.3
+"""Distance from both ends of a line of sight within which nothing blocks it."""
+
+NearestPoints = tuple[Indices, Indices, Array]
+"""For each pair of a pedestrian and a nearby wall segment: index of the pedestrian (k,), solid that the segment belongs
+to (k,), and point of the segment nearest to the pedestrian (k, 2)."""
+
 
 @dataclass(frozen=True, eq=False)
 class ObservedRobot:
-    """A robot: pose and velocity (m/s) of its base in the world, radius (m), and outline (n, 2) in its base frame."""
+    """A robot at the current step.
+
+    pose:     pose of the base in the world
+    velocity: velocity of the base in m/s along the world's x and y axes
+    radius:   radius in m of a disc around the origin of the base frame that contains the body
+    outline:  corners (n, 2) of the body in the base frame
+    """
 
     name: str
     pose: Pose2
@@ -24,7 +46,7 @@ class ObservedRobot:
 
 @dataclass(frozen=True, eq=False)
 class ObservedObject:
-    """An object: its outlines (n, 2) in the world frame."""
+    """An object at the current step, with the corners (n, 2) of its outlines in the world frame."""
 
     name: str
     outlines: tuple[Array, ...]
@@ -32,75 +54,73 @@ class ObservedObject:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """All robots and objects, sorted by name."""
+    """All robots and objects at the current step, sorted by name."""
 
     robots: tuple[ObservedRobot, ...] = ()
     objects: tuple[ObservedObject, ...] = ()
 
 
 def edges(outlines: Sequence[Array]) -> Array:
-    """Return the edges of closed outlines as segments (n, 2, 2)."""
+    """Return the edges of closed outlines, given by their corners (m, 2), as segments (n, 2, 2)."""
     rings = [np.stack((ring, np.roll(ring, -1, axis=0)), axis=1) for ring in outlines]
     return np.concatenate(rings) if rings else np.empty((0, 2, 2))
 
 
-CELL_M = 1.0
-"""Size of the grid cells for which nearby walls are cached."""
-REACH_M = 1.2
-"""Distance from the center of a pedestrian within which walls act; a gap of 1 m leaves 0.00014 m/s² of their force."""
-SIGHT_CELL_M = 0.1
-"""Cell size of the visibility grid; larger if it would have more than MAX_SIGHT_CELLS."""
-MAX_SIGHT_CELLS = 4_000_000
-NearestPoints = tuple[Indices, Indices, Array]
-"""Index of a pedestrian (k,), owner of a nearby wall (k,), and point of the wall nearest to the pedestrian (k, 2)."""
-SIGHT_MARGIN_M = 0.3
-"""Distance from both ends of a line of sight within which nothing blocks it."""
-
-
 class WallMap:
-    """Walls that block pedestrians, and among them the opaque ones, which block their view.
+    """Walls that block pedestrians. Those that are opaque also block their view."""
 
-    Takes segments (n, 2, 2) in m in the world frame, the solids `owners` (n,) that they belong to, and which ones are
-    `opaque` (n,). Raises ValueError for segments that are not finite.
-    """
+    def __init__(self, segments: Array, owners: Indices, is_opaque: npt.NDArray[np.bool_]) -> None:
+        """Create a map of wall segments. Raises ValueError for coordinates that are not finite.
 
-    def __init__(self, segments: Array, owners: Indices, opaque: npt.NDArray[np.bool_]) -> None:
+        segments (n, 2, 2):  ends of the segments in m in the world frame
+        owners (n,):         index of the solid that each segment belongs to
+        is_opaque (n,):      whether each segment blocks the view
+        """
         if not np.isfinite(segments).all():
             raise ValueError("a wall segment has coordinates that are not finite")
         self._segments, self._owners = segments, owners
         self._low, self._high = segments.min(axis=1), segments.max(axis=1)
         self._segments_by_cell: dict[tuple[int, int], Indices] = {}
-        self._sight = _SightGrid(segments[opaque])
+        self._sight = _SightGrid(segments[is_opaque])
 
     def nearest_points(self, points: Array) -> NearestPoints:
-        """Return the nearest point of each segment within REACH_M of each of the `points` (n, 2)."""
+        """Return the nearest points of wall segments for pedestrians at `points` (n, 2).
+
+        Contains all segments within OBSTACLE_RANGE_M of a point, and some that are a little farther away.
+        """
         cells = np.floor(points / CELL_M).astype(np.int64).tolist()
         candidates = [self._segments_near(column, row) for column, row in cells]
         point_index = np.repeat(np.arange(len(points)), [len(each) for each in candidates])
         segment_index = np.concatenate(candidates) if candidates else np.empty(0, dtype=np.int64)
-        return point_index, self._owners[segment_index], nearest_on(self._segments[segment_index], points[point_index])
+        return (
+            point_index,
+            self._owners[segment_index],
+            nearest_points_on(self._segments[segment_index], points[point_index]),
+        )
 
     def _segments_near(self, column: int, row: int) -> Indices:
-        """Return the segments that may be within REACH_M of any point of a cell."""
+        """Return the indices of segments that may be within OBSTACLE_RANGE_M of any point of a cell of CELL_M."""
         if (column, row) not in self._segments_by_cell:
             low = np.array([column, row]) * CELL_M
             outside = np.maximum(np.maximum(self._low - low - CELL_M, low - self._high), 0.0)
-            self._segments_by_cell[column, row] = np.flatnonzero(np.hypot(outside[:, 0], outside[:, 1]) <= REACH_M)
+            self._segments_by_cell[column, row] = np.flatnonzero(
+                np.hypot(outside[:, 0], outside[:, 1]) <= OBSTACLE_RANGE_M
+            )
         return self._segments_by_cell[column, row]
 
     def distance(self, point: tuple[float, float]) -> float:
-        """Return the distance in m from a point to the nearest wall; inf beyond REACH_M."""
+        """Return the distance in m from a point to the nearest wall; may be inf beyond OBSTACLE_RANGE_M."""
         points = np.array([point])
         _, _, nearest = self.nearest_points(points)
         return float(np.hypot(*(nearest - points).T).min(initial=math.inf))
 
     def visible(self, viewers: Array, targets: Array) -> npt.NDArray[np.bool_]:
-        """Return for each pair of viewers (n, 2) and targets (n, 2) whether no wall hides the target."""
+        """Return for each pair of points `viewers` (n, 2) and `targets` (n, 2) whether no wall hides the target."""
         return self._sight.clear_lines(viewers, targets)
 
 
 class _SightGrid:
-    """Grid of opaque cells, which block lines of sight."""
+    """Grid of the cells that opaque segments (n, 2, 2) pass through, which block lines of sight."""
 
     def __init__(self, segments: Array) -> None:
         self._low = segments.reshape(-1, 2).min(axis=0, initial=0.0) - SIGHT_CELL_M
@@ -116,7 +136,10 @@ class _SightGrid:
         self._opaque[cells[:, 0], cells[:, 1]] = True
 
     def clear_lines(self, viewers: Array, targets: Array) -> npt.NDArray[np.bool_]:
-        """Return which lines of sight are clear. One sample per cell suffices, because walls are closed or thicker."""
+        """Return for each pair of points (n, 2) whether the line of sight between them is clear.
+
+        The line is sampled once per cell. This suffices, because walls are closed outlines or thicker than a cell.
+        """
         offset = targets - viewers
         distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
         samples = np.maximum(np.ceil((distance - 2 * SIGHT_MARGIN_M) / self._cell), 0).astype(np.int64)
@@ -131,8 +154,8 @@ class _SightGrid:
         return is_clear
 
 
-def nearest_on(segments: Array, points: Array) -> Array:
-    """Return the point (n, 2) on each segment (n, 2, 2) that is nearest to each point (n, 2)."""
+def nearest_points_on(segments: Array, points: Array) -> Array:
+    """Return for each pair of a segment (n, 2, 2) and a point (n, 2) the nearest point (n, 2) on the segment."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     squared = np.maximum(np.sum(along * along, axis=1), 1e-18)
     ratio = np.clip(np.sum((points - start) * along, axis=1) / squared, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Camera and bumper: sensors that report what the simulation provides, without noise."""
+"""Camera and bumper: sensors that report what the simulation computes, without noise."""
 
 from simscen.core.messages.sensor_data import Bump, Image
 from simscen.model.robot import Bumper, Camera
@@ -6,14 +6,14 @@ from simscen.sensors.sensor import SensorSetting
 
 
 class CameraSensor:
-    """Pinhole camera with color and depth, without noise or distortion. Rendering takes milliseconds per picture."""
+    """Pinhole camera with color and depth, without noise or distortion."""
 
     def __init__(self, spec: Camera, setting: SensorSetting) -> None:
         self.name, self.period, self._spec, self._view = setting.name, setting.period, spec, setting.view
         self._mount = spec.mount.pose
 
     def read(self, tick: int) -> Image:
-        """Render a picture."""
+        """Render and return a picture."""
         spec = self._spec
         rgb, depth = self._view.image(self._mount, spec.width, spec.height, spec.field_of_view, spec.max_range)
         return Image(self.name, tick, rgb, depth, self._mount, spec.field_of_view)

@@ -1,4 +1,4 @@
-"""Builds the sensors of a robot, and checks the readings of sensors from plugins."""
+"""Build the sensors of a robot, and check the readings of sensors from plugins."""
 
 import traceback
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
 
 T = TypeVar("T")
 _DISTANCE_ARRAYS = frozenset({"ranges", "depth"})
-"""Arrays in which nan (invalid), inf (no hit within range), and -inf (too close, REP 117) are valid."""
+"""Fields of readings in which nan (invalid), inf (no hit within range), and -inf (too close, REP 117) are valid."""
 
 
 def build_sensors(
@@ -51,7 +51,10 @@ def _build_sensor(
 
 
 class PluginSensor:
-    """Wrapper of a plugin's sensor that checks each reading before the stack and the log receive it."""
+    """Wrapper of a plugin's sensor that checks each reading before the stack and the log receive it.
+
+    Raises RunError if the plugin's sensor raises an exception or is not valid.
+    """
 
     def __init__(self, kind: str, spec: SensorSpec, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
@@ -62,7 +65,7 @@ class PluginSensor:
             self._fail(f"{type(self._sensor).__name__} has no method `read`")
 
     def read(self, tick: int) -> Reading:
-        """Return a reading; raises RunError if it is invalid."""
+        """Return a reading. Raises RunError if it is invalid."""
         reading: Reading = self._call(lambda: self._sensor.read(tick))
         if type(reading) is not self._reading_type:
             self._fail(f"returned {type(reading).__name__}, but its specification declares {self._spec.reading_type}")
@@ -77,6 +80,7 @@ class PluginSensor:
         return reading
 
     def _call(self, function: Callable[[], T]) -> T:
+        """Call a function of the plugin, and convert its exceptions to RunError."""
         try:
             return function()
         except (RunError, MemoryError):
@@ -95,7 +99,7 @@ class PluginSensor:
 
 
 def _defect(name: str, value: object) -> str:
-    """Return what is wrong with the field `name` of a reading, or ""."""
+    """Return what is wrong with the field `name` of a reading, for a message; "" if it is valid."""
     match value:
         case np.ndarray() if name in _DISTANCE_ARRAYS:
             is_wrong = value.dtype.kind != "f" or (np.isfinite(value) & (value < 0)).any() or not value.size

@@ -1,4 +1,4 @@
-"""Inertial measurement unit."""
+"""Inertial measurement unit (IMU): gyroscope and accelerometer with noise and bias."""
 
 from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry import Pose3, Vector, rotated
@@ -10,8 +10,9 @@ from simscen.sensors.sensor import NormalStream, SensorSetting
 class ImuSensor:
     """Measures the angular velocity with a constant bias, and the mean specific force since the last reading.
 
-    Its frame is the base frame, or `spec.mount`, where turning causes centripetal and tangential acceleration as well.
-    A robot that is placed elsewhere at rest (`kidnap`) is not accelerated: the next reading contains gravity only.
+    The specific force is the acceleration minus gravity. The IMU is at the origin of the base frame, or at
+    `spec.mount`. There, rotation causes centripetal and tangential acceleration as well. Moving the robot elsewhere
+    (`kidnap`) causes no acceleration: the next reading contains only gravity.
     """
 
     def __init__(self, spec: InertialUnit, setting: SensorSetting) -> None:
@@ -27,7 +28,7 @@ class ImuSensor:
         self._placements = self._view.placements()
 
     def read(self, tick: int) -> Imu:
-        """Return a reading in the frame of the sensor. A level one at rest measures +9.81 m/s² along z."""
+        """Return a reading in the frame of the sensor. A level sensor at rest measures +9.81 m/s² along z."""
         (i, j, k, w), linear, angular = self._sensor_motion()
         px, py, pz = self._velocity
         if (placements := self._view.placements()) != self._placements:
@@ -51,7 +52,10 @@ class ImuSensor:
         )
 
     def _sensor_motion(self) -> tuple[tuple[float, float, float, float], Vector, Vector]:
-        """Return the orientation of the sensor, and its linear and angular velocity, all in the world frame."""
+        """Return the orientation of the sensor (quaternion x y z w), its linear velocity (m/s), and angular (rad/s).
+
+        All are in the world frame.
+        """
         pose, (linear, angular) = self._view.base_pose(), self._view.base_velocity()
         if self._is_at_base:
             return pose.quaternion, linear, angular

@@ -1,4 +1,4 @@
-"""Planar lidar: ray casting, Gaussian noise, and quantized ranges, vectorized over the beams."""
+"""Planar lidar: casts one ray per beam, adds Gaussian noise, and rounds the ranges to the resolution of the lidar."""
 
 import math
 
@@ -11,9 +11,9 @@ from simscen.model.robot import Lidar
 from simscen.sensors.sensor import SensorSetting
 
 MAX_NOISE_STDS = 10.0
-"""Noise never exceeds this many standard deviations."""
+"""Number of standard deviations that noise is assumed never to exceed, to limit the length of rays."""
 NOISE_BUFFER_SCANS = 8
-"""Number of scans whose noise is drawn in one call."""
+"""Number of scans whose noise is drawn at once, which is faster."""
 
 
 class LidarSensor:
@@ -40,7 +40,7 @@ class LidarSensor:
         self._noise_buffer, self._next = np.empty((0, spec.beams)), 0
 
     def read(self, tick: int) -> Scan:
-        """Return a scan; inf: no hit within range, -inf: a hit below the minimum range (REP 117)."""
+        """Return a scan. A range of inf means no hit within range, -inf a hit below the minimum range (REP 117)."""
         pose, spec = self._view.base_pose(), self._spec
         if self._tilted_mount is not None:
             ranges = self._to_ranges(self._tilted_distances(pose.compose(self._tilted_mount)))
@@ -53,12 +53,12 @@ class LidarSensor:
         return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)
 
     def _tilted_distances(self, lidar: Pose3) -> Array:
-        """Return the distances to obstacles or to the floor, whichever is nearer."""
+        """Return the distances (beams,) in m to obstacles or the floor for a lidar at the pose `lidar`."""
         distances = np.asarray(self._rays.sweep(self._fan, lidar, self._cast_range), dtype=np.float64)
         return np.minimum(distances, floor_distances(lidar.z, self._directions @ lidar.rotation()[2, :2]))
 
     def _to_ranges(self, distances: Array | Singles) -> Array:
-        """Return reported ranges for true distances: with noise, rounded, and limited to the sensor's range."""
+        """Return the ranges (beams,) to report for true distances in m: with noise, rounded, and limited."""
         spec = self._spec
         ranges: Array = distances + self._draw_noise() if spec.noise > 0 else distances.astype(np.float64)
         ranges /= spec.resolution
@@ -73,7 +73,7 @@ class LidarSensor:
         return ranges
 
     def _draw_noise(self) -> Array:
-        """Return the noise of one scan in meters from a buffer that has the values of single draws."""
+        """Return the noise (beams,) of one scan in m, the same as if the noise of each scan were drawn separately."""
         if self._next == len(self._noise_buffer):
             shape = NOISE_BUFFER_SCANS, self._spec.beams
             self._noise_buffer, self._next = self._rng.normal(0.0, self._spec.noise, shape), 0
@@ -83,9 +83,10 @@ class LidarSensor:
 
 
 def floor_distances(height: float, slopes: Array) -> Array:
-    """Return the distance along each beam from `height` to the floor (z = 0); inf for beams that do not point down.
+    """Return the distances (n,) in m along beams from `height` m to the floor (z = 0).
 
-    `slopes` (n,) are the z components of their unit vectors.
+    `slopes` (n,) are the z components of the unit vectors of the beams. The distance is inf if a beam does not point
+    down.
     """
     down = slopes < -1e-9
     return np.where(down, height / np.where(down, -slopes, 1.0), np.inf)

@@ -1,4 +1,4 @@
-"""Wheel odometry: encoder increments integrated along arcs, with random-walk errors."""
+"""Wheel odometry: integrates encoder increments along arcs, with errors that accumulate as a random walk."""
 
 import math
 from collections.abc import Callable
@@ -20,11 +20,11 @@ _new = tuple.__new__  # creates a named tuple without the call overhead of its c
 
 
 class WheelOdometrySensor:
-    """Dead reckoning; the origin of the odom frame is the initial pose of the robot.
+    """Dead reckoning from wheel encoders; the origin of the odom frame is the initial pose of the robot.
 
-    Errors of increments are independent, with variances proportional to the distance and the turn. They therefore do
-    not depend on the rate, and the standard deviation after one meter is that of the specification. Readings carry the
-    covariances of these errors. The covariance of the pose grows along the way, to first order.
+    The errors of increments are independent, with variances proportional to distance and turn. The accumulated error
+    therefore does not depend on the rate, and its standard deviation after one meter is that of the specification.
+    Readings contain the covariances of velocity and pose. That of the pose is propagated to first order.
     """
 
     def __init__(self, spec: WheelOdometry, setting: SensorSetting) -> None:
@@ -55,7 +55,7 @@ class WheelOdometrySensor:
         return Odometry(self.name, tick, pose, twist, twist_variance, self._covariance)
 
     def _variances(self, step: Twist) -> Variances:
-        """Return the variances of the errors of an increment (Probabilistic Robotics, table 5.6)."""
+        """Return the variances of the errors of an increment `step` (m, m, rad): Probabilistic Robotics, table 5.6."""
         vx, vy, wz = step
         distance = math.hypot(vx, vy)
         position = self._position_variance_per_m * distance
@@ -71,7 +71,7 @@ class WheelOdometrySensor:
         ))  # fmt: skip
 
     def _grow_covariance(self, last: Pose2, pose: Pose2, variances: Variances) -> None:
-        """Propagate the covariance of the pose along an increment with errors of these variances."""
+        """Propagate the covariance of the pose along an increment from `last` to `pose` with errors of `variances`."""
         xx, xy, xa, _, yy, ya, _, _, aa = self._covariance
         forward, lateral, turn = variances
         dx, dy, heading = pose.x - last.x, pose.y - last.y, (pose.yaw + last.yaw) / 2
@@ -86,7 +86,7 @@ class WheelOdometrySensor:
 
 
 def integrate_arc(step: Twist) -> Pose2:
-    """Return the pose after a motion (m, m, rad) at constant velocity: the exponential map of SE(2)."""
+    """Return the pose after a motion (m, m, rad) at constant velocity from the origin: the exponential map of SE(2)."""
     vx, vy, turn = step
     if abs(turn) < 1e-9:
         return _new(Pose2, (vx, vy, turn))
@@ -95,7 +95,7 @@ def integrate_arc(step: Twist) -> Pose2:
 
 
 def kinematics_of(drive: Drive) -> Kinematics:
-    """Return the forward kinematics of a drive without slip.
+    """Return the forward kinematics of a drive without slip: a function from encoder increments to base motion.
 
     Source: Siegwart, Nourbakhsh and Scaramuzza, Introduction to Autonomous Mobile Robots, section 3.2; for mecanum
     wheels, see MecanumWheels.
@@ -109,6 +109,8 @@ def kinematics_of(drive: Drive) -> Kinematics:
 
 
 def _two_sided_kinematics(radius: float, separation: float) -> Kinematics:
+    """Return the kinematics of driven wheels of `radius` m on two sides, `separation` m apart."""
+
     def motion(increment: EncoderIncrement) -> Twist:
         left, right = increment[0] * radius, increment[1] * radius
         return _new(Twist, ((left + right) / 2, 0.0, (right - left) / separation))

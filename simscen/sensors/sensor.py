@@ -1,4 +1,4 @@
-"""Interface of sensors, their view of the simulation, and their buffered random numbers."""
+"""Interface of sensors, the arguments that they receive, and a stream of normal random numbers for their noise."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -13,9 +13,12 @@ from simscen.model.robot import Drive
 
 Vector = tuple[float, float, float]
 
+BUFFER_SIZE = 384
+"""Number of random numbers that a NormalStream draws at once."""
+
 
 class SensorView(Protocol):
-    """Part of the true state that sensors may use."""
+    """The part of the true state that sensors may use."""
 
     def base_pose(self) -> Pose3:
         """Return the pose of the base frame in the world."""
@@ -26,15 +29,15 @@ class SensorView(Protocol):
         ...
 
     def placements(self) -> int:
-        """Return how many times the robot was placed elsewhere (`kidnap`), which no sensor measures as motion."""
+        """Return how many times `kidnap` has moved the robot elsewhere, which no sensor measures as motion."""
         ...
 
     def encoders(self) -> tuple[float, ...]:
-        """Return the accumulated rotation of the wheels.
+        """Return the accumulated rotation of the wheels; the elements depend on the drive.
 
         Wheels on two sides: mean angle in rad of the driven wheels on the left and on the right. Mecanum: angles in rad
-        of the front left, front right, rear left, and rear right wheel. Omnidirectional: meters forward, meters to the
-        left, and radians.
+        of the front left, front right, rear left, and rear right wheel. Omnidirectional, whose wheels are not modeled:
+        distance in m driven forward and to the left, and angle in rad turned.
         """
         ...
 
@@ -45,21 +48,21 @@ class SensorView(Protocol):
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """Return colors (h, w, 3) and depths (h, w) in meters along the optical axis, inf beyond `far`.
+        """Return colors (height, width, 3) and depths (height, width) in m along the optical axis, inf beyond `far` m.
 
-        `mount` is the pose of the camera in the base frame; its optical axis is its x axis. `field_of_view` is
-        horizontal, in rad.
+        `mount` is the pose of the camera in the base frame; the optical axis is the x axis of this pose. `width` and
+        `height` are in pixels. `field_of_view` is horizontal, in rad.
         """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class SensorSetting:
-    """Arguments of a sensor besides its specification: `Class(specification, setting)`. SI units.
+    """What a sensor needs besides its specification: a sensor is created as `Class(specification, setting)`.
 
-    name:     name of the sensor in the robot's file, repeated in its readings
-    period:   ticks between two readings
-    seconds:  the same in seconds
+    name:     name of the sensor in the robot's file, which is also in its readings
+    period:   time between two readings in ticks
+    seconds:  time between two readings in s
     rng:      random generator of this sensor, from the stream `sensor.<name>` of the run's seed
     view:     part of the true state that sensors may use
     rays:     ray caster for distances to the surroundings
@@ -76,10 +79,10 @@ class SensorSetting:
 
 
 class Sensor(Protocol):
-    """Takes readings at a fixed rate.
+    """Takes readings of one quantity at a fixed rate.
 
     *Given* the same world and generator *then* the same readings, bit for bit.
-    *Given* noise *then* no two scans or inertial readings of a robot at rest are equal; without noise all are.
+    *Given* noise *then* no two scans or inertial readings of a robot at rest are equal; without noise, all are equal.
     *Given* a reading *then* nothing changes it later.
     """
 
@@ -98,13 +101,11 @@ class Sensor(Protocol):
         ...
 
 
-BUFFER_SIZE = 384
-
-
 class NormalStream:
-    """Standard normal numbers from a generator with no other user, the same as single draws would give.
+    """Standard normal random numbers, the same as if they were drawn from the generator one by one.
 
-    The numbers are drawn in batches: drawing three at a time costs as much as drawing hundreds.
+    They are drawn in large batches, because drawing three numbers takes as long as drawing hundreds. The generator must
+    have no other user.
     """
 
     def __init__(self, rng: np.random.Generator) -> None:

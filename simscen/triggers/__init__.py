@@ -1,1 +1,1 @@
-"""Conditions that start events, each with its specification and implementation."""
+"""Trigger conditions, which start events. Each class is both the YAML specification and the implementation."""

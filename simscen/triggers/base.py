@@ -1,4 +1,4 @@
-"""Base class of trigger conditions, the choice of a condition by its key, and `when`."""
+"""Base class of trigger conditions, the choice of a condition by its YAML key, and the trigger of an event (`when`)."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Condition(ABC):
 
 
 class AnyCondition(Choice):
-    """One condition, chosen by its key, or a combination of conditions."""
+    """One condition, chosen by its YAML key, or a combination of conditions (`all`, `any`, `not`)."""
 
     group: ClassVar[str] = "trigger"
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot"})
@@ -79,21 +79,24 @@ class AnyCondition(Choice):
 
     @property
     def inner(self) -> list[AnyCondition]:
-        """The conditions that this one combines; [] for a single condition."""
+        """The conditions under `all`, `any`, or `not`; [] for a single condition."""
         return self.all or self.any or ([self.not_] if self.not_ is not None else [])
 
     def parts(self) -> Iterator[AnyCondition]:
-        """Yield this condition and, recursively, all conditions in it."""
+        """Yield this condition and all conditions in it, at any depth."""
         yield self
         for condition in self.inner:
             yield from condition.parts()
 
     def situation_of_robot(self, now: Situation) -> Situation:
-        """Return the situation of the robot that the condition is for."""
+        """Return the situation as seen by the robot that the condition is for."""
         return now if self.robot is None else now.of(self.robot)
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the condition is true at this beat, regardless of `for`."""
+        """Return whether the condition is true at this beat, regardless of `for`.
+
+        Raises RunError if a condition of a plugin returns something else than a boolean.
+        """
         now = self.situation_of_robot(now)
         if self.all is not None:
             return all_hold(self.all, now)
@@ -121,7 +124,7 @@ def any_holds(conditions: list[AnyCondition], now: Situation) -> bool:
 
 
 class Trigger(AnyCondition):
-    """A condition and how it starts an event."""
+    """A condition, and how often, with which delay, and with which probability it starts an event."""
 
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot", "edge", "delay", "times", "probability"})
 

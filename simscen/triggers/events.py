@@ -13,9 +13,12 @@ from simscen.spec.places import DisturbanceName, GoalName, MovableName, ObjectNa
 from simscen.triggers.base import Condition
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
+COMPLETED = frozenset({EventKind.GOAL_REACHED, EventKind.GOAL_PASSED})
+"""Kinds of events that complete a waypoint."""
 
 
 def _count_events(now: Situation, kind: EventKind, name: str | None) -> int:
+    """Return the number of logged events of this kind and name; None counts all names."""
     return sum(e.kind == kind and name in (None, e.name) for e in now.events)
 
 
@@ -41,7 +44,7 @@ class EventStatus(Spec, Condition):
 
 
 class Replan(Spec, Condition):
-    """True once the robot has replanned this often because its plan was blocked or outdated.
+    """True once the robot has replanned `count` times because its plan was blocked or outdated.
 
     Example: `when: {replan: {count: 2}}`
     """
@@ -55,7 +58,7 @@ class Replan(Spec, Condition):
 
 
 class RecoveryStatus(Spec, Condition):
-    """True once a recovery behavior has started or ended this often.
+    """True once a recovery behavior has started or ended `count` times.
 
     Example: `when: {recovery: {status: started}}`
     """
@@ -105,11 +108,8 @@ class GoalStatus(Spec, Condition):
         return sum(e.kind == kind and matches_goal_name(e.name, self.name) for e in now.events) >= self.count
 
 
-COMPLETED = frozenset({EventKind.GOAL_REACHED, EventKind.GOAL_PASSED})
-
-
 class Waypoint(Spec, Condition):
-    """True once the robot has reported this many waypoints as reached or passed.
+    """True once the robot has reported `count` waypoints as reached or passed.
 
     Use it for disturbances at a certain point of a tour, whether the robot stops at its waypoints or not: after the
     second shelf, a door closes. The count continues over all loops of the tour.

@@ -21,7 +21,7 @@ from simscen.triggers.base import Condition
 
 
 class SpeedBelow(Value[PositiveSpeed], Condition):
-    """True while the true speed of the robot is less than this.
+    """True while the true speed of the robot is less than the given speed.
 
     Example: `when: {speed_below: 0.05 m/s}`
     """
@@ -32,7 +32,7 @@ class SpeedBelow(Value[PositiveSpeed], Condition):
 
 
 class SpeedAbove(Value[PositiveSpeed], Condition):
-    """True while the true speed of the robot is greater than this.
+    """True while the true speed of the robot is greater than the given speed.
 
     Example: `when: {speed_above: 0.4 m/s}`
     """
@@ -43,7 +43,7 @@ class SpeedAbove(Value[PositiveSpeed], Condition):
 
 
 class TurningAbove(Value[PositiveAngularSpeed], Condition):
-    """True while the true turn rate of the robot, in either direction, is greater than this (rad/s).
+    """True while the true turn rate of the robot, in either direction, is greater than the given one (rad/s).
 
     Use it for disturbances in a turn: a scan distorted by the motion, odometry that slips, a person in a blind corner.
 
@@ -56,9 +56,9 @@ class TurningAbove(Value[PositiveAngularSpeed], Condition):
 
 
 class TurningBelow(Value[PositiveAngularSpeed], Condition):
-    """True while the true turn rate of the robot, in either direction, is less than this (rad/s).
+    """True while the true turn rate of the robot, in either direction, is less than the given one (rad/s).
 
-    Combine it with `for` to detect the end of a turn. It is also true for a robot that stands still.
+    Combine it with `for` to detect the end of a turn. The condition is also true for a robot that stands still.
 
     Example: `when: {turning_below: 5 deg/s, for: 1 s}`
     """
@@ -69,7 +69,7 @@ class TurningBelow(Value[PositiveAngularSpeed], Condition):
 
 
 class Travelled(Value[NonNegativeLength], Condition):
-    """True once the robot has truly driven this far since the start; kidnapping does not count.
+    """True once the robot has truly driven the given distance since the start; kidnapping does not count.
 
     Example: `when: {travelled: 2.5 m}`
     """
@@ -80,7 +80,7 @@ class Travelled(Value[NonNegativeLength], Condition):
 
 
 class DistanceRemaining(Value[NonNegativeLength], Condition):
-    """True while the true straight-line distance from the robot to its goal is at most this.
+    """True while the true straight-line distance from the robot to its goal is at most the given distance.
 
     Example: `when: {distance_remaining: 2 m}`
     """
@@ -91,7 +91,7 @@ class DistanceRemaining(Value[NonNegativeLength], Condition):
 
 
 class BelievedDistanceRemaining(Value[NonNegativeLength], Condition):
-    """True while the straight-line distance from the estimated pose to the goal is at most this (m).
+    """True while the straight-line distance from the estimated pose to the goal is at most the given distance.
 
     A robot with a wrong belief slows down, parks, or reports success where it believes the goal is.
     `distance_remaining` measures from the true position.
@@ -105,7 +105,7 @@ class BelievedDistanceRemaining(Value[NonNegativeLength], Condition):
 
 
 class LocalizationError(Value[NonNegativeLength], Condition):
-    """True while the estimated position of the robot is further than this from its true position.
+    """True while the distance between estimated and true position of the robot is greater than the given one.
 
     Example: `when: {localization_error: 0.5 m}`
     """
@@ -197,7 +197,7 @@ class RobotWithin(Spec, Condition):
 
 
 class ClearanceBelow(Value[PositiveLength], Condition):
-    """True while the distance between the robot's hull and the nearest obstacle is less than this (m).
+    """True while the distance between the robot's hull and the nearest obstacle is less than the given one.
 
     Use it for disturbances in narrow places: a scan that drops out in a doorway, a push beside a shelf. Walls, objects,
     and other robots count. The clearance is measured with each truth sample (`physics.truth_rate`).

@@ -10,7 +10,7 @@ from simscen.triggers.base import Condition
 
 
 class Time(Value[Duration], Condition):
-    """True from this simulated time on.
+    """True from the given simulated time on.
 
     Example: `when: {time: 10 s}`
     """
@@ -23,7 +23,7 @@ class Time(Value[Duration], Condition):
 
 
 class ScanAge(Spec, Condition):
-    """True while the newest scan that the stack received is older than this.
+    """True while the newest scan that the stack received is older than `above`.
 
     Use it for a second disturbance while a lidar is silent, such as a person who steps in front of a blind robot. The
     age is the simulated time since the stack received the scan, however late it arrived; before the first scan, it is
@@ -33,7 +33,7 @@ class ScanAge(Spec, Condition):
     """
 
     above: PositiveDuration
-    """Age in seconds."""
+    """Age that the scan must exceed."""
     sensor: Name | None = None
     """Name of the lidar in the robot's `sensors`; default: the lidar whose scan arrived last."""
 

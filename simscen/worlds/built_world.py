@@ -1,4 +1,4 @@
-"""Prepare the mesh and the map of a world, once for all its runs, and summarize worlds."""
+"""Build the triangle mesh and the occupancy map of a world, and summarize a built world for `simscen world inspect`."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -14,10 +14,10 @@ from simscen.worlds.maps.occupancy_map import draw_map
 
 
 def build_world_and_map(world: World, lidar_height: float, resolution: float = MAP_RESOLUTION_M) -> BuiltWorld:
-    """Merge the static solids, and draw the map that SLAM with a lidar at `lidar_height` meters would build.
+    """Merge the static solids to one mesh, and draw the map that SLAM with a lidar at `lidar_height` m would build.
 
-    The result has only NumPy arrays, so that forked runs can share it. Takes some 10 ms for
-    a house of 20 x 20 m, 0.1 s for thousands of solids. Raises InvalidInput for a map beyond 16 million cells.
+    `resolution` is the edge length of a map cell in m. A world is built once for all its runs: mesh and map are NumPy
+    arrays, whose memory forked processes share. Raises InvalidInput for a map of more than MAX_MAP_CELLS cells.
     """
     mesh = merge_solids(world.solids)
     return BuiltWorld(world, mesh, draw_map(world, mesh, lidar_height, resolution))
@@ -29,32 +29,40 @@ Extent = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True)
 class WorldItem:
-    """Solid or body; `extent` is in the world frame."""
+    """A static solid or a body in a summary."""
 
     name: str
     shape: str
+    """Kind of shape, for example "box"; "box+cylinder" for a body with both."""
     triangles: int
+    """Number of triangles."""
     extent: Extent
+    """Bounding box in the world frame; zeros without triangles."""
     mass: float | None = None
-    """In kg; None for a static solid."""
+    """In kg; 0 for a body that cannot be pushed, None for a static solid."""
 
 
 @dataclass(frozen=True)
 class WorldSummary:
-    """Summary of a world: solids, bodies, map, and notes of the importer."""
+    """Summary of a world. The names of the fields are keys of the JSON output."""
 
     name: str
     bounds: tuple[float, float, float, float]
+    """(min x, min y, max x, max y) in m."""
     solids: tuple[WorldItem, ...]
     bodies: tuple[WorldItem, ...]
     map_size: tuple[int, int]
     """Rows and columns."""
     map_resolution: float
+    """Edge length of a cell in m."""
     map_shares: tuple[float, float, float]
     """Fractions of occupied, free and unknown cells."""
     places: tuple[str, ...]
+    """Names of all places, sorted."""
     regions: tuple[str, ...]
+    """Names of all regions, sorted."""
     notes: tuple[str, ...]
+    """Notes of the importer, for example about ignored elements."""
 
     @property
     def triangles(self) -> int:
@@ -63,7 +71,7 @@ class WorldSummary:
 
     @property
     def shapes(self) -> tuple[tuple[str, int], ...]:
-        """Kinds of shapes of the solids with their counts, the most frequent first."""
+        """Pairs (kind of shape, number of solids), the most frequent kind first."""
         counts = Counter(item.shape for item in self.solids)
         return tuple(sorted(counts.items(), key=lambda entry: (-entry[1], entry[0])))
 

@@ -1,4 +1,7 @@
-"""Conversion of imported worlds to world files: exact shapes where possible, else prisms over a cross section."""
+"""Convert imported worlds (SDF) to the obstacles and objects of a world file.
+
+World files have only upright shapes. A solid with another shape is replaced by upright prisms over its cross section.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -27,19 +30,20 @@ from simscen.worlds.geometry.triangulation import merge_solids
 
 MIN_UPRIGHT_COSINE = 1 - 1e-8
 """Cosine of the tilt up to which a solid is upright: 0.1 mm per meter."""
-DIGITS = 6
-"""Decimals of lengths in m that are written."""
+DECIMALS = 6
+"""Number of decimals of lengths (m) and angles (rad) in the world file."""
 MAX_NAME_LENGTH = 120
+"""Number of characters to which names are cut. World files do not allow longer names."""
 STRAIGHT_TOLERANCE_RAD = 1e-6
 """Change of direction up to which a path is straight."""
 
 
 @dataclass(frozen=True)
 class PrismShape:
-    """Shape of a world file that begins `bottom` m above the ground and is `height` m tall.
+    """Upright shape of a world file that begins `bottom` m above the ground and is `height` m tall.
 
-    Exactly one of these is given: `box` (lengths along x and y), `radius`, or `polygon` (corners in the frame of
-    `pose`).
+    Its base is either a `box` (lengths in m along x and y), a circle of `radius` m, or a `polygon` (corners in m in the
+    frame of `pose`).
     """
 
     pose: Pose2
@@ -51,28 +55,28 @@ class PrismShape:
 
     @property
     def fields(self) -> dict[str, object]:
-        """The fields of an obstacle except its name, rounded to the micrometer."""
+        """The keys of an obstacle in a world file except `name`, with their values; lengths rounded to 1 µm."""
         x, y, yaw = _rounded(self.pose)
-        height, bottom = round(self.height, DIGITS), round(self.bottom, DIGITS)
+        height, bottom = round(self.height, DECIMALS), round(self.bottom, DECIMALS)
         fields: dict[str, object] = {"pose": PoseSpec(x=x, y=y, yaw=yaw)}
         if self.box is not None:
             fields["box"] = [*_rounded(self.box), height]
         elif self.radius is not None:
-            fields["cylinder"] = [round(self.radius, DIGITS), height]
+            fields["cylinder"] = [round(self.radius, DECIMALS), height]
         else:
             fields |= {"polygon": [_rounded(point) for point in self.polygon], "height": height}
         return {**fields, "z": bottom} if bottom > 0 else fields
 
 
 def prism_shapes(solid: Solid, height: float, changes: list[str]) -> list[PrismShape]:
-    """Return the shapes of a solid above the ground; add a sentence to `changes` for each difference.
+    """Return the shapes that replace a solid, without any part below the ground.
 
-    A solid without exact equivalent is replaced by its cross section at `height` m, or at half its height if it does
-    not reach that height.
+    A solid that no shape of world files equals is replaced by prisms over its cross section at `height` m, or at half
+    its height if it does not reach `height`. A sentence about each difference is appended to `changes`.
     """
     exact = _exact_shape(solid)
     shapes = [exact] if exact else list(_prisms(solid, height, changes))
-    above = [_above_ground(shape) for shape in shapes if shape.bottom + shape.height > 10**-DIGITS]
+    above = [_above_ground(shape) for shape in shapes if shape.bottom + shape.height > 10**-DECIMALS]
     if shapes and not above:
         changes.append(f"{solid.name}: it is below the ground; it is left out")
     return [shape for shape in above if _is_valid(shape, solid.name, changes)]
@@ -89,14 +93,14 @@ def _is_valid(shape: PrismShape, name: str, changes: list[str]) -> bool:
 
 
 def _reason(error: ValidationError) -> str:
-    """Return the first problem, e.g. "its `box` is not valid: input should be greater than 0"."""
+    """Return the first problem of a validation, e.g. "its `box` is not valid: input should be greater than 0"."""
     problem = error.errors()[0]
     message = problem["msg"].removeprefix("Value error, ")
     return f"its `{problem['loc'][0]}` is not valid: {message[:1].lower()}{message[1:]}"
 
 
 def _exact_shape(solid: Solid) -> PrismShape | None:
-    """Return the shape that equals a solid; None if it is not upright or world files have no such shape."""
+    """Return the shape that equals a solid; None if the solid is not upright or world files have no such shape."""
     rotation, pose = solid.pose.rotation(), solid.pose
     up = int(np.argmax(np.abs(rotation[2])))
     if abs(rotation[2, up]) < MIN_UPRIGHT_COSINE:
@@ -115,7 +119,7 @@ def _exact_shape(solid: Solid) -> PrismShape | None:
 
 
 def _prisms(solid: Solid, height: float, changes: list[str]) -> Iterator[PrismShape]:
-    """Yield prisms over the cross section of a solid."""
+    """Yield prisms over the cross section of a solid, see `prism_shapes`; none if it is not closed or is empty."""
     mesh = merge_solids([solid])
     kind = type(solid.shape).__name__.lower()
     kind = f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
@@ -140,7 +144,7 @@ def _prisms(solid: Solid, height: float, changes: list[str]) -> Iterator[PrismSh
 
 
 def _is_prism(solid: Solid, volume: float) -> bool:
-    """Return whether a solid equals its prisms: all faces are level or upright, and the volume is the same."""
+    """Return whether a solid equals prisms of this volume (m³): each face is level or upright, the volume is equal."""
     mesh = merge_solids([solid])
     a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
     normals = np.cross(b - a, c - a)
@@ -156,21 +160,21 @@ def _above_ground(shape: PrismShape) -> PrismShape:
 
 
 def _rounded(values: Sequence[float]) -> list[float]:
-    return [round(value, DIGITS) + 0.0 for value in values]  # + 0.0 makes -0.0 positive
+    return [round(value, DECIMALS) + 0.0 for value in values]  # + 0.0 makes -0.0 positive
 
 
 @dataclass
 class Conversion:
-    """Obstacles and objects of a world file, and a sentence for each difference from the imported world."""
+    """Obstacles and objects of a world file, with a sentence in `changes` for each difference from the world."""
 
     obstacles: list[Obstacle] = field(default_factory=list)
     objects: list[Movable] = field(default_factory=list)
     changes: list[str] = field(default_factory=list)
 
     def merged_into(self, spec: WorldSpec) -> WorldSpec:
-        """Return a specification in which these come before the obstacles and objects of `spec`.
+        """Return a copy of `spec` with these obstacles and objects before its own, and without its `sdf`.
 
-        Raises pydantic.ValidationError if there are too many.
+        Raises pydantic.ValidationError if there are more obstacles or objects than a world file may have.
         """
         return WorldSpec.model_validate(
             {
@@ -183,15 +187,16 @@ class Conversion:
 
 
 def convert_world(world: World, height: float) -> Conversion:
-    """Convert the solids and bodies of a world.
+    """Convert the solids of a world to obstacles, and its bodies to objects.
 
-    Solids without exact equivalent are replaced by their cross section at `height` m, or left out, with a sentence.
+    `height` is the height in m of the cross section of solids that are replaced by prisms (see `prism_shapes`). Solids
+    and bodies that cannot be converted are left out, with a sentence in `changes`.
     """
     conversion = Conversion()
     for solid in world.solids:
         friction = {"friction": solid.friction} if solid.friction != 1.0 else {}
         for shape in prism_shapes(solid, height, conversion.changes):
-            _add_obstacle({"name": _name(solid.name), **shape.fields, **friction}, conversion)
+            _add_obstacle({"name": _valid_name(solid.name), **shape.fields, **friction}, conversion)
     for body in world.bodies:
         _add_body(body, height, conversion)
     return conversion
@@ -216,10 +221,10 @@ def _add_body(body: Body, height: float, conversion: Conversion) -> None:
             f"{body.name}: it {moves} and has {len(shapes)} shapes, but an object can have only one; it is made static"
         )
         for shape in shapes:
-            _add_obstacle({"name": _name(body.name), **shape.fields}, conversion)
+            _add_obstacle({"name": _valid_name(body.name), **shape.fields}, conversion)
         return
     travel = _travel(body, shapes[0], conversion.changes) if body.path else None
-    fields = {"name": _name(body.name), "mass": body.mass, "move": travel, **shapes[0].fields}
+    fields = {"name": _valid_name(body.name), "mass": body.mass, "move": travel, **shapes[0].fields}
     try:
         conversion.objects.append(Movable.model_validate(fields))
     except ValidationError as error:
@@ -227,7 +232,11 @@ def _add_body(body: Body, height: float, conversion: Conversion) -> None:
 
 
 def _travel(body: Body, shape: PrismShape, changes: list[str]) -> Travel | None:
-    """Return the scripted motion: waypoints if it is straight with a constant speed, else keyframes."""
+    """Return the scripted motion of a body; None with a sentence in `changes` if it cannot be converted.
+
+    It has waypoints if the body moves along straight lines with a constant speed, otherwise keyframes. `shape` is the
+    shape of the body at its initial pose.
+    """
     assert body.path is not None
     path, start, is_round = body.path, shape.pose, shape.radius is not None
     if waypoints := _waypoints(path):
@@ -238,10 +247,10 @@ def _travel(body: Body, shape: PrismShape, changes: list[str]) -> Travel | None:
             if _are_same_motion(travel.path(start, path.start), path, is_round):
                 return travel
     first = pose_at(path, 0.0)
-    if start.distance(first) > 10**-DIGITS or not (is_round or abs(wrap(start.yaw - first.yaw)) < 10**-DIGITS):
+    if start.distance(first) > 10**-DECIMALS or not (is_round or abs(wrap(start.yaw - first.yaw)) < 10**-DECIMALS):
         changes.append(f"{body.name}: it moves, but its shape is not at its origin; it is made static")
         return None
-    frames = [[time, *np.round(pose, DIGITS).tolist()] for time, pose in zip(path.times, path.poses, strict=True)]
+    frames = [[time, *np.round(pose, DECIMALS).tolist()] for time, pose in zip(path.times, path.poses, strict=True)]
     timed = {"keyframes": frames, "repeat": path.mode, "ease": path.ease, "phase": path.phase, "start": path.start}
     try:
         return Travel.model_validate(timed)
@@ -253,14 +262,18 @@ def _travel(body: Body, shape: PrismShape, changes: list[str]) -> Travel | None:
 
 
 def _waypoints(path: MotionPath) -> list[list[float]]:
-    """Return the corners of a path after its start, without the return of a loop; empty if it is eased."""
-    points = [(round(pose.x, DIGITS), round(pose.y, DIGITS)) for pose in path.poses]
-    turns = [b for a, b, c in zip(points, points[1:], points[2:], strict=False) if not _in_line(a, b, c)]
+    """Return the corners [x, y] of a path after its start, without the way back to the start of a loop.
+
+    Empty for a path whose `ease` is not "linear" or whose duration is 0, because waypoints cannot describe it.
+    """
+    points = [(round(pose.x, DECIMALS), round(pose.y, DECIMALS)) for pose in path.poses]
+    turns = [b for a, b, c in zip(points, points[1:], points[2:], strict=False) if not _is_straight(a, b, c)]
     corners = [*turns, *(points[-1:] if path.mode != "loop" else [])]
     return [list(corner) for corner in corners] if path.ease == "linear" and path.times[-1] > 0 else []
 
 
-def _in_line(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
+def _is_straight(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
+    """Return whether a path from `a` to `c` does not turn at `b`."""
     (ux, uy), (vx, vy) = (b[0] - a[0], b[1] - a[1]), (c[0] - b[0], c[1] - b[1])
     return ux * vx + uy * vy >= 0 and abs(ux * vy - uy * vx) <= STRAIGHT_TOLERANCE_RAD * math.hypot(
         ux, uy
@@ -268,13 +281,13 @@ def _in_line(a: tuple[float, float], b: tuple[float, float], c: tuple[float, flo
 
 
 def _are_same_motion(converted: MotionPath, path: MotionPath, is_round: bool) -> bool:
-    """Return whether two paths have the same poses at all their times; headings of round objects are ignored."""
+    """Return whether two paths have the same poses at all times of both; headings of round objects are ignored."""
     times = sorted({*converted.times, *path.times})
     pairs = [(pose_at(converted, t + path.start), pose_at(path, t + path.start)) for t in times]
     return math.isclose(converted.times[-1], path.times[-1], rel_tol=1e-6) and all(
-        a.distance(b) < 10**-DIGITS and (is_round or abs(wrap(a.yaw - b.yaw)) < 10**-DIGITS) for a, b in pairs
+        a.distance(b) < 10**-DECIMALS and (is_round or abs(wrap(a.yaw - b.yaw)) < 10**-DECIMALS) for a, b in pairs
     )
 
 
-def _name(name: str) -> str:
+def _valid_name(name: str) -> str:
     return name[:MAX_NAME_LENGTH] or "obstacle"

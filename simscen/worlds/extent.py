@@ -1,4 +1,4 @@
-"""Extent of a world and of its parts, and the model that makes a map too large."""
+"""Extents of solids and models, and a hint which model makes the map of a world too large."""
 
 from collections.abc import Iterable, Sequence
 
@@ -10,18 +10,21 @@ from simscen.worlds.maps.map_size import Bounds, map_size_error
 
 
 def placed_solids(solids: Sequence[Solid], bodies: Sequence[Body]) -> list[Solid]:
-    """Return the solids, and those of the bodies at their initial poses with the names of the bodies."""
+    """Return all solids of a world in the world frame: the static `solids`, then those of the bodies.
+
+    A solid of a body is at the initial pose of the body, and has the name of the body.
+    """
     moved = (Solid(solid.shape, body.pose.compose(solid.pose), body.name) for body in bodies for solid in body.solids)
     return [*solids, *moved]
 
 
 def model_name(solid: Solid) -> str:
-    """Return the name of the outermost model that a solid belongs to."""
+    """Return the name of the outermost model that a solid belongs to: "shelf" for a solid "shelf::link::collision"."""
     return solid.name.partition("::")[0]
 
 
 def union(rectangles: Iterable[Bounds]) -> Bounds:
-    """Return the bounds of rectangles; zeros if there is none."""
+    """Return the smallest rectangle that contains all `rectangles`; zeros if there are none."""
     sides = list(zip(*rectangles, strict=True))
     if not sides:
         return 0.0, 0.0, 0.0, 0.0
@@ -40,14 +43,17 @@ def top_height(solid: Solid) -> float:
 
 
 def oversize_hint(world: World) -> str:
-    """Return what makes the map of a world too large, as a hint."""
+    """Return a hint for a world whose map is too large: which model to move or remove, or else to move the goals."""
     if name := _largest_model(world):
         return f'"{name}" makes it large; move or remove it'
     return "move the start and the goals closer together"
 
 
 def _largest_model(world: World) -> str:
-    """Return the model without which the world has the smallest area; "" if all models but floors fit on a map."""
+    """Return the name of the model without which the world has the smallest area.
+
+    Floors do not count as models. Returns "" if all models fit on a map.
+    """
     rectangles: dict[str, list[Bounds]] = {}
     for solid in placed_solids(world.solids, world.bodies):
         if top_height(solid) > FLOOR_HEIGHT_M:

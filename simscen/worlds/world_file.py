@@ -1,4 +1,4 @@
-"""Conversion of world files to worlds: walls with mitered corners, obstacles, ramps, movable objects, and doors."""
+"""Build the world that a world file specifies: walls with mitered corners, obstacles, ramps, objects, and doors."""
 
 import math
 from collections.abc import Iterable
@@ -14,6 +14,17 @@ from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import Body, Box, Extrusion, Mesh, Solid
 from simscen.model.world import Door, Movable, Obstacle, Ramp, Wall, WorldSpec
 from simscen.worlds.geometry.prisms import bounding_rectangle
+from simscen.worlds.maps.map_size import Bounds
+
+Point = tuple[float, float]
+"""(x, y) in m."""
+
+MIN_MITER_COSINE = -0.5
+"""Cosine of the sharpest turn (120°) with a miter. At sharper turns, a miter would be longer than the wall is thick."""
+_WEDGE_FACES = (0, 1, 3), (0, 3, 2), (0, 4, 5), (0, 5, 1), (2, 3, 5), (2, 5, 4), (0, 2, 4), (1, 5, 3)
+"""Corners of each face of a ramp (see `ramp_solid`), counterclockwise as seen from outside.
+
+Two triangles each for the bottom, the slope, and the upper end, and one each for the right and the left side."""
 
 
 def world_from_spec(
@@ -23,12 +34,12 @@ def world_from_spec(
     base: World | None = None,
     notes: tuple[str, ...] = (),
 ) -> World:
-    """Return the world of a specification.
+    """Return the world that `spec` specifies.
 
-    name:   used if the specification has none
-    grid:   loaded `map`; it becomes walls with the height `map_height`, and is the robot's map
-    base:   imported `sdf`; its solids and bodies come first, and `spec` overrides its places and regions
-    notes:  messages of the map's loader
+    name:   name of the world if `spec` has none
+    grid:   occupancy grid of the key `map`; it becomes walls with the height `map_height`, and is the robot's map
+    base:   world of the key `sdf`; its solids and bodies come first, and `spec` overrides its places and regions
+    notes:  messages of the map's loader, appended to those of `base`
     """
     base = base or World(name, ())
     solids = [*base.solids]
@@ -58,22 +69,19 @@ def world_from_spec(
     )
 
 
-def door_poses(hinge: tuple[float, float], post: tuple[float, float]) -> tuple[Pose2, Pose2]:
-    """Return the poses of a closed and an open panel, which turns counterclockwise by 90° about its hinge."""
-    yaw = math.atan2(post[1] - hinge[1], post[0] - hinge[0])
-    return Pose2(*hinge, yaw), Pose2(*hinge, yaw).compose(Pose2(0.0, 0.0, math.pi / 2))
-
-
 def _panel_poses(door: Door) -> tuple[Pose2, Pose2]:
-    """Return the poses of a door's panel when closed and when open."""
+    """Return the poses of a door's panel when closed and when open.
+
+    A swinging panel turns counterclockwise by 90° about its hinge; a sliding panel moves past the first door post.
+    """
     (hx, hy), (px, py) = door.points
-    closed, opened = door_poses((hx, hy), (px, py))
+    closed = Pose2(hx, hy, math.atan2(py - hy, px - hx))
     if door.motion == "swing":
-        return closed, opened
+        return closed, closed.compose(Pose2(0.0, 0.0, math.pi / 2))
     return closed, closed.compose(Pose2(-(door.travel or math.hypot(px - hx, py - hy)), 0.0))
 
 
-def _corners(wall: Wall) -> list[tuple[float, float]]:
+def _corners(wall: Wall) -> list[Point]:
     return [(x, y) for x, y in wall.points]
 
 
@@ -83,7 +91,6 @@ def _obstacle(obstacle: Obstacle) -> Solid:
 
 
 def _ramp(ramp: Ramp) -> Solid:
-
     (ax, ay), (bx, by) = ramp.start, ramp.end
     return ramp_solid((ax, ay), (bx, by), ramp.width, ramp.height, ramp.name, ramp.friction)
 
@@ -109,9 +116,9 @@ def _bounds(
     bodies: Iterable[Body],
     places: Iterable[Pose2],
     grid: OccupancyGrid | None,
-    base: tuple[float, float, float, float],
-) -> tuple[float, float, float, float]:
-    """Return (min x, min y, max x, max y) of everything in m, with the bounds `base`; zeros for an empty world."""
+    base: Bounds,
+) -> Bounds:
+    """Return the bounds of all arguments; zeros for an empty world. `base` are the bounds of the imported world."""
     corners = [(place.x, place.y) for place in places]
     rectangles = [bounding_rectangle(solid) for solid in solids]
     rectangles += [bounding_rectangle(solid, body.pose) for body in bodies for solid in body.solids]
@@ -125,24 +132,18 @@ def _bounds(
     return min(xs), min(ys), max(xs), max(ys)
 
 
-def _grid_corners(grid: OccupancyGrid) -> list[tuple[float, float]]:
+def _grid_corners(grid: OccupancyGrid) -> list[Point]:
     height, width = (cells * grid.resolution for cells in grid.shape)
     local = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
     return [grid.origin.compose(Pose2(x, y))[:2] for x, y in local]
 
 
-Point = tuple[float, float]
-
-MIN_MITER_COSINE = -0.5
-"""Cosine of the greatest turn (120°) with a miter. At sharper turns, it would be longer than the wall is thick."""
-
-
 def wall_solids(points: list[Point], thickness: float, height: float, name: str) -> list[Solid]:
-    """Return one prism for each straight part of a wall along the center line `points`.
+    """Return one prism for each straight part of a wall with the center line `points`; thickness and height in m.
 
     The wall is closed if the last point equals the first. Turns up to 120° are mitered, so that the prisms neither
     overlap nor leave a notch. At sharper turns, and for parts that are too short for a miter, the prisms are extended
-    by half the thickness. Repeated points are skipped.
+    by half the thickness and overlap. Repeated points are skipped.
     """
     corners = [p for k, p in enumerate(points) if k == 0 or p != points[k - 1]]
     if len(corners) < 2:
@@ -162,17 +163,25 @@ def wall_solids(points: list[Point], thickness: float, height: float, name: str)
 
 
 def _direction(a: Point, b: Point) -> Point:
+    """Return the unit vector from `a` to `b`."""
     length = math.hypot(b[0] - a[0], b[1] - a[1])
     return (b[0] - a[0]) / length, (b[1] - a[1]) / length
 
 
 def _runs_backward(start: Point, end: Point, direction: Point) -> bool:
-    """Return whether a side of a part would run backwards, because its miters cross."""
+    """Return whether one side of a part of a wall runs against its direction, because its miters cross."""
     return (end[0] - start[0]) * direction[0] + (end[1] - start[1]) * direction[1] <= 0
 
 
 def _miter_end(corner: Point, direction: Point, other: Point | None, half: float, side: float) -> tuple[Point, Point]:
-    """Return the left and right corner of a part at one end; `side` is -1 at its start, 1 at its end."""
+    """Return the left and right corner at one end of a part of a wall, mitered if possible.
+
+    corner:     end of the center line of the part
+    direction:  unit vector along the part
+    other:      unit vector along the part that is joined at this end; None without one
+    half:       half of the thickness in m
+    side:       -1 at the start of the part, 1 at its end
+    """
     (x, y), (ux, uy) = corner, direction
     if other is None:
         return (x - uy * half, y + ux * half), (x + uy * half, y - ux * half)
@@ -184,20 +193,15 @@ def _miter_end(corner: Point, direction: Point, other: Point | None, half: float
 
 
 def _square_end(corner: Point, direction: Point, half: float, side: float) -> tuple[Point, Point]:
+    """Return the left and right corner of an end that is extended by `half`; parameters as in `_miter_end`."""
     (x, y), (ux, uy) = corner, direction
     x, y = x + ux * half * side, y + uy * half * side
     return (x - uy * half, y + ux * half), (x + uy * half, y - ux * half)
 
 
-_WEDGE_FACES = (0, 1, 3), (0, 3, 2), (0, 4, 5), (0, 5, 1), (2, 3, 5), (2, 5, 4), (0, 2, 4), (1, 5, 3)
-"""Counterclockwise as seen from outside: bottom, slope, upper end, right, left."""
-
-
 def ramp_solid(start: Point, end: Point, width: float, height: float, name: str, friction: float = 1.0) -> Solid:
-    """Return a ramp whose center line rises from the ground at `start` to `height` m at `end`.
-
-    Corners 0 and 1 are the right and left end of its foot, 2 and 3 below its upper edge, 4 and 5 on its upper edge.
-    """
+    """Return a ramp, `width` m wide, whose center line rises from the ground at `start` to `height` m at `end`."""
+    # In pairs (right, left): the foot, the points below the upper edge, and the upper edge.
     length, half = math.dist(start, end), width / 2
     corners = np.array(
         [[0, -half, 0], [0, half, 0], [length, -half, 0], [length, half, 0], [length, -half, height],

@@ -12,7 +12,7 @@ from simscen.loading.checks.scene import TOUCH_M
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import MappingNode
-from simscen.worlds.geometry.overlaps import blocking_solid
+from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 BLOCKING_HEIGHTS_M = 0.02, 0.4
 """Heights between which an obstacle blocks most robots."""
@@ -46,7 +46,7 @@ def places_in_obstacles(built: BuiltWorld) -> Iterator[CheckFinding]:
     assert built.source.spec is not None
     world = _without_platforms(built.world) if built.source.spec.ramps else built.world
     for name, place in built.source.spec.places.items():
-        solid = blocking_solid(world, (place.x, place.y), TOUCH_M, BLOCKING_HEIGHTS_M)
+        solid = first_solid_in_disc(world.solids, (place.x, place.y), TOUCH_M, BLOCKING_HEIGHTS_M)
         if solid is not None:
             message = f'place {quoted(name)} is inside obstacle "{solid}"'
             yield CheckFinding(("places", name), message, at_key=True)
@@ -58,7 +58,7 @@ def motions_into_obstacles(built: BuiltWorld) -> Iterator[CheckFinding]:
     assert built.source.spec is not None
     for index, thing in enumerate(built.source.spec.objects):
         for keys, what, (x, y) in motion_stops(thing.move) if thing.move is not None else ():
-            if solid := blocking_solid(built.world, (x, y), TOUCH_M, BLOCKING_HEIGHTS_M):
+            if solid := first_solid_in_disc(built.world.solids, (x, y), TOUCH_M, BLOCKING_HEIGHTS_M):
                 message = f'{what} of {quoted(thing.name)} ({x:g}, {y:g}) is inside obstacle "{solid}"'
                 yield CheckFinding(("objects", index, "move", *keys), message)
 

@@ -50,7 +50,7 @@ class LiveRayCaster(RayCaster):
         # Identical objects mean that nothing has moved.
         if state is None or names is not state[0] or poses is not state[1] or rest_poses is not state[2]:
             self._state = names, poses, rest_poses
-            self._scene.set_moving({name: (self._meshes[name], poses[name]) for name in names}, rest_poses)
+            self._scene.set_bodies({name: (self._meshes[name], poses[name]) for name in names}, rest_poses)
 
     def _reachable_names(self, predicted: PredictedPoses, origin: Vector, reach: float) -> Iterable[str]:
         """Return the objects that can be in reach according to their scripted paths."""

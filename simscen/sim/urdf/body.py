@@ -186,7 +186,7 @@ def read_spec_tree(
     try:
         path = found.urdf if found else folders.find(spec.urdf, folder)
     except UnusableFile as trouble:
-        shown = folders.shown(file.resolve()) if file else ""
+        shown = folders.display_path(file.resolve()) if file else ""
         raise InvalidInput([Problem(shown, 0, 0, CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
     return read_tree(path, folders, read_mesh, {name: _text(value) for name, value in spec.arguments.items()})
 
@@ -195,7 +195,7 @@ def read_tree(
     path: Path, folders: AllowedFolders, read_mesh: MeshReader | None, arguments: Mapping[str, str] | None = None
 ) -> LinkTree:
     """Read the links and joints of a URDF or xacro file. Raises InvalidInput."""
-    path = folders.named(path)
+    path = folders.resolve_parent(path)
     robot = read_xml(path, folders)
     expanded = path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes
     if expanded:

@@ -73,7 +73,7 @@ class MeshSource:
         uri = element.text("filename")
         scale = element.numbers("scale", 3, (1.0, 1.0, 1.0))
         try:
-            path = self.folders.check(self._find(uri), MAX_MESH_BYTES)
+            path = self.folders.check_file(self._find(uri), MAX_MESH_BYTES)
             if self.read is None:
                 raise UnusableFile("meshes cannot be read here")
             mesh = self.read(path)
@@ -95,7 +95,7 @@ class MeshSource:
             return self.folders.find(uri, self.folder, absolute=self.from_xacro)
         except NoSuchFile:
             if uri.startswith(PACKAGE_SCHEMES):  # a missing package gives a more helpful error
-                self.folders.package(uri.partition("://")[2].partition("/")[0], self.folder)
+                self.folders.package_folder(uri.partition("://")[2].partition("/")[0], self.folder)
             raise
 
 

@@ -93,9 +93,9 @@ class RobotFiles:
 
 def read_xml(path: Path, folders: AllowedFolders) -> Element:
     """Read a URDF or an included file without expansion. Raises InvalidInput."""
-    shown_path = folders.shown(path)
+    shown_path = folders.display_path(path)
     try:
-        _, data = folders.open(path, MAX_URDF_BYTES)
+        _, data = folders.read_file(path, MAX_URDF_BYTES)
     except UnusableFile as trouble:
         raise InvalidInput([Problem(shown_path, 0, 0, CODE, str(trouble))]) from trouble
     return parse_xml(data, shown_path)

@@ -1,6 +1,6 @@
-"""Horizontal cross sections of meshes: segments, closed rings, simple polygons, and the distance of a point to them.
+"""Horizontal cross sections of meshes, their conversion to polygons, and the horizontal distance to a mesh.
 
-A cross section is what a level lidar at that height can see.
+The cross section at a height is what a level lidar at that height can see.
 """
 
 import math
@@ -13,26 +13,44 @@ from simscen.core.geometry import Array
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import TriangleMesh
 
+Point = tuple[float, float]
+"""(x, y) in m."""
+Ring = list[Point]
+"""Corners of a closed polygon; the first corner is not repeated at the end."""
+
+STRAIGHTNESS_TOLERANCE_M = 1e-6
+"""Distance from the line between its neighbors up to which a corner is removed from a ring."""
+MAX_CORNERS = 200
+"""Maximum number of corners of a polygon in a world file."""
+
+
+class OpenCrossSection(ValueError):
+    """The cross section of a mesh is not closed, because the mesh has holes."""
+
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """Directed segments (n, 2, 2) in meters with the solid on their left, and the index (n,) of the solid of each."""
+    """Outlines of solids at one height, seen from above.
+
+    segments (n, 2, 2):  start and end point of each segment in m; the inside of the solid is on its left
+    owners (n,):         index of the solid that each segment belongs to
+    """
 
     segments: Array
     owners: npt.NDArray[np.int32]
 
 
 def section_segments(mesh: TriangleMesh, height: float) -> Array:
-    """Return the segments (n, 2, 2) of the cross section at `height`; [k, 0] is the start of segment k."""
+    """Return only the segments (n, 2, 2) of the cross section at `height` m; see `CrossSection`."""
     return cross_section(mesh, height).segments
 
 
 def cross_section(mesh: TriangleMesh, height: float) -> CrossSection:
-    """Cut the mesh at `height`; the segments form closed loops wherever the mesh is closed.
+    """Cut the mesh at `height` m; the segments form closed loops wherever the mesh is closed.
 
     A vertex at exactly `height` counts as above it. A box is therefore cut from its underside (excluded) to its top
-    (included), and no cut is a single point or a whole face. Two triangles that share an edge compute the same point,
-    bit for bit, because both follow the edge upwards.
+    (included), and no cut is a single point or an entire face. Two triangles with a common edge compute exactly the
+    same point, because both follow the edge upwards.
     """
     above = mesh.vertices[:, 2] >= height
     count_above = above[mesh.faces].sum(axis=1)
@@ -48,7 +66,7 @@ def cross_section(mesh: TriangleMesh, height: float) -> CrossSection:
 
 
 def _edge_crossing(tip: Array, base: Array, height: float, is_tip_above: npt.NDArray[np.bool_]) -> Array:
-    """Return the points (n, 2) where the edges between `tip` (n, 3) and `base` (n, 3) pass the height."""
+    """Return the points (n, 2) where the edges between `tip` (n, 3) and `base` (n, 3) cross `height`."""
     low, high = np.where(is_tip_above[:, None], base, tip), np.where(is_tip_above[:, None], tip, base)
     fraction = (height - low[:, 2]) / (high[:, 2] - low[:, 2])
     point: Array = low[:, :2] + fraction[:, None] * (high - low)[:, :2]
@@ -56,11 +74,12 @@ def _edge_crossing(tip: Array, base: Array, height: float, is_tip_above: npt.NDA
 
 
 def horizontal_distance(
-    mesh: TriangleMesh, point: tuple[float, float], z_range: tuple[float, float], within: float = math.inf
+    mesh: TriangleMesh, point: Point, z_range: tuple[float, float], within: float = math.inf
 ) -> float:
-    """Return the distance in meters from a point to the mesh between two heights, seen from above; 0 inside.
+    """Return the horizontal distance in m from a point to the part of the mesh between two heights; 0 inside.
 
-    Returns inf if the mesh has nothing between these heights, or nothing nearer than `within`.
+    Returns inf if the mesh has no part between the heights `z_range`. May return inf if the distance is greater than
+    `within` m, because triangles that are farther away are not examined.
     """
     low, high = z_range
     bottom, top = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
@@ -76,7 +95,7 @@ def horizontal_distance(
     return 0.0 if _contains_origin(corners, valid).any() else _distance_from_origin(corners, valid)
 
 
-def _triangles_near(mesh: TriangleMesh, point: tuple[float, float], distance: float) -> Array:
+def _triangles_near(mesh: TriangleMesh, point: Point, distance: float) -> Array:
     """Return the triangles (m, 3, 3) whose bounding rectangle is at most `distance` away from the point."""
     triangles = mesh.vertices[mesh.faces]
     corners = triangles[:, :, :2] - point
@@ -85,10 +104,11 @@ def _triangles_near(mesh: TriangleMesh, point: tuple[float, float], distance: fl
     return near
 
 
-def winds_around(segments: Array, point: tuple[float, float]) -> bool:
-    """Return whether segments (n, 2, 2) wind counterclockwise around a point, counted both towards +x and towards -x.
+def winds_around(segments: Array, point: Point) -> bool:
+    """Return whether segments (n, 2, 2) wind counterclockwise around a point, so that it is inside a solid.
 
-    For closed outlines both counts are equal. For meshes with holes, a single count would report points outside.
+    The crossings are counted on two rays from the point, towards +x and towards -x. Closed outlines give the same
+    result on both. For meshes with holes, a single ray would report points outside as inside.
     """
     (x0, y0), (x1, y1) = segments[:, 0].T - np.array(point)[:, None], segments[:, 1].T - np.array(point)[:, None]
     crosses = (y0 > 0) != (y1 > 0)
@@ -99,10 +119,11 @@ def winds_around(segments: Array, point: tuple[float, float]) -> bool:
 
 
 def _clip_to_heights(triangles: Array, low: float, high: float) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Clip triangles (m, 3, 3) to the slab between two heights; return corners (m, 9, 2) and which of them are valid.
+    """Clip triangles (m, 3, 3) to the slab between two heights.
 
-    A clipped triangle is convex. It is the hull of its own corners in the slab and of the points where its edges pass
-    the two faces of the slab.
+    Returns corners (m, 9, 2), seen from above, and the flags (m, 9) of those that are valid. A clipped triangle is the
+    convex hull of its valid corners: its own corners in the slab, and the points where its edges cross the two faces of
+    the slab.
     """
     z = triangles[:, :, 2]
     corners, valid = [triangles[:, :, :2]], [(z >= low) & (z <= high)]
@@ -116,7 +137,10 @@ def _clip_to_heights(triangles: Array, low: float, high: float) -> tuple[Array, 
 
 
 def _contains_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return which convex hulls of corners (m, 9, 2) contain the origin: no angle between corners reaches 180°."""
+    """Return for each convex hull of valid corners (m, 9, 2) whether it contains the origin.
+
+    It does if no angle between neighboring corners, seen from the origin, reaches 180°.
+    """
     angles = np.where(valid, np.arctan2(corners[:, :, 1], corners[:, :, 0]), np.nan)
     angles = np.sort(angles, axis=1)
     last = np.nanmax(angles, axis=1) - 2 * math.pi
@@ -126,7 +150,10 @@ def _contains_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> npt.NDArra
 
 
 def _distance_from_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> float:
-    """Return the distance to the nearest convex hull; none contains the origin, so the nearest point is on an edge."""
+    """Return the distance from the origin to the nearest convex hull of valid corners (m, 9, 2).
+
+    None of the hulls contains the origin, so the nearest point is on a line between two corners.
+    """
     first, second = np.triu_indices(corners.shape[1])
     both_valid = valid[:, first] & valid[:, second]
     a, b = corners[:, first][both_valid], corners[:, second][both_valid]
@@ -136,21 +163,8 @@ def _distance_from_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> float
     return float(np.sqrt(np.min(np.sum((a + fraction[:, None] * edge) ** 2, axis=1))))
 
 
-Point = tuple[float, float]
-Ring = list[Point]
-
-STRAIGHTNESS_M = 1e-6
-"""Distance up to which a corner may be removed from a ring."""
-MAX_CORNERS = 200
-"""Maximum number of corners of a polygon in a world file."""
-
-
-class OpenCrossSection(ValueError):
-    """The cross section of a mesh is not closed."""
-
-
 def rings_from_segments(segments: Array) -> list[Ring]:
-    """Return closed rings of directed segments (n, 2, 2), counterclockwise around solid.
+    """Join directed segments (n, 2, 2) to closed rings: counterclockwise outlines of solids, and clockwise holes.
 
     Segments of a closed mesh meet in exactly equal points. Where rings touch at a corner, they are separated, so that
     no ring visits a point twice. Raises OpenCrossSection if a ring is not closed.
@@ -178,7 +192,10 @@ def rings_from_segments(segments: Array) -> list[Ring]:
 
 
 def simple_polygons(rings: list[Ring]) -> list[Ring]:
-    """Return simple polygons that cover what the rings enclose; rings with holes or many corners become triangles."""
+    """Return polygons without holes that cover the area that the rings enclose.
+
+    A ring with holes, or with more than MAX_CORNERS corners, is divided into triangles.
+    """
     outer_rings = [ring for ring in rings if signed_area(ring) > 0]
     holes: dict[int, list[Ring]] = {number: [] for number in range(len(outer_rings))}
     for ring in rings:
@@ -195,13 +212,13 @@ def simple_polygons(rings: list[Ring]) -> list[Ring]:
 
 
 def signed_area(ring: Ring) -> float:
-    """Return the area in m², positive for an counterclockwise ring."""
+    """Return the area in m², positive for a counterclockwise ring."""
     x, y = np.array(ring).T
     return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2)
 
 
 def _triangles(rings: list[Ring]) -> list[Ring]:
-    """Triangulate an outer ring with holes."""
+    """Return counterclockwise triangles that cover the outer ring `rings[0]` except its holes `rings[1:]`."""
     import mapbox_earcut
 
     points = np.array([point for ring in rings for point in ring])
@@ -209,13 +226,13 @@ def _triangles(rings: list[Ring]) -> list[Ring]:
     faces = mapbox_earcut.triangulate_float64(points, ends).reshape(-1, 3)
     triangles = [[(float(x), float(y)) for x, y in points[face]] for face in faces]
     counterclockwise = [ring if signed_area(ring) > 0 else ring[::-1] for ring in triangles]
-    return [ring for ring in counterclockwise if signed_area(ring) > STRAIGHTNESS_M**2]
+    return [ring for ring in counterclockwise if signed_area(ring) > STRAIGHTNESS_TOLERANCE_M**2]
 
 
 def _without_straight_corners(ring: Ring) -> Ring:
-    """Return the ring without the corners that triangles leave on straight edges.
+    """Return the ring without the corners on straight edges, where two triangles of the mesh meet.
 
-    Each corner is compared with the last one that was kept, so that a round ring of short chords keeps its shape.
+    Each corner is compared with the last corner that was kept, so that a round ring of short chords keeps its shape.
     """
     kept: Ring = [ring[0]]
     for point, following in zip(ring[1:], [*ring[2:], ring[0]], strict=True):
@@ -225,9 +242,9 @@ def _without_straight_corners(ring: Ring) -> Ring:
 
 
 def _is_corner(before: Point, point: Point, after: Point) -> bool:
-    """Return whether removing the point would move the ring by more than STRAIGHTNESS_M."""
+    """Return whether removing the point would move the ring by more than STRAIGHTNESS_TOLERANCE_M."""
     (ax, ay), (px, py), (bx, by) = before, point, after
     length = math.hypot(bx - ax, by - ay)
-    if length < STRAIGHTNESS_M:
+    if length < STRAIGHTNESS_TOLERANCE_M:
         return True
-    return abs((bx - ax) * (py - ay) - (by - ay) * (px - ax)) / length > STRAIGHTNESS_M
+    return abs((bx - ax) * (py - ay) - (by - ay) * (px - ax)) / length > STRAIGHTNESS_TOLERANCE_M

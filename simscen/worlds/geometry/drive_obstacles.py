@@ -1,6 +1,7 @@
-"""Obstacles for a robot that can climb: static solids without the ground that its wheels can drive on.
+"""Find the obstacles of a robot that can climb: the static solids without the ground that its wheels can drive on.
 
-A ramp is no obstacle for a robot that can climb it. Its sides are obstacles where they are higher than a step.
+A ramp is no obstacle for such a robot. Its sides are obstacles where they are higher than the robot's maximum step. The
+line that an upright face of the ground forms, seen from above, is called an edge here.
 """
 
 import math
@@ -18,45 +19,48 @@ from simscen.worlds.geometry.prisms import has_no_drivable_solids
 from simscen.worlds.geometry.triangulation import merge_solids
 
 EDGE_PIECE_M = 0.1
-"""Length of a piece of an edge, for which one height is measured."""
+"""Maximum length of the pieces into which edges are divided. The height of the step is measured once per piece."""
 SAMPLE_OFFSET_M = 0.01
 """Distance to both sides of an edge at which the ground height is measured."""
 WALL_THICKNESS_M = 0.01
 """Thickness of the walls and prisms that stand for edges and steep faces."""
 MAX_WALL_NORMAL_Z = 0.5
-"""z component of the unit normal up to which a face counts as a wall, i.e. is steeper than 60°, not as a slope."""
+"""Vertical component of the unit normal up to which a face counts as a wall: steeper than 60°. Others are slopes."""
 
 _PRISM_FACES = np.array(
     [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]], dtype=np.int32
 )
+"""Faces of a prism with the corners 0, 1, 2 of its base below its corners 3, 4, 5."""
 
 
 def drive_obstacles(
     solids: tuple[Solid, ...], wheel_radius: float, max_slope: float, max_step: float
 ) -> tuple[Solid, ...]:
-    """Return the solids that block a robot; the same tuple if no solid is drivable ground.
+    """Return the solids that block a robot. If no solid is drivable ground, returns `solids` itself.
 
-    The robot climbs slopes up to `max_slope` rad and steps up to `max_step` m. Only solids that begin at most
-    `wheel_radius` m above the floor can be ground, because wheels do not reach higher ones.
+    The robot climbs slopes up to `max_slope` rad and steps up to `max_step` m. A solid can only be ground if it has an
+    upward face at most `wheel_radius` m above the floor or above other ground. The sides and the steep faces of ground
+    are returned as thin solids.
     """
     if max_slope <= 0 or has_no_drivable_solids(solids, wheel_radius):
         return solids
     mesh = merge_solids(solids)
-    ground = frozenset(owner for owner in drivable_solids(mesh, wheel_radius) if _is_simple(mesh, owner))
+    drivable = drivable_solids(mesh, wheel_radius)
+    ground = frozenset(owner for owner in drivable if _is_convex_or_height_field(mesh, owner))
     if not ground:
         return solids
     obstacles = [solid for number, solid in enumerate(solids) if number not in ground]
     return (*obstacles, *_walls_at_edges(mesh, ground, max_step), *_steep_faces(mesh, ground, max_slope))
 
 
-def _is_simple(mesh: TriangleMesh, owner: int) -> bool:
-    """Return whether the solid `owner` is convex or a height field; other shapes may overhang and remain obstacles."""
+def _is_convex_or_height_field(mesh: TriangleMesh, owner: int) -> bool:
+    """Return whether the solid with index `owner` is convex or a height field; other shapes may overhang the ground."""
     is_own = mesh.owners == owner
     return is_convex(submesh(mesh.vertices, mesh.faces[is_own])) or bool((face_normals(mesh)[is_own, 2] >= 0).all())
 
 
 def _steep_faces(mesh: TriangleMesh, ground: Owners, max_slope: float) -> Iterator[Solid]:
-    """Yield each ground face that is too steep, as a prism down to its lowest corner."""
+    """Yield a prism for each slope of the ground that is steeper than `max_slope` rad, down to its lowest corner."""
     normal_z = face_normals(mesh)[:, 2]
     is_steep = (normal_z > MAX_WALL_NORMAL_Z) & (normal_z < math.cos(max_slope) - 1e-9)
     for face in np.flatnonzero(_is_ground_face(mesh, ground) & is_steep).tolist():
@@ -67,11 +71,12 @@ def _steep_faces(mesh: TriangleMesh, ground: Owners, max_slope: float) -> Iterat
 
 
 def _is_ground_face(mesh: TriangleMesh, ground: Owners) -> npt.NDArray[np.bool_]:
+    """Return for each face whether it belongs to a solid in `ground`."""
     return np.isin(mesh.owners, sorted(ground))
 
 
 def _walls_at_edges(mesh: TriangleMesh, ground: Owners, max_step: float) -> Iterator[Solid]:
-    """Yield upright ground faces as thin walls, where the ground next to them is lower by more than a step."""
+    """Yield thin walls for the upright faces of the ground, where it drops by more than `max_step` m."""
     is_wall = np.abs(face_normals(mesh)[:, 2]) <= MAX_WALL_NORMAL_Z
     pieces = list(_edge_pieces(mesh, np.flatnonzero(_is_ground_face(mesh, ground) & is_wall)))
     if not pieces:
@@ -80,7 +85,7 @@ def _walls_at_edges(mesh: TriangleMesh, ground: Owners, max_step: float) -> Iter
     outward = np.array([edge.outward for edge in pieces])
     inside = middles - (SAMPLE_OFFSET_M + np.array([[edge.depth] for edge in pieces])) * outward
     heights = _ground_heights(mesh, ground, np.concatenate((inside, middles + SAMPLE_OFFSET_M * outward)))
-    walls: list[tuple[_Edge, float, float]] = []
+    walls: list[tuple[_EdgePiece, float, float]] = []
     for edge, high, low in zip(pieces, *np.round(np.split(heights, 2), 4).tolist(), strict=True):
         if high - low > max_step:
             if walls and walls[-1][1:] == (high, low) and walls[-1][0].is_continued_by(edge):
@@ -91,10 +96,13 @@ def _walls_at_edges(mesh: TriangleMesh, ground: Owners, max_step: float) -> Iter
         yield edge.wall(high, low, mesh.names[edge.owner])
 
 
-class _Edge(NamedTuple):
-    """A piece of an upright face seen from above: ends (2,), outward unit vector, and index of the face's solid.
+class _EdgePiece(NamedTuple):
+    """A piece of an edge.
 
-    A leaning face covers `depth` meters inwards of the line between the ends.
+    start, end (2,):  ends of the piece in m
+    outward (2,):     unit vector away from the solid
+    owner:            index of the solid
+    depth:            distance in m that the face covers inwards of the line from `start` to `end`; 0 if it is vertical
     """
 
     start: Array
@@ -103,20 +111,20 @@ class _Edge(NamedTuple):
     owner: int
     depth: float
 
-    def is_continued_by(self, other: "_Edge") -> bool:
-        """Return whether the other piece is of the same face and starts at the end of this piece."""
+    def is_continued_by(self, other: "_EdgePiece") -> bool:
+        """Return whether `other` is a piece of the same face and starts at the end of this piece."""
         return self.owner == other.owner and self.outward is other.outward and bool((self.end == other.start).all())
 
     def wall(self, high: float, low: float, name: str) -> Solid:
-        """Return a thin wall between two heights."""
+        """Return a thin wall between the heights `low` and `high` in m."""
         x, y = ((self.start + self.end) / 2 - self.outward * WALL_THICKNESS_M / 2).tolist()
         along = self.end - self.start
         pose = Pose3.planar(Pose2(x, y, math.atan2(along[1], along[0])), (low + high) / 2)
         return Solid(Box((float(np.linalg.norm(along)), WALL_THICKNESS_M, high - low)), pose, name)
 
 
-def _edge_pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_Edge]:
-    """Yield the lines of upright faces seen from above, each line once, in pieces."""
+def _edge_pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_EdgePiece]:
+    """Divide the edges of upright `faces` (indices) into pieces; an edge that several faces form counts once."""
     seen = set()
     horizontal_normals = face_normals(mesh)[:, :2]
     for face in faces.tolist():
@@ -132,13 +140,13 @@ def _edge_pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_
         if key in seen or not np.ptp(positions):
             continue
         seen.add(key)
-        shares = np.linspace(0.0, 1.0, max(1, math.ceil(float(np.ptp(positions)) / EDGE_PIECE_M)) + 1)
-        ends = first + shares[:, None] * (last - first)
-        yield from (_Edge(a, b, outward, owner, float(np.ptp(offsets))) for a, b in pairwise(ends))
+        fractions = np.linspace(0.0, 1.0, max(1, math.ceil(float(np.ptp(positions)) / EDGE_PIECE_M)) + 1)
+        ends = first + fractions[:, None] * (last - first)
+        yield from (_EdgePiece(a, b, outward, owner, float(np.ptp(offsets))) for a, b in pairwise(ends))
 
 
 def _ground_heights(mesh: TriangleMesh, ground: Owners, points: Array) -> Array:
-    """Return the height of the highest ground at points (n, 2) in m, at least 0."""
+    """Return the heights (n,) in m of the highest ground at points (n, 2); 0 where there is only the floor."""
     from simscen.worlds.raycasting.ray_scene import RayScene
 
     is_ground = _is_ground_face(mesh, ground)

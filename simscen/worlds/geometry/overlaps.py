@@ -1,6 +1,6 @@
-"""Tests whether a disc or a footprint overlaps a solid, with the name of the first solid that does.
+"""Find the first solid that a disc or a footprint overlaps, and test whether two polygons overlap.
 
-Upright prisms are tested in plain Python, so that `validate` needs neither triangles nor scipy for most scenarios.
+Upright prisms are tested in plain Python, so that `validate` needs neither triangles nor SciPy for most scenarios.
 """
 
 import math
@@ -8,31 +8,25 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from simscen.core.environment.world_model import Polygon, World
+from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import polygon_contains, segments_cross
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 from simscen.worlds.geometry.prisms import upright_prism
 
 ZRange = tuple[float, float]
-"""Lower and upper height in meters."""
+"""Lower and upper height in m."""
 SHRINK_FRACTION = 1e-3
 """Fraction by which an outline is shrunk before the test, because touching is not overlapping."""
-
-
-def blocking_solid(world: World, point: tuple[float, float], radius: float, z_range: ZRange) -> str | None:
-    """Return the name of the first static solid that a disc at `point` would overlap, or None.
-
-    The disc is a cylinder of `radius` meters between the heights `z_range`; touching is not overlapping. Takes a
-    few milliseconds for thousands of solids, because distant solids are skipped by their bounding balls.
-    """
-    return first_solid_in_disc(world.solids, point, radius, z_range)
 
 
 def first_solid_in_disc(
     solids: Iterable[Solid], point: tuple[float, float], radius: float, z_range: ZRange
 ) -> str | None:
-    """Return the name of the first of the solids that a disc at `point` overlaps, or None; see `blocking_solid`."""
+    """Return the name of the first of the solids that a disc at `point` overlaps, or None.
+
+    The disc is a cylinder of `radius` m between the heights `z_range`. Touching is not overlapping.
+    """
     for solid in solids:
         if is_near(solid, point, radius) and _horizontal_distance(solid, point, z_range, radius) < radius:
             return solid.name
@@ -40,7 +34,10 @@ def first_solid_in_disc(
 
 
 def _horizontal_distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within: float) -> float:
-    """Return the horizontal distance in m to a solid between two heights; inf if it is greater than `within` m."""
+    """Return the horizontal distance in m to the part of a solid between two heights; 0 inside, inf without a part.
+
+    A distance greater than `within` m may be returned as inf.
+    """
     prism = upright_prism(solid)
     if prism is not None:
         return prism.distance(point, z_range)
@@ -51,12 +48,12 @@ def _horizontal_distance(solid: Solid, point: tuple[float, float], z_range: ZRan
 
 
 def is_near(solid: Solid, point: tuple[float, float], radius: float) -> bool:
-    """Return whether the bounding ball of a solid is at most `radius` meters away from a point, seen from above."""
+    """Return whether a solid can be at most `radius` m away from a point, judged by the solid's bounding sphere."""
     return math.hypot(solid.pose.x - point[0], solid.pose.y - point[1]) <= radius + _bounding_radius(solid.shape)
 
 
 def _bounding_radius(shape: Shape) -> float:
-    """Return the radius of a ball around the shape's origin that contains the shape."""
+    """Return the radius in m of a sphere around the shape's origin that contains the shape."""
     match shape:
         case Box(size):
             return math.hypot(*size) / 2
@@ -75,13 +72,16 @@ def _bounding_radius(shape: Shape) -> float:
 
 
 def place_polygon(outline: Polygon, pose: Pose2) -> Polygon:
-    """Return an outline, given in its own frame, at a pose."""
+    """Transform the corners of an outline from the frame at `pose` to the frame in which `pose` is given."""
     c, s = math.cos(pose.yaw), math.sin(pose.yaw)
     return tuple((pose.x + c * x - s * y, pose.y + s * x + c * y) for x, y in outline)
 
 
 def first_solid_in_footprint(solids: Iterable[Solid], outline: Polygon, pose: Pose2, z_range: ZRange) -> str | None:
-    """Return the name of the first solid that `outline` at `pose` overlaps between two heights, or None."""
+    """Return the name of the first solid that a footprint at `pose` overlaps between two heights, or None.
+
+    `outline` are the corners of the footprint in its own frame.
+    """
     radius = max(math.hypot(x, y) for x, y in outline)
     corners = place_polygon(tuple((x * (1 - SHRINK_FRACTION), y * (1 - SHRINK_FRACTION)) for x, y in outline), pose)
     for solid in solids:
@@ -91,10 +91,10 @@ def first_solid_in_footprint(solids: Iterable[Solid], outline: Polygon, pose: Po
 
 
 def polygons_overlap(first: Sequence[tuple[float, float]], second: Sequence[tuple[float, float]]) -> bool:
-    """Return whether two filled polygons share inner points.
+    """Return whether the interiors of two polygons have a point in common.
 
-    A corner on the border of the other polygon proves nothing, for example for equal polygons. The centers are
-    therefore tested as well.
+    Tests corners, crossings of edges, and also the centers: the corners of equal polygons are on the border of the
+    other polygon and not inside, and their edges do not cross.
     """
     if polygon_contains(first, second[0]) or polygon_contains(second, first[0]):
         return True
@@ -106,6 +106,7 @@ def polygons_overlap(first: Sequence[tuple[float, float]], second: Sequence[tupl
 
 
 def _overlaps(solid: Solid, corners: Polygon, z_range: ZRange) -> bool:
+    """Return whether a solid overlaps a polygon in its frame between two heights."""
     prism = upright_prism(solid)
     if prism is not None:
         low, high = z_range

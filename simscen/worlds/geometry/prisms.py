@@ -1,6 +1,6 @@
-"""Upright prisms over convex bases, computed in plain Python without triangulation; and bounds of any solid.
+"""Upright prisms over convex bases, computed in plain Python without triangulation, and bounding rectangles of solids.
 
-Commands that must be fast use prisms. Their bases equal those of `triangulation.triangulate`, corner for corner.
+Commands that must be fast use prisms. Their bases have the same corners as those of `triangulation.triangulate`.
 """
 
 from __future__ import annotations
@@ -9,17 +9,15 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-import numpy as np
-
 from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Pose3
 from simscen.core.geometry.meshes import FLOOR_HEIGHT_M
 from simscen.core.geometry.polygons import distance_to_segment
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid, facet_count
 
 
 class UprightPrism(NamedTuple):
-    """A prism over a convex counterclockwise polygon, from the height `bottom` to the height `top`, in meters."""
+    """A prism over a convex counterclockwise polygon (m), from the height `bottom` to the height `top` in m."""
 
     base: Polygon
     bottom: float
@@ -27,12 +25,15 @@ class UprightPrism(NamedTuple):
 
     @property
     def rectangle(self) -> tuple[float, float, float, float]:
-        """Bounding rectangle as (min x, min y, max x, max y)."""
+        """Bounding rectangle of the base as (min x, min y, max x, max y) in m."""
         xs, ys = [x for x, _ in self.base], [y for _, y in self.base]
         return min(xs), min(ys), max(xs), max(ys)
 
     def distance(self, point: tuple[float, float], z_range: tuple[float, float]) -> float:
-        """Return the horizontal distance to the prism between two heights: 0 inside, inf if it has no part there."""
+        """Return the horizontal distance in m from a point to the part of the prism between two heights.
+
+        Returns 0 inside the prism, and inf if it has no part between the heights `z_range`.
+        """
         low, high = z_range
         if self.bottom >= high or self.top <= low:
             return math.inf
@@ -46,7 +47,7 @@ class UprightPrism(NamedTuple):
 def upright_prism(solid: Solid, frame: Pose3 | None = None) -> UprightPrism | None:
     """Return a solid as a prism; None if it is tilted, not a prism, or has a base that is not convex.
 
-    `frame` is the pose of the frame in which the solid is placed.
+    `frame` is the pose of the frame that the solid's pose refers to, for example of a body; default: the world.
     """
     poses = (solid.pose,) if frame is None else (solid.pose, frame)
     if any(pose.qx != 0 or pose.qy != 0 for pose in poses):
@@ -74,6 +75,7 @@ def _circle(radius: float) -> Polygon:
 
 
 def _place(base: Polygon, pose: Pose3) -> Polygon:
+    """Return a polygon rotated by the yaw of a level pose and moved to its position."""
     c, s = 1 - 2 * pose.qz * pose.qz, 2 * pose.qz * pose.qw
     return tuple((c * x - s * y + pose.x, s * x + c * y + pose.y) for x, y in base)
 
@@ -89,28 +91,31 @@ def _is_convex_and_counterclockwise(base: Polygon) -> bool:
 
 
 def has_no_drivable_solids(solids: Iterable[Solid], max_height: float) -> bool:
-    """Return True if wheels cannot drive onto any solid: all are upright prisms whose top is above
-    `max_height` or not above the floor.
+    """Return whether all solids are upright prisms that are too high to drive on, or not above the floor.
 
-    If False, the triangles of the solids must be examined.
+    Wheels cannot drive onto a solid whose top is higher than `max_height` m. False means that the triangles of the
+    solids must be examined.
     """
     prisms = [upright_prism(solid) for solid in solids]
     return all(prism is not None and (prism.top > max_height or prism.top <= FLOOR_HEIGHT_M) for prism in prisms)
 
 
 def bounding_rectangle(solid: Solid, frame: Pose3 | None = None) -> tuple[float, float, float, float]:
-    """Return the rectangle around a solid as (min x, min y, max x, max y); `frame` is the frame it is placed in."""
+    """Return the bounding rectangle of a solid, seen from above, as (min x, min y, max x, max y) in m.
+
+    `frame` is the pose of the frame that the solid's pose refers to; default: the world.
+    """
     prism = upright_prism(solid, frame)
     if prism is not None:
         return prism.rectangle
-    (left, bottom), (right, top) = mesh_bounds_2d(solid, frame).tolist()
-    return left, bottom, right, top
+    return mesh_rectangle(solid, frame)
 
 
-def mesh_bounds_2d(solid: Solid, frame: Pose3 | None = None) -> Array:
-    """Return the lower left and upper right corner (2, 2) of the rectangle around a solid's triangles."""
+def mesh_rectangle(solid: Solid, frame: Pose3 | None = None) -> tuple[float, float, float, float]:
+    """Return the same as `bounding_rectangle`, always computed from the triangles of the solid."""
     from simscen.worlds.geometry.triangulation import triangulate
 
     pose = frame.compose(solid.pose) if frame else solid.pose
-    vertices = pose.apply(triangulate(solid.shape).vertices)[:, :2]
-    return np.stack((vertices.min(axis=0), vertices.max(axis=0)))
+    vertices = pose.apply(triangulate(solid.shape).vertices)
+    (left, bottom, _), (right, top, _) = vertices.min(axis=0).tolist(), vertices.max(axis=0).tolist()
+    return left, bottom, right, top

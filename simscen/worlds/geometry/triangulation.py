@@ -1,4 +1,4 @@
-"""Triangulation of shapes: closed surfaces with outward normals, in a deterministic order.
+"""Triangulate shapes: closed surfaces with outward normals, always in the same order of vertices and faces.
 
 Physics, ray casting and maps use the same triangles, so that they agree on the position of every wall.
 """
@@ -29,8 +29,9 @@ from simscen.core.geometry.shapes import (
 )
 
 Faces = npt.NDArray[np.int32]
+"""Triangles (n, 3) as indices of vertices."""
 Profile = list[tuple[float, float]]
-"""Points (distance from the z axis, height), from the bottom up."""
+"""Points (distance from the z axis, height) in m, from the bottom up."""
 
 
 _BOX_CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
@@ -41,10 +42,14 @@ _BOX_FACES = np.array(
     ],
     dtype=np.int32,
 )  # fmt: skip
+"""Corners (8, 3) and triangles (12, 3) of a cube of side 1 around the origin."""
 
 
 def merge_solids(solids: Iterable[Solid]) -> TriangleMesh:
-    """Return all solids as one triangle mesh in their common frame; the owner of a face is an index into `names`."""
+    """Return all solids as one triangle mesh in their common frame, in the order of the solids.
+
+    The owner of a face is the index of its solid. Each distinct shape is triangulated only once.
+    """
     vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), np.int32)]
     owners, names, frictions, hulls = [np.empty(0, np.int32)], [], [], list[slice | None]()
     meshes: dict[Shape, tuple[Mesh, bool]] = {}
@@ -73,7 +78,7 @@ def merge_solids(solids: Iterable[Solid]) -> TriangleMesh:
 
 
 def _is_convex_by_kind(shape: Shape) -> bool:
-    """Return whether a shape is convex by its kind; always False for meshes, which are not examined."""
+    """Return whether a shape is convex, judged without its triangles; always False for meshes."""
     match shape:
         case Mesh():
             return False
@@ -85,7 +90,7 @@ def _is_convex_by_kind(shape: Shape) -> bool:
 
 
 def triangulate(shape: Shape) -> Mesh:
-    """Return the surface of a shape around its origin; round shapes have inscribed facets, see `facet_count`."""
+    """Return the triangles of a shape in its own frame. Round shapes have inscribed facets (see `facet_count`)."""
     match shape:
         case Box(size):
             return Mesh(_BOX_CORNERS * size, _BOX_FACES)
@@ -166,6 +171,7 @@ def _extrude(polygon: Array, height: float) -> Mesh:
 
 
 def _counterclockwise(triangles: Faces, points: Array) -> Faces:
+    """Return the triangles with those reversed that run clockwise through the points (n, 2)."""
     a, b, c = points[triangles].swapaxes(0, 1)
     is_clockwise = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
     result: Faces = np.where(is_clockwise[:, None], triangles[:, ::-1], triangles)

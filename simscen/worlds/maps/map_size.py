@@ -1,4 +1,4 @@
-"""Size of the occupancy map of a world, computed without drawing the map and without importing numpy."""
+"""Compute the size of the occupancy map of a world before it is drawn, without importing NumPy."""
 
 import math
 from typing import NamedTuple
@@ -15,23 +15,25 @@ Bounds = tuple[float, float, float, float]
 
 
 class MapSize(NamedTuple):
-    """First column and first row as multiples of the resolution, and the number of columns and rows."""
+    """Position and size of a map in cells: its lower left corner is at (`left`, `bottom`) times the resolution."""
 
     left: int
     bottom: int
     width: int
+    """Number of columns."""
     height: int
+    """Number of rows."""
 
 
 def map_size(bounds: Bounds, resolution: float = MAP_RESOLUTION_M) -> MapSize:
-    """Return the size of a map over `bounds` and a margin; its grid lines are multiples of `resolution` in meters."""
+    """Return the size of a map that covers `bounds` and MAP_MARGIN_M around it, with cells of `resolution` m."""
     left, bottom = (math.floor(round((edge - MAP_MARGIN_M) / resolution, 6)) for edge in bounds[:2])
     right, top = (math.ceil(round((edge + MAP_MARGIN_M) / resolution, 6)) for edge in bounds[2:])
     return MapSize(left, bottom, right - left, top - bottom)
 
 
 def map_size_error(bounds: Bounds, resolution: float = MAP_RESOLUTION_M) -> str | None:
-    """Return a message if a map over `bounds` would have more than MAX_MAP_CELLS cells."""
+    """Return a message if a map over `bounds` with cells of `resolution` m is too large, otherwise None."""
     size = map_size(bounds, resolution)
     if size.width * size.height <= MAX_MAP_CELLS:
         return None
@@ -39,7 +41,7 @@ def map_size_error(bounds: Bounds, resolution: float = MAP_RESOLUTION_M) -> str 
 
 
 def fitting_resolution(bounds: Bounds) -> float:
-    """Return the default resolution in meters, doubled until a map over `bounds` has at most MAX_MAP_CELLS cells."""
+    """Return the default resolution in m, doubled until a map over `bounds` is not too large."""
     resolution = MAP_RESOLUTION_M
     while map_size_error(bounds, resolution):
         resolution *= 2

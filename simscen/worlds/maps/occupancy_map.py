@@ -1,4 +1,4 @@
-"""Occupancy map of a world, as SLAM with a perfect lidar at one height would build it, and walls from such a map."""
+"""Convert a world to an occupancy map, as SLAM with a perfect lidar at one height would, and a map back to walls."""
 
 import numpy as np
 import numpy.typing as npt
@@ -11,15 +11,21 @@ from simscen.core.geometry.shapes import Mesh, Solid, TriangleMesh
 from simscen.worlds.extent import oversize_hint
 from simscen.worlds.geometry.cross_section import CrossSection, cross_section
 from simscen.worlds.maps.map_size import MAP_RESOLUTION_M, Bounds, map_size, map_size_error
-from simscen.worlds.maps.rasterization import Cells, filled_cells, touched_cells
+from simscen.worlds.maps.rasterization import CellMask, filled_cells, touched_cells
+
+MIN_OCCUPIED_VALUE = 65
+"""Cells with values from this to 100 are walls: Nav2's occupied_thresh, for maps in mode scale or raw."""
+MAX_EDGES = 500_000
+"""Maximum number of straight edges of walls. A building of 16 million cells has about 10 000, noise one per cell."""
 
 
 def draw_map(world: World, mesh: TriangleMesh, height: float, resolution: float = MAP_RESOLUTION_M) -> OccupancyGrid:
-    """Draw the map of a world whose static solids form `mesh`, cut at `height` in meters.
+    """Draw the map of a world with cells of `resolution` m, from the cross section of `mesh` at `height` m.
 
-    A cell is occupied if any part of a solid, hollow or not, lies in the cell at that height. A cell is unknown if it
-    lies outside the building (see `_cells_outside_building`). All other cells are free. If the world has its own map,
-    the solids are drawn into a copy of that map. Raises InvalidInput beyond MAX_MAP_CELLS.
+    `mesh` consists of the static solids of the world. A cell is occupied if any part of a solid, hollow or not, lies in
+    the cell at that height. A cell is unknown if it lies outside the building (see `_cells_outside_building`). All
+    other cells are free. If the world has its own map, the solids are drawn into a copy of that map, which keeps its
+    resolution. Raises InvalidInput if the map would have more than MAX_MAP_CELLS cells.
     """
     section = cross_section(mesh, height)
     if world.grid is not None:
@@ -36,16 +42,16 @@ def draw_map(world: World, mesh: TriangleMesh, height: float, resolution: float 
     return OccupancyGrid(cells, resolution, grid.origin)
 
 
-def occupied_cells(grid: OccupancyGrid, section: CrossSection) -> Cells:
-    """Return the cells of the grid (rows, columns) that share inner points with the solids of a cross section."""
+def occupied_cells(grid: OccupancyGrid, section: CrossSection) -> CellMask:
+    """Return the mask of the cells of `grid` that overlap the solids of a cross section, which is in m."""
     points_in_cells = grid.origin.inverse().apply(section.segments.reshape(-1, 2)) / grid.resolution
     return touched_cells(CrossSection(points_in_cells.reshape(-1, 2, 2), section.owners), grid.shape)
 
 
 def empty_grid(bounds: Bounds, resolution: float, name: str) -> OccupancyGrid:
-    """Return a free grid over `bounds` and a margin; raises InvalidInput beyond MAX_MAP_CELLS.
+    """Return a grid of free cells of `resolution` m over `bounds` and MAP_MARGIN_M around it.
 
-    The grid lines are multiples of `resolution`. `name` names the world in the error.
+    Raises InvalidInput with `name` as the name of the world if the grid would have more than MAX_MAP_CELLS cells.
     """
     if message := map_size_error(bounds, resolution):
         raise InvalidInput([Problem(name, 0, 0, "SC330", message, "is something placed far away from the rest?")])
@@ -55,7 +61,7 @@ def empty_grid(bounds: Bounds, resolution: float, name: str) -> OccupancyGrid:
 
 
 def _map_bounds(world: World, segments: Array) -> Bounds:
-    """Return the bounds of the world, or those of its cross section if the world states none."""
+    """Return the bounds of the world; if they are all 0 (unknown), those of the `segments` of its cross section."""
     if any(world.bounds):
         return world.bounds
     if not len(segments):
@@ -66,24 +72,24 @@ def _map_bounds(world: World, segments: Array) -> Bounds:
 
 
 def _cells_of_places(world: World, grid: OccupancyGrid) -> npt.NDArray[np.int64]:
-    """Return the cells (n, 2) of the named places that lie on the grid."""
+    """Return the cells (n, 2) of the named places that lie on the grid, as (row, column)."""
     points = np.array([(pose.x, pose.y) for pose in world.places.values()]).reshape(-1, 2)
     cells = grid.cell_of(points)
     return cells[grid.inside(cells)]
 
 
-def _cells_outside_building(occupied: Cells, places: npt.NDArray[np.int64]) -> Cells:
-    """Return the free cells outside the building; none if the world is not a building.
+def _cells_outside_building(occupied: CellMask, places: npt.NDArray[np.int64]) -> CellMask:
+    """Return the mask of the free cells outside the building; all False if the world is not a building.
 
-    Cells are outside if they are connected to the edge of the map. A world is a building if the enclosed free area is
-    larger than the outside area within the convex hull of all walls, and no named place lies outside. A field of
-    obstacles encloses hardly any area, so all of its free cells stay free.
+    Free cells are outside if they are connected to the edge of the map. A world is a building if the enclosed free area
+    is larger than the outside area within the convex hull of all walls, and none of the `places` (row, column) lies
+    outside. A field of obstacles encloses hardly any area, so all of its free cells stay free.
     """
     from scipy import ndimage
 
     labels, _ = ndimage.label(~occupied)
     edge_labels = np.unique(np.concatenate((labels[0], labels[-1], labels[:, 0], labels[:, -1])))
-    outside: Cells = np.isin(labels, edge_labels[edge_labels > 0])
+    outside: CellMask = np.isin(labels, edge_labels[edge_labels > 0])
     enclosed_count = np.count_nonzero(~occupied & ~outside)
     has_place_outside = bool(outside[places[:, 0], places[:, 1]].any())
     if (
@@ -95,8 +101,11 @@ def _cells_outside_building(occupied: Cells, places: npt.NDArray[np.int64]) -> C
     return outside
 
 
-def _cells_in_convex_hull(occupied: Cells) -> Cells:
-    """Return the cells with their center in the convex hull of the occupied ones, which must not be collinear."""
+def _cells_in_convex_hull(occupied: CellMask) -> CellMask:
+    """Return the mask of the cells whose center is in the convex hull of the `occupied` cells.
+
+    The occupied cells must not be collinear.
+    """
     from scipy.spatial import ConvexHull
 
     rows = np.flatnonzero(occupied.any(axis=1))
@@ -108,19 +117,11 @@ def _cells_in_convex_hull(occupied: Cells) -> Cells:
     return filled_cells(CrossSection(segments, np.zeros(len(segments), np.int32)), occupied.shape)
 
 
-Runs = npt.NDArray[np.int64]
-
-MIN_OCCUPIED_VALUE = 65
-"""Cells with values from this to 100 are walls: Nav2's occupied_thresh, for maps in mode scale or raw."""
-MAX_EDGES = 500_000
-"""Maximum number of straight edges. A building of 16 million cells has about 10 000, noise has one per cell."""
-
-
 def walls_from_map(grid: OccupancyGrid, height: float, name: str = "map") -> list[Solid]:
-    """Return the occupied cells of a map as one closed mesh, `height` m tall; empty without occupied cells.
+    """Return the occupied cells of a map as one closed mesh, `height` m tall; [] if no cell is occupied.
 
-    A straight edge of any length becomes one face, and there are no faces between cells, so that no object can catch on
-    a seam. Raises InvalidInput for a map with more than MAX_EDGES straight edges.
+    A straight edge of any length becomes one rectangle, and there are no faces between cells, so that no object can
+    catch on a seam. Raises InvalidInput for a map with more than MAX_EDGES straight edges.
     """
     occupied = grid.cells >= MIN_OCCUPIED_VALUE
     if not occupied.any():
@@ -132,8 +133,11 @@ def walls_from_map(grid: OccupancyGrid, height: float, name: str = "map") -> lis
     return [Solid(Mesh(vertices, faces), Pose3.planar(grid.origin), name)]
 
 
-def _sides(occupied: Cells, name: str) -> Array:
-    """Return the upright faces (n, 4, 3) in cells, with height 1: one for each straight edge of the outline."""
+def _sides(occupied: CellMask, name: str) -> Array:
+    """Return the corners (n, 4, 3) of the upright rectangles of the walls, one for each straight edge of the outline.
+
+    x and y are in cells; z is 0 or 1.
+    """
     sides = []
     for swapped, cells in ((False, occupied), (True, occupied.T)):
         change = np.diff(np.pad(cells.astype(np.int8), ((1, 1), (0, 0))), axis=0)
@@ -148,8 +152,11 @@ def _sides(occupied: Cells, name: str) -> Array:
     return np.concatenate(sides).astype(np.float64)
 
 
-def _caps(occupied: Cells, name: str) -> Array:
-    """Return the faces (n, 4, 3) of bottom and top, one for equal runs of cells in consecutive rows."""
+def _caps(occupied: CellMask, name: str) -> Array:
+    """Return the corners (n, 4, 3) of the rectangles of the top and the bottom; units as in `_sides`.
+
+    Each rectangle covers equal runs of occupied cells in consecutive rows.
+    """
     row, start, stop = _runs(occupied, name).T
     order = np.lexsort((row, stop, start))
     row, start, stop = row[order], start[order], stop[order]
@@ -165,8 +172,11 @@ def _caps(occupied: Cells, name: str) -> Array:
     return np.concatenate((top, under)).astype(np.float64)
 
 
-def _runs(lines: Cells, name: str) -> Runs:
-    """Return the runs of True along the rows (n, 3): row, first column, column after the last."""
+def _runs(lines: CellMask, name: str) -> npt.NDArray[np.int64]:
+    """Return the runs of True in the rows of a mask, as (n, 3): row, first column, column after the last.
+
+    Raises InvalidInput with `name` as the name of the map if there are more than MAX_EDGES.
+    """
     steps = np.diff(np.pad(lines.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     count = int(np.count_nonzero(steps == 1))
     if count > MAX_EDGES:

@@ -1,7 +1,7 @@
-"""Rasterization: find the grid cells that solids touch or fill, from the outlines of the solids.
+"""Rasterize the outlines of solids: find the grid cells that the solids touch or fill.
 
-All coordinates are in cells: the cell in row r and column c covers c ≤ x < c + 1 and r ≤ y < r + 1. The `owner` of a
-segment is the index of the solid to which it belongs. All segments are processed at once.
+All coordinates are in cells: the cell in row r and column c covers c ≤ x < c + 1 and r ≤ y < r + 1. The functions
+process all segments of a cross section at once.
 """
 
 import numpy as np
@@ -10,26 +10,29 @@ import numpy.typing as npt
 from simscen.core.geometry import Array
 from simscen.worlds.geometry.cross_section import CrossSection
 
-Cells = npt.NDArray[np.bool_]
+CellMask = npt.NDArray[np.bool_]
+"""Mask (rows, columns) of grid cells."""
+Flags = npt.NDArray[np.bool_]
+Integers = npt.NDArray[np.int64]
 
 INWARD_OFFSET_CELLS = 1e-6
-"""Inward offset of outlines, so that a wall that ends at the edge of a cell does not touch this cell."""
+"""Distance by which outlines are moved inwards, so that a wall that ends at the edge of a cell does not touch it."""
 
 
-def touched_cells(cut: CrossSection, shape: tuple[int, int]) -> Cells:
-    """Return a mask of `shape` (rows, columns) that is True for the cells that overlap solids.
+def touched_cells(section: CrossSection, shape: tuple[int, int]) -> CellMask:
+    """Return the mask of `shape` (rows, columns) of the cells that overlap solids in any part.
 
-    `cut` contains the outlines of the solids, in cells.
+    `section` contains the outlines of the solids, in cells. Compare `filled_cells`, which only tests centers of cells.
     """
-    cells = filled_cells(cut, shape)
-    rows, columns = _outline_cells(cut.segments)
+    cells = filled_cells(section, shape)
+    rows, columns = _outline_cells(section.segments)
     inside = (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
     cells[rows[inside], columns[inside]] = True
     return cells
 
 
-def _outline_cells(segments: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Return the rows and columns of the cells that the segments cross.
+def _outline_cells(segments: Array) -> tuple[Integers, Integers]:
+    """Return the rows (k,) and columns (k,) of the cells that segments (n, 2, 2) cross, possibly outside the grid.
 
     The segments are split at the grid lines, so that each piece lies in one cell.
     """
@@ -57,30 +60,31 @@ def _outline_cells(segments: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[
     return cells[:, 1], cells[:, 0]
 
 
-def filled_cells(cut: CrossSection, shape: tuple[int, int]) -> Cells:
-    """Return the cells whose center is inside a solid, i.e. the winding number of the outlines is positive.
+def filled_cells(section: CrossSection, shape: tuple[int, int]) -> CellMask:
+    """Return the mask of `shape` (rows, columns) of the cells whose center is inside a solid.
 
-    Rows in which the outline of a solid is not closed (meshes with holes) are not filled, nor are solids with inverted
-    faces, e.g. a room that is modeled as a box seen from inside.
+    A center is inside if the winding number of the outlines around it is positive. Rows in which the outline of a solid
+    is not closed (a mesh with holes) are not filled, nor are solids with inverted faces, e.g. a room that is modeled as
+    a box seen from inside.
     """
-    rows, columns, signs, owners = _crossings(cut, shape)
-    keep = _is_balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_is_inside_out(cut)[owners]
+    rows, columns, signs, owners = _crossings(section, shape)
+    keep = _is_balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_is_inside_out(section)[owners]
     flat = rows[keep] * (shape[1] + 1) + np.clip(columns[keep], 0, shape[1])
     steps = np.bincount(flat, weights=signs[keep], minlength=shape[0] * (shape[1] + 1))
     winding = np.cumsum(steps.reshape(shape[0], shape[1] + 1), axis=1)[:, :-1]
-    inside: Cells = winding > 0.5
+    inside: CellMask = winding > 0.5
     return inside
 
 
 def _crossings(
-    cut: CrossSection, shape: tuple[int, int]
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Array, npt.NDArray[np.int32]]:
-    """Return where outlines cross the horizontal center lines of rows: row, column, sign, and owner of each crossing.
+    section: CrossSection, shape: tuple[int, int]
+) -> tuple[Integers, Integers, Array, npt.NDArray[np.int32]]:
+    """Return row, column, sign, and owner (n,) of each crossing of an outline with the center line of a row.
 
-    The column is the first one whose center is at the crossing or at larger x. The sign is 1 if the solid is on the
-    side of larger x, and -1 if it ends there. The owner is the index of the solid.
+    The column is the first one whose center is at the crossing or at larger x. The sign is 1 if the solid begins there
+    and continues towards larger x, and -1 if the solid ends there. The owner is the index of the solid.
     """
-    (x0, y0), (x1, y1) = cut.segments[:, 0].T, cut.segments[:, 1].T
+    (x0, y0), (x1, y1) = section.segments[:, 0].T, section.segments[:, 1].T
     first = np.clip(np.ceil(np.minimum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
     last = np.clip(np.ceil(np.maximum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
     which, rows = expand_ranges(first, last)
@@ -88,29 +92,30 @@ def _crossings(
     x = x0[which] + (rows + 0.5 - y0[which]) * slope
     # A solid is on the left of its outline: beyond an upward segment (at larger x) is the outside.
     signs = np.where((y1 > y0)[which], -1.0, 1.0)
-    return rows, np.ceil(x - 0.5).astype(np.int64), signs, cut.owners[which]
+    return rows, np.ceil(x - 0.5).astype(np.int64), signs, section.owners[which]
 
 
-def _is_balanced(keys: npt.NDArray[np.int64], signs: Array) -> Cells:
-    """Return which crossings belong to a (row, owner) whose signs have the sum 0."""
+def _is_balanced(keys: Integers, signs: Array) -> Flags:
+    """Return for each crossing whether the signs of all crossings with the same key have the sum 0.
+
+    The key stands for a row and a solid. If the sum is not 0, the outline of the solid is not closed in this row.
+    """
     _, group = np.unique(keys, return_inverse=True)
-    balanced: Cells = (np.bincount(group, weights=signs) == 0)[group]
+    balanced: Flags = (np.bincount(group, weights=signs) == 0)[group]
     return balanced
 
 
-def _is_inside_out(cut: CrossSection) -> Cells:
-    """Return for each solid, in the order of the owner indices, whether its outline is clockwise."""
-    if not len(cut.owners):
+def _is_inside_out(section: CrossSection) -> Flags:
+    """Return for each solid, by its index, whether its outline is clockwise."""
+    if not len(section.owners):
         return np.zeros(0, dtype=np.bool_)
-    (x0, y0), (x1, y1) = cut.segments[:, 0].T, cut.segments[:, 1].T
-    clockwise: Cells = np.bincount(cut.owners, weights=x0 * y1 - x1 * y0) < 0
+    (x0, y0), (x1, y1) = section.segments[:, 0].T, section.segments[:, 1].T
+    clockwise: Flags = np.bincount(section.owners, weights=x0 * y1 - x1 * y0) < 0
     return clockwise
 
 
-def expand_ranges(
-    first: npt.NDArray[np.int64], stop: npt.NDArray[np.int64]
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Return all integers of the half-open ranges from first[k] to stop[k], in one array after the index k of each."""
+def expand_ranges(first: Integers, stop: Integers) -> tuple[Integers, Integers]:
+    """Concatenate the ranges first[k], …, stop[k] - 1. Return the index k of each integer, and the integers."""
     lengths = np.maximum(stop - first, 0)
     which = np.repeat(np.arange(len(first)), lengths)
     offsets = np.arange(len(which)) - np.repeat(np.cumsum(lengths) - lengths, lengths)

@@ -1,4 +1,4 @@
-"""ROS maps, read and written as by Nav2's map_server (nav2_map_server/src/map_io.cpp)."""
+"""Read and write ROS maps (YAML file and image) as Nav2's map_server does (nav2_map_server/src/map_io.cpp)."""
 
 import io
 import json
@@ -23,12 +23,20 @@ if TYPE_CHECKING:
     from PIL import Image
 
 Grays8 = npt.NDArray[np.uint8]
+"""Gray values of pixels (rows, columns), 0 (black) to 255."""
 Grays16 = npt.NDArray[np.uint16]
+"""Gray values of pixels (rows, columns), 0 (black) to 65535."""
 
 MAX_PIXELS, MAX_BYTES = 16 * 2**20, 64 * 2**20
-"""Limits on the size of an image, and of its file."""
+"""Maximum number of pixels of an image, and of bytes of its file."""
 PROBLEM_CODE = "SC320"
+"""Code of all problems with the image of a map."""
+UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 205, 254, 0
+"""Gray values of trinary maps written by map_saver."""
+MAX_DISTANCE_M = 1e4
+"""Maximum distance of map cells from the origin of the map frame, as for coordinates in all files."""
 
+# Header of a PGM: P2 or P5, width, height, and maxval, separated by white space or comments.
 _PNM_SEPARATOR = rb"(?:\s|#[^\r\n]*[\r\n])+"
 _PNM_HEADER = re.compile(
     rb"(P[25])" + _PNM_SEPARATOR + rb"(\d{1,10})" + _PNM_SEPARATOR + rb"(\d{1,10})" + _PNM_SEPARATOR + rb"(\d{1,10})\s"
@@ -37,10 +45,11 @@ _PNM_HEADER = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class MapImage:
-    """Pixels as nav2_map_server reads them with GraphicsMagick: `gray` (h, w), top row first; `alpha` if it has one."""
+    """Pixels as nav2_map_server reads them with GraphicsMagick; the first row is the top of the image."""
 
     gray: Grays8
     alpha: Grays8 | None = None
+    """Opacity of the pixels, 0 to 255; None if the image has no alpha channel."""
 
 
 class UnreadableImage(Exception):
@@ -48,7 +57,7 @@ class UnreadableImage(Exception):
 
 
 def read_image(path: Path) -> MapImage:
-    """Read a pgm (P2 or P5, 8 or 16 bit), png or bmp; raises InvalidInput for other or too large files."""
+    """Read a PGM (P2 or P5, 8 or 16 bit), PNG or BMP; raises InvalidInput for other, damaged, or too large files."""
     try:
         data = _read_bytes(path)
         if data[:2] in (b"P2", b"P5"):
@@ -73,6 +82,7 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def _check_size(width: int, height: int) -> None:
+    """Raise UnreadableImage for an image without pixels or with more than MAX_PIXELS."""
     if width < 1 or height < 1:
         raise UnreadableImage(f"the image has no pixels: {width} x {height}")
     if width * height > MAX_PIXELS:
@@ -80,7 +90,7 @@ def _check_size(width: int, height: int) -> None:
 
 
 def _decode_pgm(data: bytes) -> Grays16:
-    """Return a PGM as 16-bit grays (h, w). Source: netpbm's pgm(5); samples of two bytes are big-endian."""
+    """Return the pixels of a PGM, scaled to 16 bit. Source: netpbm's pgm(5); samples of two bytes are big-endian."""
     match = _PNM_HEADER.match(data)
     if match is None:
         raise UnreadableImage("the PGM header is damaged; expected width, height and maxval")
@@ -101,11 +111,13 @@ def _decode_pgm(data: bytes) -> Grays16:
 
 
 def _binary_samples(raster: bytes, count: int, maximum: int) -> npt.NDArray[np.generic]:
+    """Return the first `count` samples of a P5 raster, or fewer if it is truncated; `maximum` determines their size."""
     sample = np.dtype(">u2" if maximum > 255 else "u1")
     return np.frombuffer(raster, dtype=sample, count=min(count, len(raster) // sample.itemsize))
 
 
 def _ascii_samples(raster: bytes) -> npt.NDArray[np.generic]:
+    """Return all samples of a P2 raster. Raises UnreadableImage if it contains something else than numbers."""
     text = re.sub(rb"#[^\r\n]*", b"", raster)
     if re.search(rb"[^\d\s]", text):
         raise UnreadableImage("the PGM contains something that is not a number")
@@ -138,38 +150,33 @@ def _decode_png_or_bmp(data: bytes) -> MapImage:
 
 
 def _bmp_size(data: bytes) -> tuple[int, int]:
+    """Return the width and the height in the header of a BMP."""
     (header,) = struct.unpack("<I", data[14:18])
     width, height = struct.unpack("<HH" if header == 12 else "<ii", data[18 : 22 if header == 12 else 26])
     return width, abs(height)
 
 
 def _gray_and_alpha(image: "Image.Image") -> MapImage:
-    """Return 8-bit grays, computed as by GraphicsMagick: 0.299 R + 0.587 G + 0.114 B (Rec. 601), in integers."""
+    """Convert colors to gray as GraphicsMagick does: 0.299 R + 0.587 G + 0.114 B (Rec. 601), in integers."""
     if image.mode.startswith("I"):
         return MapImage(_to_8_bits(np.clip(np.asarray(image), 0, 65535).astype(np.uint16)))
-    transparent = image.mode in ("LA", "PA", "RGBA") or "transparency" in image.info
-    red, green, blue, *alpha = np.moveaxis(np.asarray(image.convert("RGBA" if transparent else "RGB")), 2, 0)
+    has_alpha = image.mode in ("LA", "PA", "RGBA") or "transparency" in image.info
+    red, green, blue, *alpha = np.moveaxis(np.asarray(image.convert("RGBA" if has_alpha else "RGB")), 2, 0)
     quanta = [color.astype(np.uint32) * 257 for color in (red, green, blue)]
     luma = (306 * quanta[0] + 601 * quanta[1] + 117 * quanta[2]) >> 10
-    return MapImage(_to_8_bits(luma.astype(np.uint16)), alpha[0] if transparent else None)
+    return MapImage(_to_8_bits(luma.astype(np.uint16)), alpha[0] if has_alpha else None)
 
 
 def _to_8_bits(quanta: Grays16) -> Grays8:
     return (quanta // 257).astype(np.uint8)
 
 
-UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 205, 254, 0
-"""Gray values of trinary maps written by map_saver."""
-
-MAX_DISTANCE_M = 1e4
-"""Maximum distance from the origin, as for coordinates in all files."""
-
-
 def load_map(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[str, ...]]:
-    """Return the map of an image, and warnings. Raises InvalidInput for an image that cannot be read.
+    """Return the map that a YAML file (its content is `spec`) and an image describe, and warnings for the user.
 
-    As in map_server, only the 8-bit gray of a pixel counts, computed in single precision. In the modes trinary and
-    scale, pixels that are not opaque are unknown.
+    As in map_server, only the 8-bit gray of a pixel counts, and the occupancy is computed in single precision. In the
+    modes trinary and scale, pixels that are not opaque are unknown. Raises InvalidInput for an image that cannot be
+    read, and for a map that extends farther than MAX_DISTANCE_M.
     """
     image = read_image(image_path)
     _check_distance(spec, image.gray.shape[::-1], image_path)
@@ -182,7 +189,10 @@ def load_map(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[s
 
 
 def _check_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path) -> None:
-    """Raise InvalidInput for a too large map, e.g. with a resolution in the wrong unit."""
+    """Raise InvalidInput for a map that is too large, e.g. because its resolution is in the wrong unit.
+
+    `pixels` are the width and the height of the image.
+    """
     distance = max(pixels) * spec.resolution + max(abs(spec.origin[0]), abs(spec.origin[1]))
     if distance > MAX_DISTANCE_M:
         size = " x ".join(str(count) for count in pixels)
@@ -192,12 +202,12 @@ def _check_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path)
 
 
 def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:
-    """Return the cell value (256,) of nav_msgs/OccupancyGrid for each gray."""
+    """Return a table (256,) with the cell value in nav_msgs/OccupancyGrid for each gray value."""
     grays = np.arange(256)
     if spec.mode == "raw":
         return np.where(grays <= OCCUPIED, grays, UNKNOWN).astype(np.int8)
-    share = grays.astype(np.float32) / np.float32(255)
-    occupancy = share if spec.negate else np.float32(1) - share
+    brightness = grays.astype(np.float32) / np.float32(255)
+    occupancy = brightness if spec.negate else np.float32(1) - brightness
     free, occupied = np.float32(spec.free_thresh), np.float32(spec.occupied_thresh)
     values = np.where(occupancy >= occupied, OCCUPIED, UNKNOWN)
     values = np.where(occupancy <= free, FREE, values)
@@ -209,31 +219,32 @@ def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:
     return values.astype(np.int8)
 
 
-def _warnings(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_grays: int) -> tuple[str, ...]:
-    if spec.mode == "raw" or spec.negate or not unknown_grays or table[UNKNOWN_GRAY] != FREE:
+def _warnings(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_gray_count: int) -> tuple[str, ...]:
+    """Return a warning if pixels that map_saver wrote for unknown are read as free."""
+    if spec.mode == "raw" or spec.negate or not unknown_gray_count or table[UNKNOWN_GRAY] != FREE:
         return ()
     return (
-        f"{spec.image}: {unknown_grays} pixels of gray 205, which map_saver writes for unknown, are read as free "
+        f"{spec.image}: {unknown_gray_count} pixels of gray 205, which map_saver writes for unknown, are read as free "
         f"because free_thresh is {spec.free_thresh:g}; 0.196 keeps them unknown",
     )
 
 
 def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
-    """Write a map as `yaml_path` and a PGM file with the same name. Loading them gives the same grid. Raises OSError.
+    """Write a map as the file `yaml_path` and a PGM file of the same name, from which `load_map` reads the same grid.
 
     The mode is trinary, with map_saver's grays and thresholds, or raw if there are other values than free, occupied and
-    unknown.
+    unknown. Raises OSError.
     """
     image_path = yaml_path.with_suffix(".pgm")
     require_regular_file(image_path)
-    trinary = bool(np.isin(grid.cells, (FREE, OCCUPIED, UNKNOWN)).all())
+    is_trinary = bool(np.isin(grid.cells, (FREE, OCCUPIED, UNKNOWN)).all())
     height, width = grid.shape
     header = f"P5\n{width} {height}\n255\n".encode()
-    image_path.write_bytes(header + _grays(grid.cells, trinary)[::-1].tobytes())
+    image_path.write_bytes(header + _grays(grid.cells, is_trinary)[::-1].tobytes())
     origin = ", ".join(format_decimal(value) for value in grid.origin)
     lines = (
         f"image: {json.dumps(image_path.name)}",
-        f"mode: {'trinary' if trinary else 'raw'}",
+        f"mode: {'trinary' if is_trinary else 'raw'}",
         f"resolution: {format_decimal(grid.resolution)}",
         f"origin: [{origin}]",
         "negate: 0",
@@ -243,12 +254,12 @@ def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
     yaml_path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _grays(cells: npt.NDArray[np.int8], trinary: bool) -> npt.NDArray[np.uint8]:
-    if not trinary:
+def _grays(cells: npt.NDArray[np.int8], is_trinary: bool) -> Grays8:
+    if not is_trinary:
         return np.where(cells < 0, np.uint8(255), cells.astype(np.uint8))
     return np.select((cells == FREE, cells == OCCUPIED), (FREE_GRAY, OCCUPIED_GRAY), UNKNOWN_GRAY).astype(np.uint8)
 
 
 def format_decimal(value: float) -> str:
-    """Return the shortest decimal with the same value, without an exponent, which YAML 1.1 reads as text."""
+    """Return the shortest decimal with the same value, without an exponent: YAML 1.1 reads `1e-05` as text."""
     return np.format_float_positional(value, unique=True, trim="0")

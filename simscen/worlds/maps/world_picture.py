@@ -1,4 +1,4 @@
-"""Picture of a world from above: its cross section, the map, bodies, places and regions."""
+"""Draw a picture of a world from above: its cross section, map, bodies, places and regions."""
 
 import math
 from collections.abc import Sequence
@@ -18,23 +18,35 @@ if TYPE_CHECKING:
     from PIL import Image, ImageDraw
 
 Color = tuple[int, int, int, int]
+"""Red, green, blue and opacity, 0 to 255."""
 
-BACKGROUND, FREE_GROUND, UNKNOWN_GROUND = (226, 230, 236, 255), (255, 255, 255, 255), (226, 230, 236, 255)
-MAPPED_WALL, WALL = (147, 178, 214, 255), (16, 42, 82, 255)
-BODY, PLACE, REGION, SCALE_BAR = (214, 102, 20, 255), (20, 128, 74, 255), (122, 82, 178, 255), (120, 128, 140, 255)
-MARKER = (200, 24, 40, 255)
+BACKGROUND_COLOR = UNKNOWN_COLOR = (226, 230, 236, 255)
+FREE_COLOR = (255, 255, 255, 255)
+OCCUPIED_COLOR = (147, 178, 214, 255)
+WALL_COLOR = (16, 42, 82, 255)
+BODY_COLOR = (214, 102, 20, 255)
+PLACE_COLOR = (20, 128, 74, 255)
+REGION_COLOR = (122, 82, 178, 255)
+SCALE_BAR_COLOR = (120, 128, 140, 255)
+MARKER_COLOR = (200, 24, 40, 255)
+"""Color of footprints and of rings around gaps."""
 
 MAX_SIDE_PIXELS = 1200
 """Length of the longer side of the picture."""
 SUPERSAMPLING = 2
-"""Factor by which everything is drawn larger and then scaled down, for smooth lines."""
-GAP_RING_RADIUS = 18 * SUPERSAMPLING
+"""Factor by which the canvas is larger than the picture. It is scaled down at the end, for smooth lines."""
+GAP_RING_RADIUS_PIXELS = 18 * SUPERSAMPLING
 """Radius of the ring around a gap, in canvas pixels."""
 
 
 @dataclass(frozen=True)
 class Viewport:
-    """Mapping of the world to the canvas: `left` and `top` in m, `scale` in canvas pixels per m."""
+    """Mapping of the world to the canvas.
+
+    left, top:  world coordinates in m of the upper left corner of the canvas
+    scale:      canvas pixels per m
+    size:       width and height of the canvas in pixels
+    """
 
     left: float
     top: float
@@ -42,7 +54,7 @@ class Viewport:
     size: tuple[int, int]
 
     def pixels(self, points: Array) -> list[tuple[float, float]]:
-        """Return the canvas positions of world points (n, 2)."""
+        """Return the positions (x, y) on the canvas in pixels of world points (n, 2) in m."""
         x, y = (points[:, 0] - self.left) * self.scale, (self.top - points[:, 1]) * self.scale
         return list(zip(x.tolist(), y.tolist(), strict=True))
 
@@ -53,30 +65,40 @@ def draw_world(
     footprints: Sequence[Polygon] = (),
     gaps: Sequence[tuple[float, float]] = (),
 ) -> "Image.Image":
-    """Return an RGB image of the cross section at `height` m, at most MAX_SIDE_PIXELS wide and tall, with y upwards.
+    """Return an RGB image of a world with y upwards, at most MAX_SIDE_PIXELS wide and tall.
 
-    Dark lines are the cross section, light blue cells the walls of the map, and gray cells unknown. Bodies at their
-    start are orange, places green, and regions violet. `footprints` and rings around `gaps` are red.
+    Dark lines are the cross section of the world at `height` m. Occupied cells of the map are light blue, and unknown
+    cells gray. Bodies at their initial poses are orange, places green, and regions violet. The outlines `footprints`
+    and rings around the points `gaps`, both in the world frame, are red.
     """
     from PIL import Image, ImageDraw
 
     view = _viewport(built.map)
-    canvas = Image.new("RGBA", view.size, BACKGROUND)
+    canvas = Image.new("RGBA", view.size, BACKGROUND_COLOR)
     canvas.alpha_composite(_map_layer(built.map, view))
     overlay = Image.new("RGBA", view.size, (0, 0, 0, 0))
     pen = ImageDraw.Draw(overlay)
     for polygon in built.world.regions.values():
-        pen.polygon(view.pixels(np.array(polygon)), fill=(*REGION[:3], 40), outline=REGION, width=SUPERSAMPLING)
-    _draw_segments(pen, view, section_segments(built.mesh, height), WALL)
+        pen.polygon(
+            view.pixels(np.array(polygon)), fill=(*REGION_COLOR[:3], 40), outline=REGION_COLOR, width=SUPERSAMPLING
+        )
+    _draw_segments(pen, view, section_segments(built.mesh, height), WALL_COLOR)
     for body in built.world.bodies:
-        _draw_segments(pen, view, _body_outline(body, height), BODY)
+        _draw_segments(pen, view, _body_outline(body, height), BODY_COLOR)
     for outline in footprints:
-        pen.polygon(view.pixels(np.array(outline)), fill=(*MARKER[:3], 60), outline=MARKER, width=SUPERSAMPLING + 1)
+        pen.polygon(
+            view.pixels(np.array(outline)), fill=(*MARKER_COLOR[:3], 60), outline=MARKER_COLOR, width=SUPERSAMPLING + 1
+        )
     _draw_names(pen, view, built)
     for x, y in view.pixels(np.array(gaps).reshape(-1, 2)):
         pen.ellipse(
-            (x - GAP_RING_RADIUS, y - GAP_RING_RADIUS, x + GAP_RING_RADIUS, y + GAP_RING_RADIUS),
-            outline=MARKER,
+            (
+                x - GAP_RING_RADIUS_PIXELS,
+                y - GAP_RING_RADIUS_PIXELS,
+                x + GAP_RING_RADIUS_PIXELS,
+                y + GAP_RING_RADIUS_PIXELS,
+            ),
+            outline=MARKER_COLOR,
             width=2 * SUPERSAMPLING,
         )
     _draw_scale_bar(pen, view)
@@ -99,10 +121,10 @@ def _corners(grid: OccupancyGrid) -> Array:
 
 
 def _map_layer(grid: OccupancyGrid, view: Viewport) -> "Image.Image":
-    """Return the cells of the map, rotated by the yaw of its origin."""
+    """Return an image of the canvas size with the cells of the map."""
     from PIL import Image
 
-    shades = np.array([UNKNOWN_GROUND, FREE_GROUND, MAPPED_WALL], dtype=np.uint8)
+    shades = np.array([UNKNOWN_COLOR, FREE_COLOR, OCCUPIED_COLOR], dtype=np.uint8)
     kind = np.where(grid.cells < 0, 0, np.where(grid.cells == FREE, 1, 2))
     cells = Image.fromarray(shades[kind], "RGBA")
     # Pillow needs the transform from pixels to cells: canvas -> world -> frame of the grid -> cells.
@@ -110,11 +132,16 @@ def _map_layer(grid: OccupancyGrid, view: Viewport) -> "Image.Image":
     zero, right, down = grid.origin.inverse().apply(ends) / grid.resolution
     across, along = right - zero, down - zero
     matrix = (across[0], along[0], zero[0], across[1], along[1], zero[1])
-    return cells.transform(view.size, Image.Transform.AFFINE, matrix, Image.Resampling.NEAREST, fillcolor=BACKGROUND)
+    return cells.transform(
+        view.size, Image.Transform.AFFINE, matrix, Image.Resampling.NEAREST, fillcolor=BACKGROUND_COLOR
+    )
 
 
 def _body_outline(body: Body, height: float) -> Array:
-    """Return the cross section of a body at its start; at half its height if it does not reach `height`."""
+    """Return the segments (n, 2, 2) of the cross section of a body at its initial pose.
+
+    The cross section is at `height` m, or at half the height of the body if it does not reach `height`.
+    """
     mesh = merge_solids(body.solids)
     placed = type(mesh)(body.pose.apply(mesh.vertices), mesh.faces, mesh.owners, mesh.names)
     cut = section_segments(placed, height)
@@ -132,31 +159,32 @@ def _draw_segments(pen: "ImageDraw.ImageDraw", view: Viewport, segments: Array, 
 def _draw_names(pen: "ImageDraw.ImageDraw", view: Viewport, built: BuiltWorld) -> None:
     for name, polygon in built.world.regions.items():
         upper_left = np.array([[min(x for x, _ in polygon), max(y for _, y in polygon)]])
-        _draw_text(pen, view.pixels(upper_left)[0], name, REGION)
+        _draw_text(pen, view.pixels(upper_left)[0], name, REGION_COLOR)
     for body in built.world.bodies:
-        _draw_text(pen, view.pixels(np.array([body.pose.position[:2]]))[0], body.name, BODY)
+        _draw_text(pen, view.pixels(np.array([body.pose.position[:2]]))[0], body.name, BODY_COLOR)
     for name, place in built.world.places.items():
         tip = place.apply(np.array([[0.0, 0.0], [0.3, 0.0]]))
         (x, y), end = view.pixels(tip)
         radius = 4 * SUPERSAMPLING
-        pen.line(((x, y), end), fill=PLACE, width=2 * SUPERSAMPLING)
-        pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=PLACE)
-        _draw_text(pen, (x, y), name, PLACE)
+        pen.line(((x, y), end), fill=PLACE_COLOR, width=2 * SUPERSAMPLING)
+        pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=PLACE_COLOR)
+        _draw_text(pen, (x, y), name, PLACE_COLOR)
 
 
-def _draw_text(pen: "ImageDraw.ImageDraw", place: tuple[float, float], text: str, color: Color) -> None:
+def _draw_text(pen: "ImageDraw.ImageDraw", point: tuple[float, float], text: str, color: Color) -> None:
+    """Write a text to the lower right of a point of the canvas."""
     from PIL import ImageFont
 
     font = ImageFont.load_default(13 * SUPERSAMPLING)
-    x, y = place[0] + 6 * SUPERSAMPLING, place[1] + 4 * SUPERSAMPLING
+    x, y = point[0] + 6 * SUPERSAMPLING, point[1] + 4 * SUPERSAMPLING
     pen.text((x, y), text, fill=color, font=font, stroke_width=SUPERSAMPLING, stroke_fill=(255, 255, 255, 220))
 
 
 def _draw_scale_bar(pen: "ImageDraw.ImageDraw", view: Viewport) -> None:
-    """Draw a scale bar in the lower left corner, up to a fifth of the width: 1, 2 or 5 times a power of ten."""
+    """Draw a scale bar in the lower left corner: 1, 2 or 5 times a power of ten m, at most a fifth of the width."""
     max_length = view.size[0] / view.scale / 5
     power = 10.0 ** math.floor(math.log10(max_length))
     meters = max(step * power for step in (1, 2, 5) if step * power <= max_length)
     x, y = 14 * SUPERSAMPLING, view.size[1] - 14 * SUPERSAMPLING
-    pen.line((x, y, x + meters * view.scale, y), fill=SCALE_BAR, width=3 * SUPERSAMPLING)
-    _draw_text(pen, (x - 6 * SUPERSAMPLING, y - 24 * SUPERSAMPLING), f"{meters:g} m", SCALE_BAR)
+    pen.line((x, y, x + meters * view.scale, y), fill=SCALE_BAR_COLOR, width=3 * SUPERSAMPLING)
+    _draw_text(pen, (x - 6 * SUPERSAMPLING, y - 24 * SUPERSAMPLING), f"{meters:g} m", SCALE_BAR_COLOR)

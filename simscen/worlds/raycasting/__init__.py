@@ -1,1 +1,1 @@
-"""Ray casting with Embree."""
+"""Ray casting with Embree: `mesh_scene` for one mesh, `ray_scene` for a world with moving and resting bodies."""

@@ -1,6 +1,10 @@
-"""Embree scenes of meshes, and the direct calls of the Embree library that cast rays in packets of 16.
+"""Cast rays against one mesh, static or moving, by direct calls of the Embree library in packets of 16 rays.
 
-The embreex package, which contains the library, copies triangles number by number and casts rays one by one.
+The embreex package contains the library, but its own Python functions are slow: they copy triangles number by number,
+and cast rays one by one.
+
+A fan contains the rays of a planar lidar (see `RayFan`). To sweep a fan means to cast its rays: each ray is shortened
+to end at the first triangle that it hits. Several scenes can therefore be swept one after another.
 """
 
 import ctypes
@@ -18,11 +22,17 @@ from simscen.core.geometry import Array, Pose3, Vector, rotated
 from simscen.core.geometry.ray_fans import ALL_PACKETS, PACKET_SIZE, RayFan, RayPackets, Singles
 from simscen.core.geometry.shapes import Mesh, TriangleMesh
 
-_LIBRARY = ctypes.PyDLL(rtcore_scene.__file__)  # also finds the functions of the libraries it is linked with
+_LIBRARY = ctypes.PyDLL(rtcore_scene.__file__)  # also finds the functions of the libraries that it is linked with
+
+# Values of Embree's enumerations and bit masks.
 _TRIANGLES, _ROBUST, _COHERENT, _ALL = 0, 1 << 2, 1 << 16, 0xFFFFFFFF
+"""RTC_GEOMETRY_TYPE_TRIANGLE, RTC_SCENE_FLAG_ROBUST, RTC_RAY_QUERY_FLAG_COHERENT, RTC_FEATURE_FLAG_ALL."""
 _INDICES, _VERTICES, _THREE_WORDS, _THREE_FLOATS = 0, 1, 0x5003, 0x9003
+"""RTC_BUFFER_TYPE_INDEX, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_UINT3, RTC_FORMAT_FLOAT3."""
 _NO_ERROR, _OUT_OF_MEMORY = 0, 4
+"""RTC_ERROR_NONE, RTC_ERROR_OUT_OF_MEMORY."""
 _ALIGNMENT_BYTES = 64
+"""Required alignment of the mask of a packet."""
 
 for _name, _result, _arguments in (
     ("rtcNewDevice", c_void_p, (ctypes.c_char_p,)),
@@ -56,20 +66,23 @@ _QUERY = _Query(_COHERENT, _ALL)
 _QUERY_ADDRESS = c_void_p(ctypes.addressof(_QUERY))
 _ALL_VALID = np.full(PACKET_SIZE + _ALIGNMENT_BYTES // 4, -1, dtype=np.int32)
 _ALL_VALID_ADDRESS = c_void_p(_ALL_VALID.ctypes.data + -_ALL_VALID.ctypes.data % _ALIGNMENT_BYTES)
-"""Address of the mask of a packet in which all rays are valid."""
+"""Address, aligned within _ALL_VALID, of the mask of a packet in which all rays are valid."""
 
 
 @cache
 def _device() -> c_void_p:
-    """Return a device with one thread, because other threads would not exist after a fork."""
+    """Return the Embree device. It has one thread, because other threads would not exist after a fork."""
     return c_void_p(_LIBRARY.rtcNewDevice(b"threads=1"))
 
 
 class EmbreeScene:
-    """Embree scene of triangles."""
+    """Thin wrapper of an `RTCScene` of triangles. Does not know frames; see `MeshScene`."""
 
     def __init__(self, vertices: Array, mesh: TriangleMesh | Mesh) -> None:
-        """Build a scene of the faces of a mesh with other vertices (n, 3)."""
+        """Build the scene from the faces of `mesh`, but with `vertices` (n, 3) instead of the mesh's own.
+
+        Raises MemoryError, or RuntimeError if Embree refuses the triangles.
+        """
         device, count = _device(), len(mesh.faces)
         self._scene = c_void_p(_LIBRARY.rtcNewScene(device))
         finalize(self, _LIBRARY.rtcReleaseScene, self._scene).atexit = False
@@ -94,45 +107,46 @@ class EmbreeScene:
         if error != _NO_ERROR:
             raise RuntimeError(f"Embree cannot take {count} triangles (error {error})")
 
-    def shorten(self, rays: RayPackets, packets: slice = slice(None)) -> None:
-        """End the rays of some `packets` at the first triangle that they hit."""
+    def shorten(self, rays: RayPackets, packets: slice = ALL_PACKETS) -> None:
+        """End the rays in the packets of this range at the first triangle that they hit."""
         intersect, scene = _LIBRARY.rtcIntersect16, self._scene
         for packet in rays.addresses[packets]:
             intersect(_ALL_VALID_ADDRESS, scene, packet, _QUERY_ADDRESS)
 
 
-HeightRange = tuple[float, float]
-"""Minimum and maximum height of rays in m."""
-Numbers = npt.NDArray[np.int64]
-
-
 class MeshScene:
-    """Embree scene of a mesh, relative to its center, because Embree works in single precision.
+    """Triangles of a mesh to cast rays at, in the frame of the mesh.
 
-    `radius` is the radius of the bounding sphere, `extent` the greatest distance of the mesh from the origin of its
-    frame.
+    Embree works in single precision. It therefore receives all positions relative to `center`.
+
+    center:  point near the mesh in m, by default the center of its bounding box
+    radius:  radius in m of a sphere around `center` that contains the mesh
+    extent:  upper bound in m of the distance of the mesh from the origin of its frame
     """
 
-    def __init__(self, mesh: TriangleMesh | Mesh, middle: Array | None = None) -> None:
-        """Build the scene relative to `middle` (3,); default: the center of the mesh."""
-        self.middle = bounding_box_center(mesh.vertices) if middle is None else middle
-        x, y, z = self.middle.tolist()
-        self.center = (x, y, z)
-        corners = mesh.vertices - self.middle
+    def __init__(self, mesh: TriangleMesh | Mesh, center: Vector | None = None) -> None:
+        self.center = _bounding_box_center(mesh.vertices) if center is None else center
+        corners = mesh.vertices - self.center
         # Slightly more, for rays that touch the farthest corner.
         self.radius = 1.001 * float(np.linalg.norm(corners, axis=1).max(initial=0.0))
-        self.extent = math.hypot(x, y, z) + self.radius
+        self.extent = math.hypot(*self.center) + self.radius
         self._scene = EmbreeScene(corners, mesh)
 
     def distances(self, origins: Array, directions: Array, ends: float | Singles) -> Singles:
-        """Return the distances (n,) to the first hits of rays in the frame of the mesh, or to their ends."""
+        """Return the distances (n,) in m to the first hits of single rays, or their `ends` without a hit.
+
+        The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and are `ends` (n,) m long.
+        """
         rays = RayPackets(len(origins))
-        rays.put(origins - self.middle, directions, ends)
+        rays.put(origins - self.center, directions, ends)
         self._scene.shorten(rays)
         return rays.distances()
 
     def sweep(self, fan: RayFan, position: Vector, packets: slice = ALL_PACKETS) -> None:
-        """Shorten some `packets` of a fan's rays, which start at `position` with their current directions."""
+        """Shorten the rays of a fan at `position`; only those in the packets of this range.
+
+        The directions of the fan must be set already, in the frame of the mesh.
+        """
         (x, y, z), (mx, my, mz) = position, self.center
         fan.set_origin(x - mx, y - my, z - mz, packets)
         self._scene.shorten(fan.rays, packets)
@@ -140,61 +154,66 @@ class MeshScene:
 
 @cached_on_instance
 def cached_mesh_scene(mesh: TriangleMesh) -> MeshScene:
-    """Return the scene of a mesh, cached with the mesh, also for forked processes."""
+    """Return the scene of a mesh. It is built once and kept with the mesh, also for processes that are forked later."""
     return MeshScene(mesh)
 
 
 class MovingMesh:
-    """Mesh scene at a pose in the world. Its center and rotation are computed when rays come near."""
+    """A mesh at a pose in the world. Rays are transformed to the frame of the mesh, so that its scene need not change.
 
-    def __init__(self, mesh: TriangleMesh, part: MeshScene, pose: Pose3) -> None:
-        """Place the scene `part` of a mesh at a pose of its frame in the world."""
-        self.mesh, self.part, self.pose = mesh, part, pose
-        self._middle: Vector | None = None
+    Center and rotation are computed only when rays come near.
+    """
+
+    def __init__(self, mesh: TriangleMesh, scene: MeshScene, pose: Pose3) -> None:
+        """Put a mesh, whose scene is `scene`, at `pose`: the pose of its frame in the world."""
+        self.mesh, self.scene, self.pose = mesh, scene, pose
+        self._center: Vector | None = None
         self._rotation: Array | None = None
 
     @property
-    def middle(self) -> Vector:
-        """The center in the world."""
-        if self._middle is None:
+    def center(self) -> Vector:
+        """Center of the scene in the world frame."""
+        if self._center is None:
             x, y, z, i, j, k, w = self.pose
-            p, q, r = rotated((i, j, k, w), self.part.center)
-            self._middle = x + p, y + q, z + r
-        return self._middle
+            p, q, r = rotated((i, j, k, w), self.scene.center)
+            self._center = x + p, y + q, z + r
+        return self._center
 
     @property
     def _world_rotation(self) -> Array:
+        """Rotation matrix (3, 3) from the frame of the mesh to the world frame."""
         if self._rotation is None:
             self._rotation = self.pose.rotation()
         return self._rotation
 
     def min_distance(self, position: Vector) -> float:
-        """Return a lower bound of the distance in m from a position in the world."""
-        return math.dist(self.pose[:3], position) - self.part.extent
+        """Return a lower bound of the distance in m between the mesh and a position in the world frame."""
+        return math.dist(self.pose[:3], position) - self.scene.extent
 
     def distances(self, origins: Array, directions: Array, ends: Singles) -> Singles:
-        """Return the distances (n,) to the first hits of rays in the world frame, as `MeshScene.distances`."""
+        """Return the same as `MeshScene.distances`, for rays in the world frame."""
         rotation = self._world_rotation
-        return self.part.distances((origins - self.pose[:3]) @ rotation, directions @ rotation, ends)
+        return self.scene.distances((origins - self.pose[:3]) @ rotation, directions @ rotation, ends)
 
     def sweep(self, fan: RayFan, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
-        """Shorten the rays of a fan at `pose`, whose x and y axes are `axes`.
+        """Shorten the rays of a fan at `pose`. `axes` are the x and y axis of that pose, all in the world frame.
 
-        Only rays within the cone around the bounding sphere are cast, if any of them is long enough.
+        Only rays that may hit the bounding sphere of the mesh are cast.
         """
-        for packets in packets_towards_sphere(fan, pose, self.middle, self.part.radius):
+        for packets in packets_towards_sphere(fan, pose, self.center, self.scene.radius):
             self._sweep_packets(fan, packets, pose, axes)
 
     def _sweep_packets(self, fan: RayFan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
+        """Transform the rays in the packets of this range to the frame of the mesh, and shorten them."""
         (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
         inverse = -i, -j, -k, w
         fan.set_directions(rotated(inverse, ahead), rotated(inverse, left), packets)
-        self.part.sweep(fan, rotated(inverse, (px - x, py - y, pz - z)), packets)
+        self.scene.sweep(fan, rotated(inverse, (px - x, py - y, pz - z)), packets)
 
 
-def packets_towards_sphere(fan: RayFan, pose: Pose3, middle: Vector, radius: float) -> list[slice]:
-    """Return the packets of a fan at `pose` with rays that may hit a sphere."""
-    (x, y, z), (px, py, pz, i, j, k, w) = middle, pose
+def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: float) -> list[slice]:
+    """Return the ranges of packets of a fan at `pose` with rays that may hit the sphere around `center`."""
+    (x, y, z), (px, py, pz, i, j, k, w) = center, pose
     offset = x - px, y - py, z - pz
     distance = math.hypot(*offset)
     ahead, left, _ = rotated((-i, -j, -k, w), offset)
@@ -207,18 +226,22 @@ def packets_towards_sphere(fan: RayFan, pose: Pose3, middle: Vector, radius: flo
     return [packets for packets in found if (some := ends[packets]).item(some.argmax()) >= distance - radius]
 
 
-def rays_hitting_sphere(middle: Vector, radius: float, origins: Array, directions: Array, ends: Singles) -> Numbers:
-    """Return the indices of rays with different origins that hit a sphere before they end."""
-    offsets = middle - origins
+def rays_hitting_sphere(
+    center: Vector, radius: float, origins: Array, directions: Array, ends: Singles
+) -> npt.NDArray[np.int64]:
+    """Return the indices of single rays that may hit the sphere around `center`; rays as in `MeshScene.distances`."""
+    offsets = center - origins
     ahead = (offsets * directions).sum(axis=1)
     lateral_squared = (offsets * offsets).sum(axis=1) - ahead**2
-    hit: Numbers = ((ahead >= -radius) & (ahead - radius <= ends) & (lateral_squared <= radius * radius)).nonzero()[0]
+    hit: npt.NDArray[np.int64] = (
+        (ahead >= -radius) & (ahead - radius <= ends) & (lateral_squared <= radius * radius)
+    ).nonzero()[0]
     return hit
 
 
-def bounding_box_center(vertices: Array) -> Array:
-    """Return the center (3,) of the bounding box of vertices (n, 3)."""
+def _bounding_box_center(vertices: Array) -> Vector:
+    """Return the center of the bounding box of vertices (n, 3); zeros without vertices."""
     if not len(vertices):
-        return np.zeros(3)
-    middle: Array = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    return middle
+        return 0.0, 0.0, 0.0
+    x, y, z = ((vertices.min(axis=0) + vertices.max(axis=0)) / 2).tolist()
+    return x, y, z

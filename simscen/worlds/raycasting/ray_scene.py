@@ -1,4 +1,4 @@
-"""Ray casting with Embree: one scene for the static world, one for resting bodies, and one for each moving body."""
+"""Cast rays in a world: against one scene of the static world, a few of resting bodies, and one of each moving body."""
 
 import math
 from collections.abc import Iterator, Mapping, Set
@@ -11,7 +11,6 @@ from simscen.core.geometry.meshes import submesh_between_heights
 from simscen.core.geometry.ray_fans import RayCaster, RayFan, Singles
 from simscen.core.geometry.shapes import Mesh, TriangleMesh
 from simscen.worlds.raycasting.mesh_scene import (
-    HeightRange,
     MeshScene,
     MovingMesh,
     cached_mesh_scene,
@@ -20,20 +19,29 @@ from simscen.worlds.raycasting.mesh_scene import (
 )
 
 PlacedMesh = tuple[TriangleMesh, Pose3]
-"""A mesh in the frame of a body, and the pose of that frame."""
+"""A mesh in the frame of a body, and the pose of that frame in the world."""
+HeightRange = tuple[float, float]
+"""Minimum and maximum height in m of the rays, and of the triangles that they need."""
 
 MAX_GROUP_TRIANGLES = 20_000
-"""Maximum number of triangles of a group, whose scene takes 10 ms to build."""
+"""Maximum number of triangles of a group of several bodies, so that building its scene takes about 10 ms."""
 MAX_GROUPS = 16
-"""Number of groups at which all groups are rebuilt when another body comes to rest."""
+"""Number of groups from which on all groups are merged and divided anew when another body comes to rest."""
+NO_POSES: Mapping[str, Pose3] = MappingProxyType({})
+_MAX_RANGE_M = 1e30
+"""Maximum length of a ray: an infinite one would overflow in single precision."""
+_END_FACTOR = 1.001
+"""Initial length of a ray as a multiple of its range: a ray that is longer than its range at the end has no hit."""
+_HEIGHT_MARGIN_M, _ROUNDING_MARGIN_M = 0.1, 0.01
+"""Minimum margin of the height range from which triangles are taken, and upper bound of rounding errors."""
 
 
 class RestingBodies:
-    """All resting bodies, in groups. A group is split when one of its bodies leaves."""
+    """All resting bodies of a world, in groups with one scene each. A group is split when one of its bodies leaves."""
 
-    def __init__(self, middle: Array) -> None:
-        """Create an empty set. `middle` (3,) is the center of the world, to which all scenes are relative."""
-        self._middle = middle
+    def __init__(self, center: Vector) -> None:
+        """Create an empty set. `center` is the center of the world, to which all scenes are relative."""
+        self._center = center
         self._bodies: Mapping[str, PlacedMesh] = {}
         self._groups: list[RestingGroup] = []
 
@@ -41,7 +49,7 @@ class RestingBodies:
         return bool(self._groups)
 
     def set_bodies(self, bodies: Mapping[str, PlacedMesh]) -> None:
-        """Set the bodies that are at rest now."""
+        """Set the bodies that are at rest now, by name."""
         previous, self._bodies = self._bodies, bodies
         unchanged = {name for name, body in previous.items() if name in bodies and _is_same(body, bodies[name])}
         if len(unchanged) < len(previous):
@@ -52,16 +60,22 @@ class RestingBodies:
                 self._groups, unchanged = [], set()
             new = {name: body for name, body in bodies.items() if name not in unchanged}
             meshes = {name: Mesh(pose.apply(mesh.vertices), mesh.faces) for name, (mesh, pose) in new.items()}
-            self._groups += RestingGroup(self._middle, meshes).split_to_limit()
+            self._groups += RestingGroup(self._center, meshes).split_to_limit()
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float, heights: HeightRange) -> None:
-        """Shorten the rays of a fan, which is already turned to `pose`."""
+        """Shorten the rays of a fan at `pose`, which are at most `reach` m long and have these heights.
+
+        The directions of the fan must be set already.
+        """
         for group in self._groups:
             if group.min_distance(pose[:3]) <= reach:
                 group.sweep(fan, pose, heights)
 
     def cast(self, origins: Array, directions: Array, heights: HeightRange, ends: Singles) -> None:
-        """Shorten the `ends` (n,) of rays with different origins, in place."""
+        """Shorten single rays in place: set their lengths `ends` (n,) in m to their first hits.
+
+        The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and have these heights.
+        """
         for group in self._groups:
             group.cast(origins, directions, heights, ends)
 
@@ -76,19 +90,22 @@ class RestingGroup:
     The hits of a ray do not depend on other bodies of the scene, so the grouping does not affect results.
     """
 
-    def __init__(self, middle: Array, meshes: Mapping[str, Mesh]) -> None:
-        """Create a group of meshes in the world frame, by name; `middle` (3,) is the center of the world."""
-        self._middle, self._meshes = middle, meshes
+    def __init__(self, world_center: Vector, meshes: Mapping[str, Mesh]) -> None:
+        """Create a group of bodies from their meshes in the world frame, by name.
+
+        The scene is relative to `world_center`, whatever the group is, so that the grouping does not affect rounding.
+        """
+        self._world_center, self._meshes = world_center, meshes
         corners = np.concatenate([mesh.vertices for mesh in meshes.values()])
         self._low, self._high = corners.min(axis=0), corners.max(axis=0)
         x, y, z = ((self._low + self._high) / 2).tolist()
         self._center = x, y, z
         self._radius = 1.001 * float(np.linalg.norm(corners - self._center, axis=1).max())
-        self._part: MeshScene | None = None
+        self._scene: MeshScene | None = None
         self._heights: HeightRange | None = None
 
     def split_to_limit(self) -> Iterator["RestingGroup"]:
-        """Yield this group, or its parts with at most MAX_GROUP_TRIANGLES."""
+        """Yield this group or, if it has more than MAX_GROUP_TRIANGLES, smaller groups of its bodies."""
         if len(self._meshes) == 1 or sum(len(mesh.faces) for mesh in self._meshes.values()) <= MAX_GROUP_TRIANGLES:
             yield self
         else:
@@ -96,9 +113,9 @@ class RestingGroup:
                 yield from half.split_to_limit()
 
     def split_without(self, removed: Set[str]) -> Iterator["RestingGroup"]:
-        """Yield this group, or its parts without the bodies in `removed`.
+        """Yield this group if it has none of the `removed` bodies, otherwise smaller groups of its other bodies.
 
-        The group is halved repeatedly, so that each body that leaves causes less to be rebuilt.
+        The group is halved repeatedly, so that the next body that leaves causes a smaller group to be rebuilt.
         """
         if removed.isdisjoint(self._meshes):
             yield self
@@ -107,87 +124,78 @@ class RestingGroup:
                 yield from half.split_without(removed)
 
     def _halves(self) -> Iterator["RestingGroup"]:
-        """Yield two groups, divided along the longest side of the bounding box."""
+        """Yield two groups with half of the bodies each, divided along the longest side of the bounding box."""
         along = int((self._high - self._low).argmax())
         names = sorted(self._meshes, key=lambda name: (self._meshes[name].vertices[:, along].mean(), name))
         for half_names in (names[: len(names) // 2], names[len(names) // 2 :]):
-            yield RestingGroup(self._middle, {name: self._meshes[name] for name in half_names})
+            yield RestingGroup(self._world_center, {name: self._meshes[name] for name in half_names})
 
-    def _scene(self, heights: HeightRange) -> MeshScene:
-        if self._part is None or heights != self._heights:
-            merged = _merged(list(self._meshes.values()))
-            self._part = MeshScene(submesh_between_heights(merged.vertices, merged.faces, heights), self._middle)
+    def _scene_between(self, heights: HeightRange) -> MeshScene:
+        """Return the scene of the triangles in a range of heights; it is kept until the range changes."""
+        if self._scene is None or heights != self._heights:
+            merged = _merge(list(self._meshes.values()))
+            self._scene = MeshScene(submesh_between_heights(merged.vertices, merged.faces, heights), self._world_center)
             self._heights = heights
-        return self._part
+        return self._scene
 
     def min_distance(self, position: Vector) -> float:
-        """Return a lower bound of the distance in m from a position."""
+        """Return a lower bound of the distance in m from a position to any of the bodies."""
         return math.dist(self._center, position) - self._radius
 
     def sweep(self, fan: RayFan, pose: Pose3, heights: HeightRange) -> None:
-        """Shorten the rays of a fan, which is already turned to `pose`."""
+        """Shorten the rays of a fan; see `RestingBodies.sweep`."""
         for packets in packets_towards_sphere(fan, pose, self._center, self._radius):
-            self._scene(heights).sweep(fan, pose[:3], packets)
+            self._scene_between(heights).sweep(fan, pose[:3], packets)
 
     def cast(self, origins: Array, directions: Array, heights: HeightRange, ends: Singles) -> None:
-        """Shorten the `ends` (n,) of rays with different origins, in place."""
+        """Shorten single rays; see `RestingBodies.cast`."""
         rays = rays_hitting_sphere(self._center, self._radius, origins, directions, ends)
         if len(rays):
-            ends[rays] = self._scene(heights).distances(origins[rays], directions[rays], ends[rays])
+            ends[rays] = self._scene_between(heights).distances(origins[rays], directions[rays], ends[rays])
 
 
-def _merged(meshes: list[Mesh]) -> Mesh:
-    """Return one mesh of all meshes."""
+def _merge(meshes: list[Mesh]) -> Mesh:
+    """Return one mesh with the triangles of all meshes."""
     firsts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])]).tolist()
     faces = [mesh.faces + np.int32(first) for mesh, first in zip(meshes, firsts, strict=True)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
-NO_HOMES: Mapping[str, Pose3] = MappingProxyType({})
-
-_MAX_RANGE_M = 1e30
-"""Maximum length of a ray in single precision."""
-_END_FACTOR = 1.001
-"""End of a ray without a hit, as a multiple of its range."""
-_HEIGHT_MARGIN_M, _ROUNDING_MARGIN_M = 0.1, 0.01
-"""Minimum margin of the height range from which triangles are taken, and upper bound of rounding errors."""
-
-
 class RayScene(RayCaster):
-    """A `core.geometry.ray_fans.RayCaster` over the triangles of a world and of the bodies that move in it.
+    """A `core.geometry.ray_fans.RayCaster` over the triangles of a world and of the bodies in it.
 
     The scene of a moving body is built once in its own frame, and the few rays that come near it are transformed to
-    that frame. The triangles of bodies that rest at their home pose are transformed to the world frame, once, so that
-    many bodies are one scene. The frame affects the last bits of distances, so it depends only on the current poses,
-    not on earlier calls.
+    that frame. The triangles of resting bodies are transformed once to the world frame, so that many bodies form one
+    scene. The frame affects the last bits of distances. Whether a body counts as resting therefore depends only on the
+    current poses, not on earlier calls.
 
     Distances agree with PyBullet's rays within 1 mm. Embree works in single precision. Each scene is therefore relative
     to its own center: a world that is 10 km from the origin loses no precision, a world that is 10 km wide 0.5 mm.
     """
 
     def __init__(self, static: "TriangleMesh | RayScene") -> None:
-        """Create a scene of the static mesh of a world, or with that of another scene."""
+        """Create a scene with the static mesh of a world, or with the same static mesh as another scene."""
         self._static: MeshScene = static._static if isinstance(static, RayScene) else cached_mesh_scene(static)
         self._movers: dict[str, MovingMesh] = {}
-        self._resting = RestingBodies(self._static.middle)
+        self._resting = RestingBodies(self._static.center)
         self._heights = math.inf, -math.inf
 
-    def set_moving(self, bodies: Mapping[str, PlacedMesh], homes: Mapping[str, Pose3] = NO_HOMES) -> None:
-        """Set the current bodies: by name, the mesh in the body's frame and the pose of that frame.
+    def set_bodies(self, bodies: Mapping[str, PlacedMesh], rest_poses: Mapping[str, Pose3] = NO_POSES) -> None:
+        """Set all bodies that exist now, by name; others are removed.
 
-        A body at the pose in `homes` is treated as resting.
+        A body counts as resting if its pose equals its pose in `rest_poses`, otherwise as moving.
         """
         previous, self._movers = self._movers, {}
         resting = dict[str, PlacedMesh]()
         for name, (mesh, pose) in bodies.items():
-            if homes and homes.get(name) == pose:
+            if rest_poses and rest_poses.get(name) == pose:
                 resting[name] = mesh, pose
                 continue
             mover = previous.get(name)
             if mover is None or mover.mesh is not mesh:
                 mover = MovingMesh(mesh, cached_mesh_scene(mesh), pose)
             elif mover.pose != pose:
-                mover = MovingMesh(mesh, mover.part, pose)
+                mover = MovingMesh(mesh, mover.scene, pose)
             self._movers[name] = mover
         if resting or self._resting:
             self._resting.set_bodies(resting)
@@ -205,7 +213,7 @@ class RayScene(RayCaster):
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Singles:
         """Return the distances (n,) in m of a fan with its frame at `pose`; values beyond `reach` mean no hit.
 
-        This method runs once per scan, so that each numpy call (1 µs) counts.
+        This method runs once per scan, so that each NumPy call counts.
         """
         position, (ahead, left) = pose[:3], forward_and_left(pose[3:])
         fan.set_directions(ahead, left)
@@ -220,7 +228,7 @@ class RayScene(RayCaster):
         return fan.rays.distances()
 
     def _first_hits(self, origins: Array, directions: Array, reach: float, end: float) -> Singles:
-        """Return the distances (n,) to the first hits of rays with different origins."""
+        """Return the distances (n,) in m to the first hits of single rays, or `end` without a hit within `reach` m."""
         x, y, z = origins[0].tolist()
         reach += float(np.linalg.norm(origins - (x, y, z), axis=1).max())
         ends = self._static.distances(origins, directions, end)
@@ -231,13 +239,16 @@ class RayScene(RayCaster):
             self._resting.cast(origins, directions, heights, ends)
         for mover in self._movers.values():
             if mover.min_distance((x, y, z)) <= reach:
-                rays = rays_hitting_sphere(mover.middle, mover.part.radius, origins, directions, ends)
+                rays = rays_hitting_sphere(mover.center, mover.scene.radius, origins, directions, ends)
                 if len(rays):
                     ends[rays] = mover.distances(origins[rays], directions[rays], ends[rays])
         return ends
 
     def _height_range(self, low: float, high: float) -> HeightRange:
-        """Return the height range of triangles for rays between two heights; the last range is kept if it suffices."""
+        """Return the range from which triangles are needed for rays between two heights in m.
+
+        The last range is returned again as long as it contains the rays, because a new range requires new scenes.
+        """
         below, above = self._heights
         if not (below <= low - _ROUNDING_MARGIN_M and high + _ROUNDING_MARGIN_M <= above):
             low, high = min(low, below), max(high, above)
@@ -247,10 +258,10 @@ class RayScene(RayCaster):
 
 
 def _max_rise(slope: float, reach: float) -> float:
-    """Return the maximum rise in m of a ray with the vertical component `slope` of its unit direction."""
+    """Return the height in m that a ray of `reach` m gains at most; `slope` is the z component of its unit vector."""
     return slope * reach if slope > 0 else 0.0
 
 
 def build_mesh_scene(mesh: TriangleMesh) -> None:
-    """Build the scene of a static mesh before runs are forked; this takes 0.2 µs per triangle."""
+    """Build the scene of a static mesh, so that processes that are forked later need not build it again."""
     cached_mesh_scene(mesh)

@@ -1,1 +1,1 @@
-"""Shortest paths, clearance and passages of a disc in the static world."""
+"""Paths of a disc-shaped robot through the static world: shortest paths, clearance, narrow gaps, and passages."""

@@ -1,5 +1,6 @@
-"""Clearance from static solids, exact where necessary, and overlap tests for footprints."""
+"""Compute the clearance from static solids, exactly where necessary, and test footprints for overlaps with a solid."""
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,11 +14,17 @@ from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Solid, TriangleMesh
 from simscen.worlds.geometry.cross_section import CrossSection, cross_section, winds_around
 from simscen.worlds.geometry.triangulation import merge_solids
-from simscen.worlds.maps.rasterization import Cells, expand_ranges, filled_cells, touched_cells
+from simscen.worlds.maps.map_size import MAP_MARGIN_M, Bounds
+from simscen.worlds.maps.occupancy_map import empty_grid
+from simscen.worlds.maps.rasterization import CellMask, expand_ranges, filled_cells, touched_cells
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
+MIN_RESOLUTION_M = 0.05
+"""Size of the cells of a grid on which paths or gaps are searched."""
+MAX_CELLS = 1_000_000
+"""Maximum number of cells of such a grid; the cells of larger worlds are larger."""
 MAX_LEVELS = 12
 """Maximum number of cross sections over the height of the robot. Walls and boxes need only one."""
 SPACING_M = 0.02
@@ -25,32 +32,36 @@ SPACING_M = 0.02
 CLEARANCE_WITHOUT_SOLIDS_M = 1e6
 """Clearance in a world without solids."""
 HALF_DIAGONAL_CELLS = 0.7072
-"""Half of a cell's diagonal: the maximum distance of a point from the center of its cell."""
+"""Half of a cell's diagonal, in cells: the maximum distance of a point from the center of its cell."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClearanceField:
-    """Distance to the nearest solid, approximate for cells and exact for points; negative inside solids.
+    """Distance to the nearest solid: approximate for each cell of a grid, exact for single points.
 
-    rough (rows, columns):  distance in m from the center of a cell to that of the nearest cell that a solid touches;
-                            its error is at most HALF_DIAGONAL_CELLS
-    inside:                 cells whose center is in a solid
-    outline:                points of the outlines of solids; point k is on the solid `names[owners[k]]`
+    grid:                   grid without yaw; only its size, resolution, and origin are used
+    rough (rows, columns):  distance in m from the center of a cell to the center of the nearest cell that a solid
+                            touches, 0 for such cells; differs from the exact clearance of the center by at most
+                            HALF_DIAGONAL_CELLS
+    inside:                 mask of the cells whose center is in a solid
+    outline:                points of the outlines of all solids; None without solids
+    owners (n,):            index in `names` of the solid that each point of `outline` belongs to
+    names:                  names of the solids
     """
 
     grid: OccupancyGrid
     rough: Array
-    inside: Cells
+    inside: CellMask
     outline: "cKDTree | None"
     owners: npt.NDArray[np.int32]
     names: tuple[str, ...] = ()
 
     def exact(self, points: Array) -> Array:
-        """Return the clearance (n,) in m at points (n, 2)."""
+        """Return the clearance (n,) in m at points (n, 2); negative inside solids."""
         return self._nearest(points)[0]
 
     def has_clearance(self, points: Array, distance: float) -> npt.NDArray[np.bool_]:
-        """Return which of the points (n, 2) are at least `distance` m away from all solids."""
+        """Return for each of the points (n, 2) whether it is at least `distance` m away from all solids."""
         rough = self.rough[self._cells(points)]
         # Twice, because both the point and the outline may be that far from the centers of their cells.
         has_clearance: npt.NDArray[np.bool_] = rough >= distance + 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
@@ -58,16 +69,19 @@ class ClearanceField:
         has_clearance[undecided] = self.exact(points[undecided]) >= distance
         return has_clearance
 
-    def free_cells(self, distance: float) -> Cells:
-        """Return the cells whose center is at least `distance` m away from all solids."""
+    def free_cells(self, distance: float) -> CellMask:
+        """Return the mask of the cells whose center is at least `distance` m away from all solids."""
         slack = HALF_DIAGONAL_CELLS * self.grid.resolution
-        free: Cells = (self.rough >= distance + slack) & ~self.inside
+        free: CellMask = (self.rough >= distance + slack) & ~self.inside
         undecided = (np.abs(self.rough - distance) < slack) & ~self.inside
         free[undecided] = self.exact(self.grid.center_of(np.argwhere(undecided))) >= distance
         return free
 
     def push_away(self, points: Array, distance: float) -> Array:
-        """Return the translations (n, 2) that move points (n, 2) to `distance` m from their nearest solid."""
+        """Return translations (n, 2) that move points (n, 2) away from their nearest solid, to `distance` m.
+
+        Points that are farther away are not moved.
+        """
         moves = np.zeros_like(points)
         is_near = self.rough[self._cells(points)] < distance + 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
         clearance, gradients = self._nearest(points[is_near])
@@ -75,7 +89,7 @@ class ClearanceField:
         return moves
 
     def _nearest(self, points: Array) -> tuple[Array, Array]:
-        """Return the clearance (n,) in m and its unit gradient (n, 2)."""
+        """Return the clearance (n,) in m at points (n, 2), and its gradient (n, 2), unit vectors away from solids."""
         if self.outline is None:
             return np.full(len(points), CLEARANCE_WITHOUT_SOLIDS_M), np.zeros_like(points)
         distances, numbers = self.outline.query(points)
@@ -84,12 +98,26 @@ class ClearanceField:
         return sign * distances, offsets * (sign / np.where(distances > 0, distances, 1.0))[:, None]
 
     def _cells(self, points: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """Return rows (n,) and columns (n,) of the cells of points (n, 2); outside the grid, the nearest cells."""
         rows, columns = self.grid.cell_of(points).T
         return np.clip(rows, 0, self.grid.shape[0] - 1), np.clip(columns, 0, self.grid.shape[1] - 1)
 
 
+def search_grid(bounds: Bounds, radius: float, min_resolution: float = MIN_RESOLUTION_M) -> OccupancyGrid:
+    """Return the grid for a search of paths of a disc of `radius` m.
+
+    The grid extends beyond the `bounds` of the world by the diameter of the disc, so that a path can lead around the
+    world. Its cells are `min_resolution` m wide, or wider in a large world.
+    """
+    x0, y0, x1, y1 = bounds
+    margin = 2 * radius
+    width, height = (side + 2 * margin + 2 * MAP_MARGIN_M for side in (x1 - x0, y1 - y0))
+    resolution = max(min_resolution, math.sqrt(width * height / MAX_CELLS))
+    return empty_grid((x0 - margin, y0 - margin, x1 + margin, y1 + margin), resolution, "paths")
+
+
 def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[float, float]) -> ClearanceField:
-    """Return the clearance from a mesh between two heights, on the cells of `grid`, which has no yaw."""
+    """Return the clearance from the part of a mesh between two heights, on the cells of `grid`, which has no yaw."""
     from scipy import ndimage, spatial
 
     cuts = sections_between(mesh, z_range)
@@ -108,7 +136,11 @@ def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[floa
 
 
 def sections_between(mesh: TriangleMesh, z_range: tuple[float, float]) -> list[CrossSection]:
-    """Return cross sections between two heights: all that upright solids need, at most MAX_LEVELS for others."""
+    """Return cross sections of a mesh between two heights, at most MAX_LEVELS.
+
+    There is one between any two neighboring heights of vertices, which is exact for upright solids. If these are too
+    many, the heights of the cross sections are evenly spaced.
+    """
     low, high = z_range
     z = np.unique(np.round(mesh.vertices[:, 2], 3))
     levels = np.concatenate(([low], z[(z > low) & (z < high)], [high]))
@@ -136,11 +168,15 @@ def _sample_segments(segments: Array, owners: npt.NDArray[np.int32]) -> tuple[Ar
 
 
 def footprint_overlaps_solid(solid: Solid, corners: Polygon, z_range: tuple[float, float]) -> bool:
-    """Return whether an outline overlaps a solid between two heights."""
+    """Return whether a footprint overlaps the part of a solid between two heights.
+
+    `corners` are the corners of the footprint in the frame of the solid's pose.
+    """
     return any(_overlaps_outline(cut.segments, corners) for cut in sections_between(merge_solids([solid]), z_range))
 
 
 def _overlaps_outline(segments: Array, corners: Polygon) -> bool:
+    """Return whether a footprint overlaps the cross section of a solid, given by its segments (n, 2, 2)."""
     if not len(segments):
         return False
     if winds_around(segments, corners[0]):
@@ -152,7 +188,7 @@ def _overlaps_outline(segments: Array, corners: Polygon) -> bool:
 
 
 def _starts_inside(segments: Array, corners: Polygon) -> bool:
-    """Return whether a segment starts inside; a small object may be completely inside the footprint."""
+    """Return whether a segment starts inside the footprint, because a small object may be completely inside."""
     (left, low), (right, high) = np.min(corners, axis=0), np.max(corners, axis=0)
     x, y = segments[:, 0].T
     starts = segments[(x >= left) & (x <= right) & (y >= low) & (y <= high), 0]

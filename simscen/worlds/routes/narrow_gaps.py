@@ -1,6 +1,8 @@
-"""Search of the gap that is too narrow for a robot: the narrowest point of the widest path between two positions."""
+"""Find the gap that is too narrow for a robot: the narrowest point of the widest path between two positions.
 
-import math
+The widest path is the path whose narrowest point is as wide as possible.
+"""
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,23 +11,24 @@ import numpy.typing as npt
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.shapes import TriangleMesh
-from simscen.worlds.maps.occupancy_map import empty_grid
-from simscen.worlds.routes.clearance import ClearanceField, clearance_field
+from simscen.worlds.maps.map_size import Bounds
+from simscen.worlds.routes.clearance import ClearanceField, clearance_field, search_grid
 
-MAX_CELLS = 1_000_000
 MIN_CLEARANCE_CELLS = 0.71
-"""Clearance below which a gap cannot be distinguished from a thin wall."""
+"""Clearance below which a gap cannot be distinguished from a thin wall: half of a cell's diagonal."""
 SAME_THICKNESS_CELLS = 0.3
-"""Difference up to which walls count as equally thin; the wall nearest to the midpoint of start and goal is used."""
+"""Difference up to which walls count as equally thin. Of these, the wall nearest to the middle of both ends is used."""
 OPPOSITE_COSINE = -0.5
-"""Cosine of the angle beyond which two solids are on different sides of a gap."""
+"""Cosine of the angle (120°), seen from the gap, beyond which two points are on different sides of the gap."""
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Narrowest point of the widest path: its center, and `width` in m, 0 without any gap.
+    """Narrowest point of the widest path between two positions.
 
-    `sides` are the points of the solids on both sides.
+    x, y:   center in m
+    width:  width in m; 0 if every path leads through a wall: then the center is in the thinnest wall
+    sides:  nearest points of the solids on both sides; () if there is only one side or a wall
     """
 
     x: float
@@ -36,23 +39,21 @@ class Gap:
 
 def narrowest_gap(
     mesh: TriangleMesh,
-    bounds: tuple[float, float, float, float],
+    bounds: Bounds,
     ends: tuple[Pose2, Pose2],
     radius: float,
     z_range: tuple[float, float],
 ) -> Gap:
-    """Return the gap between two `ends` that blocks a disc of `radius` m. Its width is exact to about 2 cm."""
-    x0, y0, x1, y1 = bounds
-    margin = 2 * radius
-    area = (x1 - x0 + 2 * margin + 2) * (y1 - y0 + 2 * margin + 2)
-    grid = empty_grid(
-        (x0 - margin, y0 - margin, x1 + margin, y1 + margin), max(0.05, math.sqrt(area / MAX_CELLS)), "gap"
-    )
-    return narrowest_gap_in(clearance_field(mesh, grid, z_range), ends, radius)
+    """Return the gap that blocks a disc of `radius` m on its way from one of the two `ends` to the other.
+
+    The width of the gap is exact to about 2 cm. Only the part of `mesh` between the heights `z_range` counts. `bounds`
+    are those of the world.
+    """
+    return narrowest_gap_in(clearance_field(mesh, search_grid(bounds, radius), z_range), ends, radius)
 
 
 def narrowest_gap_in(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: float) -> Gap:
-    """Return the gap, as `narrowest_gap`, for a known clearance field."""
+    """Return the same as `narrowest_gap`, from a clearance field that was computed before."""
     grid = field.grid
     clearance = _clearances(field, 2 * radius)
     cell = _bottleneck(clearance, grid.cell_of(np.array([ends[0][:2], ends[1][:2]])))
@@ -67,16 +68,15 @@ def _clearances(field: ClearanceField, max_clearance: float) -> Array:
     """Return the clearance of each cell's center in m, negative in solids and at most `max_clearance`."""
     clearance: Array = np.minimum(field.rough, max_clearance)
     near = field.rough < max_clearance
-    clearance[near] = np.minimum(field.exact(_centers(field.grid, near)), max_clearance)
+    clearance[near] = np.minimum(field.exact(field.grid.center_of(np.argwhere(near))), max_clearance)
     return clearance
 
 
-def _centers(grid: OccupancyGrid, cells: npt.NDArray[np.bool_]) -> Array:
-    return grid.center_of(np.argwhere(cells))
-
-
 def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """Return the cell (row, column) with the least clearance on the path between two cells with the most clearance."""
+    """Return the cell (row, column) with the least clearance on the widest path between two cells.
+
+    `clearance` (rows, columns) is in m, and `ends` (2, 2) are the cells as (row, column).
+    """
     from scipy import ndimage
 
     first, last = (tuple(end) for end in ends)
@@ -93,7 +93,10 @@ def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np
 def _connecting_cell(
     clearance: Array, level: float, first: tuple[int, ...], last: tuple[int, ...]
 ) -> npt.NDArray[np.int64]:
-    """Return a cell of this clearance that connects the start's region of greater clearance with another region."""
+    """Return a cell with clearance `level` that connects the region of greater clearance around `first` with another.
+
+    If possible, the other region is that around `last`. All cells are (row, column).
+    """
     from scipy import ndimage
 
     parts, _ = ndimage.label(clearance > level, structure=np.ones((3, 3)))
@@ -111,28 +114,31 @@ def _connecting_cell(
 
 
 def _thinnest_wall(clearance: Array, grid: OccupancyGrid, ends: tuple[Pose2, Pose2]) -> tuple[float, float]:
-    """Return the center of the thinnest wall between the regions of both ends.
+    """Return the point (x, y) at the center of the thinnest wall between the regions that contain the two ends.
 
-    Thinner walls elsewhere do not count, because a path through them would cross two walls.
+    Walls that do not adjoin both regions do not count, because a path through them would cross two walls.
     """
     from scipy import ndimage
 
-    places = np.array([end[:2] for end in ends])
+    points = np.array([end[:2] for end in ends])
     walls = clearance < MIN_CLEARANCE_CELLS * grid.resolution
     parts, _ = ndimage.label(~walls, structure=np.ones((3, 3)))
     distances: list[Array] = []
-    for row, column in grid.cell_of(places).tolist():
+    for row, column in grid.cell_of(points).tolist():
         part = parts == parts[row, column] if parts[row, column] else np.zeros_like(walls)
         part[row, column] = True
         distances.append(ndimage.distance_transform_edt(~part))
     depth = np.where(walls, np.maximum(*distances), np.inf)
     middles = grid.center_of(np.argwhere(depth < depth.min() + SAME_THICKNESS_CELLS))
-    x, y = middles[np.argmin(np.linalg.norm(middles - places.mean(axis=0), axis=1))].tolist()
+    x, y = middles[np.argmin(np.linalg.norm(middles - points.mean(axis=0), axis=1))].tolist()
     return x, y
 
 
 def _measure_gap(field: ClearanceField, position: Array, search_radius: float) -> Gap:
-    """Return the gap at a position, between the two nearest points of solids on opposite sides."""
+    """Return the gap at a position (2,): between the two nearest points of solids on opposite sides.
+
+    Only points of solids within `search_radius` m of the position are considered.
+    """
     assert field.outline is not None
     points = field.outline.data[field.outline.query_ball_point(position, search_radius)]
     offsets = points - position

@@ -1,4 +1,7 @@
-"""Passages of a path: gaps between two solids that a robot has to cross, such as doors."""
+"""Find the passages of a path: gaps between two solids that a robot has to cross, such as doors.
+
+The sides of a passage are points of the outline: the points on all solids that a `ClearanceField` contains.
+"""
 
 import math
 from collections.abc import Iterator
@@ -14,68 +17,82 @@ from simscen.worlds.routes.clearance import ClearanceField
 MAX_WIDTH_M = 4.0
 """Maximum width of a passage."""
 SPACING_M, MAX_PROBES = 0.25, 80
-"""Distance between two points of the path at which a passage is searched, and their maximum number."""
+"""Distance between the points of the path at which passages are searched, and maximum number of these points."""
 NARROW_WIDTH_M = 2.0
 """Width up to which a passage is measured at its narrowest point instead of where the path crosses it."""
 RAY_ROTATIONS = np.array(
     [[[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]] for a in np.radians(np.arange(-60, 61, 10))]
 )
-"""Rotations (n, 2, 2) of the rays towards the other side of a passage.
+"""Rotations (n, 2, 2) of the rays from a point of the path towards the other side of a passage: -60° to 60°.
 
-At an oblique door, the other door post is not exactly opposite.
+There are several rays because at an oblique door, the other door post is not exactly opposite.
 """
 MAX_POINTS = 400
-"""Maximum number of points of the outline on each side of a passage."""
+"""Maximum number of points of the outline on each side of a passage that are compared, to limit memory."""
 
 
 def find_passages(path: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...]:
-    """Return the passages of a path (n, 2) to `goal`, in its direction. Widths are exact to about 2 cm."""
+    """Return the passages of a path (n, 2) to `goal`, in the order in which the path crosses them.
+
+    The widths of passages are exact to about 2 cm. `goal` is the name of the goal.
+    """
     if field.outline is None:
         return ()
     points = resample_polyline(path, max(SPACING_M, polyline_length(path) / MAX_PROBES))
     found: dict[tuple[int, int], float] = {}
     for point in points:
-        places = ((pair, _crossing_index(field.outline.data[list(pair)], points)) for pair in _pairs(point, field))
-        pair, place = next(((pair, place) for pair, place in places if place is not None), (None, None))
-        if pair is not None and place is not None:
-            found.setdefault((min(pair), max(pair)), place)
+        crossings = (
+            (pair, _crossing_index(field.outline.data[list(pair)], points)) for pair in _candidate_pairs(point, field)
+        )
+        pair, index = next(((pair, index) for pair, index in crossings if index is not None), (None, None))
+        if pair is not None and index is not None:
+            found.setdefault((min(pair), max(pair)), index)
     return tuple(_passage(goal, pair, field) for pair in sorted(found, key=lambda pair: found[pair]))
 
 
 def passage_between(sides: tuple[Point, ...], goal: str, field: ClearanceField) -> Passage:
-    """Return the passage between the two points of the outline that are nearest to `sides`."""
+    """Return the passage between the two points of the outline that are nearest to the two `sides`."""
     assert field.outline is not None
     one, other = (int(field.outline.query(np.array(side))[1]) for side in sides)
     return _passage(goal, (one, other), field)
 
 
 def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage:
+    """Return the passage between two points of the outline, given by their indices."""
     one, other = pair
     return Passage(
-        goal, (_outline_point(one, field), _outline_point(other, field)), (_name(one, field), _name(other, field))
+        goal,
+        (_outline_point(one, field), _outline_point(other, field)),
+        (_name_of_solid(one, field), _name_of_solid(other, field)),
     )
 
 
-def _pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
-    """Yield pairs of points of the outline, by index, on both sides of a point of the path; the nearest pair first."""
+def _candidate_pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
+    """Yield pairs of points of the outline, by index, that may be the two sides of a passage at a point of the path.
+
+    The pair that is nearest to the point comes first.
+    """
     assert field.outline is not None
     distance, index = field.outline.query(point)
     one, apart = int(index), float(distance)
     if not 0 < apart < MAX_WIDTH_M:
         return
-    hits = _hits(point, field.outline.data[one], apart, field)
+    hits = _ray_hits(point, field.outline.data[one], apart, field)
     reached = np.flatnonzero(np.isfinite(hits[:, 0]))
     if not len(reached):
         return
     nearest = reached[np.argmin(np.linalg.norm(hits[reached] - point, axis=1))]
     for hit in dict.fromkeys((int(nearest), int(reached[np.argmin(np.abs(reached - len(RAY_ROTATIONS) // 2))]))):
         other = int(field.outline.query(hits[hit])[1])
-        yield _narrowest(one, other, field)
+        yield _narrowest_pair(one, other, field)
         yield one, other
 
 
-def _hits(point: Array, side: Array, distance: float, field: ClearanceField) -> Array:
-    """Return the points (n, 2) where rays from `point` away from `side` hit a solid; nan without a hit."""
+def _ray_hits(point: Array, side: Array, distance: float, field: ClearanceField) -> Array:
+    """Return for each of the RAY_ROTATIONS the point (n, 2) where a ray from `point` hits a solid; nan without a hit.
+
+    The rays point away from `side`, which is `distance` m from `point`. Passages are at most MAX_WIDTH_M wide.
+    """
     steps = np.arange(0.0, MAX_WIDTH_M - distance, field.grid.resolution / 2)
     rays = point + steps[None, :, None] * (RAY_ROTATIONS @ ((point - side) / distance))[:, None]
     cells = field.grid.cell_of(rays.reshape(-1, 2))
@@ -88,7 +105,10 @@ def _hits(point: Array, side: Array, distance: float, field: ClearanceField) -> 
 
 
 def _crossing_index(ends: Array, path: Array) -> float | None:
-    """Return the index along the path where the line between two points first crosses it; None without a crossing."""
+    """Return where the line between two points `ends` (2, 2) first crosses a path (n, 2); None without a crossing.
+
+    The result is an index of the path: 2.5 means halfway between the points 2 and 3.
+    """
     (ax, ay), (bx, by) = ends.tolist()
     across = (bx - ax) * (path[:, 1] - ay) - (by - ay) * (path[:, 0] - ax)
     step = np.diff(path, axis=0)
@@ -101,10 +121,10 @@ def _crossing_index(ends: Array, path: Array) -> float | None:
     return first + (before / (before + after) if before + after else 0.0)
 
 
-def _narrowest(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
-    """Return the two sides of a passage, as indices of outline points, at its narrowest place near `one` and `other`.
+def _narrowest_pair(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
+    """Return the two sides of a passage where it is narrowest near `one` and `other`; all are indices of the outline.
 
-    `one` and `other` are returned themselves if they are more than NARROW_WIDTH_M apart.
+    If `one` and `other` are more than NARROW_WIDTH_M apart, returns them unchanged.
     """
     assert field.outline is not None
     data = field.outline.data
@@ -122,12 +142,12 @@ def _narrowest(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
 
 
 def _subsample(indices: npt.NDArray[np.int64], required: int) -> npt.NDArray[np.int64]:
-    """Return at most MAX_POINTS of the indices, evenly spaced, and `required`."""
+    """Return at most MAX_POINTS of the indices, evenly spaced, and the index `required`."""
     return np.append(indices[:: 1 + len(indices) // MAX_POINTS], required)
 
 
-def _name(index: int, field: ClearanceField) -> str:
-    """Return the name of the solid at a point of the outline."""
+def _name_of_solid(index: int, field: ClearanceField) -> str:
+    """Return the name of the solid at a point of the outline; "" without names."""
     owner = int(field.owners[index])
     return field.names[owner] if owner < len(field.names) else ""
 

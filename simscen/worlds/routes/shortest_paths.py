@@ -1,4 +1,4 @@
-"""Shortest paths of a disc through the static world, as a reference for driven paths."""
+"""Find the shortest paths of a disc-shaped robot through the static world, as a reference for driven paths."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -14,53 +14,68 @@ from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Goal
 from simscen.core.records.case import Passage
 from simscen.grid_graph import CellIndices, GridGraph, polyline_length, resample_polyline
-from simscen.worlds.maps.occupancy_map import empty_grid
-from simscen.worlds.routes.clearance import HALF_DIAGONAL_CELLS, ClearanceField, clearance_field
+from simscen.worlds.maps.map_size import Bounds
+from simscen.worlds.routes.clearance import (
+    HALF_DIAGONAL_CELLS,
+    MIN_RESOLUTION_M,
+    ClearanceField,
+    clearance_field,
+    search_grid,
+)
 from simscen.worlds.routes.narrow_gaps import narrowest_gap_in
 from simscen.worlds.routes.passages import find_passages, passage_between
 
 Z_RANGE_M = (0.03, 0.4)
 """Heights in m between which solids block a robot: lower ones are sills to drive over, higher ones leave room below."""
-MIN_RESOLUTION_M = 0.05
-"""Size of the grid cells of the search."""
-MAX_CELLS = 1_000_000
-"""Maximum number of cells; the cells of larger worlds are larger."""
+
+MIN_SHORTENING = 0.001
+"""Fraction of the length; a round that shortens the path by less is the last. Most paths need two to five rounds."""
+MAX_ROUNDS = 12
+"""Maximum number of rounds in which a path is straightened and smoothed."""
+SMOOTHING_STEPS = 24
+"""Smoothing steps in each round; they affect about five points on either side of a corner."""
 
 
 @dataclass(frozen=True)
 class Leg:
-    """Shortest path to a goal: its length in m, inf if there is none, and its passages."""
+    """The shortest path from one pose to a goal.
+
+    length:    length in m; inf if there is no path
+    passages:  passages on the path; without a path, at most the gap that is too narrow
+    """
 
     length: float
     passages: tuple[Passage, ...] = ()
 
 
 class ShortestPaths:
-    """Shortest paths of a disc of one radius in one world.
+    """Finds the shortest paths of a disc of one radius in one world.
 
     Lengths are exact to about 1 %. If the paths around both sides of an obstacle differ by less than 3 %, the longer
-    one may be chosen. A smaller radius than 0.7 grid cells counts as 0.7 cells; a cell is 5 cm wide in worlds of up to
-    50 x 50 m. A house of 20 x 20 m takes about 30 ms to prepare, and each path around corners 30 ms.
+    one may be chosen. A radius smaller than 0.71 grid cells counts as 0.71 cells. A cell is 5 cm wide in worlds of up
+    to 50 x 50 m.
     """
 
     def __init__(
         self,
         mesh: TriangleMesh,
-        bounds: tuple[float, float, float, float],
+        bounds: Bounds,
         radius: float,
         z_range: tuple[float, float] = Z_RANGE_M,
         min_resolution: float = MIN_RESOLUTION_M,
     ) -> None:
-        """Prepare the search with cells of `min_resolution` m, or larger ones in a large world."""
-        x0, y0, x1, y1 = bounds
-        margin = 2 * radius  # around the world, so that a path can lead around it
-        bounds = (x0 - margin, y0 - margin, x1 + margin, y1 + margin)
-        resolution = max(min_resolution, math.sqrt((x1 - x0 + 2 * margin + 2) * (y1 - y0 + 2 * margin + 2) / MAX_CELLS))
-        grid = empty_grid(bounds, resolution, "shortest path")
-        self._radius = max(radius, 0.71 * resolution)
+        """Prepare the search.
+
+        mesh:            static solids; only their parts between the heights `z_range` in m are obstacles
+        bounds:          rectangle around the world and all starts and goals
+        radius:          radius of the disc in m
+        min_resolution:  size of the grid cells in m; in large worlds they are larger
+        """
+        grid = search_grid(bounds, radius, min_resolution)
+        self._radius = max(radius, 0.71 * grid.resolution)
         self._is_radius_enlarged = radius < self._radius
         self._field = clearance_field(mesh, grid, z_range)
-        self._min_clearance = self._radius - 0.1 * resolution
+        self._min_clearance = self._radius - 0.1 * grid.resolution
 
     def length(self, start: Pose2, goal: Pose2) -> float:
         """Return the length in m of the shortest path between two positions; inf if there is none."""
@@ -74,7 +89,7 @@ class ShortestPaths:
     def leg(self, start: Pose2, goal: Pose2, name: str) -> Leg:
         """Return the shortest path to the goal `name`, with its passages.
 
-        If there is no path, the length is inf, and the only passage is the gap that is too narrow for the disc.
+        If there is no path, the length is inf, and the only passage is the gap that is too narrow, if one was found.
         """
         path = self.path(start, goal)
         if path is not None:
@@ -82,14 +97,14 @@ class ShortestPaths:
         return Leg(math.inf, self._too_narrow_gap(start, goal, name))
 
     def _too_narrow_gap(self, start: Pose2, goal: Pose2, name: str) -> tuple[Passage, ...]:
-        """Return the gap that is too narrow, as one passage; empty if start or goal is occupied, or without a gap."""
+        """Return the gap that is too narrow, as one passage; () if start or goal is blocked, or without a gap."""
         if not self._field.has_clearance(np.array([start[:2], goal[:2]]), self._min_clearance).all():
             return ()
         gap = narrowest_gap_in(self._field, (start, goal), self._radius)
         return (passage_between(gap.sides, name, self._field),) if len(gap.sides) == 2 else ()
 
     def path(self, start: Pose2, goal: Pose2) -> Array | None:
-        """Return the corners (n, 2) of the shortest path, with arcs as short chords; None if there is none."""
+        """Return the corners (n, 2) of the shortest path, with arcs as short chords; None if there is no path."""
         ends = np.array([start[:2], goal[:2]])
         if not self._field.has_clearance(ends, self._min_clearance).all():
             return None
@@ -108,9 +123,9 @@ class ShortestPaths:
         return not first or not last or self._optimistic_graph.shortest_path(first, last) is not None
 
     def may_enter(self, starts: Sequence[Pose2], distance: Callable[[Pose2], float]) -> bool:
-        """Return whether the disc may get from one of the starts to a pose at which `distance` is at most 0.
+        """Return whether there may be a path from one of the starts into an area; False proves that there is none.
 
-        `distance` returns the distance in m from a pose to the destination. False proves that there is no path.
+        `distance` returns the distance in m from a pose to the area, and at most 0 inside.
         """
         if self._is_radius_enlarged:
             return True
@@ -123,16 +138,16 @@ class ShortestPaths:
 
     @cached_property
     def _optimistic_graph(self) -> GridGraph:
-        """All cells that the disc may touch with its center: no gap is missed, but some are too narrow."""
+        """Graph of all cells in which the center of the disc may be: no gap is missed, but some may be too narrow."""
         return GridGraph(self._field.free_cells(self._radius - HALF_DIAGONAL_CELLS * self._field.grid.resolution))
 
     @cached_property
     def _strict_graph(self) -> GridGraph:
-        """The cells whose center the disc may occupy: gaps less than a cell wider than the disc may be missed."""
+        """Graph of the cells on whose center the disc has room: gaps hardly wider than the disc may be missed."""
         return GridGraph(self._field.free_cells(self._radius))
 
     def _search(self, graph: GridGraph, ends: Array) -> Array | None:
-        """Return the tightened path (n, 2) over a graph; None if there is none."""
+        """Return the tightened path (n, 2) between `ends` (2, 2) over a graph; None if there is no path."""
         first, last = (self._free_cell(graph, end) for end in ends)
         cells = graph.shortest_path(first, last) if first and last else None
         if cells is None:
@@ -144,7 +159,7 @@ class ShortestPaths:
         return all(is_line_clear(a, b, self._field, self._min_clearance) for a, b in pairwise(path))
 
     def _free_cell(self, graph: GridGraph, point: Array) -> tuple[int, int] | None:
-        """Return the free cell nearest to a point; None without one nearby. The cell of the point may not be free."""
+        """Return the free cell (row, column) nearest to a point (2,); None if none within two cells is free."""
         grid = self._field.grid
         around = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3), indexing="ij"), axis=-1).reshape(-1, 2)
         cells: CellIndices = grid.cell_of(point[None]) + around
@@ -163,14 +178,14 @@ def shortest_paths_in(
     z_range: tuple[float, float] = Z_RANGE_M,
     min_resolution: float = MIN_RESOLUTION_M,
 ) -> ShortestPaths:
-    """Return the shortest paths of a disc in a built world, extended to contain all `stops`."""
+    """Return the search for paths in a built world, over an area that contains all `stops` (starts and goals)."""
     return ShortestPaths(built.mesh, _bounds_containing(built, stops), radius, z_range, min_resolution)
 
 
 def legs_between(
     built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float, z_range: tuple[float, float] = Z_RANGE_M
 ) -> list[Leg]:
-    """Return the shortest path of a disc from each pose to its goal. Repeated pairs are searched once."""
+    """Return the shortest path of a disc for each pair (start, goal) of `ends`. Repeated pairs are searched once."""
     stops = [pose for start, goal in ends for pose in (start, goal.pose)]
     paths = shortest_paths_in(built, stops, radius, z_range) if stops else None
     found: dict[tuple[Pose2, Pose2], Leg] = {}
@@ -183,7 +198,7 @@ def legs_between(
     return legs
 
 
-def _bounds_containing(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, float, float, float]:
+def _bounds_containing(built: BuiltWorld, stops: Sequence[Pose2]) -> Bounds:
     """Return the bounds of the world, or of its map if the world has none, extended to contain the stops."""
     x0, y0, x1, y1 = built.world.bounds
     corners = [(x0, y0), (x1, y1)]
@@ -195,15 +210,8 @@ def _bounds_containing(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float
     return left, low, right, high
 
 
-MIN_SHORTENING = 0.001
-"""Fraction of the length; a round that shortens the path by less is the last. Most paths need two to five rounds."""
-MAX_ROUNDS = 12
-SMOOTHING_STEPS = 24
-"""Smoothing steps in each round; they affect about five points on either side of a corner."""
-
-
 def tighten_path(path: Array, field: ClearanceField, radius: float) -> Array:
-    """Return a path (n, 2) shortened as far as the clearance `radius` in m allows, with a tolerance of 0.1 cells.
+    """Return a path (n, 2) shortened as far as it keeps `radius` m away from solids, with a tolerance of 0.1 cells.
 
     String pulling creates the straight parts. Between them, an elastic band (Quinlan and Khatib 1993) moves the path
     onto arcs with `radius` around obstacles.
@@ -218,14 +226,17 @@ def tighten_path(path: Array, field: ClearanceField, radius: float) -> Array:
 
 
 def is_line_clear(a: Array, b: Array, field: ClearanceField, min_clearance: float) -> bool:
-    """Return whether a straight line keeps the clearance `min_clearance` in m, sampled twice per cell."""
+    """Return whether the line from `a` to `b` keeps `min_clearance` m away from solids, sampled twice per cell."""
     count = 2 + math.ceil(2 * math.dist(a, b) / field.grid.resolution)
     line = a + np.linspace(0.0, 1.0, count)[:, None] * (b - a)
     return bool(field.has_clearance(line, min_clearance).all())
 
 
 def _straighten(path: Array, field: ClearanceField, min_clearance: float) -> Array:
-    """Return the path with straight lines to the farthest visible point, found by doubling and bisection."""
+    """Return only the corners of a path that are needed so that straight lines between them are clear (string pulling).
+
+    From each corner, the farthest point with a clear line is searched by doubling the step and bisection.
+    """
     kept, last = [0], len(path) - 1
     while kept[-1] < last:
         here = kept[-1]
@@ -243,7 +254,7 @@ def _straighten(path: Array, field: ClearanceField, min_clearance: float) -> Arr
 
 
 def _smooth(path: Array, field: ClearanceField, radius: float) -> Array:
-    """Return a path after the smoothing steps of an elastic band."""
+    """Return a path (n, 2) after SMOOTHING_STEPS of an elastic band, which keeps `radius` m away from solids."""
     path = path.copy()
     for _ in range(SMOOTHING_STEPS):
         path[1:-1] = (path[:-2] + path[2:]) / 2

@@ -1,7 +1,7 @@
-"""Fast search of paths between upright solids, to find out whether a goal can be reached.
+"""Find out fast whether a disc-shaped robot can reach a goal between upright solids.
 
-If no path is found here, there may still be one; then `shortest_paths` searches. That module needs NumPy and SciPy,
-whose import takes longer than this whole search.
+If no path is found here, there may still be one, and `shortest_paths` must be used. That module needs NumPy and SciPy,
+whose import takes longer than an entire search here.
 """
 
 import heapq
@@ -14,7 +14,11 @@ from simscen.worlds.geometry.overlaps import ZRange
 from simscen.worlds.geometry.prisms import UprightPrism, upright_prism
 
 Point = tuple[float, float]
+"""(x, y) in m."""
 Cell = tuple[int, int]
+"""Point of the search grid: steps along x and y from the start."""
+Bucket = tuple[int, int]
+"""Square of 1 x 1 m in which the prisms nearby are listed: its lower left corner in m."""
 
 STEP_M = 0.2
 """Distance between neighboring points of the search grid, along x and y."""
@@ -24,15 +28,17 @@ SAMPLING_MARGIN_M = 0.02
 """Additional clearance, because straight lines are checked at single points."""
 MAX_POINTS = 4000
 """Maximum number of grid points that a search visits. Beyond it, the search with SciPy is faster."""
+MOVES = [move for move in product((-1, 0, 1), repeat=2) if move != (0, 0)]
+"""Steps to the eight neighbors of a grid point."""
 
 
 class SimplePaths:
-    """Finds paths of a disc of `radius` m that avoid upright prisms with convex bases."""
+    """Finds paths of a disc of `radius` m that avoid upright prisms with convex bases, whatever their height."""
 
     def __init__(self, prisms: Iterable[UprightPrism], radius: float) -> None:
         self._radius = radius
         self._lengths: dict[tuple[Point, Point], float] = {}
-        self._near: dict[Cell, list[UprightPrism]] = {}
+        self._near: dict[Bucket, list[UprightPrism]] = {}
         search_radius = radius + HALF_DIAGONAL_STEP_M + SAMPLING_MARGIN_M
         for prism in prisms:
             left, bottom, right, top = prism.rectangle
@@ -60,7 +66,7 @@ class SimplePaths:
     def can_enter(self, start: Point, towards: Point, is_inside: Callable[[Point], bool]) -> bool:
         """Return whether a path was found from `start` to any point for which `is_inside` is true.
 
-        The search prefers points near `towards`.
+        The search examines points near `towards` first.
         """
         return (
             is_inside(start)
@@ -68,9 +74,9 @@ class SimplePaths:
         )
 
     def _search(self, start: Point, goal: Point, last_leg: Callable[[Point], float]) -> float:
-        """Return the length of a path by A* over a grid around the start; inf if none was found.
+        """Return the length in m of a path found by A* over a grid around the start; inf if none was found.
 
-        `last_leg` returns the distance from a point to the goal, inf if it is not reachable in a straight line.
+        `last_leg` returns the length of a straight line from a point to the goal, inf if the search must go on.
         """
         lengths: dict[Cell, float] = {(0, 0): 0.0}
         queue = [(math.dist(start, goal), (0, 0))]
@@ -91,11 +97,15 @@ class SimplePaths:
                     heapq.heappush(queue, (length + math.dist(there, goal), neighbor))
         return math.inf
 
-    def _can_move(self, here: Point, there: Point, first: bool) -> bool:
-        """Return whether the disc can move to a neighbor. Only the start may have less clearance than required."""
-        return self._has_clearance(there, HALF_DIAGONAL_STEP_M) and (not first or self._is_clear(here, there))
+    def _can_move(self, here: Point, there: Point, is_from_start: bool) -> bool:
+        """Return whether the disc can move to a neighbor on the grid.
+
+        Every grid point except the start has so much clearance that the lines to its neighbors are clear.
+        """
+        return self._has_clearance(there, HALF_DIAGONAL_STEP_M) and (not is_from_start or self._is_clear(here, there))
 
     def _is_clear(self, a: Point, b: Point) -> bool:
+        """Return whether the disc can move from `a` to `b` in a straight line."""
         pieces = max(1, math.ceil(math.dist(a, b) / (2 * SAMPLING_MARGIN_M)))
         parts = (k / pieces for k in range(pieces + 1))
         return all(
@@ -108,11 +118,8 @@ class SimplePaths:
         return all(prism.distance(point, (prism.bottom, prism.top)) >= self._radius + margin for prism in near)
 
 
-MOVES = [move for move in product((-1, 0, 1), repeat=2) if move != (0, 0)]
-
-
 def simple_paths_between(solids: Iterable[Solid], radius: float, z_range: ZRange) -> SimplePaths | None:
-    """Return the search for paths that avoid the solids in a range of heights.
+    """Return the search for paths of a disc of `radius` m that avoid the solids between two heights.
 
     Returns None if one of the solids is not an upright prism with a convex base.
     """
@@ -124,4 +131,5 @@ def simple_paths_between(solids: Iterable[Solid], radius: float, z_range: ZRange
 
 
 def _point(start: Point, cell: Cell) -> Point:
+    """Return the position of a point of the search grid."""
     return start[0] + STEP_M * cell[0], start[1] + STEP_M * cell[1]

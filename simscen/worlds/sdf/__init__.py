@@ -1,4 +1,4 @@
-"""Import of Gazebo worlds: SDF 1.3 to 1.12 is converted to the shapes that physics, ray casting and maps share."""
+"""Import Gazebo worlds: convert SDF 1.3 to 1.12 to the shapes that physics, ray casting and maps use."""
 
 from simscen.worlds.sdf.load import load_sdf
 

@@ -1,4 +1,4 @@
-"""`<actor>` elements: bodies that follow a scripted trajectory and cannot be pushed.
+"""Convert `<actor>` elements to bodies that follow a scripted trajectory and cannot be pushed.
 
 As in Gazebo Classic (Actor::LoadScript), waypoints are world poses, trajectories follow each other by id, and an actor
 waits at its first waypoint until the time of that waypoint. simscen interpolates linearly between waypoints; Gazebo
@@ -18,14 +18,17 @@ from simscen.worlds.sdf.report import ImportReport
 from simscen.worlds.sdf.shapes import ShapeReader
 
 ACTOR_SHAPE = Cylinder(0.3, 1.8)
-"""Shape of an actor that has a skin and no collision geometry."""
+"""Shape (radius and height in m) of an actor that has a skin or visuals, but no collision geometry."""
 
 Waypoint = tuple[float, Pose3]
 """Time in s and pose in the world."""
 
 
 def read_actor(actor: ModelNode, world: ModelNode, reader: ShapeReader, report: ImportReport) -> Body | None:
-    """Return the moving body of an actor, or None with a note if the actor has no geometry. Raises UnusableElement."""
+    """Return the body of an actor, or None with a note in the report if the actor has no geometry.
+
+    `world` is the root of the tree that contains the actor. Raises UnusableElement for invalid values.
+    """
     element = actor.element
     script = element.child("script")
     waypoints = _read_waypoints(script) if script else []
@@ -33,18 +36,21 @@ def read_actor(actor: ModelNode, world: ModelNode, reader: ShapeReader, report: 
     ground_pose = Pose3.planar(start.plane)
     solids = _actor_solids(actor, start, ground_pose, reader, report)
     if not solids:
-        report.note(element.place, "an actor without skin and collision geometry is ignored")
+        report.note(element.location, "an actor without skin and collision geometry is ignored")
         return None
     path = _motion_path(script, waypoints, report) if script and len(waypoints) > 1 else None
     if path is None:
-        report.note(element.place, "an actor without a scripted trajectory stands still")
+        report.note(element.location, "an actor without a scripted trajectory stands still")
     return Body(actor.name, solids, ground_pose, 0.0, path)
 
 
 def _actor_solids(
     actor: ModelNode, start: Pose3, ground_pose: Pose3, reader: ShapeReader, report: ImportReport
 ) -> tuple[Solid, ...]:
-    """Return the solids in the frame on the ground below the actor; they keep height and tilt along a planar path."""
+    """Return the solids of an actor in the planar frame `ground_pose` below it, so that they keep height and tilt.
+
+    `start` is the initial pose of the actor in the world. Returns () for an actor without any geometry.
+    """
     links = [read_link(link, reader, report) for link in place_links(actor, start, report)]
     solids = [solid for link in links for solid in link.solids]
     if solids:
@@ -54,7 +60,7 @@ def _actor_solids(
     if actor.element.child("skin") is None and not has_visual:
         return ()
     report.note(
-        actor.element.place,
+        actor.element.location,
         f"has no collision geometry: a cylinder of radius {ACTOR_SHAPE.radius:g} m and height {ACTOR_SHAPE.length:g} "
         "m stands in for its skin",
     )
@@ -62,7 +68,10 @@ def _actor_solids(
 
 
 def _read_waypoints(script: Element) -> list[Waypoint]:
-    """Return the waypoints of all trajectories, with times from the start of the script, in ascending order."""
+    """Return the waypoints of all trajectories by time, which counts from the start of the script.
+
+    The trajectories follow each other in the order of their ids.
+    """
     waypoints: list[Waypoint] = []
     offset = 0.0
     for trajectory in sorted(script.all("trajectory"), key=_trajectory_id):
@@ -101,11 +110,12 @@ def _read_waypoint(element: Element) -> Waypoint:
 
 
 def _motion_path(script: Element, waypoints: list[Waypoint], report: ImportReport) -> MotionPath | None:
+    """Return the planar path of an actor; None with a note if its script is never started."""
     if not read_bool(script.child("auto_start"), default=True):
-        report.note(script.place, "auto_start is off and no plugin will start it")
+        report.note(script.location, "auto_start is off and no plugin will start it")
         return None
     if any(_height_and_tilt(pose) != _height_and_tilt(waypoints[0][1]) for _, pose in waypoints):
-        report.note(script.place, "the actor keeps the height and the tilt of its first waypoint")
+        report.note(script.location, "the actor keeps the height and the tilt of its first waypoint")
     delay_element = script.child("delay_start")
     delay = read_numbers(delay_element, 1)[0] if delay_element else 0.0
     times = [time for time, _ in waypoints]
@@ -118,6 +128,6 @@ def _motion_path(script: Element, waypoints: list[Waypoint], report: ImportRepor
 
 
 def _height_and_tilt(pose: Pose3) -> tuple[float, ...]:
-    """Return z in mm resolution, and the tilt about two axes in whole degrees."""
+    """Return z rounded to 1 mm, and the tilt about two axes rounded to 1°, to find out whether they change."""
     up = pose.rotation()[2]
     return round(pose.z, 3), *(round(math.degrees(math.asin(max(-1.0, min(1.0, float(part)))))) for part in up[:2])

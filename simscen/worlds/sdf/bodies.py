@@ -1,4 +1,4 @@
-"""Content of links (collision solids with friction, mass), and their grouping into static solids and movable bodies.
+"""Read the collision geometry and the mass of links, and group links into static solids and movable bodies.
 
 Links that are connected by a joint of any type form one rigid body: simscen has no jointed obstacles, and the physics
 would push apart separate bodies that overlap at a joint. A joint to the world or to a static model makes the whole
@@ -42,24 +42,32 @@ from simscen.worlds.sdf.report import ImportReport
 from simscen.worlds.sdf.shapes import ShapeReader
 
 DEFAULT_FRICTION = 1.0
-"""Coefficient of friction of rubber wheels on dry concrete."""
-WATER_DENSITY_KG_M3 = 1000.0
-"""Density in kg/m³ that SDF assumes for `<inertial auto="true">`."""
+"""Coefficient of friction without `<mu>`: that of rubber wheels on dry concrete."""
+DEFAULT_DENSITY_KG_M3 = 1000.0
+"""Density that SDF assumes for `<inertial auto="true">`: that of water."""
 DEFAULT_MASS_KG = 1.0
 """SDF's default mass of a link."""
+MAX_BODIES = 2000
+"""Maximum number of bodies of a world, including actors."""
+MAX_MOVABLE_MASS_KG = 1e6
+"""Heavier bodies do not move. Physics is stable up to a thousand times this mass, and fails from 1e12 kg on."""
+_WORLD = -1
+"""Number that stands for the world in LinkGroups."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinkContent:
-    """A link, its collision `solids` in the world frame, and its mass in kg."""
+    """A link with its collision geometry and its mass."""
 
     link: PlacedLink
     solids: tuple[Solid, ...]
+    """Collision geometry in the world frame."""
     mass: float
+    """In kg."""
 
 
 def read_link(link: PlacedLink, reader: ShapeReader, report: ImportReport) -> LinkContent:
-    """Read the content of a link; unusable collisions are added to the report and left out."""
+    """Read the collisions and the mass of a link; unusable collisions are added to the report and left out."""
     element = link.frame.element
     collisions: list[tuple[Element, list[Solid]]] = []
     for child in element.children:
@@ -69,7 +77,7 @@ def read_link(link: PlacedLink, reader: ShapeReader, report: ImportReport) -> Li
             else:
                 report_unknown(child, "link", report)
     if element.child("collision") is None and element.child("visual"):
-        report.note(element.place, "has only visuals: robots cannot collide with it, and lidars do not see it")
+        report.note(element.location, "has only visuals: robots cannot collide with it, and lidars do not see it")
     mass = DEFAULT_MASS_KG
     with report.skip_unusable():
         mass = _link_mass(element.child("inertial"), collisions)
@@ -79,6 +87,7 @@ def read_link(link: PlacedLink, reader: ShapeReader, report: ImportReport) -> Li
 def _collision_solids(
     collision: Element, link: PlacedLink, reader: ShapeReader, report: ImportReport
 ) -> Iterator[Solid]:
+    """Yield the solids of a `<collision>` in the world frame. Raises UnusableElement."""
     report_unknown_children(collision, "collision", report)
     geometry = collision.child("geometry")
     if geometry is None:
@@ -92,9 +101,9 @@ def _collision_solids(
 
 
 def _friction(collision: Element, report: ImportReport) -> float:
-    """Return `<mu>` of ODE's surface, at most DEFAULT_FRICTION.
+    """Return the coefficient of friction `<mu>` of ODE's surface, limited to DEFAULT_FRICTION.
 
-    In a contact, ODE and Gazebo use the lesser friction of the two surfaces, and one of them is a rubber wheel.
+    In a contact, ODE and Gazebo use the lower friction of the two surfaces, and one of them is a rubber wheel.
     """
     mu_element: Element | None = collision
     for tag in ("surface", "friction", "ode", "mu"):
@@ -106,13 +115,13 @@ def _friction(collision: Element, report: ImportReport) -> float:
     except ValueError:
         mu = -1.0
     if not mu >= 0:
-        report.note(mu_element.place, f"not a coefficient of friction: {DEFAULT_FRICTION:g} is used")
+        report.note(mu_element.location, f"not a coefficient of friction: {DEFAULT_FRICTION:g} is used")
         return DEFAULT_FRICTION
     return min(DEFAULT_FRICTION, mu)
 
 
 def _pose_in_link(pose: Element | None, link: PlacedLink) -> Pose3:
-    """Return `link_from_collision`; the pose may be relative to another frame of the model."""
+    """Return the pose of a collision in the frame of its link; `<pose>` may refer to another frame of the model."""
     frame, scope = reference_frame(pose), link.model.scope
     if pose is None or frame in ("", link.frame.name):
         return read_pose(pose)
@@ -124,11 +133,11 @@ def _note_disabled_contacts(collision: Element, report: ImportReport) -> None:
         text = element.text.lower()
         has_no_bits = element.tag == "collide_bitmask" and text.removeprefix("0x").strip("0") == ""
         if has_no_bits or (element.tag == "collide_without_contact" and text in ("1", "true")):
-            report.note(element.place, "not supported: the robot still collides with it")
+            report.note(element.location, "not supported: the robot still collides with it")
 
 
 def _scaled(shape: Shape, scale: Scale) -> Shape:
-    """Return a shape with its sizes multiplied; a radius is multiplied by the x component, as in Gazebo Classic."""
+    """Return a shape with its sizes multiplied by `scale`; a radius by its x component, as in Gazebo Classic."""
     if scale == (1.0, 1.0, 1.0):
         return shape
     x, y, z = scale
@@ -150,7 +159,7 @@ def _scaled(shape: Shape, scale: Scale) -> Shape:
 
 
 def _link_mass(inertial: Element | None, collisions: Sequence[tuple[Element, Sequence[Solid]]]) -> float:
-    """Return the mass in kg that an `<inertial>` states, or the mass of the collisions if it is `auto`."""
+    """Return the mass in kg that an `<inertial>` states; with `auto`, volume times density of the collisions."""
     if inertial is None:
         return DEFAULT_MASS_KG
     if parse_bool(inertial.attributes.get("auto", "0"), inertial):
@@ -161,30 +170,24 @@ def _link_mass(inertial: Element | None, collisions: Sequence[tuple[Element, Seq
 
 
 def _density(collision: Element, inertial: Element) -> float:
+    """Return the density in kg/m³ that a collision or else the `<inertial>` of its link states, or the default."""
     owner = next((owner for owner in (collision, inertial) if owner.child("density")), None)
-    return read_positive(owner, "density") if owner else WATER_DENSITY_KG_M3
+    return read_positive(owner, "density") if owner else DEFAULT_DENSITY_KG_M3
 
 
 def _volume(shape: Shape) -> float:
-    """Return the volume in m³ enclosed by a shape's triangles, by the divergence theorem.
+    """Return the volume in m³ that the triangles of a shape enclose.
 
-    An open mesh encloses no volume. For an open mesh the result is the sum of the signed tetrahedra between the
-    origin and each triangle, as in sdformat.
+    It is the sum of the signed tetrahedra between the origin and each triangle, as in sdformat. For a mesh that is not
+    closed, the result depends on the origin.
     """
     mesh = triangulate(shape)
     a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
     return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6
 
 
-MAX_BODIES = 2000
-MAX_MOVABLE_MASS_KG = 1e6
-"""Heavier bodies do not move. Physics is stable up to a thousand times this mass, and fails from 1e12 kg on."""
-_WORLD = -1
-"""Number of the world in LinkGroups."""
-
-
 class LinkGroups:
-    """Disjoint sets (union-find) of links, by number; the set that contains the world is static."""
+    """Disjoint sets (union-find) of links, which are given by numbers from 0; the set with _WORLD is static."""
 
     def __init__(self) -> None:
         self._parents: dict[int, int] = {_WORLD: _WORLD}
@@ -205,10 +208,10 @@ class LinkGroups:
 def split_model(
     model: ModelNode, pose: Pose3, contents: list[LinkContent], report: ImportReport
 ) -> tuple[list[Solid], list[Body]]:
-    """Return the static solids and the bodies of a top-level model at `pose`, in document order.
+    """Return the static solids and the movable bodies of a top-level model at `pose`, in document order.
 
-    If the model is a single body, the body has the model's name and frame, as in Gazebo; otherwise each body has the
-    name and frame of its first link.
+    `contents` are all links of the model and of the models in it. If there is only one movable body, it has the name
+    and the frame of the model, as in Gazebo. Otherwise each body has the name and the frame of its first link.
     """
     groups = _link_groups(model, [content.link for content in contents], report)
     members: dict[int, list[LinkContent]] = {}
@@ -222,11 +225,12 @@ def split_model(
 
 
 def _link_groups(model: ModelNode, links: list[PlacedLink], report: ImportReport) -> LinkGroups:
+    """Return the groups of links, by their index in `links`: joined by joints, or with _WORLD if static."""
     groups = LinkGroups()
     numbers = {id(link.frame): number for number, link in enumerate(links)}
     for number, link in enumerate(links):
         groups.root(number)
-        if link.model.static:
+        if link.model.is_static:
             groups.join(_WORLD, number)
     for owner in model.models():
         for joint in owner.joints:
@@ -238,6 +242,10 @@ def _link_groups(model: ModelNode, links: list[PlacedLink], report: ImportReport
 def _join_links(
     owner: ModelNode, joint: Element, numbers: dict[int, int], groups: LinkGroups, report: ImportReport
 ) -> None:
+    """Join the groups of the parent and the child of a joint in the model `owner`. Raises UnusableElement.
+
+    `numbers` are the numbers of links in `groups`, by the id of their frame.
+    """
     ends = []
     for tag in ("parent", "child"):
         end = joint.child(tag)
@@ -247,11 +255,12 @@ def _join_links(
         ends.append(_WORLD if link is None else numbers.get(id(link), _WORLD))
     joint_type = joint.attributes.get("type", "")
     if joint_type != "fixed" and any(end != _WORLD and groups.root(end) != _WORLD for end in ends):
-        report.note(joint.place, f"a joint of type {joint_type[:20] or 'unknown'} is treated as fixed")
+        report.note(joint.location, f"a joint of type {joint_type[:20] or 'unknown'} is treated as fixed")
     groups.join(*ends)
 
 
 def _body(name: str, pose: Pose3, group: list[LinkContent], report: ImportReport) -> Body:
+    """Return the body of a group of links, with its frame at `pose`."""
     body_from_world = pose.inverse()
     solids = tuple(replace(s, pose=body_from_world.compose(s.pose)) for content in group for s in content.solids)
     mass = 0.0 if _is_kinematic(group, report) else _movable_mass(group, report)
@@ -270,19 +279,22 @@ def _movable_mass(group: list[LinkContent], report: ImportReport) -> float:
 
 
 def _is_kinematic(group: list[LinkContent], report: ImportReport) -> bool:
-    """Return whether SDF states for any link of the group that contacts do not move it (`<kinematic>`)."""
+    """Return whether any link of the group is `<kinematic>`: contacts do not move it."""
     is_kinematic = False
     for content in group:
         element = content.link.frame.element
         with report.skip_unusable():
             if not read_bool(element.child("gravity"), default=True):
-                report.note(element.place, "gravity cannot be switched off for a single link, so it will fall")
+                report.note(element.location, "gravity cannot be switched off for a single link, so it will fall")
             is_kinematic = is_kinematic or read_bool(element.child("kinematic"))
     return is_kinematic
 
 
 def with_unique_names(bodies: list[Body], report: ImportReport, world: Element) -> tuple[Body, ...]:
-    """Return the bodies, with a number appended to every repeated name; raises UnusableElement for too many bodies."""
+    """Return the bodies, with a number appended to every repeated name, and a note at the `world` element.
+
+    Raises UnusableElement for more than MAX_BODIES.
+    """
     if len(bodies) > MAX_BODIES:
         raise world.unusable(f"more than {MAX_BODIES} bodies")
     taken: set[str] = set()
@@ -293,7 +305,7 @@ def with_unique_names(bodies: list[Body], report: ImportReport, world: Element) 
             number += 1
             name = f"{body.name}_{number}"
         if number:
-            report.note(world.place, f"the name {body.name!r} is already used; the next body is called {name!r}")
+            report.note(world.location, f"the name {body.name!r} is already used; the next body is called {name!r}")
         taken.add(name.casefold())
         unique.append(replace(body, name=name))
     return tuple(unique)

@@ -1,4 +1,7 @@
-"""XML elements of SDF files with lines and columns: reading of values, and the elements that the importer knows."""
+"""Read values from the XML elements of SDF files, and report elements that the importer does not read.
+
+All functions that read a value raise UnusableElement at the element that holds an invalid value.
+"""
 
 import difflib
 import math
@@ -10,10 +13,12 @@ from typing_extensions import Self
 
 from simscen.assets import markup
 from simscen.core.geometry import Pose3
-from simscen.worlds.sdf.report import ImportReport, OutOfReach, SourcePlace, UnusableElement
+from simscen.worlds.sdf.report import ImportReport, OutOfReach, SourceLocation, UnusableElement
 
 MAX_SHOWN_NAME_LENGTH = 120
+"""Number of characters to which tags and names are cut in messages."""
 MAX_NAME_LENGTH = 120
+"""Maximum number of characters of the name of a model, link or frame."""
 MAX_COORDINATE_M = 1e4
 """Maximum absolute value of coordinates and sizes."""
 
@@ -29,14 +34,14 @@ class Element(markup.Element):
 
     @property
     def path(self) -> str:
-        """Path from the root, for example world[default]/model[shelf]/link[link]."""
+        """Path without the root element, for example world[default]/model[shelf]/link[link]."""
         own = f"{_printable(self.tag)}[{_printable(self.name)}]" if self.name else _printable(self.tag)
         return f"{self.parent.path}/{own}" if self.parent and self.parent.parent else own
 
     @property
-    def place(self) -> SourcePlace:
+    def location(self) -> SourceLocation:
         """Position in the file, for messages."""
-        return SourcePlace(self.source.name, self.line, self.col, self.path, self.source.line(self.line))
+        return SourceLocation(self.source.name, self.line, self.col, self.path, self.source.line(self.line))
 
     def descendants(self) -> Iterator[Self]:
         """Yield all elements below this one, in document order."""
@@ -45,26 +50,26 @@ class Element(markup.Element):
             yield from child.descendants()
 
     def unusable(self, message: str, hint: str = "") -> UnusableElement:
-        """Return an error about this element."""
-        return UnusableElement(self.place, message, hint)
+        """Return an error about this element, to be raised."""
+        return UnusableElement(self.location, message, hint)
 
 
 def parse(data: bytes, file: str, folder: str) -> Element:
-    """Return the root element of an XML text; raises UnusableElement if the text is not well-formed."""
+    """Return the root element of an XML text. Raises UnusableElement if the text is not well-formed or not allowed.
+
+    `file` is the name of the file for messages, `folder` the folder to which its relative paths refer.
+    """
     try:
         return markup.parse(data, markup.Source.of(data, file, folder), Element)
     except markup.MalformedXml as error:
-        place = SourcePlace(file, error.line, error.col, source=error.source)
-        raise UnusableElement(place, error.message, error.hint) from error
+        location = SourceLocation(file, error.line, error.col, source=error.source)
+        raise UnusableElement(location, error.message, error.hint) from error
 
 
 def _printable(name: str) -> str:
     """Return a name with control characters escaped and at most MAX_SHOWN_NAME_LENGTH characters."""
     printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
     return printable if len(printable) <= MAX_SHOWN_NAME_LENGTH else f"{printable[:MAX_SHOWN_NAME_LENGTH]}…"
-
-
-# Values: each function raises UnusableElement at the element that holds an invalid value.
 
 
 def read_numbers(element: Element, *counts: int) -> tuple[float, ...]:
@@ -80,6 +85,7 @@ def read_numbers(element: Element, *counts: int) -> tuple[float, ...]:
 
 
 def _number(word: str) -> float:
+    """Return a finite number. Raises ValueError for other words."""
     try:
         value = math.nan if "_" in word else float(word)
     except ValueError as error:
@@ -96,7 +102,10 @@ def read_sizes(
     default: Sequence[float] | None = None,
     largest: float = MAX_COORDINATE_M,
 ) -> tuple[float, ...]:
-    """Return `count` positive lengths in meters, each at most `largest`, from the child `tag`."""
+    """Return `count` positive lengths in m, each at most `largest`, from the child `tag`.
+
+    Without such a child, returns `default`, or raises UnusableElement if there is no default.
+    """
     element = parent.child(tag)
     if element is None:
         if default is None:
@@ -111,12 +120,12 @@ def read_sizes(
 
 
 def read_size(parent: Element, tag: str) -> float:
-    """Return one positive length in meters from the child `tag`."""
+    """Return one positive length in m from the required child `tag`."""
     return read_sizes(parent, tag, 1)[0]
 
 
 def read_positive(parent: Element, tag: str) -> float:
-    """Return one positive number of any unit from the child `tag`."""
+    """Return one positive number of any unit from the required child `tag`."""
     element = parent.child(tag)
     if element is None:
         raise parent.unusable(f"<{tag}> is missing")
@@ -127,12 +136,12 @@ def read_positive(parent: Element, tag: str) -> float:
 
 
 def read_bool(element: Element | None, default: bool = False) -> bool:
-    """Return the boolean in an element's text: 1, true, True, TRUE, or 0, false, …"""
+    """Return the boolean in an element's text: 1, true, True, TRUE, or 0, false, …; `default` without an element."""
     return default if element is None else parse_bool(element.text, element)
 
 
 def parse_bool(word: str, element: Element) -> bool:
-    """Return the boolean that `word` means; errors name `element`."""
+    """Return the boolean that a text or attribute of `element` means; the case of `word` does not matter."""
     word = word.strip().lower()
     if word not in ("0", "1", "true", "false"):
         raise element.unusable(f"expected true or false, got {word[:40]!r}")
@@ -152,16 +161,20 @@ def checked_name(element: Element, name: str | None = None) -> str:
 
 
 def reference_frame(pose: Element | None) -> str:
-    """Return the name of the frame that a `<pose>` is relative to; SDF before 1.7 called the attribute `frame`."""
+    """Return the name of the frame that a `<pose>` is relative to; "" if it states none.
+
+    The attribute is `relative_to`. Before SDF 1.7, it was `frame`.
+    """
     if pose is None:
         return ""
     return pose.attributes.get("relative_to", pose.attributes.get("frame", ""))
 
 
 def read_pose(element: Element | None) -> Pose3:
-    """Return the pose in an element: x y z and either roll pitch yaw or a quaternion x y z w.
+    """Return the pose in a `<pose>`: x y z and either roll pitch yaw or a quaternion x y z w; identity without one.
 
-    Source: SDF specification, "Specifying pose in SDFormat"; `rotation_format` and `degrees` were added in 1.9.
+    Source: SDF specification, "Specifying pose in SDFormat"; `rotation_format` and `degrees` were added in 1.9. Raises
+    OutOfReach if a coordinate exceeds MAX_COORDINATE_M.
     """
     if element is None or not element.text:
         return Pose3()
@@ -176,7 +189,7 @@ def read_pose(element: Element | None) -> Pose3:
     else:
         raise element.unusable(f"unknown rotation_format {rotation_format[:40]!r}: expected euler_rpy or quat_xyzw")
     if any(abs(coordinate) > MAX_COORDINATE_M for coordinate in pose.position):
-        raise OutOfReach(element.place, f"farther than {MAX_COORDINATE_M:g} m from its frame")
+        raise OutOfReach(element.location, f"farther than {MAX_COORDINATE_M:g} m from its frame")
     return pose
 
 
@@ -189,6 +202,8 @@ def _quaternion_pose(element: Element, in_degrees: bool) -> Pose3:
         raise element.unusable("zero quaternion")
     return Pose3(x, y, z, *(part / norm for part in quaternion))
 
+
+# Tables of elements. `report_unknown` uses them to distinguish harmless elements from misspelled ones.
 
 _HARMLESS_ANYWHERE = {"plugin", "light", "pose", "name", "meta", "description", "frame", "model_state"}
 HARMLESS = {
@@ -209,7 +224,7 @@ HARMLESS = {
     "heightmap": {"texture", "blend", "use_terrain_paging", "sampling", "use_terrain_splatting"},
     "mesh": {"convex_decomposition"},
 }  # fmt: skip
-"""Elements that add no solid, by parent. Source: SDF specification 1.4 to 1.12, and its examples."""
+"""Elements that are ignored because they add no solids, by parent. Source: SDF specification 1.4 to 1.12, examples."""
 
 SHAPES: dict[str, set[str]] = {
     "box": {"size"},
@@ -234,8 +249,9 @@ GEOMETRIC = SHAPES | {
     "actor": {"link", "script", "pose"},
     "include": {"uri", "name", "pose", "static", "placement_frame"},
 }
-"""Elements that add or move solids, by parent: a misspelling of one of them is an error."""
+"""Elements that add or move solids, by parent. A misspelling of one of them is an error."""
 
+# Tags for which `report_unknown` looks in unknown elements and in `experimental:params`.
 _ADDS_SOLIDS = {"model", "include", "actor", "population", "link", "collision", "geometry"}
 _ADDS_NO_SOLIDS = {"visual", "light", "sensor", "plugin", "particle_emitter", "projector", "audio_source", "audio_sink"}
 _XACRO_DEFINITIONS = ("xacro:arg", "xacro:property", "xacro:macro")
@@ -243,12 +259,12 @@ _XACRO_CONDITIONALS = ("xacro:if", "xacro:unless")
 
 
 def report_unknown(element: Element, parent: str, report: ImportReport) -> None:
-    """Report an element in `parent` that the importer does not read, unless the element is known to be harmless.
+    """Report an element that the importer does not read, unless it is harmless. `parent` is a key of GEOMETRIC.
 
     Raises UnusableElement if the unknown element could change the geometry: if it contains solids, if its parent is a
-    shape, or if its name is a misspelling of an element in GEOMETRIC. Otherwise adds a note. Elements with a namespace
-    prefix are ignored as extensions, which SDF allows, except for xacro elements and `experimental:params` that must be
-    expanded first.
+    shape, or if its name is a misspelling of an element in GEOMETRIC. Otherwise adds a note to the report. Elements
+    with a namespace prefix are ignored as extensions, which SDF allows. Exceptions are xacro elements and
+    `experimental:params`, which must be expanded first.
     """
     tag = element.tag
     harmless = HARMLESS.get(parent, set()) | (set() if parent in SHAPES else _HARMLESS_ANYWHERE)
@@ -265,11 +281,11 @@ def report_unknown(element: Element, parent: str, report: ImportReport) -> None:
     hint = f"did you mean <{similar}>?" if similar else ""
     if adds_solids or parent in SHAPES or similar in GEOMETRIC[parent]:
         raise element.unusable(f"unknown element <{tag[:60]}>", hint)
-    report.note(element.place, f"unknown element <{tag[:60]}> ignored" + (f"; {hint}" if hint else ""))
+    report.note(element.location, f"unknown element <{tag[:60]}> ignored" + (f"; {hint}" if hint else ""))
 
 
 def report_unknown_children(element: Element, parent: str, report: ImportReport) -> None:
-    """Report all children of an element that the importer does not read; `parent` is the key in GEOMETRIC."""
+    """Call `report_unknown` for all children of an element that are not in GEOMETRIC[parent]."""
     for child in element.children:
         if child.tag not in GEOMETRIC[parent]:
             report_unknown(child, parent, report)

@@ -1,4 +1,4 @@
-"""Files that an SDF world refers to: finding them by URI, reading them, and opening included models."""
+"""Find the files that an SDF world refers to by URI, read them, and open included models."""
 
 import os
 from pathlib import Path
@@ -6,53 +6,61 @@ from pathlib import Path
 from simscen.assets.folders import AllowedFolders, NoSuchFile, UnusableFile
 from simscen.assets.uris import builtin_model_name
 from simscen.worlds.sdf.elements import Element, parse
-from simscen.worlds.sdf.report import ImportReport, MissingAsset, SourcePlace, UnusableElement
+from simscen.worlds.sdf.report import ImportReport, MissingAsset, SourceLocation, UnusableElement
 
 MAX_WORLD_BYTES = 20 * 2**20
+"""Maximum size of a world or model file."""
 MAX_MESH_BYTES = 64 * 2**20
+"""Maximum size of a mesh or image file."""
 MAX_SHOWN_URI_LENGTH = 1000
+"""Number of characters up to which messages contain the URI."""
 OLDEST_VERSION, NEWEST_VERSION = (1, 3), (1, 12)
+"""Oldest and newest version of SDF that is read."""
 _NEWEST_PATCH = (*NEWEST_VERSION, 99)
+"""Upper bound of patch versions such as 1.12.1."""
 BUILT_IN_MODELS = {
     "sun": "<sdf version='1.6'><light name='sun' type='directional'/></sdf>",
     "ground_plane": "<sdf version='1.6'><model name='ground_plane'><static>1</static><link name='link'>"
     "<collision name='collision'><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>"
     "</collision></link></model></sdf>",
 }
-"""Models that Gazebo installs and nearly every world includes; they need not be in a folder of the user."""
+"""SDF of models that Gazebo installs and nearly every world includes. The user's folders need not contain them."""
 
 
 class WorldFiles(AllowedFolders):
-    """Finds and reads the files that elements refer to; errors are raised at the element."""
+    """Allowed folders of an SDF world. Errors are raised as UnusableElement with the position of the element."""
 
     def locate(self, element: Element) -> Path:
-        """Return the real path of the file that a `<uri>` refers to; raises UnusableElement."""
+        """Return the real path of the file or folder that a `<uri>` refers to.
+
+        Raises MissingAsset if it does not exist, or UnusableElement.
+        """
         uri = element.text
         try:
             return self.find(uri, Path(element.source.folder), absolute=True)
         except NoSuchFile as error:
-            raise MissingAsset(element.place, f"{uri}: {error}", error.hint, uri) from error
+            raise MissingAsset(element.location, f"{uri}: {error}", error.hint, uri) from error
         except UnusableFile as error:
             can_show_uri = uri.isprintable() and uri and len(uri) <= MAX_SHOWN_URI_LENGTH
             raise element.unusable(f"{uri}: {error}" if can_show_uri else str(error), error.hint) from error
 
     def read(self, path: Path, element: Element, max_bytes: int) -> bytes:
-        """Return the content of a located file; raises UnusableElement at `element`."""
+        """Return the content of a file that `element` refers to, found by `locate`. Raises UnusableElement."""
         try:
-            return self.open(path, max_bytes)[1]
+            return self.read_file(path, max_bytes)[1]
         except UnusableFile as error:
-            raise element.unusable(f"{self.shown(path)}: {error}") from error
+            raise element.unusable(f"{self.display_path(path)}: {error}") from error
 
     def read_world(self, path: Path) -> tuple[Path, bytes]:
-        """Return the real path and the content of the world file itself; raises UnusableElement."""
+        """Return the real path and the content of the world file itself. Raises UnusableElement."""
         try:
-            return self.open(self.named(path), MAX_WORLD_BYTES)
+            return self.read_file(self.resolve_parent(path), MAX_WORLD_BYTES)
         except UnusableFile as error:
-            raise UnusableElement(SourcePlace(path.name), str(error)) from error
+            raise UnusableElement(SourceLocation(path.name), str(error)) from error
 
 
 class IncludedFiles:
-    """Opens the world file and included files, each once, and rejects include cycles."""
+    """Parses the world file and the files that `<include>` refers to, each once, and rejects include cycles."""
 
     def __init__(self, files: WorldFiles, report: ImportReport) -> None:
         self._files, self._report = files, report
@@ -63,19 +71,22 @@ class IncludedFiles:
         """Return the root element of the world file."""
         real_path, data = self._files.read_world(path)
         self._open_paths = [str(real_path)]
-        root = parse(data, self._files.shown(real_path), str(real_path.parent))
+        root = parse(data, self._files.display_path(real_path), str(real_path.parent))
         _check_root(root)
         return root
 
     def enter(self, include: Element) -> Element:
-        """Return the root element of an included file; call `leave` afterwards. Raises UnusableElement."""
+        """Return the root element of the file that an `<include>` refers to. Raises UnusableElement.
+
+        Call `leave` after the content of the file was read.
+        """
         uri = include.child("uri")
         if uri is None:
             raise include.unusable("<uri> is missing")
         path = self._path_or_builtin_name(uri)
         if path in self._open_paths:
             cycle = [*self._open_paths[self._open_paths.index(path) :], path]
-            raise uri.unusable("include cycle: " + " → ".join(self._files.shown(Path(p)) for p in cycle))
+            raise uri.unusable("include cycle: " + " → ".join(self._files.display_path(Path(p)) for p in cycle))
         if path not in self._roots:
             self._roots[path] = self._read_root(path, uri)
         self._open_paths.append(path)
@@ -91,11 +102,12 @@ class IncludedFiles:
         else:
             file = Path(path)
             data = self._files.read(file, uri, MAX_WORLD_BYTES)
-            root = parse(data, self._files.shown(file), str(file.parent))
+            root = parse(data, self._files.display_path(file), str(file.parent))
         _check_root(root)
         return root
 
     def _path_or_builtin_name(self, uri: Element) -> str:
+        """Return the path of the SDF file that a `<uri>` refers to, or a key of BUILT_IN_MODELS if it is not found."""
         try:
             found = self._files.locate(uri)
         except UnusableElement:
@@ -111,14 +123,14 @@ class IncludedFiles:
         if not os.path.lexists(config):
             if os.path.lexists(model):
                 return model
-            raise uri.unusable(f"{self._files.shown(folder)}: neither model.config nor model.sdf in this folder")
+            raise uri.unusable(f"{self._files.display_path(folder)}: neither model.config nor model.sdf in this folder")
         try:
             data = self._files.read(config, uri, MAX_WORLD_BYTES)
-            return self._files.locate(_newest_model(parse(data, self._files.shown(config), str(folder))))
+            return self._files.locate(_newest_model(parse(data, self._files.display_path(config), str(folder))))
         except UnusableElement as error:
             if not os.path.lexists(model):
                 raise
-            self._report.note(error.place, f"{error.message}; model.sdf in the same folder is used")
+            self._report.note(error.location, f"{error.message}; model.sdf in the same folder is used")
             return model
 
 
@@ -143,6 +155,6 @@ def _check_root(root: Element) -> None:
 
 
 def _version(element: Element) -> tuple[int, ...]:
-    """Return the `version` attribute as numbers, as 1.10 is newer than 1.9; (0,) if it is missing or invalid."""
+    """Return the `version` attribute as numbers, because 1.10 is newer than 1.9; (0,) if it is missing or invalid."""
     words = element.attributes.get("version", "").strip().split(".")
     return tuple(int(word) for word in words) if all(word.isdecimal() for word in words) else (0,)

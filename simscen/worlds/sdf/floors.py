@@ -1,4 +1,4 @@
-"""Floors that a world models as geometry: level slabs near z = 0 on which robots drive."""
+"""Find the floor of a world that models its floor as geometry: a level slab near z = 0 on which robots drive."""
 
 from collections.abc import Sequence
 
@@ -16,32 +16,37 @@ from simscen.worlds.maps.rasterization import filled_cells
 from simscen.worlds.sdf.shapes import MIN_LEVEL_NORMAL_Z
 
 MAX_FLOOR_HEIGHT_M = 0.3
-"""Maximum height of a floor that carries other geometry in a world without a ground plane."""
+"""Maximum height of the top of a floor that carries other geometry in a world without a ground plane."""
 MAX_COVERING_HEIGHT_M = 0.05
-"""Maximum height of a floor covering: a thin slab that is a floor even if it lies on a ground plane."""
+"""Maximum height of the top of a floor covering: a thin slab that is a floor even if it lies on a ground plane."""
 MIN_FLOOR_HEIGHT_M = 0.001
-"""Height up to which a floor is treated as lying at z = 0."""
+"""Height of the top up to which a floor is treated as lying at z = 0."""
 MIN_FLOOR_WIDTH_M = 1.0
 """Minimum width of a floor that carries other geometry; narrower slabs are steps or curbs."""
 MIN_COVERING_WIDTH_M = 4.0
 """Minimum width of a floor covering; smaller slabs are platforms."""
-MIN_FLOOR_SHARE = 0.8
-"""Fraction of the world's extent that a floor must cover."""
+MIN_COVERED_FRACTION = 0.8
+"""Fraction of the world's area that a floor must cover."""
 MAX_UNCOVERED_WIDTH_M = 1.0
 """Maximum width of ground plane beside a floor: a wall can stand there, but no robot drives there."""
 SAMPLES = 64
-"""Rows and columns of the grid on which the covered area is measured."""
+"""Number of rows and columns of the grid on which the covered area is measured."""
 
-Mask = npt.NDArray[np.bool_]
+FaceMask = npt.NDArray[np.bool_]
+"""Mask (m,) of the faces of a mesh."""
 
 
 def floor_height(placed: Sequence[Solid], static_count: int, bounds: Bounds, has_ground: bool) -> float:
-    """Return the height in meters of the floor on which everything in `bounds` stands; 0 if it is at z = 0.
+    """Return the height in m of the floor on which everything in `bounds` stands; 0 if it is at z = 0.
 
-    `placed` are the solids in the world frame: `static_count` static ones, then those of movable bodies. A static level
-    slab is the floor if it covers nearly all of `bounds`, and is either thin and wide, or carries other geometry in a
-    world without a ground plane. A block that stands on a ground plane is therefore never the floor. For example, the
-    floor of AWS's small_warehouse is a plate whose top is 3.4 cm above z = 0.
+    placed:        solids in the world frame: `static_count` static ones first, then those of movable bodies
+    static_count:  number of static solids
+    bounds:        bounds of the world
+    has_ground:    whether the world has a ground plane at z = 0
+
+    A static level slab is the floor if it covers nearly all of `bounds`, and is either thin and wide, or carries other
+    geometry in a world without a ground plane. A block that stands on a ground plane is therefore never the floor. For
+    example, the floor of AWS's small_warehouse is a plate whose top is 3.4 cm above z = 0.
     """
     mesh = merge_solids(placed)
     top, is_level = mesh.vertices[mesh.faces, 2].max(axis=1), _level_faces(mesh)
@@ -60,17 +65,17 @@ def could_be_floor(solid: Solid) -> bool:
     return min(right - left, top - bottom) >= MIN_COVERING_WIDTH_M and top_height(solid) <= MAX_FLOOR_HEIGHT_M
 
 
-def _level_faces(mesh: TriangleMesh) -> Mask:
-    """Return which faces are level and face upwards."""
+def _level_faces(mesh: TriangleMesh) -> FaceMask:
+    """Return the mask of the faces that are level and face upwards."""
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1)
-    is_level: Mask = (lengths > 0) & (normals[:, 2] >= MIN_LEVEL_NORMAL_Z * lengths)
+    is_level: FaceMask = (lengths > 0) & (normals[:, 2] >= MIN_LEVEL_NORMAL_Z * lengths)
     return is_level
 
 
-def _is_floor(mesh: TriangleMesh, faces: Mask, bounds: Bounds, has_ground: bool) -> bool:
-    """Return whether level faces at one height are the floor of the world."""
+def _is_floor(mesh: TriangleMesh, faces: FaceMask, bounds: Bounds, has_ground: bool) -> bool:
+    """Return whether these level faces, which are at one height, are the floor of the world; see `floor_height`."""
     corners: Array = mesh.vertices[mesh.faces[faces]]
     height = corners[..., 2].max()
     low, high = corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1))
@@ -81,11 +86,14 @@ def _is_floor(mesh: TriangleMesh, faces: Mask, bounds: Bounds, has_ground: bool)
         is_possible = is_covering and uncovered <= MAX_UNCOVERED_WIDTH_M
     else:
         is_possible = is_covering or (width >= MIN_FLOOR_WIDTH_M and _carries_geometry(mesh, height))
-    return is_possible and _covered_share(corners[..., :2], bounds) >= MIN_FLOOR_SHARE
+    return is_possible and _covered_fraction(corners[..., :2], bounds) >= MIN_COVERED_FRACTION
 
 
 def _carries_geometry(mesh: TriangleMesh, height: float) -> bool:
-    """Return whether a solid stands on a floor at `height` m, or is the floor itself and rises above it."""
+    """Return whether any solid begins at most MAX_COVERING_HEIGHT_M above `height` m, and ends higher than that.
+
+    Such a solid stands on a floor at this height, or contains the floor.
+    """
     heights = mesh.vertices[mesh.faces, 2]
     lowest, highest = np.full(len(mesh.names), np.inf), np.full(len(mesh.names), -np.inf)
     np.minimum.at(lowest, mesh.owners, heights.min(axis=1))
@@ -94,7 +102,7 @@ def _carries_geometry(mesh: TriangleMesh, height: float) -> bool:
     return bool(stands.any())
 
 
-def _covered_share(triangles: Array, bounds: Bounds) -> float:
+def _covered_fraction(triangles: Array, bounds: Bounds) -> float:
     """Return the fraction of `bounds` that is covered by counterclockwise triangles (n, 3, 2), which may overlap."""
     left, bottom, right, top = bounds
     cells = (triangles - (left, bottom)) * SAMPLES / (right - left, top - bottom)

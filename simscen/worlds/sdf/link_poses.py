@@ -1,8 +1,8 @@
-"""Poses of links in the world, from the poses of models and from the `<state>` that Gazebo Classic saved.
+"""Compute the poses of links in the world, from the poses of models and the `<state>` that Gazebo Classic saved.
 
-Gazebo Classic applies the first `<state>` of a world after it loads the world: the poses of models, nested models and
-links in it are world poses and override those in the models (World::Load, Model::SetState). The new Gazebo ignores
-`<state>`, but worlds that have one were made with Classic.
+Gazebo Classic applies the first `<state>` of a world after it loads the world (World::Load, Model::SetState). A state
+contains poses of models, nested models and links. These are world poses, and override those in the models. The new
+Gazebo ignores `<state>`, but worlds that have one were made with Classic.
 """
 
 from collections.abc import Iterator
@@ -14,13 +14,17 @@ from simscen.worlds.sdf.model_tree import Frame, ModelNode
 from simscen.worlds.sdf.report import ImportReport
 
 Scale = tuple[float, float, float]
+"""Factors for the sizes of shapes along x, y and z."""
 
 
 @dataclass(frozen=True)
 class ModelState:
-    """Saved world poses of a model (None if not saved), of its links, and of its nested models, by name.
+    """Saved state of a model.
 
-    The shapes of its links are enlarged by `scale`; their poses are not.
+    pose:    pose of the model in the world; None if not saved
+    links:   poses of its links in the world, by name
+    models:  states of its nested models, by name
+    scale:   factors for the shapes of its links, not for their poses
     """
 
     pose: Pose3 | None = None
@@ -31,7 +35,12 @@ class ModelState:
 
 @dataclass(frozen=True)
 class WorldState:
-    """Saved states of models by name, names of deleted models, and inserted `<model>` elements."""
+    """Saved state of a world.
+
+    models:    states of models, by name
+    deleted:   names of models that were deleted from the world
+    inserted:  `<model>` elements that were inserted into the world
+    """
 
     models: dict[str, ModelState] = field(default_factory=dict)
     deleted: frozenset[str] = frozenset()
@@ -40,7 +49,14 @@ class WorldState:
 
 @dataclass(frozen=True, eq=False)
 class PlacedLink:
-    """A link with its pose in the world, its name as in Gazebo (model::nested::link), and the scale of its shapes."""
+    """A link with its pose in the world.
+
+    name:   name as in Gazebo, for example model::nested::link
+    frame:  frame of the link in its model
+    model:  the model that contains the link directly
+    pose:   pose in the world
+    scale:  factors for the shapes of the link
+    """
 
     name: str
     frame: Frame
@@ -50,13 +66,13 @@ class PlacedLink:
 
 
 def read_state(world: Element, report: ImportReport) -> WorldState:
-    """Return the state of a `<world>`; empty if the world has none."""
+    """Return the first `<state>` of a `<world>`; an empty one if the world has none."""
     states = list(world.all("state"))
     if not states:
         return WorldState()
     first = states[0]
     if len(states) > 1:
-        report.note(states[1].place, "only the first <state> of a world is applied")
+        report.note(states[1].location, "only the first <state> of a world is applied")
     deletions, insertions = first.child("deletions"), first.child("insertions")
     return WorldState(
         {model.name: _read_model_state(model, report) for model in first.all("model")},
@@ -66,6 +82,7 @@ def read_state(world: Element, report: ImportReport) -> WorldState:
 
 
 def _read_model_state(element: Element, report: ImportReport) -> ModelState:
+    """Read a `<model>` of a `<state>`; unusable values are added to the report and left out."""
     links: dict[str, Pose3] = {}
     models: dict[str, ModelState] = {}
     pose, scale = None, (1.0, 1.0, 1.0)
@@ -97,13 +114,17 @@ def _read_scale(element: Element) -> Scale:
 def place_links(
     model: ModelNode, pose: Pose3, report: ImportReport, state: ModelState | None = None
 ) -> Iterator[PlacedLink]:
-    """Yield all links of a model at `pose` in the world; poses in `state` override those in the model."""
+    """Yield all links of a model at `pose` in the world, also those of nested models.
+
+    Poses in `state` override those in the model. Links without a valid pose are added to the report and left out.
+    """
     yield from _place_links_below(model, pose, model.name, report, state or ModelState())
 
 
 def _place_links_below(
     model: ModelNode, pose: Pose3, scoped_name: str, report: ImportReport, state: ModelState
 ) -> Iterator[PlacedLink]:
+    """Yield the links of `place_links`; `scoped_name` is the name of the model with the models around it."""
     model_pose = state.pose if state.pose is not None else pose
     for part in model.parts:
         with report.skip_unusable():
@@ -118,7 +139,10 @@ def _place_links_below(
 
 
 def _state_of_included_model(state: ModelState, model: ModelNode) -> ModelState:
-    """Return the state of a nested model whose links an older Classic saved as `model::link` in the outer model."""
+    """Return the state of a nested model from the `state` of the outer model.
+
+    Older versions of Classic saved the links of an included model as `model::link` of the outer model.
+    """
     prefix = f"{model.name}::"
     links = {name.removeprefix(prefix): pose for name, pose in state.links.items() if name.startswith(prefix)}
     return ModelState(scale=state.scale, links=links)

@@ -23,21 +23,22 @@ from simscen.worlds.sdf.model_tree import ModelNode, TreeReader
 from simscen.worlds.sdf.report import ImportReport, UnusableElement
 from simscen.worlds.sdf.shapes import ShapeReader
 
-MAX_OUTLIER_SHARE = 0.05
-"""Fraction of the models (rounded down, plus one) that may be outliers; with more, the world is regarded as large."""
+MAX_OUTLIER_FRACTION = 0.05
+"""Fraction of the models (rounded down, plus one) that may be outliers. With more, the world is regarded as large."""
 
 Placed = TypeVar("Placed", Solid, Body)
+"""A solid or a body: both have a pose."""
 
 
 def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bool = False) -> World:
     """Load the world in a Gazebo `.sdf`, `.world` or model file of SDF 1.3 to 1.12.
 
     Only collision geometry is used. Static models become solids, other models bodies with their mass, and actors
-    bodies of mass 0 with a path. Poses are in the world frame, and the order is that of the document. A floor above
-    z = 0 is lowered to z = 0, where robots drive. Files that the world refers to are searched in its folder and in
-    `search`, and must lie inside `root` or `search`.
+    bodies of mass 0 with a path. Poses are in the world frame, and the order is that of the document. A world whose
+    floor is above z = 0 is lowered, because robots drive at z = 0. Files that the world refers to are searched in its
+    folder and in the folders `search`, and must lie inside `root` or `search`.
 
-    Raises InvalidInput with all elements that would change the geometry and cannot be used. With `lenient`, such
+    Raises InvalidInput with all elements that would change the geometry but cannot be used. With `lenient`, such
     elements are left out with a note in `World.notes`, and only an unreadable world file is an error.
     """
     report, files = ImportReport(lenient=lenient), WorldFiles.of([root, *search])
@@ -65,7 +66,7 @@ def _world_element(document: Element, report: ImportReport) -> Element:
     """Return the first `<world>`, as Gazebo does, or the root of a file that contains only models."""
     worlds = list(document.all("world"))
     for other in worlds[1:]:
-        report.note(other.place, f"only the first world of a file is loaded, which is {worlds[0].name!r}")
+        report.note(other.location, f"only the first world of a file is loaded, which is {worlds[0].name!r}")
     if worlds:
         return worlds[0]
     if not any(document.all("model", "actor", "include")):
@@ -74,7 +75,7 @@ def _world_element(document: Element, report: ImportReport) -> Element:
 
 
 class _WorldImporter:
-    """Collects the solids and bodies of one world."""
+    """Collects the solids and bodies of the models below `root`, the node of the world."""
 
     def __init__(self, root: ModelNode, shapes: ShapeReader, report: ImportReport) -> None:
         self._root, self._shapes, self._report = root, shapes, report
@@ -82,10 +83,10 @@ class _WorldImporter:
         self._bodies: list[Body] = []
 
     def build(self, state: WorldState, tree: TreeReader) -> World:
-        """Return the world with the saved `state` applied."""
+        """Return the world with the saved `state` applied; `tree` reads the models that the state inserts."""
         for element in state.inserted:
             with self._report.skip_unusable():
-                tree.add_model(self._root, tree.read_model(element, static=False))
+                tree.add_model(self._root, tree.read_model(element, is_parent_static=False))
         for model in self._root.parts:
             if isinstance(model, ModelNode) and model.name not in state.deleted:
                 with self._report.skip_unusable():
@@ -95,10 +96,11 @@ class _WorldImporter:
                 body = read_actor(actor, self._root, self._shapes, self._report)
                 self._bodies += [body] if body else []
         for joint in self._root.joints:
-            self._report.note(joint.place, "a joint between models is ignored")
-        return self._world()
+            self._report.note(joint.location, "a joint between models is ignored")
+        return self._build_world()
 
     def _add_model(self, model: ModelNode, state: WorldState) -> None:
+        """Collect the solids and bodies of a top-level model."""
         saved = state.models.get(model.name, ModelState())
         pose = saved.pose or self._root.scope.pose_of(model.frame)
         links = place_links(model, pose, self._report, saved)
@@ -107,7 +109,8 @@ class _WorldImporter:
         self._solids += solids
         self._bodies += bodies
 
-    def _world(self) -> World:
+    def _build_world(self) -> World:
+        """Return the world of the collected solids and bodies, without outliers and with its floor at z = 0."""
         element = self._root.element
         if not self._solids and not self._bodies and not self._report.has_problems:
             self._report_empty_world(element)
@@ -118,9 +121,9 @@ class _WorldImporter:
         height = floor_height(placed, len(solids), bounds, self._shapes.has_ground)
         if height:
             self._report.note(
-                element.place, f"its floor is {height:.3f} m above z = 0; the world is lowered by that height"
+                element.location, f"its floor is {height:.3f} m above z = 0; the world is lowered by that height"
             )
-        solids, bodies = _lowered_by(solids, height), _lowered_by(bodies, height)
+        solids, bodies = _lower(solids, height), _lower(bodies, height)
         # Beside a floor that is above the ground plane, the ground is too low for robots.
         has_open_ground = self._shapes.has_ground and not height
         if map_size_error(bounds):
@@ -130,7 +133,7 @@ class _WorldImporter:
         return World(name, solids, bodies, bounds=bounds, has_open_ground=has_open_ground, notes=self._report.notes)
 
     def _without_outliers(self, bodies: tuple[Body, ...]) -> tuple[tuple[Solid, ...], tuple[Body, ...]]:
-        """Return the solids and bodies without those far away from all others; a slab like a floor is never far."""
+        """Return the static solids and the bodies without outliers; see `outliers`. Floors are never outliers."""
         extents: dict[str, list[Bounds]] = {}
         for solid in self._solids:
             if not could_be_floor(solid):
@@ -140,19 +143,22 @@ class _WorldImporter:
         far_models = outliers({name: union(boxes) for name, boxes in extents.items()})
         for name, distance in far_models.items():
             message = f"left out: {name!r} is {distance:.0f} m away from the median of all models, too far for a map"
-            self._report.note(self._root.element.place, message)
+            self._report.note(self._root.element.location, message)
         return (
             tuple(solid for solid in self._solids if model_name(solid) not in far_models),
             tuple(body for body in bodies if body.name not in far_models),
         )
 
     def _report_empty_world(self, element: Element) -> None:
-        """Report a world without obstacles as an error, unless it is a ground plane on purpose."""
+        """Report that a world has no obstacles: as an error, or as a note if it has a ground plane.
+
+        Raises UnusableElement if elements were skipped, because an empty world would then be misleading.
+        """
         if self._report.skipped_count:
             message = f"nothing is left of this world: {self._report.skipped_count} of its elements were skipped"
             raise element.unusable(message, "load it without --lenient to see what is missing")
         if self._shapes.has_ground:
-            self._report.note(element.place, "contains only a ground plane")
+            self._report.note(element.location, "contains only a ground plane")
             return
         models = [m for part in self._root.parts if isinstance(part, ModelNode) for m in part.models()]
         has_links = any(not isinstance(part, ModelNode) for model in models for part in model.parts)
@@ -163,15 +169,16 @@ class _WorldImporter:
         self._report.add_error(element.unusable(message, "load it with --lenient if the world should be empty"))
 
 
-def _lowered_by(placed: Sequence[Placed], height: float) -> tuple[Placed, ...]:
+def _lower(placed: Sequence[Placed], height: float) -> tuple[Placed, ...]:
+    """Return solids or bodies moved down by `height` m."""
     return tuple(replace(each, pose=each.pose._replace(z=each.pose.z - height)) for each in placed)
 
 
 def outliers(extents: Mapping[str, Bounds]) -> dict[str, float]:
-    """Return the models to leave out so that the others fit on a map, with their distances from the median in meters.
+    """Return the models to leave out so that the others fit on a map, with their distances in m from the median.
 
-    `extents` are the rectangles around the models. The result is empty if all models fit, if more
-    than MAX_OUTLIER_SHARE of them would have to be left out, or if one of them is large instead of far away.
+    `extents` are the bounding rectangles of the models by name. The result is empty if all models fit, if more than
+    MAX_OUTLIER_FRACTION of them would have to be left out, or if one of these is large instead of far away.
     """
     names, corners = list(extents), np.array(list(extents.values())).reshape(-1, 2, 2)
     if not names:
@@ -179,7 +186,7 @@ def outliers(extents: Mapping[str, Bounds]) -> dict[str, float]:
     centers = corners.mean(axis=1)
     distance = np.hypot(*(centers - np.median(centers, axis=0)).T)
     farthest_first = np.argsort(distance, kind="stable")[::-1]
-    for count in range(min(int(MAX_OUTLIER_SHARE * len(names)) + 2, len(names))):
+    for count in range(min(int(MAX_OUTLIER_FRACTION * len(names)) + 2, len(names))):
         kept = corners[farthest_first[count:]]
         left, bottom = kept[:, 0].min(axis=0).tolist()
         right, top = kept[:, 1].max(axis=0).tolist()

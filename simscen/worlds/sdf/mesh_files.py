@@ -1,4 +1,4 @@
-"""Readers of COLLADA (DAE), STL and OBJ mesh files; vertices are in meters.
+"""Parse COLLADA (DAE), STL and OBJ mesh files into named parts with vertices in m.
 
 COLLADA is read with pycollada, because trimesh drops the unit and the node names. STL and OBJ are parsed by trimesh's
 exchange functions without creating `Trimesh` objects, which would compute normals of degenerate triangles.
@@ -23,23 +23,29 @@ if TYPE_CHECKING:
     import collada
 
 MAX_FACES = 1_000_000
+"""Maximum number of triangles of a file."""
 MAX_NODES = 10_000
+"""Maximum number of nodes of a COLLADA scene, in which a node may be instantiated repeatedly."""
 STL_HEADER_BYTES, STL_TRIANGLE_BYTES = 84, 50
+"""Size of the header and of each triangle of a binary STL file."""
 MATERIAL_ELEMENTS = {"library_materials", "library_effects", "library_images", "bind_material"}
+"""COLLADA elements that are removed before pycollada reads a file."""
 INSTANCE_ELEMENTS = {"instance_geometry", "instance_controller", "instance_node"}
+"""COLLADA elements that add geometry to a scene node."""
 UNSUPPORTED_ELEMENTS = {"tristrips", "trifans", "convex_mesh", "spline", "instance_controller"}
+"""COLLADA geometry that is not read, and is an error."""
 
 # trimesh logs tracebacks of formats that it tries; without any handler, Python would print them to stderr.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 
 class UnusableMesh(Exception):
-    """The reason why a mesh file cannot be used."""
+    """A mesh file cannot be used; the message is the reason."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshPart:
-    """A part of a mesh: `vertices` (n, 3) in meters, `faces` (m, 3), and the names by which `<submesh>` finds it."""
+    """A part of a mesh: `vertices` (n, 3) in m, `faces` (m, 3), and the names by which `<submesh>` finds the part."""
 
     names: tuple[str, ...]
     vertices: Array
@@ -47,7 +53,7 @@ class MeshPart:
 
 
 def read_parts(data: bytes, suffix: str) -> tuple[MeshPart, ...]:
-    """Return the parts of a .dae, .stl or .obj file; raises UnusableMesh."""
+    """Return the parts in the content of a file with the suffix .dae, .stl or .obj. Raises UnusableMesh."""
     readers = {".dae": _read_dae, ".stl": _read_stl, ".obj": _read_obj}
     if suffix not in readers:
         raise UnusableMesh(f"{suffix or 'files without suffix'} meshes are not read, only DAE, STL and OBJ")
@@ -59,6 +65,7 @@ def read_parts(data: bytes, suffix: str) -> tuple[MeshPart, ...]:
 
 
 def _check_parts(parts: tuple[MeshPart, ...]) -> None:
+    """Raise UnusableMesh if a vertex or a triangle of the parts is invalid, or if there are too many triangles."""
     _check_face_count(sum(len(part.faces) for part in parts))
     for part in parts:
         if part.vertices.ndim != 2 or part.vertices.shape[1] != 3:
@@ -109,7 +116,7 @@ def _read_obj(data: bytes) -> Iterator[MeshPart]:
 
 
 def _parts_from_trimesh(load: Callable[[], Mapping[str, Any]], file_format: str) -> Iterator[MeshPart]:
-    """Yield the parts in the keyword arguments that trimesh's loaders return for Trimesh or Scene."""
+    """Call a loader of trimesh, and yield the parts in its result: keyword arguments of a Trimesh or of a Scene."""
     from trimesh.geometry import triangulate_quads
 
     try:
@@ -155,10 +162,10 @@ def _read_dae(data: bytes) -> Iterator[MeshPart]:
 
 
 def _geometry_only(data: bytes) -> bytes:
-    """Return the file without materials and without the nodes of its scenes that have no geometry.
+    """Return the content of a COLLADA file without materials and without scene nodes that have no geometry.
 
-    pycollada drops every geometry whose material or image is missing. Exporters write invalid matrices for lights and
-    cameras.
+    pycollada drops every geometry whose material or image is missing. Nodes without geometry are lights and cameras,
+    for which exporters write invalid matrices.
     """
     root = ET.fromstring(data)
     with_geometry: set[ET.Element] = set()
@@ -174,7 +181,7 @@ def _geometry_only(data: bytes) -> bytes:
 
 
 def _check_complete(document: "collada.Collada") -> None:
-    """Raise UnusableMesh for geometry that pycollada silently leaves out because it cannot read it."""
+    """Raise UnusableMesh if the file has geometry that pycollada silently left out because it cannot read it."""
     known = {geometry.id for geometry in document.geometries}
     for element in document.xmlnode.getroot().iter():
         name = element.get("url", "").removeprefix("#")
@@ -190,7 +197,10 @@ def _local_name(element: "ET.Element") -> str:
 
 
 def _parts_of_nodes(nodes: list[object]) -> Iterator[MeshPart]:
-    """Yield the parts of a COLLADA scene in its own unit; a part is first named after the nearest named node above."""
+    """Yield the parts of a COLLADA scene in the unit of the file.
+
+    The first name of a part is that of the nearest node above it that has a name.
+    """
     from collada.scene import GeometryNode, Node
 
     pending = [(node, np.eye(4), "") for node in reversed(nodes)]
@@ -212,6 +222,7 @@ def _parts_of_nodes(nodes: list[object]) -> Iterator[MeshPart]:
 
 
 def _parts_of_geometry(geometry: Any, matrix: Array, node_name: str) -> Iterator[MeshPart]:
+    """Yield the triangles of a COLLADA geometry, transformed by a matrix (4, 4)."""
     names = tuple(name for name in (node_name, geometry.name, geometry.id) if name)
     for primitive in geometry.primitives:
         triangles = primitive.triangleset() if hasattr(primitive, "triangleset") else primitive

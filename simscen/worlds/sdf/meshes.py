@@ -1,4 +1,4 @@
-"""Triangle meshes of `<mesh>` and `<heightmap>`; concave meshes are used as they are.
+"""Convert `<mesh>` and `<heightmap>` elements to triangle meshes; concave meshes stay concave.
 
 A COLLADA `<unit>` is used; `<up_axis>` is not, because Gazebo ignores it as well: its ColladaLoader does not read the
 element, and its AssimpLoader undoes the rotation that assimp adds. Published worlds rely on this: meshes of Nav2's
@@ -24,18 +24,21 @@ from simscen.worlds.sdf.mesh_files import MeshPart, UnusableMesh, read_parts
 from simscen.worlds.sdf.report import CODE, ImportReport
 
 MAX_CACHE_BYTES = 256 << 20
+"""Maximum size of all vertices and faces in the cache; the newest file is kept even if it is larger."""
 MAX_HEIGHTMAP_PIXELS = 513
-"""Maximum pixels along an edge: Gazebo's heightmaps have 2^n + 1 pixels."""
+"""Maximum number of pixels along an edge: Gazebo's heightmaps have 2^n + 1 pixels."""
 IMAGE_FORMATS = ("PNG", "BMP", "PPM", "JPEG", "TIFF")
+"""Formats of heightmaps, as Pillow calls them."""
 GRAY_MODES = ("L", "I", "I;16", "I;16B", "F")
 """Pillow's single-channel modes, whose values are used as heights without conversion."""
 
 
 class MeshCache:
-    """Cache of parsed mesh files by content; the least recently used file is dropped first.
+    """Cache of parsed mesh files by their content; the least recently used file is dropped first.
 
     The cache is in memory only, because a run must not write outside its output folder. The fork server fills the
-    cache, and its forks inherit it. The returned arrays are shared and must not be changed.
+    cache, and the processes that it forks inherit the content. All callers receive the same arrays, which must not be
+    changed.
     """
 
     def __init__(self, max_bytes: int = MAX_CACHE_BYTES) -> None:
@@ -43,7 +46,7 @@ class MeshCache:
         self._parts: OrderedDict[str, tuple[MeshPart, ...]] = OrderedDict()
 
     def read(self, data: bytes, suffix: str) -> tuple[MeshPart, ...]:
-        """Return the parts in the content of a file with this suffix; raises UnusableMesh."""
+        """Return the parts in the content of a file with this suffix. Raises UnusableMesh."""
         key = hashlib.sha256(suffix.encode() + b"\0" + data).hexdigest()
         if key not in self._parts:
             self._parts[key] = read_parts(data, suffix)
@@ -63,23 +66,26 @@ MESH_CACHE = MeshCache()
 
 @dataclass(frozen=True)
 class MeshRequest:
-    """The file, scale and submesh that a `<mesh>` refers to; equal requests share one mesh."""
+    """What a `<mesh>` element asks for. Equal requests have the same mesh as result."""
 
     path: Path
     scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+    """Factors for x, y and z."""
     submesh: str = ""
+    """Name of the part to use; "" for all parts."""
     is_centered: bool = False
+    """Whether the center of the bounding box is moved to the origin."""
 
 
 class MeshReader:
-    """Reads the meshes of one world; equal meshes are the same object."""
+    """Reads the meshes that the elements of one world refer to. Equal meshes are the same object, to save memory."""
 
     def __init__(self, files: WorldFiles, report: ImportReport) -> None:
         self._files, self._report = files, report
         self._meshes: dict[MeshRequest, Mesh] = {}
 
     def read(self, element: Element) -> Mesh:
-        """Return the mesh that a `<mesh>` element refers to; raises UnusableElement."""
+        """Return the mesh that a `<mesh>` element refers to. Raises UnusableElement."""
         uri = element.child("uri")
         if uri is None:
             raise element.unusable("<uri> is missing")
@@ -90,7 +96,7 @@ class MeshReader:
                 raise element.unusable(f"the mesh reaches farther than {MAX_COORDINATE_M:g} m")
             self._meshes[request] = _merge_parts(parts, request)
         if element.attributes.get("optimization") or element.child("convex_decomposition"):
-            self._report.note(element.place, "convex hulls are not computed; the mesh is used unchanged")
+            self._report.note(element.location, "convex hulls are not computed; the mesh is used unchanged")
         return self._meshes[request]
 
     def _read_file(self, path: Path, uri: Element) -> tuple[MeshPart, ...]:
@@ -98,17 +104,17 @@ class MeshReader:
         try:
             return MESH_CACHE.read(data, path.suffix.lower())
         except UnusableMesh as error:
-            raise uri.unusable(f"{self._files.shown(path)}: {error}") from error
+            raise uri.unusable(f"{self._files.display_path(path)}: {error}") from error
 
 
 def read_mesh(path: Path) -> Mesh:
-    """Return all triangles of a DAE, STL or OBJ file in meters, without checking whether the folder is allowed.
+    """Return all triangles of a DAE, STL or OBJ file in m, without checking whether its folder is allowed.
 
     Raises InvalidInput if the file is not a regular file, too large, broken, or without triangles.
     """
     real_path = path.resolve()
     try:
-        data = WorldFiles.of([real_path.parent]).open(real_path, MAX_MESH_BYTES)[1]
+        data = WorldFiles.of([real_path.parent]).read_file(real_path, MAX_MESH_BYTES)[1]
         parts = MESH_CACHE.read(data, path.suffix.lower())
     except (UnusableFile, UnusableMesh) as error:
         raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from error
@@ -116,6 +122,7 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def _mesh_request(element: Element, path: Path) -> MeshRequest:
+    """Read scale and submesh from a `<mesh>` whose file is `path`. Raises UnusableElement."""
     scale_element, submesh = element.child("scale"), element.child("submesh")
     scale = read_numbers(scale_element, 3) if scale_element else (1.0, 1.0, 1.0)
     if scale_element and 0.0 in scale:
@@ -129,6 +136,7 @@ def _mesh_request(element: Element, path: Path) -> MeshRequest:
 
 
 def _select_submesh(parts: tuple[MeshPart, ...], request: MeshRequest, element: Element) -> tuple[MeshPart, ...]:
+    """Return the parts with the requested name, or all parts. Raises UnusableElement if there are none."""
     selected = tuple(part for part in parts if not request.submesh or request.submesh in part.names)
     if not selected:
         known = sorted({part.names[0] for part in parts if part.names})
@@ -138,9 +146,9 @@ def _select_submesh(parts: tuple[MeshPart, ...], request: MeshRequest, element: 
 
 
 def _largest_coordinate(parts: tuple[MeshPart, ...], request: MeshRequest) -> float:
-    """Return the largest absolute coordinate of the requested mesh.
+    """Return the largest absolute coordinate in m of the requested mesh.
 
-    Computed in Python floats: huge coordinates and scales overflow to infinity without a warning of NumPy.
+    It is computed with Python floats: huge coordinates and scales overflow to infinity without a warning of NumPy.
     """
     reach = 0.0
     for axis, factor in enumerate(request.scale):
@@ -152,6 +160,7 @@ def _largest_coordinate(parts: tuple[MeshPart, ...], request: MeshRequest) -> fl
 
 
 def _merge_parts(parts: tuple[MeshPart, ...], request: MeshRequest) -> Mesh:
+    """Return one read-only mesh of all parts, centered and scaled as requested."""
     vertices = np.vstack([part.vertices for part in parts])
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     faces = np.vstack([part.faces + start for part, start in zip(parts, starts, strict=True)]).astype(np.int32)
@@ -166,7 +175,7 @@ def _merge_parts(parts: tuple[MeshPart, ...], request: MeshRequest) -> Mesh:
 
 
 def read_heightmap(element: Element, files: WorldFiles) -> Solid:
-    """Return the mesh of a `<heightmap>`, centered on `<pos>`; raises UnusableElement.
+    """Return the terrain of a `<heightmap>` as a solid, centered on `<pos>`. Raises UnusableElement.
 
     As in Gazebo (gz-common, ImageHeightmap.cc), the brightest pixel is as high as the z of `<size>`, and black is 0.
     """
@@ -180,7 +189,7 @@ def read_heightmap(element: Element, files: WorldFiles) -> Solid:
 
 
 def _read_relative_heights(uri: Element, files: WorldFiles) -> Array:
-    """Return heights (rows, columns) in 0 … 1 from an image; the first row is the top of the image."""
+    """Return the heights (rows, columns) in an image, from 0 to 1 for the brightest pixel. The first row is the top."""
     from PIL import Image
 
     path = files.locate(uri)
@@ -193,23 +202,27 @@ def _read_relative_heights(uri: Element, files: WorldFiles) -> Array:
         with image:
             if max(image.size) > MAX_HEIGHTMAP_PIXELS or min(image.size) < 2:
                 size = f"{image.size[0]} x {image.size[1]} pixels"
-                raise uri.unusable(f"{files.shown(path)}: {size}; an edge must have 2 to {MAX_HEIGHTMAP_PIXELS} pixels")
+                raise uri.unusable(
+                    f"{files.display_path(path)}: {size}; an edge must have 2 to {MAX_HEIGHTMAP_PIXELS} pixels"
+                )
             gray = image if image.mode in GRAY_MODES else image.convert("L")
             pixels = np.asarray(gray, dtype=np.float64)
     except Image.DecompressionBombError as error:
-        raise uri.unusable(f"{files.shown(path)}: image too large") from error
+        raise uri.unusable(f"{files.display_path(path)}: image too large") from error
     except (OSError, ValueError, SyntaxError) as error:
-        raise uri.unusable(f"{files.shown(path)}: not a readable image (PNG, BMP, PGM, JPEG or TIFF)") from error
+        raise uri.unusable(f"{files.display_path(path)}: not a readable image (PNG, BMP, PGM, JPEG or TIFF)") from error
     if not np.isfinite(pixels).all() or pixels.min() < 0:
-        raise uri.unusable(f"{files.shown(path)}: a height is negative or not a number", "save it as 16-bit gray")
+        raise uri.unusable(
+            f"{files.display_path(path)}: a height is negative or not a number", "save it as 16-bit gray"
+        )
     brightest = float(pixels.max())
     return pixels / brightest if brightest > 0 else pixels
 
 
 def terrain_mesh(heights: Array, width: float, depth: float) -> Mesh:
-    """Return two triangles per cell between the samples `heights` (rows, columns), centered on x and y.
+    """Return a mesh with two triangles per cell between the samples `heights` (rows, columns); all lengths in m.
 
-    The first row is at +y; all lengths are in meters.
+    The terrain is `width` m long along x and `depth` m along y, and centered on the origin. The first row is at +y.
     """
     rows, columns = heights.shape
     x, y = np.meshgrid(np.linspace(-width / 2, width / 2, columns), np.linspace(depth / 2, -depth / 2, rows))

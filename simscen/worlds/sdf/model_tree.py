@@ -1,8 +1,9 @@
-"""Tree of models in a world, with every `<include>` replaced by the model that it refers to.
+"""Read the tree of models in a world, and compute the poses of their frames.
 
-Every model is a scope with the implicit frame `__model__`; the world is a scope with the frame `world`. Names with
-`::` refer to nested models; a name cannot refer to an enclosing model. Source: SDF proposals "Pose Frame Semantics"
-(1.7, 1.8) and sdformat's FrameSemantics.cc.
+Every `<include>` is replaced by the model that it refers to. Every model is a scope for names of frames, with the
+implicit frame `__model__`; the world is a scope with the frame `world`. Names with `::` refer to frames of nested
+models; a name cannot refer to an enclosing model. Source: SDF proposals "Pose Frame Semantics" (1.7, 1.8) and
+sdformat's FrameSemantics.cc.
 """
 
 from collections.abc import Iterator
@@ -23,16 +24,21 @@ from simscen.worlds.sdf.files import IncludedFiles
 from simscen.worlds.sdf.report import ImportReport
 
 MODEL_FRAME, WORLD_FRAME = "__model__", "world"
+"""Names of the implicit frame of a model, and of the world."""
+MAX_MODELS = 20_000
+"""Maximum number of models, against exponential growth: files that include ten others at every level."""
 
 
 @dataclass(eq=False)
 class Frame:
-    """A named frame; a file that is included twice yields two frames.
+    """A named frame: of a link, a nested model, a joint, or a `<frame>` element.
 
-    `pose` is the `<pose>` element (None = identity), relative to the frame in its attribute `relative_to`, or to
-    `default_reference` if it has none. The frame moves with the link or frame `attached_to`. Only a model has a
-    `model_scope` with the frames in it. If a model has a `placement_frame`, `pose` is the pose of that frame instead of
-    the model's own frame.
+    element:            the XML element; a file that is included twice yields two frames with the same element
+    pose:               the `<pose>` element, relative to the frame in its attribute `relative_to`; None for identity
+    default_reference:  name of the frame to which `pose` is relative if it does not state one; "" for the scope's own
+    attached_to:        name of the link or frame with which a joint or a `<frame>` moves; "" for the scope's own frame
+    model_scope:        the frames in a nested model; None if this is not the frame of a model
+    placement_frame:    name of a frame in the nested model: if set, `pose` is the pose of this frame, not of the model
     """
 
     name: str
@@ -46,12 +52,11 @@ class Frame:
 
 @dataclass(eq=False)
 class FrameScope:
-    """The frames of one model or of the world.
+    """The frames of one model or of the world, by name.
 
-    `implicit_frame` is the name of the scope's own frame. It is attached to the link, frame, or nested model
-    `canonical_link`; "" if it is attached to the world, which does not move. `_frames_in_progress` are the frames whose
-    pose is being computed, to detect cycles. The names in `merged_models` (included with merge="true") are
-    visible in this scope too.
+    implicit_frame:  name of the scope's own frame
+    canonical_link:  name of the link, frame, or nested model with which this frame moves; "" in the world
+    merged_models:   models that were included with merge="true", whose frames are visible in this scope too
     """
 
     implicit_frame: str = MODEL_FRAME
@@ -59,14 +64,19 @@ class FrameScope:
     frames: dict[str, Frame] = field(default_factory=dict)
     merged_models: list[Frame] = field(default_factory=list)
     _poses: dict[int, Pose3] = field(default_factory=dict)
+    """Computed poses by the id of the frame."""
     _frames_in_progress: list[int] = field(default_factory=list)
+    """Ids of the frames whose pose is being computed, to detect cycles."""
 
     def add(self, frame: Frame) -> None:
-        """Add a frame; the first of two frames with the same name wins."""
+        """Add a frame, unless there is one with the same name."""
         self.frames.setdefault(frame.name, frame)
 
     def pose_of(self, frame: Frame) -> Pose3:
-        """Return the pose of a frame in this scope; raises UnusableElement for unknown frames and for cycles."""
+        """Return the pose of a frame of this scope, relative to the scope's own frame.
+
+        Raises UnusableElement if the pose refers to an unknown frame or depends on itself.
+        """
         key = id(frame)
         if key not in self._poses:
             referrer = frame.pose or frame.element
@@ -87,9 +97,9 @@ class FrameScope:
         return pose
 
     def pose_of_name(self, name: str, referrer: Element) -> Pose3:
-        """Return the pose of the frame `name` in this scope.
+        """Return the pose of the frame `name`, which may be `model::frame`, relative to the scope's own frame.
 
-        Raises UnusableElement at `referrer` if there is no such frame.
+        Raises UnusableElement at the element `referrer` if there is no such frame.
         """
         if name in ("", self.implicit_frame):
             return Pose3()
@@ -101,9 +111,10 @@ class FrameScope:
         return self.pose_of(model).compose(model.model_scope.pose_of_name(rest, referrer))
 
     def link_of_frame(self, name: str, referrer: Element, visited: tuple[Frame, ...] = ()) -> Frame | None:
-        """Return the link that the frame `name` moves with, or None for the world.
+        """Return the frame of the link with which the frame `name` moves; None for the world.
 
-        Raises UnusableElement at `referrer` if there is no such frame.
+        `visited` are the frames that lead to this one, to detect cycles. Raises UnusableElement at the element
+        `referrer` if there is no such frame, or if it is attached to itself.
         """
         if name == WORLD_FRAME:
             return None
@@ -124,7 +135,10 @@ class FrameScope:
         return self.link_of_frame(frame.attached_to, referrer, (*visited, frame))
 
     def _model_with_frame(self, name: str) -> tuple[Frame | None, str]:
-        """Return the nested or merged model that has the frame `name`, and the frame's name in that model."""
+        """Return the frame of the nested or merged model that has the frame `name`, and the frame's name in that model.
+
+        The model is None if there is none.
+        """
         head, _, rest = name.partition("::")
         nested = self.frames.get(head)
         if rest and nested is not None and nested.model_scope is not None and nested.model_scope.has_frame(rest):
@@ -135,28 +149,27 @@ class FrameScope:
         return None, name
 
     def has_frame(self, name: str) -> bool:
-        """Return True if `name` is a frame of this scope or of a model in it."""
+        """Return whether `name` is a frame of this scope or of a model in it."""
         return name == self.implicit_frame or name in self.frames or self._model_with_frame(name)[0] is not None
-
-
-MAX_MODELS = 20_000
-"""Limit against exponential growth, e.g. files that include ten others at every level."""
 
 
 @dataclass(eq=False)
 class ModelNode:
     """A model, an actor, or the world as the outermost model.
 
-    `parts` are its links (Frame) and nested models in document order; an actor has links only. `frame` is the model's
-    own frame in the scope of its parent. If `static`, everything below it is static too, as in Gazebo. Only the world
-    has `actors`.
+    frame:      the model's own frame, in the scope of its parent
+    scope:      the frames in the model
+    is_static:  True if the model or a model around it is static, as in Gazebo
+    parts:      links (their frames) and nested models, in document order; an actor has only links
+    joints:     `<joint>` elements
+    actors:     actors of the world; empty for models
     """
 
     name: str
     element: Element
     frame: Frame
     scope: FrameScope
-    static: bool = False
+    is_static: bool = False
     parts: "list[Frame | ModelNode]" = field(default_factory=list)
     joints: list[Element] = field(default_factory=list)
     actors: "list[ModelNode]" = field(default_factory=list)
@@ -170,7 +183,7 @@ class ModelNode:
 
 
 class TreeReader:
-    """Reads worlds and models; unusable elements are added to the report and left out."""
+    """Reads the trees of worlds and models; unusable elements are added to the report and left out."""
 
     def __init__(self, included_files: IncludedFiles, report: ImportReport) -> None:
         self._included_files, self._report = included_files, report
@@ -183,35 +196,40 @@ class TreeReader:
         self._read_children(world, "world")
         return world
 
-    def read_model(self, element: Element, static: bool, include: Element | None = None) -> ModelNode:
-        """Read a model; `include` overrides name, pose, static and placement_frame as the specification allows."""
+    def read_model(self, element: Element, is_parent_static: bool, include: Element | None = None) -> ModelNode:
+        """Read a `<model>`, which is static if it or its parent is static.
+
+        The children name, pose, static and placement_frame of `include` override those of the model, as the
+        specification allows. Raises UnusableElement.
+        """
         self._model_count += 1
         if self._model_count > MAX_MODELS:
             raise element.unusable(f"more than {MAX_MODELS} models")
         overrides = {child.tag: child for child in include.children} if include else {}
-        name = _name(element, overrides.get("name"))
+        name = _checked_name(element, overrides.get("name"))
         is_static = read_bool(overrides.get("static", element.child("static")))
-        if include is not None and _is_merged(include):
+        if include is not None and _has_merge(include):
             is_static = False
         scope = FrameScope(MODEL_FRAME)
         frame = Frame(name, element, overrides.get("pose", element.child("pose")), model_scope=scope)
         placement = overrides.get("placement_frame")
         frame.placement_frame = placement.text if placement else element.attributes.get("placement_frame", "")
-        model = ModelNode(name, element, frame, scope, static or is_static)
+        model = ModelNode(name, element, frame, scope, is_parent_static or is_static)
         self._read_children(model, "model")
         scope.canonical_link = element.attributes.get("canonical_link", "") or scope.canonical_link
         return model
 
-    def add_model(self, owner: ModelNode, model: ModelNode, merged: bool = False) -> None:
-        """Nest a model in its owner; the frames of a merged model are visible in the owner."""
+    def add_model(self, owner: ModelNode, model: ModelNode, is_merged: bool = False) -> None:
+        """Add a nested model to its owner. The frames of a merged model are visible in the owner too."""
         owner.parts.append(model)
-        name = f"_merged__{model.name}__model__" if merged else model.name
+        name = f"_merged__{model.name}__model__" if is_merged else model.name
         owner.scope.frames.setdefault(name, model.frame)
         owner.scope.canonical_link = owner.scope.canonical_link or name
-        if merged:
+        if is_merged:
             owner.scope.merged_models.append(model.frame)
 
     def _read_children(self, owner: ModelNode, kind: str) -> None:
+        """Read all children of a "world", "model" or "actor" (`kind`)."""
         for child in owner.element.children:
             with self._report.skip_unusable():
                 self._read_child(owner, kind, child)
@@ -223,7 +241,7 @@ class TreeReader:
                 attached_to = child.attributes.get("attached_to", "")
                 scope.add(Frame(checked_name(child), child, pose, attached_to, attached_to))
             case "world" | "model", "model":
-                self.add_model(owner, self.read_model(child, owner.static))
+                self.add_model(owner, self.read_model(child, owner.is_static))
             case "world" | "model", "include":
                 self._read_include(owner, child)
             case "world" | "model", "joint":
@@ -239,14 +257,15 @@ class TreeReader:
             case "world", "actor":
                 owner.actors.append(self._read_actor(child))
             case "model", "state":
-                self._report.note(child.place, "ignored: only the <state> of a world is applied")
+                self._report.note(child.location, "ignored: only the <state> of a world is applied")
             case "world", "population":
                 raise child.unusable("<population> is not supported", "place its models one by one")
             case _:
                 report_unknown(child, kind, self._report)
 
     def _read_actor(self, element: Element, include: Element | None = None) -> ModelNode:
-        name = _name(element, include.child("name") if include else None)
+        """Read an `<actor>`; name and pose of `include` override those of the actor."""
+        name = _checked_name(element, include.child("name") if include else None)
         pose = (include.child("pose") if include else None) or element.child("pose")
         scope = FrameScope(MODEL_FRAME)
         actor = ModelNode(name, element, Frame(name, element, pose, model_scope=scope), scope)
@@ -254,7 +273,7 @@ class TreeReader:
         return actor
 
     def _read_include(self, owner: ModelNode, include: Element) -> None:
-        """Add the first model, actor or light of another file."""
+        """Add the first model or actor of another file to the owner; a light is ignored. Raises UnusableElement."""
         report_unknown_children(include, "include", self._report)
         root = self._included_files.enter(include)
         try:
@@ -263,19 +282,20 @@ class TreeReader:
                 hint = "it contains a world" if entities else ""
                 raise include.unusable(f"{root.source.name} contains no model", hint)
             if len(entities) > 1:
-                self._report.note(root.place, "contains more than one model; only the first is included")
+                self._report.note(root.location, "contains more than one model; only the first is included")
             first = entities[0]
             if first.tag == "model":
-                self.add_model(owner, self.read_model(first, owner.static, include), _is_merged(include))
+                self.add_model(owner, self.read_model(first, owner.is_static, include), _has_merge(include))
             elif first.tag == "actor":
                 owner.actors.append(self._read_actor(first, include))
         finally:
             self._included_files.leave()
 
 
-def _name(element: Element, override: Element | None) -> str:
+def _checked_name(element: Element, override: Element | None) -> str:
+    """Return the text of the element `override` if given, otherwise the name of `element`."""
     return checked_name(override, override.text) if override else checked_name(element)
 
 
-def _is_merged(include: Element) -> bool:
+def _has_merge(include: Element) -> bool:
     return parse_bool(include.attributes.get("merge", "0"), include)

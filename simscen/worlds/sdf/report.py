@@ -1,4 +1,4 @@
-"""Problems and notes that the SDF importer collects, each with its file, line and element."""
+"""Collect the problems and notes of the SDF importer, each with its file, line and element."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,25 +11,30 @@ CODE = "SC310"
 
 
 @dataclass(frozen=True)
-class SourcePlace:
-    """Position in a file: file name for messages, line and column from 1, path of the element, and text of the line."""
+class SourceLocation:
+    """Position of an element in a file, for messages."""
 
     file: str
+    """Name of the file."""
     line: int = 0
+    """Line from 1; 0 if unknown."""
     col: int = 0
+    """Column from 1; 0 if unknown."""
     element: str = ""
+    """Path of the element, for example world[default]/model[shelf]."""
     source: str = ""
+    """Text of the line."""
 
 
 class UnusableElement(Exception):
-    """A part of a file that cannot be used; leaving it out would change the geometry."""
+    """An element that cannot be used. Leaving it out would change the geometry, so that it is an error."""
 
     is_harmless = False
-    """If True, the part is left out with a note, as leaving it out cannot affect a robot."""
+    """True if the element is left out with a note instead, because it cannot affect a robot."""
 
-    def __init__(self, place: SourcePlace, message: str, hint: str = "") -> None:
-        self.place, self.message, self.hint = place, message, hint
-        super().__init__(f"{place.file}:{place.line}: {message}")
+    def __init__(self, location: SourceLocation, message: str, hint: str = "") -> None:
+        self.location, self.message, self.hint = location, message, hint
+        super().__init__(f"{location.file}:{location.line}: {message}")
 
 
 class OutOfReach(UnusableElement):
@@ -39,17 +44,17 @@ class OutOfReach(UnusableElement):
 
 
 class MissingAsset(UnusableElement):
-    """A file or model does not exist in the allowed folders."""
+    """The file or model at `uri` does not exist in the allowed folders."""
 
-    def __init__(self, place: SourcePlace, message: str, hint: str, uri: str) -> None:
-        super().__init__(place, message, hint)
+    def __init__(self, location: SourceLocation, message: str, hint: str, uri: str) -> None:
+        super().__init__(location, message, hint)
         self.uri = uri
 
 
 class ImportReport:
-    """Collects problems and notes in the order in which they are found; repeated ones are kept once.
+    """Collects problems and notes in the order in which they are found, without repetitions.
 
-    An unusable element is a problem, or a note if `lenient`.
+    An unusable element is a problem. If `lenient`, it is a note, and `skipped_count` counts these elements.
     """
 
     def __init__(self, *, lenient: bool = False) -> None:
@@ -63,17 +68,17 @@ class ImportReport:
         """All notes as `file: element/path: sentence`."""
         return tuple(self._notes)
 
-    def note(self, place: SourcePlace, message: str) -> None:
-        """Add a note about something that is not an error."""
-        self._notes[": ".join(part for part in (place.file, place.element, message) if part)] = None
+    def note(self, location: SourceLocation, message: str) -> None:
+        """Add a note about the element at `location`; it is not an error."""
+        self._notes[": ".join(part for part in (location.file, location.element, message) if part)] = None
 
     def add_error(self, error: UnusableElement) -> None:
         """Add an unusable element, as a problem or as a note."""
         if error.is_harmless:
-            self.note(error.place, f"left out: {error.message}")
+            self.note(error.location, f"left out: {error.message}")
         elif self.lenient:
             self.skipped_count += 1
-            self.note(error.place, f"skipped: {error.message}")
+            self.note(error.location, f"skipped: {error.message}")
         elif isinstance(error, MissingAsset):
             self._missing.setdefault(error.uri, []).append(error)
         else:
@@ -81,7 +86,7 @@ class ImportReport:
 
     @contextmanager
     def skip_unusable(self) -> Iterator[None]:
-        """Add an UnusableElement raised in the block and continue after it, so that one run finds all mistakes."""
+        """Catch an UnusableElement that is raised in the block and add it, so that one import finds all mistakes."""
         try:
             yield
         except UnusableElement as error:
@@ -98,7 +103,7 @@ class ImportReport:
             raise InvalidInput(self._all_problems())
 
     def fatal_error(self, error: UnusableElement) -> InvalidInput:
-        """Return the exception for an error that ends the import, even a lenient one."""
+        """Return an InvalidInput with all problems and this error, which ends even a lenient import."""
         self.lenient = False
         self.add_error(error)
         return InvalidInput(self._all_problems())
@@ -108,13 +113,13 @@ class ImportReport:
 
 
 def _problem(error: UnusableElement, suffix: str = "") -> Problem:
-    place = error.place
-    message = f"{place.element}: {error.message}{suffix}" if place.element else f"{error.message}{suffix}"
-    return Problem(place.file, place.line, place.col, CODE, message, hint=error.hint, source=place.source)
+    location = error.location
+    message = f"{location.element}: {error.message}{suffix}" if location.element else f"{error.message}{suffix}"
+    return Problem(location.file, location.line, location.col, CODE, message, hint=error.hint, source=location.source)
 
 
 def _missing_asset_problem(errors: list[MissingAsset]) -> Problem:
-    """Return one problem for a missing asset, with the number of other places that refer to the asset."""
-    count = len({error.place for error in errors}) - 1
+    """Return one problem for a missing file, from the errors of all elements that refer to it."""
+    count = len({error.location for error in errors}) - 1
     suffix = f" (and at {count} more place{'s' if count > 1 else ''})" if count else ""
     return _problem(errors[0], suffix)

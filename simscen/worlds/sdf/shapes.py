@@ -1,4 +1,4 @@
-"""Shapes of `<geometry>`: primitives, planes and extruded polylines; meshes are read by `meshes`."""
+"""Convert `<geometry>` elements to solids: primitives, planes and polylines here, meshes and heightmaps by `meshes`."""
 
 import math
 
@@ -20,12 +20,15 @@ from simscen.worlds.sdf.meshes import MeshReader, read_heightmap
 from simscen.worlds.sdf.report import ImportReport
 
 PLANE_THICKNESS_M = 0.02
+"""Thickness of the slab that replaces a plane. Its upper face is the plane."""
 GROUND_TOLERANCE_M = 0.01
-"""Distance from z = 0 up to which a level plane is the simulator's own floor."""
+"""Distance from z = 0 up to which a level plane is the ground, which the simulator provides itself."""
 MIN_LEVEL_NORMAL_Z = math.cos(math.radians(0.5))
-"""z component of the unit normal from which a face counts as level."""
+"""Vertical component of the unit normal from which a face counts as level: at most 0.5° of tilt."""
 MAX_POLYLINE_POINTS = 1000
+"""Maximum number of points of all outlines of a `<geometry>`."""
 TOLERANCE_M = 1e-9
+"""Distance up to which points, heights and crossings count as equal."""
 
 
 class ShapeReader:
@@ -37,9 +40,10 @@ class ShapeReader:
         self.has_ground = False
 
     def solids(self, geometry: Element, world_from_geometry: Pose3) -> tuple[Solid, ...]:
-        """Return the solids of one `<geometry>` in its own frame; none for the ground, which the simulator provides.
+        """Return the solids of one `<geometry>` in its own frame; () for a ground plane and for `<empty>`.
 
-        Raises UnusableElement for anything that is not a valid shape of SDF 1.12.
+        `world_from_geometry` is the pose of this frame in the world, to recognize the ground plane. Raises
+        UnusableElement for anything that is not a valid shape of SDF 1.12.
         """
         shapes = [child for child in geometry.children if not child.tag.startswith("xacro:")]
         if not shapes:
@@ -93,7 +97,7 @@ def _read_primitive(element: Element) -> Shape | None:
 
 
 def _read_plane(plane: Element, world_from_plane: Pose3, report: ImportReport) -> Solid | None:
-    """Return a thin slab whose upper face is the plane, or None for the ground."""
+    """Return a thin slab whose upper face is the plane, or None for the ground plane."""
     normal = _read_normal(plane)
     x, y = read_sizes(plane, "size", 2, default=(1.0, 1.0), largest=math.inf)
     x, y = min(x, MAX_COORDINATE_M), min(y, MAX_COORDINATE_M)
@@ -102,13 +106,14 @@ def _read_plane(plane: Element, world_from_plane: Pose3, report: ImportReport) -
         if abs(world_from_plane.z) <= GROUND_TOLERANCE_M:
             return None
         report.note(
-            plane.place,
+            plane.location,
             f"level plane at z = {world_from_plane.z:g} m, the floor is at z = 0; it becomes a slab of {x:g} x {y:g} m",
         )
     return Solid(Box((x, y, PLANE_THICKNESS_M)), _rotation_from_z(normal).compose(Pose3(z=-PLANE_THICKNESS_M / 2)))
 
 
 def _read_normal(plane: Element) -> Array:
+    """Return the unit normal (3,) of a plane; z by default."""
     element = plane.child("normal")
     components = read_numbers(element, 3) if element else (0.0, 0.0, 1.0)
     if element and math.hypot(*components) < 1e-9:
@@ -131,9 +136,9 @@ def _rotation_from_z(normal: Array) -> Pose3:
 
 
 def _read_polylines(polylines: list[Element]) -> tuple[Solid, ...]:
-    """Return the extrusions of all `<polyline>`s of one `<geometry>`; raises UnusableElement for degenerate outlines.
+    """Return the extrusions of all `<polyline>`s of one `<geometry>`. Raises UnusableElement for invalid outlines.
 
-    As in Gazebo (MeshManager::CreateExtrudedPolyline), several outlines are filled by the even-odd rule, so nested
+    As in Gazebo (MeshManager::CreateExtrudedPolyline), several outlines are filled by the even-odd rule, so that nested
     outlines become holes.
     """
     heights = [read_size(polyline, "height") for polyline in polylines]
@@ -163,10 +168,10 @@ def _read_outline(polyline: Element) -> Array:
 
 
 def trapezoids(outlines: list[Array]) -> list[Array]:
-    """Cut the area inside an odd number of `outlines` (n, 2) into triangles and trapezoids.
+    """Divide the area that is inside an odd number of `outlines` (n, 2) into triangles and trapezoids.
 
-    The corners (3 or 4, 2) of each piece are counterclockwise. The cuts are horizontal lines through all corners and
-    crossings, which is exact for straight edges.
+    Returns the corners (3 or 4, 2) of each piece, counterclockwise. The area is cut along horizontal lines through all
+    corners and crossings, which is exact for straight edges.
     """
     starts, ends = _edges(outlines)
     levels = np.unique(np.concatenate([starts[:, 1], _crossing_levels(outlines)]))
@@ -178,7 +183,7 @@ def trapezoids(outlines: list[Array]) -> list[Array]:
 
 
 def _edges(outlines: list[Array]) -> tuple[Array, Array]:
-    """Return the start points (n, 2) and end points (n, 2) of all edges."""
+    """Return the start points (n, 2) and end points (n, 2) of the edges of all outlines."""
     return np.vstack(outlines), np.vstack([np.roll(outline, -1, axis=0) for outline in outlines])
 
 
@@ -199,7 +204,10 @@ def _crossing_levels(outlines: list[Array]) -> list[float]:
 
 
 def _trapezoids_between(starts: Array, ends: Array, low: float, high: float) -> list[Array]:
-    """Return the pieces between two levels, between which there is no corner and no crossing."""
+    """Return the pieces of `trapezoids` between y = `low` and y = `high`, between which edges neither end nor cross.
+
+    `starts` (n, 2) and `ends` (n, 2) are the ends of all edges.
+    """
     middle = (low + high) / 2
     passes = (starts[:, 1] < middle) != (ends[:, 1] < middle)
     start, along = starts[passes], (ends - starts)[passes]

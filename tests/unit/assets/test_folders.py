@@ -39,9 +39,9 @@ def test_a_package_is_found_by_the_name_in_its_package_xml(folders: AllowedFolde
     manifest.write_text("<package><!-- <name>other</name> -->\n <name> cart </name></package>")
     assert folders.find("package://cart/base.stl", root / "worlds") == mesh
     assert folders.find("package://cart/base.stl", mesh.parent / "urdf") == mesh
-    assert folders.package("cart", root) == mesh.parent
+    assert folders.package_folder("cart", root) == mesh.parent
     with pytest.raises(NoSuchFile):
-        folders.package("other", root)
+        folders.package_folder("other", root)
 
 
 def test_a_package_xml_behind_a_link_is_not_read(folders: AllowedFolders, tmp_path: Path) -> None:
@@ -50,7 +50,7 @@ def test_a_package_xml_behind_a_link_is_not_read(folders: AllowedFolders, tmp_pa
     (outside / "package.xml").write_text("<package><name>cart</name></package>")
     (folders.roots[0] / "linked").symlink_to(outside)
     with pytest.raises(NoSuchFile):
-        folders.package("cart", folders.roots[0])
+        folders.package_folder("cart", folders.roots[0])
 
 
 def test_a_package_that_is_given_is_not_looked_for(folders: AllowedFolders, tmp_path: Path) -> None:

@@ -32,10 +32,10 @@ def test_worlds_and_robots_have_the_same_xml_errors(
         parse_sdf(data, "x.sdf", "")
     with pytest.raises(InvalidInput) as robot:
         parse_urdf(data, "x.urdf")
-    place, problem = world.value.place, robot.value.problems[0]
-    assert (place.line, place.col, world.value.message) == (line, col, message)
+    location, problem = world.value.location, robot.value.problems[0]
+    assert (location.line, location.col, world.value.message) == (line, col, message)
     assert (problem.line, problem.col, problem.message) == (line, col, message)
-    assert (place.source, world.value.hint) == (problem.source, problem.hint)
+    assert (location.source, world.value.hint) == (problem.source, problem.hint)
 
 
 def test_xml_elements_have_position_and_text() -> None:

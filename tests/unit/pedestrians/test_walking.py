@@ -38,7 +38,7 @@ def test_one_step_of_the_interaction_is_that_of_the_paper():
     f = -4.5 * math.exp(-distance / b) * (
         math.exp(-((3.0 * b * theta) ** 2)) * t + math.copysign(1, theta) * math.exp(-((2.0 * b * theta) ** 2)) * n
     )  # fmt: skip
-    assert forces.social(place[None], motion[None], np.zeros(1))[0] == pytest.approx(f, rel=1e-12)
+    assert forces.social_forces(place[None], motion[None], np.zeros(1))[0] == pytest.approx(f, rel=1e-12)
 
 
 def test_head_on_pedestrians_pass_on_the_right():

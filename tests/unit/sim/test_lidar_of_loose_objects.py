@@ -62,7 +62,7 @@ def test_scan_equals_the_minimum_over_single_objects(simulate):
 
     def look(simulation):
         scene = RayScene(merge_solids([WALL]))
-        scene.set_moving(
+        scene.set_bodies(
             {
                 name: (merge_solids(body.solids), pose)
                 for name, (body, pose) in simulation.robot.bodies_and_poses().items()

@@ -179,7 +179,7 @@ class _Expansion:
             macros.spaces[space] = macros = Macros()
         try:
             found = self._folders.find(filename, self._texts.file.parent, absolute=True)
-            path = self._folders.check(found, MAX_URDF_BYTES)
+            path = self._folders.check_file(found, MAX_URDF_BYTES)
         except UnusableFile as trouble:
             if isinstance(trouble, NoSuchFile) and parse_bool(source.attributes.get("optional", "false")):
                 return

@@ -171,7 +171,7 @@ class TextEvaluator:
 
     def _package(self, name: str) -> str:
         try:
-            return str(self._folders.package(name, self.file.parent))
+            return str(self._folders.package_folder(name, self.file.parent))
         except UnusableFile as trouble:
             raise MissingFile(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
 

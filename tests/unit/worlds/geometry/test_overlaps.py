@@ -3,33 +3,28 @@ import sys
 
 import numpy as np
 
-from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Solid
 from simscen.worlds.geometry import overlaps
-from simscen.worlds.geometry.overlaps import blocking_solid
+from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 BODY = (0.05, 0.4)
 
 
-def world(*solids):
-    return World("w", solids)
-
-
 def test_a_point_inside_or_near_a_solid_names_it():
-    here = world(Solid(Box((1, 1, 1)), Pose3(0, 0, 0.5), "crate"), Solid(Cylinder(0.5, 1.0), Pose3(3, 0, 0.5), "post"))
-    assert blocking_solid(here, (0.1, 0.2), 0.0001, BODY) == "crate"
-    assert blocking_solid(here, (0.7, 0.0), 0.21, BODY) == "crate"
-    assert blocking_solid(here, (0.7, 0.0), 0.19, BODY) is None
-    assert blocking_solid(here, (3.0, 0.65), 0.16, BODY) == "post"
-    assert blocking_solid(here, (3.0, 0.65), 0.14, BODY) is None
+    here = Solid(Box((1, 1, 1)), Pose3(0, 0, 0.5), "crate"), Solid(Cylinder(0.5, 1.0), Pose3(3, 0, 0.5), "post")
+    assert first_solid_in_disc(here, (0.1, 0.2), 0.0001, BODY) == "crate"
+    assert first_solid_in_disc(here, (0.7, 0.0), 0.21, BODY) == "crate"
+    assert first_solid_in_disc(here, (0.7, 0.0), 0.19, BODY) is None
+    assert first_solid_in_disc(here, (3.0, 0.65), 0.16, BODY) == "post"
+    assert first_solid_in_disc(here, (3.0, 0.65), 0.14, BODY) is None
 
 
 def test_only_what_is_as_high_as_the_robot_counts():
     table = Solid(Box((2, 2, 0.05)), Pose3(0, 0, 0.75), "table")
     carpet = Solid(Box((2, 2, 0.01)), Pose3(0, 0, 0.005), "carpet")
-    assert blocking_solid(world(table, carpet), (0, 0), 0.2, BODY) is None
-    assert blocking_solid(world(table, carpet), (0, 0), 0.2, (0.05, 0.8)) == "table"
+    assert first_solid_in_disc((table, carpet), (0, 0), 0.2, BODY) is None
+    assert first_solid_in_disc((table, carpet), (0, 0), 0.2, (0.05, 0.8)) == "table"
 
 
 def test_distances_are_computed_only_to_solids_nearby(monkeypatch):
@@ -39,19 +34,18 @@ def test_distances_are_computed_only_to_solids_nearby(monkeypatch):
     ]
     real, near = overlaps._horizontal_distance, []
     monkeypatch.setattr(overlaps, "_horizontal_distance", lambda solid, *args: near.append(solid) or real(solid, *args))
-    assert blocking_solid(world(*posts), (posts[-1].pose.x, posts[-1].pose.y), 0.01, BODY) == "p2999"
+    assert first_solid_in_disc(posts, (posts[-1].pose.x, posts[-1].pose.y), 0.01, BODY) == "p2999"
     assert posts[-1] in near
     assert len(near) < 10
 
 
 def test_asking_imports_no_heavy_library():
     code = (
-        "import sys; from simscen.worlds.geometry.overlaps import blocking_solid;"
-        "from simscen.core.environment.world_model import World;"
+        "import sys; from simscen.worlds.geometry.overlaps import first_solid_in_disc;"
         "from simscen.core.geometry.shapes import Box, Solid, Extrusion;"
-        "w = World('w', (Solid(Box((1, 1, 1)), name='b'), Solid(Extrusion(((0, 0), (1, 0), (0, 1)), 1.0))));"
-        "assert blocking_solid(w, (5, 5), 0.1, (0, 1)) is None;"
-        "assert blocking_solid(w, (0, 0), 0.1, (0, 1)) == 'b';"
+        "w = (Solid(Box((1, 1, 1)), name='b'), Solid(Extrusion(((0, 0), (1, 0), (0, 1)), 1.0)));"
+        "assert first_solid_in_disc(w, (5, 5), 0.1, (0, 1)) is None;"
+        "assert first_solid_in_disc(w, (0, 0), 0.1, (0, 1)) == 'b';"
         "print({'scipy', 'trimesh', 'embreex', 'PIL', 'pybullet'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cone, Cylinder, Extrusion, Solid, Sphere
 from simscen.worlds.geometry.cross_section import horizontal_distance
-from simscen.worlds.geometry.prisms import bounding_rectangle, mesh_bounds_2d, upright_prism
+from simscen.worlds.geometry.prisms import bounding_rectangle, mesh_rectangle, upright_prism
 from simscen.worlds.geometry.triangulation import merge_solids
 
 L_SHAPE = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
@@ -47,9 +47,7 @@ def test_extents_are_those_of_the_triangle_mesh(shape, pose, frame):
     solid = Solid(shape, pose)
     for owner in (None, frame):
         assert upright_prism(solid, owner) is not None
-        assert bounding_rectangle(solid, owner) == pytest.approx(
-            mesh_bounds_2d(solid, owner).ravel().tolist(), abs=1e-9
-        )
+        assert bounding_rectangle(solid, owner) == pytest.approx(mesh_rectangle(solid, owner), abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +64,7 @@ def test_extents_are_those_of_the_triangle_mesh(shape, pose, frame):
 )
 def test_other_solids_use_the_mesh(solid):
     assert upright_prism(solid) is None
-    assert bounding_rectangle(solid) == pytest.approx(mesh_bounds_2d(solid).ravel().tolist())
+    assert bounding_rectangle(solid) == pytest.approx(mesh_rectangle(solid))
 
 
 def test_a_solid_in_a_tilted_frame_is_left_to_the_mesh():
@@ -78,3 +76,10 @@ def test_solid_that_only_touches_the_height_range_is_ignored():
     assert box is not None
     assert box.distance((0, 0), (1.0, 2.0)) == box.distance((0, 0), (-1.0, 0.0)) == math.inf
     assert box.distance((0, 0), (np.nextafter(1.0, 0.0), 2.0)) == 0.0
+
+
+def test_rectangles_of_meshes_follow_the_pose_of_solid_and_frame():
+    solid = Solid(Box((2.0, 1.0, 1.0)), Pose3(x=1.0))
+    assert mesh_rectangle(solid) == pytest.approx((0, -0.5, 2, 0.5))
+    turned = Pose3.from_rpy(10, 0, 0, 0, 0, math.pi / 2)
+    assert mesh_rectangle(solid, turned) == pytest.approx((9.5, 0, 10.5, 2))

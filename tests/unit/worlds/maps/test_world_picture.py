@@ -9,7 +9,14 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, Box, Solid
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.maps.occupancy_map import walls_from_map
-from simscen.worlds.maps.world_picture import BODY, FREE_GROUND, MAPPED_WALL, SUPERSAMPLING, _viewport, draw_world
+from simscen.worlds.maps.world_picture import (
+    BODY_COLOR,
+    FREE_COLOR,
+    OCCUPIED_COLOR,
+    SUPERSAMPLING,
+    _viewport,
+    draw_world,
+)
 
 
 def color_at(image, built, x, y):
@@ -29,9 +36,9 @@ def test_the_picture_shows_walls_ground_and_bodies_where_they_are():
     image = draw_world(built, 0.3)
     assert max(image.size) == 1200
     assert image.size[0] / image.size[1] == pytest.approx(8 / 6, rel=0.01)
-    assert near(color_at(image, built, 2, 1), MAPPED_WALL)
-    assert near(color_at(image, built, 0, -1), FREE_GROUND)
-    assert near(color_at(image, built, -1.5, 0.2), BODY)
+    assert near(color_at(image, built, 2, 1), OCCUPIED_COLOR)
+    assert near(color_at(image, built, 0, -1), FREE_COLOR)
+    assert near(color_at(image, built, -1.5, 0.2), BODY_COLOR)
 
 
 def test_a_map_with_a_yaw_is_drawn_turned_over_its_own_walls():
@@ -41,8 +48,8 @@ def test_a_map_with_a_yaw_is_drawn_turned_over_its_own_walls():
     built = build_world_and_map(World("w", tuple(walls_from_map(grid, 1.0)), grid=grid), 0.3)
     image = draw_world(built, 0.3)
     middle, beside = grid.center_of(np.array([[15, 45], [5, 45]]))
-    assert near(color_at(image, built, *middle), MAPPED_WALL)
-    assert near(color_at(image, built, *beside), FREE_GROUND)
+    assert near(color_at(image, built, *middle), OCCUPIED_COLOR)
+    assert near(color_at(image, built, *beside), FREE_COLOR)
 
 
 def test_an_empty_world_has_a_picture_too():

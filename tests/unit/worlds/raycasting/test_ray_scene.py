@@ -88,7 +88,7 @@ def test_ten_thousand_random_rays_agree_with_pybullet_moving_bodies_included(bul
     cart = bullet.add(CART)
     origins, directions = random_rays(10_000, 1, (-4.5, -4.5, 0.05), (4.5, 4.5, 1.9))
     for pose in (Pose3(0, -2, 0), Pose3.from_rpy(1, -1, 0.3, 0.2, -0.1, 2.0)):
-        scene.set_moving({"cart": (CART, pose)})
+        scene.set_bodies({"cart": (CART, pose)})
         bullet.move(cart, pose)
         ours = scene.cast(origins, directions)
         theirs = bullet.cast(origins, directions)
@@ -112,11 +112,11 @@ def test_bodies_come_move_and_go():
     scene = RayScene(merge_solids([]))
     origins, directions = around(1, (0, 0, 0.3))
     assert scene.cast(origins, directions)[0] == math.inf
-    scene.set_moving({"cart": (CART, Pose3(3, 0, 0))})
+    scene.set_bodies({"cart": (CART, Pose3(3, 0, 0))})
     assert scene.cast(origins, directions)[0] == pytest.approx(2.6)
-    scene.set_moving({"cart": (CART, Pose3(5, 0, 0))})
+    scene.set_bodies({"cart": (CART, Pose3(5, 0, 0))})
     assert scene.cast(origins, directions)[0] == pytest.approx(4.6)
-    scene.set_moving({})
+    scene.set_bodies({})
     assert scene.cast(origins, directions)[0] == math.inf
 
 
@@ -124,10 +124,10 @@ def test_answers_do_not_depend_on_what_was_asked_before_or_on_the_order_of_bodie
     origins, directions = random_rays(500, 3, (-4, -4, 0.1), (4, 4, 1.5))
     one, other = RayScene(merge_solids(ROOM)), RayScene(merge_solids(ROOM))
     a, b = (CART, Pose3(0, -2, 0)), (CART, Pose3(0, 3, 0))
-    one.set_moving({"a": a})
+    one.set_bodies({"a": a})
     one.cast(*random_rays(300, 4, (-4, -4, 0.1), (4, 4, 1.5)))
-    one.set_moving({"b": b, "a": a})
-    other.set_moving({"a": a, "b": b})
+    one.set_bodies({"b": b, "a": a})
+    other.set_bodies({"a": a, "b": b})
     assert np.array_equal(one.cast(origins, directions), other.cast(origins, directions))
 
 
@@ -139,7 +139,7 @@ def test_many_bodies_are_seen_as_if_they_were_one_world():
         RayScene(merge_solids([*ROOM, *(Solid(Box((0.7, 0.3, 0.5)), pose.compose(Pose3(z=0.2))) for pose in places)])),
     )
     box = merge_solids([Solid(Box((0.7, 0.3, 0.5)), Pose3(z=0.2))])
-    apart.set_moving({f"box {k}": (box, pose) for k, pose in enumerate(places)})
+    apart.set_bodies({f"box {k}": (box, pose) for k, pose in enumerate(places)})
     origins, directions = random_rays(5000, 7, (-10, -10, 0.05), (10, 10, 1.9))
     assert_agree(apart.cast(origins, directions), together.cast(origins, directions))
 
@@ -197,7 +197,7 @@ def test_a_fan_meets_what_its_rays_meet_one_by_one(first, beams, field):
     """Also a body that a full circle's first and last rays see, one that the lidar is in, and one out of reach."""
     scene, fan = RayScene(merge_solids(ROOM)), RayFan(first, field / beams, beams)
     places = [(-2.5, 0.1, 0.3), (1.5, -1.5, 2.0), (0.05, 0.0, 1.0), (30.0, 0.0, 0.0)]
-    scene.set_moving({f"cart {k}": (CART, Pose3.planar(Pose2(*place))) for k, place in enumerate(places)})
+    scene.set_bodies({f"cart {k}": (CART, Pose3.planar(Pose2(*place))) for k, place in enumerate(places)})
     for lens in (Pose3(0.0, 0.0, 0.3), Pose3.from_rpy(0.8, -0.4, 0.6, 0.1, -0.2, 2.5)):
         for reach in (2.0, 20.0):
             seen, alone = scene.sweep(fan, lens, reach), scene.cast(*fan.at(lens), reach)
@@ -227,9 +227,9 @@ def test_a_body_farther_off_than_any_ray_reaches_is_left_out_until_it_comes_near
     scene, (origins, directions) = RayScene(merge_solids([])), around(8, (0.0, 0.0, 0.5))
     origins[4:, 0] -= spread
     for x, seen in ((18.0, math.inf), (10.0, 3.5), (30.0, math.inf)):
-        scene.set_moving({"far": (CART, Pose3(50.0)), "body": (off, Pose3(x))})
+        scene.set_bodies({"far": (CART, Pose3(50.0)), "body": (off, Pose3(x))})
         assert scene.cast(origins, directions, 5.0)[0] == pytest.approx(seen)
-    scene.set_moving({"body": (off, Pose3(6.0 - 4.0 - spread))})
+    scene.set_bodies({"body": (off, Pose3(6.0 - 4.0 - spread))})
     assert scene.cast(origins, directions, 5.0)[4] == pytest.approx(3.5)
 
 

@@ -60,12 +60,12 @@ def test_order_of_bodies_does_not_change_the_result(monkeypatch, many, several):
     for number, poses in enumerate(list(changes())[::2]):
         fresh = RayScene(WALLS)
         if number % 3:
-            old.set_moving(placed(poses), HOMES)
+            old.set_bodies(placed(poses), HOMES)
         if number % 5 == 0:
-            fresh.set_moving(placed({name: HOMES[name] for name in list(HOMES)[::2]}), HOMES)
+            fresh.set_bodies(placed({name: HOMES[name] for name in list(HOMES)[::2]}), HOMES)
             fresh.sweep(FAN, LEVEL, 5.0)
-        old.set_moving(placed(poses), HOMES)
-        fresh.set_moving(placed(poses), HOMES)
+        old.set_bodies(placed(poses), HOMES)
+        fresh.set_bodies(placed(poses), HOMES)
         assert np.array_equal(seen(old), seen(fresh))
 
 
@@ -73,8 +73,8 @@ def test_order_of_bodies_does_not_change_the_result(monkeypatch, many, several):
 def test_rays_hit_resting_bodies_at_the_same_points_as_alone(reach):
     together, alone = RayScene(WALLS), RayScene(WALLS)
     for poses in list(changes())[::6]:
-        together.set_moving(placed(poses), HOMES)
-        alone.set_moving(placed(poses))
+        together.set_bodies(placed(poses), HOMES)
+        alone.set_bodies(placed(poses))
         ours, theirs = seen(together, reach), seen(alone, reach)
         met = np.isfinite(ours) & np.isfinite(theirs)
         assert np.array_equal(np.isfinite(ours), np.isfinite(theirs))
@@ -93,12 +93,12 @@ def test_things_at_home_take_no_scene_of_their_own(monkeypatch):
 
     scene, poses = RayScene(WALLS), dict(HOMES)
     monkeypatch.setattr(mesh_scene.MeshScene, "__init__", counted)
-    scene.set_moving(placed(poses), HOMES)
+    scene.set_bodies(placed(poses), HOMES)
     scene.sweep(FAN, LEVEL, math.inf)
     assert len(built) == 1
     for step in range(12):
         poses["thing 07"] = Pose3(3.0 + 0.01 * step, 3.0)
-        scene.set_moving(placed(poses), HOMES)
+        scene.set_bodies(placed(poses), HOMES)
         scene.sweep(FAN, LEVEL, math.inf)
     assert len(built) <= 1 + 1 + math.ceil(math.log2(len(HOMES)))
 
@@ -108,10 +108,10 @@ def test_which_heights_are_looked_at_changes_not_one_bit():
     tilts = [*np.linspace(0.0, 0.6, 20).tolist(), 0.0, -0.6]
     lenses = [Pose3.from_rpy(0.4, 0.1, 0.8, 0.5 * tilt, tilt, 0.3) for tilt in tilts]
     scene, taken = RayScene(WALLS), set()
-    scene.set_moving(placed(HOMES), HOMES)
+    scene.set_bodies(placed(HOMES), HOMES)
     for lens in lenses:
         whole = RayScene(WALLS)
-        whole.set_moving(placed(HOMES), HOMES)
+        whole.set_bodies(placed(HOMES), HOMES)
         whole.cast(*scattered(), 1e6)  # whose rays go up and down as far as that
         assert np.array_equal(scene.sweep(FAN, lens, 9.0), whole.sweep(FAN, lens, 9.0))
         taken.add(scene._heights)

@@ -15,7 +15,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Goal
 from simscen.worlds.built_world import build_world_and_map, inspect_world
 from simscen.worlds.geometry.drive_obstacles import drive_obstacles
-from simscen.worlds.geometry.overlaps import blocking_solid, first_solid_in_footprint
+from simscen.worlds.geometry.overlaps import first_solid_in_disc, first_solid_in_footprint
 from simscen.worlds.maps.world_picture import draw_world
 from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.routes.shortest_paths import legs_between
@@ -104,7 +104,7 @@ def use(world: World) -> None:
     drive_obstacles(world.solids, 0.1, 0.3, 0.02)
     RayScene(built.mesh).cast(np.array([[-3.0, 0.1, 0.2]]), np.array([[1.0, 0.0, 0.0]]), 10.0)
     legs_between(built, [(Pose2(-1.0, -1.0), Goal("goal", Pose2(3.0, 3.0)))], 0.3)
-    blocking_solid(world, (0.2, 0.2), 0.3, (0.0, 0.4))
+    first_solid_in_disc(world.solids, (0.2, 0.2), 0.3, (0.0, 0.4))
     footprint = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
     first_solid_in_footprint(world.solids, footprint, Pose2(0.0, 0.0, 0.4), (0.0, 0.4))
 
