@@ -123,7 +123,7 @@ class Speed(Spec, Criterion):
         if inside is None:
             return undecided("speed", f"the world has no region `{self.in_}`", limit_text)
         limits = mask.over(case.masks[mask.file].grid)
-        local_limits = limits.along(ground_truth.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
+        local_limits = limits.at_points(ground_truth.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
         highest = _highest_around(local_limits, signal.ticks, round(self.grace * trace.tick_rate))
         limited = inside & np.isfinite(highest)
         if not limited.any():
