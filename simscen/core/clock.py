@@ -34,7 +34,7 @@ class Clock:
     def nearest_rate(self, hertz: float) -> float:
         """Return the rate in Hz nearest to `hertz` that suits the clock.
 
-        Suitable rates are the whole numbers that divide the clock rate, and rates with a period of 1 to 10 whole seconds.
+        Suitable rates are the whole divisors of the clock rate, and rates with a period of 1 to 10 whole seconds.
         """
         periods = [p for p in range(1, 10 * self.rate + 1) if self.rate % p == 0 or p % self.rate == 0]
         return min((self.rate / p for p in periods), key=lambda rate: (abs(rate - hertz), rate))

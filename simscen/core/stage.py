@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Effect:
-    """Result of an action. `happened` is True if the action changed anything; `what` says what it changed, or why not."""
+    """Result of an action: `happened` if the action changed anything, and `what` it changed, or why it did not."""
 
     happened: bool
     what: str
@@ -54,9 +54,9 @@ class Situation(Protocol):
 
     @property
     def clearance(self) -> float | None:
-        """Distance in m from the hull to the nearest obstacle in the newest truth sample, at most `Case.clearance_range`.
+        """Distance in m from the hull to the nearest obstacle in the newest truth sample; None before the first.
 
-        None before the first sample.
+        Distances above `Case.clearance_range` are cut off.
         """
         ...
 
@@ -126,7 +126,10 @@ class Stage(Situation, Protocol):
         ...
 
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Return whether a pedestrian of `radius` m at `place` (x, y in m) touches nothing, or with `walls_only` no wall."""
+        """Return whether a pedestrian of `radius` m at `place` (x, y in m) would touch nothing.
+
+        With `walls_only`, it may touch anything but walls.
+        """
         ...
 
     def rng(self, name: str) -> np.random.Generator:

@@ -149,7 +149,7 @@ Filter = Literal["keepout", "speed"]
 
 @dataclass(frozen=True, eq=False)
 class Zones:
-    """Zones and masks that are enabled: `keepout` polygons, and `speed` polygons with limits in m/s, in the map frame."""
+    """Enabled zones and masks: `keepout` polygons, and `speed` polygons with limits in m/s, all in the map frame."""
 
     keepout: tuple[Polygon, ...] = ()
     speed: tuple[tuple[Polygon, float], ...] = ()
