@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import GetJsonSchemaHandler, PlainValidator
-from pydantic_core import CoreSchema, PydanticCustomError
 
-from simscen.core.messages.navigation import FAILED, ErrorCode, Goal, error_code
+from simscen.core.messages.navigation import FAILED, Goal
 from simscen.core.records.events import Event, EventKind
+from simscen.criteria.error_codes import code_of
 from simscen.criteria.trace_signals.ground_truth import truth
-from simscen.spec.base import Spec
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
@@ -161,51 +159,3 @@ def _reports(trace: Trace) -> dict[str, list[_Report]]:
 
 def _nth(reports: list[_Report], k: int) -> _Report:
     return reports[k] if k < len(reports) else (None, None)
-
-
-def parse(value: Any) -> ErrorCode:
-    """Parse an error code such as GOAL_OCCUPIED or 206. Raises a validation error that lists the names."""
-    if isinstance(value, ErrorCode):
-        return value
-    if isinstance(value, str) and value in ErrorCode.__members__:
-        return ErrorCode[value]
-    if isinstance(value, int) and not isinstance(value, bool):
-        code = error_code(value)
-        if isinstance(code, ErrorCode):
-            return code
-    raise PydanticCustomError(
-        "error_code",
-        "unknown error code `{value}`; expected one of: {names}",
-        {"value": str(value), "names": ", ".join(ErrorCode.__members__)},
-    )
-
-
-class _CodeSchema:
-    """JSON schema of an error code: one of the names or numbers."""
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"enum": [*ErrorCode.__members__, *(int(code) for code in ErrorCode)]}
-
-
-Code = Annotated[ErrorCode, PlainValidator(parse), _CodeSchema()]
-
-
-def code_of(event: Event) -> str:
-    """Return the error code of an event: its name in Nav2, or the number, or "NONE"."""
-    name, number = event.data.get("error_name"), event.data.get("error_code")
-    if isinstance(name, str) and name:
-        return name
-    code = error_code(number) if isinstance(number, int) else None
-    if isinstance(code, ErrorCode):
-        return code.name
-    return ErrorCode.NONE.name if number is None else str(number)
-
-
-class ExpectedError(Spec):
-    """Error code with which a goal is expected to fail.
-
-    Example: `expect: {error_code: GOAL_OCCUPIED}`
-    """
-
-    error_code: Code
-    """Error code of Nav2, by name or number."""

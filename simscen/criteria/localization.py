@@ -9,19 +9,20 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.core.geometry import Array
+from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, missed, undecided
-from simscen.criteria.timeline import Span, end_reason, has_ended, never_started, spans
-from simscen.criteria.trace_signals.ground_truth import DIMENSIONS, first_sustained, nees_samples, pose_error
+from simscen.criteria.timeline import Span, end_reason, first_sustained, has_ended, never_started, spans
+from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, nees_samples, pose_error
 from simscen.spec.base import Spec
 from simscen.spec.places import DisturbanceName
 from simscen.spec.quantities import Duration, PositiveAngle, PositiveDuration, PositiveLength, Quantity
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
-    from simscen.core.records.trace import Samples, Trace
+    from simscen.core.records.trace import Trace
 
 NO_BELIEF = "the robot never reported an estimated pose"
 
@@ -75,7 +76,7 @@ class LocalizationError(Spec, Criterion):
             last = trace.seconds(int(error.ticks[-1]))
             because = f"the last belief is from t = {last:.2f} s, but the evaluation begins at {self.after:.2f} s"
             return [undecided("localization_error", because)]
-        return self._bounds(trace, type(error)(error.ticks[is_counted], error.values[is_counted]))
+        return self._bounds(trace, Samples(error.ticks[is_counted], error.values[is_counted]))
 
     def _bounds(self, trace: Trace, error: Samples) -> list[Finding]:
         distances, angles = error.values.T
@@ -247,8 +248,6 @@ class LocalizationConsistency(Spec, Criterion):
 
     def _sampled(self, trace: Trace) -> Samples | None:
         """Return the NEES sampled at regular times from `after` to the last belief."""
-        from simscen.core.records.trace import Samples
-
         all_samples = nees_samples(trace)
         if not len(all_samples):
             return None

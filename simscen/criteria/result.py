@@ -9,8 +9,9 @@ from simscen.core.messages.navigation import matches_goal_name
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
+from simscen.criteria.error_codes import ErrorCodeValue, code_of
 from simscen.criteria.findings import at_most, held, missed, undecided
-from simscen.criteria.goal_outcomes import Code, GoalOutcome, closest_approach, code_of, goal_outcomes, outcome_start
+from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes, outcome_start
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.ground_truth import true_pose
 from simscen.spec.base import Spec
@@ -35,7 +36,7 @@ class Result(Spec, Criterion):
 
     status: Literal["SUCCEEDED", "FAILED", "CANCELED"]
     """Required result."""
-    error_code: Code | None = None
+    error_code: ErrorCodeValue | None = None
     """Required error code of Nav2, by name or number."""
 
     @property
@@ -66,7 +67,7 @@ class ErrorCodeIs(Spec, Criterion):
     Example: `error_code: {code: NO_VALID_PATH, goal: shelf}`
     """
 
-    code: Code
+    code: ErrorCodeValue
     """By name or number; NONE = no error."""
     goal: GoalName | None = None
     """Name of the goal; default: the navigation as a whole."""

@@ -11,8 +11,8 @@ from simscen.core.records.verdict import Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import MissingEvidence, at_most, held, missed, undecided
 from simscen.criteria.goal_outcomes import goal_outcomes
-from simscen.criteria.timeline import Span, end_reason, never_started, spans
-from simscen.criteria.trace_signals.ground_truth import Flags, drive, first_sustained, speed, truth, turn_rate
+from simscen.criteria.timeline import Span, end_reason, first_sustained, never_started, spans
+from simscen.criteria.trace_signals.ground_truth import Flags, drive, speed, truth, turn_rate
 from simscen.spec.base import Spec
 from simscen.spec.places import DisturbanceName
 from simscen.spec.quantities import PositiveAngularSpeed, PositiveDuration, PositiveLength, PositiveSpeed

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from pydantic import BaseModel
 
 from simscen.criteria.stl.condition import Condition, Release, Windowed, until_horizon, window_horizon
-from simscen.criteria.stl.criterion import TemporalCriterion, describe_response, describe_until, describe_windowed
+from simscen.criteria.stl.criterion import TemporalCriterion
+from simscen.criteria.stl.description import describe_response, describe_until, describe_windowed
 from simscen.criteria.stl.robustness import (
     EvaluationContext,
     response_robustness,

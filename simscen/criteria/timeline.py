@@ -12,7 +12,8 @@ from simscen.core.records.events import EventKind
 
 if TYPE_CHECKING:
     from simscen.core.environment.costmap_filters import Filter
-    from simscen.core.records.trace import Samples, Trace
+    from simscen.core.records.trace import Samples, Ticks, Trace
+    from simscen.criteria.trace_signals.ground_truth import Flags
 
 _STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
@@ -98,3 +99,18 @@ def clip_samples(samples: Samples, first: int, last: int) -> Samples:
     ticks = np.unique(np.concatenate(([first], inner, [last])))
     ticks = ticks[(ticks >= samples.ticks[0]) & (ticks <= samples.ticks[-1])]
     return type(samples)(ticks, samples.at(ticks))
+
+
+def first_sustained(ticks: Ticks, is_true: Flags, hold: int, end: int) -> tuple[int | None, bool]:
+    """Return the first of `ticks` from which `is_true` lasts `hold` ticks or until `end`, and whether it lasted `hold`.
+
+    An interval lasts until the next sample that is not true. Without such an interval, the result is (None, False).
+    """
+    begins = np.flatnonzero(is_true & ~np.concatenate(([False], is_true[:-1])))
+    breaks = np.flatnonzero(~is_true & np.concatenate(([False], is_true[:-1])))
+    stops = np.full(len(begins), end, dtype=np.int64)
+    stops[: len(breaks)] = ticks[breaks]
+    lasting = stops - ticks[begins] >= hold
+    if lasting.any():
+        return int(ticks[begins[int(np.argmax(lasting))]]), True
+    return (int(ticks[begins[-1]]), False) if len(is_true) and is_true[-1] else (None, False)

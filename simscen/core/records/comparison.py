@@ -59,9 +59,9 @@ class MetricDifference:
 class ScenarioChange:
     """Significant change of the pass rate or of the mean of a metric.
 
-    `scenario` is "all scenarios" for the pass rate over all. `what` is "pass rate" or the name of the metric; `baseline`
-    and `value` are its means. `p` is the p-value, adjusted for the number of tests (Holm). `is_worse` is None for a
-    metric of which neither direction is better.
+    `scenario` is "all scenarios" for the pass rate over all. `what` is "pass rate" or the name of a metric, and
+    `baseline` and `value` are its means. `p` is the p-value, adjusted for the number of tests (Holm). `is_worse` is
+    None for a metric of which neither direction is better.
     """
 
     scenario: str
@@ -83,8 +83,8 @@ class BaselineComparison:
         pairs: Number of pairs in which both runs were completed.
         error_pairs: Number of pairs in which a run could not be completed.
         unpaired_runs: Number of runs without a partner.
-        pairs_with_one_arrival: Number of completed pairs in which only one run reached its goals. Metrics that depend
-            on the length of the drive are not compared in these pairs.
+        pairs_with_one_arrival: Number of completed pairs in which only one run reached its goals. Of the metrics, only
+            `collisions` is compared in these pairs.
         flips: Pairs in which only one run passed.
         p: P-value of the sign test of the flips.
         differences: Difference of each metric.

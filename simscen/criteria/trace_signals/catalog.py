@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from simscen.core.geometry import Array
 from simscen.core.records.verdict import Evidence
 from simscen.criteria.trace_signals import distances, readers
-from simscen.criteria.trace_signals.ground_truth import BELIEF_TIMEOUT_S
+from simscen.criteria.trace_signals.estimation_errors import BELIEF_TIMEOUT_S
 from simscen.criteria.trace_signals.sampling import SignalArguments, SignalQuery
 from simscen.spec.quantities import UNITS
 

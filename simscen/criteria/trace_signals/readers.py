@@ -13,17 +13,8 @@ from simscen.core.messages.navigation import matches_goal_name
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Samples, Ticks
 from simscen.criteria.timeline import spans
-from simscen.criteria.trace_signals.ground_truth import (
-    BELIEF_TIMEOUT_S,
-    Flags,
-    check_samples,
-    drive,
-    nees_samples,
-    pose_error,
-    speed,
-    teleport_samples,
-    truth,
-)
+from simscen.criteria.trace_signals.estimation_errors import BELIEF_TIMEOUT_S, nees_samples, pose_error
+from simscen.criteria.trace_signals.ground_truth import Flags, check_samples, drive, speed, teleport_samples, truth
 from simscen.criteria.trace_signals.ground_truth import clearance as hull_clearance
 from simscen.criteria.trace_signals.ground_truth import turn_rate as unsigned_turn_rate
 from simscen.criteria.trace_signals.sampling import (
