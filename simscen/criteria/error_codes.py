@@ -1,4 +1,4 @@
-"""Error codes of Nav2 in specifications and in recorded events."""
+"""Error codes of Nav2: how specifications state them, and how recorded events do."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from simscen.spec.base import Spec
 
 
 def parse_error_code(value: Any) -> ErrorCode:
-    """Parse an error code such as GOAL_OCCUPIED or 206. Raises a validation error that lists the names."""
+    """Parse an error code from its name or number, e.g. GOAL_OCCUPIED or 206. Raises PydanticCustomError for others."""
     if isinstance(value, ErrorCode):
         return value
     if isinstance(value, str) and value in ErrorCode.__members__:
@@ -37,10 +37,11 @@ class _ErrorCodeSchema:
 
 
 ErrorCodeValue = Annotated[ErrorCode, PlainValidator(parse_error_code), _ErrorCodeSchema()]
+"""Type of a key whose value is an error code, by name or number."""
 
 
 def code_of(event: Event) -> str:
-    """Return the error code of an event: its name in Nav2, or the number, or "NONE"."""
+    """Return the error code of an event: its name in Nav2, or its number if Nav2 has no such code; "NONE" without."""
     name, number = event.data.get("error_name"), event.data.get("error_code")
     if isinstance(name, str) and name:
         return name

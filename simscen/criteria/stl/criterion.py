@@ -1,4 +1,4 @@
-"""Base class of the temporal criteria: verdict, margin, and decisive moment of a condition on signals."""
+"""Base class of the temporal criteria: finds out whether a condition on signals is met, by which margin, and when."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 
 class TemporalCriterion(Criterion):
-    """A criterion that combines comparisons of named signals."""
+    """Criterion that consists of a condition on named signals."""
 
     @abstractmethod
     def compared(self) -> list[Condition]:
-        """Return all comparisons, in the order in which they are written."""
+        """Return all comparisons in the condition, in the order of the operands."""
 
     @abstractmethod
     def formula(self) -> str:
@@ -47,19 +47,19 @@ class TemporalCriterion(Criterion):
 
     @property
     def clearance_range(self) -> float:
-        """The largest bound on the clearance plus a margin, in meters."""
+        """Distance in m around the robot up to which clearance must be measured: beyond all bounds on the clearance."""
         bounds = [one.value for one in self.compared() if one.signal == "clearance" and one.value is not None]
         return max((bound + SEARCH_MARGIN_M for bound in bounds), default=0.0)
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs: that of all compared signals."""
+        """Evidence that the criterion needs from the log: that of all compared signals."""
         compared = self.compared()
         objects = {Evidence.OBJECTS} if any(one.object is not None for one in compared) else set()
         return frozenset(objects).union(*(signal_evidence(one.signal) for one in compared if one.signal is not None))
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return the finding for the condition at the first sample, with the decisive moment."""
+        """Return one finding: whether the condition is true at the start of the run, and the sample that decides."""
         formula = self.formula()
         try:
             result = self.evaluate(EvaluationContext(trace, case, has_ended(trace)))
@@ -99,7 +99,10 @@ class TemporalCriterion(Criterion):
 
 
 def _untested_finding(response: ResponseRobustness, formula: str, optional: bool) -> Finding:
-    """Return the inconclusive finding of a condition whose premise was never true."""
+    """Return the inconclusive finding for a `whenever` whose premise was never true.
+
+    If `optional`, it has a line about the key `required`, which only the criterion itself has, not a nested `whenever`.
+    """
     premise = describe(response.condition)
     if response.may_have_held:
         because = f"the run ended before it was known whether `{premise}` was true, so nothing was tested"
@@ -114,7 +117,7 @@ def _detail(trace: Trace, formula: str, witness: Witness) -> tuple[str, ...]:
 
 
 def _margin_unit(compared: list[Condition]) -> str | None:
-    """Return the common unit of the signals, "" if all have scales, or None if their units differ."""
+    """Return the unit of the margin: that of all compared signals, or "" if all have scales; None if units differ."""
     measured = [one for one in compared if not one.definition.is_boolean]
     if measured and all(one.scale is not None for one in measured):
         return ""

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from simscen.criteria.findings import decimals, quantity
+from simscen.criteria.findings import decimals, format_quantity
 
 if TYPE_CHECKING:
     from simscen.criteria.stl.condition import Condition, Op, Window
     from simscen.criteria.stl.robustness import Witness
 
 _SIGNS: dict[Op, str] = {">=": "≥", ">": ">", "<=": "≤", "<": "<"}
+"""Signs as printed."""
 _OPPOSITE: dict[Op, Op] = {">=": "<", ">": "<=", "<=": ">", "<": ">="}
+"""Comparison that is true exactly if the key is false."""
 
 
 def describe(condition: Condition) -> str:
-    """Return all of it in words: "whenever localization_error > 0.5 m, then eventually within 5 s speed < 1 m/s"."""
+    """Return a condition in words, e.g. "whenever scan_age > 0.3 s, then (eventually within 1 s speed < 0.01 m/s)"."""
     if condition.signal is not None:
         return f"{describe_signal(condition)} {_bound(condition)}".rstrip()
     if condition.all is not None:
@@ -36,22 +38,22 @@ def describe(condition: Condition) -> str:
 
 
 def describe_windowed(operator: str, part: Condition, window: Window) -> str:
-    """Return `always` or `eventually` in a window, in words."""
+    """Return "always …" or "eventually …", with the window in words; `operator` is one of these two words."""
     return f"{' '.join(filter(None, (operator, describe_window(window))))} {_grouped(part)}"
 
 
 def describe_until(hold: Condition, release: Condition, window: Window) -> str:
-    """Return `hold` until `release` in a window, in words."""
+    """Return "… until …", with the window in words."""
     return " ".join(filter(None, (_grouped(hold), "until", describe_window(window), _grouped(release))))
 
 
 def describe_response(premise: Condition, response: Condition) -> str:
-    """Return "whenever …, then …"."""
+    """Return "whenever …, then …" in words."""
     return f"whenever {describe(premise)}, then {describe(response)}"
 
 
 def describe_window(window: Window) -> str:
-    """Return a window in words; "" for the rest of the run."""
+    """Return a window in words, e.g. "within 5 s"; "" for the rest of the run."""
     if window.between is not None:
         return f"between {window.between[0]:g} s and {window.between[1]:g} s"
     if window.after is not None:
@@ -60,13 +62,13 @@ def describe_window(window: Window) -> str:
 
 
 def describe_signal(condition: Condition) -> str:
-    """Return the signal and its arguments: "distance_to cart"."""
+    """Return the signal of a comparison with its arguments, e.g. "distance_to cart"."""
     arguments = " ".join(str(value) for value in condition.arguments.values())
     return f"{condition.signal} {arguments}".rstrip()
 
 
 def describe_value(witness: Witness) -> str:
-    """Return the decisive value with its unit."""
+    """Return the decisive value of a signal with its unit, e.g. "0.62 m"; "yes" or "no" for a yes-or-no signal."""
     comparison = witness.comparison
     signal = comparison.definition
     if signal.is_boolean:
@@ -74,11 +76,11 @@ def describe_value(witness: Witness) -> str:
     assert comparison.value is not None
     if math.isinf(witness.value):
         return "infinite"
-    return quantity(witness.value, signal.unit, decimals(witness.value, comparison.value))
+    return format_quantity(witness.value, signal.unit, decimals(witness.value, comparison.value))
 
 
 def describe_limit(witness: Witness) -> str:
-    """Return the bound of the decisive value."""
+    """Return the bound that the decisive value must meet, e.g. "≥ 0.50 m"; the opposite below a `not`."""
     comparison = witness.comparison
     signal = comparison.definition
     if signal.is_boolean:
@@ -86,10 +88,11 @@ def describe_limit(witness: Witness) -> str:
     assert comparison.value is not None and comparison.op is not None
     op = _OPPOSITE[comparison.op] if witness.negated else comparison.op
     digits = decimals(witness.value, comparison.value)
-    return f"{_SIGNS[op]} {quantity(comparison.value, signal.unit, digits)}"
+    return f"{_SIGNS[op]} {format_quantity(comparison.value, signal.unit, digits)}"
 
 
 def _bound(condition: Condition) -> str:
+    """Return the bound of a comparison, e.g. "≥ 0.5 m"; "" for a yes-or-no signal."""
     signal = condition.definition
     if signal.is_boolean:
         return ""

@@ -1,4 +1,4 @@
-"""Catalog of the named signals that temporal criteria compare and `simscen explain signals` lists."""
+"""Catalog of all signals by name. Temporal criteria compare them, and `simscen explain signals` lists them."""
 
 from __future__ import annotations
 
@@ -29,16 +29,24 @@ SignalName = Literal[
 ]  # fmt: skip
 
 YES_OR_NO = "yes or no"
+"""Dimension of a signal with the values 0 and 1."""
 NUMBER = "number"
+"""Dimension of a signal without unit."""
 
 
 @dataclass(frozen=True)
 class Signal:
-    """Definition of a quantity that has a value at each sample of the truth.
+    """Definition of a signal: a quantity that has a value at each sample of the truth.
 
-    `dimension` is one of spec.quantities.UNITS, "number", or "yes or no". `read` returns the values of a run.
-    `evidence` is what a log must contain besides the truth, which is the clock. Values lie between `minimum` and
-    `maximum`, inclusive. Exactly one of `required_arguments` must be given; `optional_arguments` may be.
+    Attributes:
+        text: Description for the reference page.
+        dimension: A key of spec.quantities.UNITS, NUMBER, or YES_OR_NO.
+        read: Function that returns the values (n,) of a run in SI units.
+        evidence: What a log must contain for this signal, besides the truth.
+        minimum: Smallest possible value.
+        maximum: Greatest possible value.
+        required_arguments: Keys of arguments of which exactly one must be given.
+        optional_arguments: Keys of arguments that may be given.
     """
 
     text: str
@@ -57,7 +65,7 @@ class Signal:
 
     @property
     def is_boolean(self) -> bool:
-        """True for a yes-or-no signal."""
+        """Whether this is a yes-or-no signal."""
         return self.dimension == YES_OR_NO
 
 
@@ -266,17 +274,17 @@ SIGNALS: dict[SignalName, Signal] = {
         required_arguments=("fault", "event"),
     ),
 }
-"""Signals by name, in the order of the reference."""
+"""Signals by name, in the order of the reference page."""
 
 
 def signal_evidence(name: SignalName) -> frozenset[Evidence]:
-    """Return the evidence that a log must contain for a signal; the truth is the clock of every signal."""
+    """Return the evidence that a log must contain for a signal, including the truth, which all signals need."""
     return frozenset({*SIGNALS[name].evidence, Evidence.TRUTH})
 
 
 def read_signal(name: SignalName, trace: Trace, case: Case, arguments: SignalArguments) -> Array:
-    """Return a signal at each sample of the truth.
+    """Return the values (n,) of a signal at each sample of the truth, in SI units; 0 or 1 for a yes-or-no signal.
 
-    Raises SignalUnavailable if the trace lacks the data, and InvalidTrace if the data are not finite.
+    Raises SignalUnavailable if the trace lacks the data of the signal, and InvalidTrace if they are not finite.
     """
     return SIGNALS[name].read(SignalQuery(trace, case, arguments))

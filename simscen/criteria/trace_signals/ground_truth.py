@@ -1,4 +1,7 @@
-"""Signals of the true motion, checked to be finite, because comparisons with nan would hide failures."""
+"""True motion of the robot: pose, speed, clearance, and driven path.
+
+All values are checked to be finite, because comparisons with nan would hide failures.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +22,14 @@ if TYPE_CHECKING:
 
     Flags = npt.NDArray[np.bool_]
 else:
-    Flags = object  # annotations are not evaluated; commands that only read files need no numpy
+    Flags = object  # annotations are not evaluated, and numpy's types take long to import
 
 MIN_MOVE_M = 0.01
-"""Minimum length in m of a move in path_length. Shorter moves are jitter of a body at rest."""
+"""Length from which a move counts as driven. Shorter moves are the jitter of a body at rest."""
 
 
 def check_samples(samples: Samples, name: str, trace: Trace) -> Samples:
-    """Return the samples. Raises InvalidTrace with signal and time if a value is nan or infinite."""
+    """Return `samples` unchanged. Raises InvalidTrace if a value is not finite; `name` is the signal in the message."""
     bad = ~np.isfinite(samples.values).all(axis=1)
     if bad.any():
         at = trace.seconds(int(samples.ticks[int(np.argmax(bad))]))
@@ -35,12 +38,12 @@ def check_samples(samples: Samples, name: str, trace: Trace) -> Samples:
 
 
 def truth(trace: Trace) -> Samples:
-    """Return x, y, yaw of the robot in the world."""
+    """Return the true poses (n, 3) of the robot in the world frame: x and y in m, yaw in rad."""
     return check_samples(trace.truth, "the true pose", trace)
 
 
 def true_pose(trace: Trace, tick: int) -> Pose2:
-    """Return the true pose at `tick`. Raises MissingEvidence for a trace without the truth."""
+    """Return the true pose at `tick`. Raises MissingEvidence if the trace does not contain true poses."""
     poses = truth(trace)
     if not len(poses):
         raise MissingEvidence("the robot's true path was not recorded")
@@ -48,7 +51,10 @@ def true_pose(trace: Trace, tick: int) -> Pose2:
 
 
 def clearance(trace: Trace) -> Samples:
-    """Return the distance (n, 1) in m of the hull to the nearest surface; infinite in unbounded free space."""
+    """Return the distance (n, 1) in m from the hull to the nearest surface; inf if there is no surface.
+
+    Raises InvalidTrace if a value is nan or -inf.
+    """
     bad = np.isnan(trace.clearance.values[:, 0]) | np.isneginf(trace.clearance.values[:, 0])
     if bad.any():
         at = trace.seconds(int(trace.clearance.ticks[int(np.argmax(bad))]))
@@ -63,14 +69,14 @@ def speed(trace: Trace) -> Samples:
 
 
 def turn_rate(trace: Trace) -> Samples:
-    """Return the absolute true turn rate (n, 1) in rad/s."""
+    """Return the magnitude of the true turn rate (n, 1) in rad/s."""
     velocity = check_samples(trace.velocity, "the true velocity", trace)
     return type(velocity)(velocity.ticks, np.abs(velocity.values[:, 2])[:, np.newaxis])
 
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Driven path. The robot left corner k at `ticks[k]` after `travelled[k]` meters."""
+    """Driven path as a sequence of moves: at `ticks[k]`, the robot had driven `travelled[k]` m."""
 
     ticks: Ticks
     travelled: Array
@@ -81,7 +87,7 @@ class Drive:
         return float(self.travelled[-1]) if len(self.travelled) else 0.0
 
     def until(self, tick: int) -> float:
-        """Return the length in m up to `tick`."""
+        """Return the length in m that was driven up to `tick`."""
         driven = self.travelled[self.ticks <= tick]
         return float(driven[-1]) if len(driven) else 0.0
 
@@ -110,9 +116,10 @@ def drive(trace: Trace) -> Drive:
 
 
 def teleport_samples(trace: Trace, ticks: Ticks | None = None) -> list[int]:
-    """Return the indices of the first samples after the robot was placed elsewhere.
+    """Return the index of the first sample after each teleportation of the robot, sorted.
 
-    The step before such a sample is no motion. `ticks` are the samples' ticks; by default those of the truth.
+    The difference between this sample and the one before is no motion. `ticks` are the ticks of the samples, by default
+    those of the truth. An index can be the number of samples, if there is no later sample.
     """
     placed = sorted({event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)})
     samples: list[int] = np.searchsorted(trace.truth.ticks if ticks is None else ticks, placed, side="right").tolist()

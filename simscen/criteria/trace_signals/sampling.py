@@ -1,13 +1,10 @@
-"""Sampling of signals: their common clock, sample and hold of slower signals, and resampling of uneven ones.
-
-A signal has one value for each sample of the truth, whenever it was taken.
+"""Sampling of signals: each signal has one value for each sample of the truth.
 
 - Signals that are published more rarely (belief, command, scans) keep their newest value until the next one. Before the
   first value, the first value counts.
-- Events between two samples count at the sample that follows.
-- Differences over time (acceleration, jerk, SPARC, LDLJ) need even samples. Uneven samples of the truth are resampled
-  to their median spacing by linear interpolation. Across a gap longer than MAX_INTERPOLATED_GAP_S, the signal is
-  unknown.
+- An event between two samples counts at the sample that follows.
+- Differences over time (acceleration, jerk, SPARC, LDLJ) need evenly spaced samples. Uneven samples of the truth are
+  resampled to their median spacing by linear interpolation.
 """
 
 from __future__ import annotations
@@ -27,19 +24,19 @@ if TYPE_CHECKING:
 
 
 MAX_INTERPOLATED_GAP_S = 0.25
-"""Longest gap across which uneven samples are interpolated."""
+"""Longest gap between samples that is interpolated. With a longer gap, differences over time are unavailable."""
 
 SignalArguments = Mapping[str, object]
-"""Arguments of a signal: object, point, goal, region, fault, event, recovery or with, as the condition names them."""
+"""Arguments of a signal by YAML key: object, point, goal, region, fault, event, recovery, or with."""
 
 
 class SignalUnavailable(ValueError):
-    """The trace lacks the data of a signal, so that nothing can be decided; the message says what is missing."""
+    """The trace lacks the data of a signal, so that a criterion is inconclusive. The message says what is missing."""
 
 
 @dataclass(frozen=True, eq=False)
 class SignalQuery:
-    """A run, and the arguments of the signal that is read from it."""
+    """Input of a reader: the trace and the case of a run, and the arguments of the signal."""
 
     trace: Trace
     case: Case
@@ -47,14 +44,17 @@ class SignalQuery:
 
 
 def sample_ticks(trace: Trace) -> Ticks:
-    """Return the ticks at which signals have values: those of the truth. Raises SignalUnavailable without a truth."""
+    """Return the ticks at which signals have values: those of the truth. Raises SignalUnavailable if there are none."""
     if not len(trace.truth):
         raise SignalUnavailable("the true pose was not recorded")
     return trace.truth.ticks
 
 
 def hold(trace: Trace, samples: Samples, what: str) -> Array:
-    """Return the newest value at each sample of the truth. Raises SignalUnavailable without any value."""
+    """Return the newest values (n, k) of `samples` at each sample of the truth (sample and hold).
+
+    Raises SignalUnavailable if `samples` are empty; `what` is the name of the signal in the message.
+    """
     ticks = sample_ticks(trace)
     if not len(samples):
         raise SignalUnavailable(f"no {what} was recorded")
@@ -69,8 +69,8 @@ def usual_period(ticks: Ticks) -> int:
 def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
     """Return the samples themselves if they are evenly spaced, else resampled to their median spacing.
 
-    Raises SignalUnavailable if there are fewer than two, if their ticks do not increase, or if a gap is too long for
-    interpolation.
+    Raises SignalUnavailable if there are fewer than two samples, if their ticks do not increase, or if a gap is longer
+    than MAX_INTERPOLATED_GAP_S.
     """
     if len(samples) < 2:
         raise SignalUnavailable(f"the run is too short: {_samples(len(samples))} of the truth")
@@ -91,4 +91,5 @@ def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
 
 
 def _samples(count: int) -> str:
+    """Return "1 sample", "2 samples", and so on."""
     return "1 sample" if count == 1 else f"{count} samples"

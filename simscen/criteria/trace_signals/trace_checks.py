@@ -1,4 +1,4 @@
-"""Checks of a whole trace: gaps between samples, chronological order, and finite values."""
+"""Checks of a whole trace: that its samples have no long gaps, are in chronological order, and are finite."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Ticks, Trace
 
 MAX_GAP_S = 1.0
-"""Longest time in s without a sample of the truth; after a longer gap, nothing passes."""
+"""Longest gap between samples. With a longer one, no criterion that needs the signal can pass."""
 
 
 def time_gaps(trace: Trace) -> dict[Evidence, str]:
-    """Return the evidence that the trace contains only for a part of the run, each with its first gap.
+    """Return the evidence that the trace contains only for a part of the run, each with its first gap in words.
 
     The truth and the clearance must have a sample at least every MAX_GAP_S, from the start of the run to its end.
     """
@@ -31,7 +31,7 @@ def time_gaps(trace: Trace) -> dict[Evidence, str]:
 
 
 def check_recorded_signals(trace: Trace) -> None:
-    """Raise InvalidTrace if a signal that simscen recorded is not finite, or its ticks do not increase.
+    """Raise InvalidTrace if a signal is not finite, or if its ticks do not increase; for logs that simscen recorded.
 
     All signals are checked, whether a criterion uses them or not. Only odometry is left out: it is a reading, which a
     fault may have corrupted.
@@ -49,7 +49,7 @@ def check_recorded_signals(trace: Trace) -> None:
 
 
 def _first_gap(trace: Trace, ticks: Ticks) -> str:
-    """Return the first gap that is too long, as text; "" if there is none, or no sample at all."""
+    """Return the first gap longer than MAX_GAP_S, as text; "" if there is none, or if there are no samples."""
     if not len(ticks):
         return ""
     edges = np.concatenate(([0], ticks, [trace.end]))
