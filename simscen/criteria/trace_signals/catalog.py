@@ -118,7 +118,7 @@ SIGNALS: dict[SignalName, Signal] = {
     ),
     "time": Signal("Simulated time since the start.", "duration", readers.time, frozenset()),
     "goal_distance": Signal(
-        "True straight-line distance to the goal accepted last; to the first goal before any is accepted.",
+        "True straight-line distance to the goal accepted last, or to the first goal before any goal is accepted.",
         "length",
         readers.goal_distance,
         {Evidence.ALIGNMENT, Evidence.NAVIGATION},
@@ -157,8 +157,8 @@ SIGNALS: dict[SignalName, Signal] = {
         {Evidence.ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT},
     ),
     "localization_error": Signal(
-        "Distance between the newest estimated position and the true one of the same time; the current "
-        "true position if the belief is over 1 s old. Not aligned.",
+        "Distance of the newest estimated position from the true position at the time of the estimate, or from the "
+        "current one if the belief is over 1 s old. Not aligned.",
         "length",
         readers.localization_error,
         {Evidence.ALIGNMENT, Evidence.BELIEF},
@@ -180,8 +180,8 @@ SIGNALS: dict[SignalName, Signal] = {
         "Standard deviation of the estimated heading.", "angle", readers.yaw_std, {Evidence.BELIEF, Evidence.COVARIANCE}
     ),
     "nees": Signal(
-        "Normalized estimation error squared of the belief: 3 on average if its covariance is right; infinite"
-        " if that is singular.",
+        "Normalized estimation error squared of the belief: 3 on average if its covariance is correct; infinite"
+        " if its covariance is singular.",
         NUMBER,
         readers.nees,
         {Evidence.ALIGNMENT, Evidence.BELIEF, Evidence.COVARIANCE},
