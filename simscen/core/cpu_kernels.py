@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 CPUINFO = Path("/proc/cpuinfo")
+"""File in which Linux lists the instruction sets of the processors."""
 _FIRST_PROCESSOR_BYTES = 8192
 """Number of bytes of CPUINFO that contain the entry of the first processor."""
 _AVX512_BEFORE_2_4 = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL"

@@ -77,6 +77,7 @@ class RayPackets:
 
 
 ALL_PACKETS = slice(None)
+"""All packets of a fan."""
 
 
 class RayFan:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 PoseCovariance = tuple[float, float, float, float, float, float, float, float, float]
 """Covariance of x, y (m) and yaw (rad), row by row."""
 UNKNOWN_POSE_COVARIANCE: PoseCovariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Zeros mean unknown, as in ROS."""
 
 
 @dataclass(frozen=True, eq=False)

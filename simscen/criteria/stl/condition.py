@@ -59,9 +59,9 @@ class Condition(Spec):
     not_: Condition | None = Field(default=None, alias="not")
     """True while the given condition is false."""
     always: Windowed | None = None
-    """True if the given condition is true at all times of the window, which begins now."""
+    """True if the given condition is true at all times of its window."""
     eventually: Windowed | None = None
-    """True if the given condition is true at least once in the window, which begins now."""
+    """True if the given condition is true at least once in its window."""
     until: Release | None = None
     """True if `hold` is true from now on until `release` becomes true."""
     whenever: Condition | None = None
