@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from simscen.core.stage import Effect, Situation, Stage
     from simscen.criteria.base import Criterion, Measure
     from simscen.criteria.findings import at_least, at_most, counted, held, missed, undecided
-    from simscen.criteria.trace_signals.ground_truth import clearance, drive, pose_error, speed, truth, turn_rate
+    from simscen.criteria.trace_signals.estimation_errors import pose_error
+    from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed, truth, turn_rate
     from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance, Sight, Wheels
     from simscen.model.controllers import GoalCheckerSpec
     from simscen.model.localizers import LocalizerSpec
@@ -311,11 +312,11 @@ _NAMES_BY_MODULE = {
     "simscen.criteria.trace_signals.ground_truth": (
         "clearance",
         "drive",
-        "pose_error",
         "speed",
         "truth",
         "turn_rate",
     ),
+    "simscen.criteria.trace_signals.estimation_errors": ("pose_error",),
     # Shared data types.
     "simscen.core.records.case": ("Case",),
     "simscen.core.random_streams": ("Streams",),

@@ -1,1 +1,1 @@
-"""Shared data types and pure functions. Imports neither pydantic nor an engine."""
+"""Data types and pure functions that all packages use. Needs neither pydantic nor a simulation library."""

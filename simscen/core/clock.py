@@ -3,19 +3,17 @@
 from dataclasses import dataclass
 
 DEFAULT_TICK_RATE_HZ = 240
+"""Physics ticks per second; the default of PyBullet."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Conversion between ticks and seconds, and from rates to whole periods.
-
-    `rate` is the number of physics ticks per second.
-    """
+    """Converts between ticks and seconds, and rates to periods in ticks. `rate` is in physics ticks per second."""
 
     rate: int = DEFAULT_TICK_RATE_HZ
 
     def seconds(self, tick: int) -> float:
-        """Return the simulated time of `tick` in seconds."""
+        """Return the simulated time of a tick in s."""
         return tick / self.rate
 
     def ticks(self, seconds: float) -> int:
@@ -25,7 +23,7 @@ class Clock:
     def period(self, hertz: float) -> int:
         """Return the number of ticks between two samples at a rate of `hertz`.
 
-        Raises ValueError, with the nearest rate that fits, if the rate does not divide the clock rate.
+        Raises ValueError, with the result of `nearest_rate`, if the period is not a whole number of ticks.
         """
         period = self.rate / hertz if hertz > 0 else 0.0
         if period < 1 or abs(period - round(period)) > 1e-9:
@@ -34,7 +32,10 @@ class Clock:
         return round(period)
 
     def nearest_rate(self, hertz: float) -> float:
-        """Return the rate nearest to `hertz` that has a period of whole ticks."""
+        """Return the rate in Hz nearest to `hertz` that suits the clock.
+
+        Suitable rates are the whole divisors of the clock rate, and rates with a period of 1 to 10 whole seconds.
+        """
         periods = [p for p in range(1, 10 * self.rate + 1) if self.rate % p == 0 or p % self.rate == 0]
         return min((self.rate / p for p in periods), key=lambda rate: (abs(rate - hertz), rate))
 
@@ -42,14 +43,15 @@ class Clock:
 NS_PER_SECOND = 1_000_000_000
 
 Stamp = tuple[int, int]
-"""builtin_interfaces/Time: seconds and nanoseconds."""
+"""Time as in builtin_interfaces/Time: seconds since the start of the run, and nanoseconds of the current second."""
 
 
 class SimTime:
-    """Simulated time of a clock with `rate` ticks per second, 1 to 999,999,999.
+    """Converts ticks to nanoseconds and ROS time, and back.
 
-    A tick is rarely a whole number of nanoseconds (1/240 s is not), so times are rounded down. `tick` inverts the
-    rounding exactly.
+    `rate` is the number of ticks per second, from 1 to 999,999,999; other values raise ValueError. A tick is rarely a
+    whole number of nanoseconds (1/240 s is not), so times are rounded down. The method `tick` finds the exact tick
+    again.
     """
 
     def __init__(self, rate: int) -> None:
@@ -69,5 +71,5 @@ class SimTime:
         return self._last[1]
 
     def tick(self, nanoseconds: int) -> int:
-        """Return the tick for which `nanoseconds` or `stamp` returned this time."""
+        """Return the tick of a time since the start of the run that was computed by `nanoseconds` or `stamp`."""
         return -(-nanoseconds * self.rate // NS_PER_SECOND)

@@ -1,8 +1,8 @@
-"""Choice of the CPU kernels of NumPy and OpenBLAS, so that all processors with AVX2 compute the same last bits.
+"""Environment variables that make NumPy and OpenBLAS compute identical results on all processors with AVX2.
 
-Both libraries choose kernels by the processor when they are loaded. The results differ in their last bits, and after
-some seconds the whole run differs. On processors with AVX2 and FMA, also on those with AVX-512, simscen uses the
-kernels for AVX2. Variables that the user has set are not changed.
+Both libraries choose their CPU kernels (AVX2, AVX-512, …) by the processor when they are loaded. Different kernels give
+results that differ in the last bits. Such differences grow until, after some seconds, the runs are no longer the same.
+simscen therefore uses the AVX2 kernels on all processors with AVX2 and FMA, even if the processor has AVX-512.
 """
 
 import os
@@ -10,12 +10,16 @@ from importlib.util import find_spec
 from pathlib import Path
 
 CPUINFO = Path("/proc/cpuinfo")
+"""File in which Linux lists the instruction sets of the processors."""
 _FIRST_PROCESSOR_BYTES = 8192
+"""Number of bytes of CPUINFO that contain the entry of the first processor."""
 _AVX512_BEFORE_2_4 = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL"
+"""Names of the AVX-512 kernels before NumPy 2.4. NumPy warns about names that it does not know."""
 _AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"
-"""Names of the kernels for AVX-512, before NumPy 2.4 and since. NumPy warns about names that it does not know."""
+"""Names of the AVX-512 kernels since NumPy 2.4."""
 
 _pinned: set[str] = set()
+"""Names of the variables that `pin_kernels` has set."""
 
 
 def kernel_variables() -> dict[str, str]:
@@ -27,7 +31,10 @@ def kernel_variables() -> dict[str, str]:
 
 
 def pin_kernels() -> None:
-    """Set the variables in this process. They have no effect on libraries that are already loaded."""
+    """Set the `kernel_variables` of this process, except those that the user has set.
+
+    The variables have no effect on libraries that are already loaded.
+    """
     for name, value in kernel_variables().items():
         if name not in os.environ:
             os.environ[name] = value
@@ -35,7 +42,7 @@ def pin_kernels() -> None:
 
 
 def pinned_variables() -> frozenset[str]:
-    """Return the names of the variables that `pin_kernels` has set, which the user had not set."""
+    """Return the names of the variables that `pin_kernels` has set."""
     return frozenset(_pinned)
 
 

@@ -14,8 +14,8 @@ _Class = TypeVar("_Class")
 def fast_dataclass(*, eq: bool = True) -> Callable[[type[_Class]], type[_Class]]:
     """Return a decorator like `dataclass(frozen=True, slots=True)` whose constructor takes half the time.
 
-    A frozen dataclass sets each field with `object.__setattr__`, which looks it up by name. This one sets the slots
-    directly.
+    The constructor of a frozen dataclass sets each field with `object.__setattr__`, which looks it up by name. The
+    constructor generated here sets the slots directly.
     """
 
     def decorate(plain: type[_Class]) -> type[_Class]:
@@ -27,7 +27,10 @@ def fast_dataclass(*, eq: bool = True) -> Callable[[type[_Class]], type[_Class]]
 
 
 def _init_function(slotted: type) -> Any:
-    """Return an `__init__` that sets all slots; its source contains only field names, as in `dataclass` itself."""
+    """Return an `__init__` that sets all slots.
+
+    As in `dataclass`, the source that is executed contains only field names, which are valid identifiers.
+    """
     namespace: dict[str, Any] = {"MISSING": MISSING}
     arguments, lines = ["self"], ["pass"]
     for field in fields(slotted):
@@ -55,9 +58,10 @@ Result = TypeVar("Result")
 def cached_on_instance(
     compute: Callable[Concatenate[Instance, Args], Result],
 ) -> Callable[Concatenate[Instance, Args], Result]:
-    """Return `compute` with its results cached on the instance, keyed by the other arguments.
+    """Return `compute` with its results cached in the `__dict__` of its first argument, the instance.
 
-    Callers must not modify the result. A result that refers to the instance keeps both alive until garbage collection.
+    The key is formed by the other arguments, which must be hashable. Callers must not modify the result. A result that
+    refers to the instance keeps both alive until garbage collection.
     """
     name = f"_{compute.__module__}.{compute.__qualname__}"
 

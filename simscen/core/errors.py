@@ -1,11 +1,15 @@
-"""Problems in input files, exceptions, and the exit codes of the command line. A verdict is not an error."""
+"""Exceptions of simscen with their exit codes, and problems in input files. A failed criterion is not an error."""
 
 from dataclasses import dataclass
 from enum import IntEnum
 
 
 class Exit(IntEnum):
-    """The exit codes of the command line."""
+    """Exit codes of the command line.
+
+    INCOMPLETE: a run could not be completed. UNDECIDED: the claim of a study is undecided. The last three are 128 plus
+    the number of the signal that ended the command.
+    """
 
     PASSED = 0
     FAILED = 1
@@ -20,9 +24,10 @@ class Exit(IntEnum):
 
 
 class SimscenError(Exception):
-    """Error that ends a command or a run on purpose."""
+    """Base class of the errors that simscen raises on purpose to end a command or a run."""
 
     exit = Exit.INTERNAL
+    """Exit code of a command that this error ends."""
 
 
 class InvalidInput(SimscenError):
@@ -35,7 +40,7 @@ class InvalidInput(SimscenError):
         super().__init__("\n".join(f"{p.place}: {p.message}" for p in self.problems))
 
     def __reduce__(self) -> "tuple[type[InvalidInput], tuple[list[Problem]]]":
-        """Pickle the problems instead of the message, so that the error survives the return from a worker process."""
+        """Pickle the problems, so that a worker process can pass the error on; by default only the message is."""
         return type(self), (self.problems,)
 
 
@@ -46,19 +51,20 @@ class UsageError(SimscenError):
 
 
 class NothingSelected(SimscenError):
-    """No scenario matched the selection; the caller can fix it."""
+    """No scenario matched the selection on the command line."""
 
     exit = Exit.NOTHING_SELECTED
 
 
 BROKEN_COMPONENT = "broken-component"
-"""Error kind of a run in which a component of a plug-in returned an invalid value."""
+"""`kind` of a RunError: a component of a plug-in returned an invalid value."""
 
 
 class RunError(SimscenError):
-    """A run could not be completed; `kind` is JUnit's error type: crashed, timeout, out-of-memory, invalid, …
+    """A run could not be completed.
 
-    `tail` is the end of the output of an external stack. `by_stack`: the stack under test is the cause.
+    `kind` is the error type in JUnit: crashed, timeout, out-of-memory, invalid, … `tail` is the end of the output of an
+    external stack. `by_stack` is True if the stack under test is the cause.
     """
 
     exit = Exit.INCOMPLETE
@@ -74,9 +80,11 @@ class RunError(SimscenError):
 
 @dataclass(frozen=True, order=True)
 class Problem:
-    """A problem in an input file: message, position (`line` and `col` from 1; 0 for the whole file), and hint.
+    """A problem in an input file.
 
-    `code` is stable (SC…). `severity` is "error" or "warning". `source` is the text of the line, shown with a caret.
+    `line` and `col` count from 1; both are 0 if the problem concerns the whole file. `code` identifies the kind of
+    problem, such as SC012, and never changes its meaning. `hint` says how to fix the problem. `severity` is "error" or
+    "warning". `source` is the text of the line.
     """
 
     path: str
@@ -90,5 +98,5 @@ class Problem:
 
     @property
     def place(self) -> str:
-        """The position as path:line:col, or the path alone."""
+        """Position as path:line:col, or the path alone if the problem concerns the whole file."""
         return f"{self.path}:{self.line}:{self.col}" if self.line else self.path

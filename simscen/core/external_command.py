@@ -5,18 +5,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 START_TIMEOUT_S = 30.0
+"""Default of `ExternalCommand.start_limit`."""
 ANSWER_TIMEOUT_S = 10.0
-"""Wall time; see ExternalCommand."""
+"""Default of `ExternalCommand.answer_limit`."""
 
 
 @dataclass(frozen=True)
 class ExternalCommand:
-    """Program that implements the stack protocol: its arguments, its whole environment, and its working folder.
+    """Program that implements the stack protocol, and how to start it.
 
-    `start_limit` is the wall time in s until the program has subscribed, and `answer_limit` the wall time of each
-    answer after that. The program is searched in the PATH of `env`, like in a shell. `digest` is a hash of the
-    arguments, the requested variables, and the content of files among the arguments. It does not include the rest of
-    the environment, which must not appear in logs or reports.
+    Attributes:
+        argv: The program, which is looked up in the PATH of `env`, and its arguments.
+        env: Complete environment of the program.
+        cwd: Working folder.
+        start_limit: Maximum wall time in s from the start of the program to its subscription to topics.
+        answer_limit: Maximum wall time in s of each later answer.
+        digest: Hash of the arguments, the files that they name, and the variables that the user configured. Other
+            variables of `env` are not included, because they may be secret.
     """
 
     argv: tuple[str, ...]
@@ -28,7 +33,10 @@ class ExternalCommand:
 
 
 def split_command(command: str) -> tuple[str, ...]:
-    """Return the arguments of a command line with shell quoting. Raises ValueError with the reason."""
+    """Return the words of a command line with shell quoting.
+
+    Raises ValueError if a quote is not closed or if the command names no program.
+    """
     try:
         words = tuple(shlex.split(command))
     except ValueError as error:

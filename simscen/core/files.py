@@ -1,4 +1,4 @@
-"""Checks of output paths, and a record of the input files that were read."""
+"""Checks that protect existing files from being overwritten, and a record of the input files that were read."""
 
 import errno
 import os
@@ -27,18 +27,19 @@ def require_regular_file(path: Path) -> None:
 
 
 def require_not_input(path: Path, inputs: Iterable[Path]) -> None:
-    """Raise OSError if writing `path` would overwrite one of the files that were read."""
+    """Raise OSError if `path` is one of the `inputs`, which it would overwrite."""
     real = os.path.realpath(path)
     if any(os.path.realpath(each) == real for each in inputs):
         raise OSError(errno.EINVAL, "it is one of the input files")
 
 
 _READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
+"""Set of `collect_read_files`; None outside of its block."""
 
 
 @contextmanager
 def collect_read_files() -> Iterator[set[Path]]:
-    """Yield a set that collects the real paths of all files read in the block, including unusable ones."""
+    """Yield a set to which `record_read_file` adds the files that are read in the block."""
     read: set[Path] = set()
     token = _READ.set(read)
     try:
@@ -48,7 +49,11 @@ def collect_read_files() -> Iterator[set[Path]]:
 
 
 def record_read_file(file: Path) -> None:
-    """Record that a result depends on this file. Each reader of files that other files name must call this."""
+    """Add `file` to the set of `collect_read_files`; without effect outside of its block.
+
+    Every function that reads a file named in another input file must call this, so that a change of the file is
+    noticed.
+    """
     read = _READ.get()
     if read is not None:
         read.add(file)

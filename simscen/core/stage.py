@@ -1,4 +1,7 @@
-"""Interfaces of a run for triggers, which observe it, and actions, which change it."""
+"""Interfaces to a running simulation: Situation for triggers, which observe it, and Stage for actions, which change it.
+
+All poses are in the world frame, except those of the belief and the plan, which are in the map frame.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +23,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Effect:
-    """Result of an action: whether it changed anything, and what, or why not."""
+    """Result of an action: `happened` if the action changed anything, and `what` it changed, or why it did not."""
 
     happened: bool
     what: str
 
 
 class Situation(Protocol):
-    """State of the run at one beat, as triggers see it; all poses are in the world frame."""
+    """State of the run at one beat, as triggers see it, from the point of view of one robot."""
 
     @property
     def tick(self) -> int:
@@ -51,24 +54,27 @@ class Situation(Protocol):
 
     @property
     def clearance(self) -> float | None:
-        """Distance in m from the hull to the nearest obstacle at the newest truth sample; None before the first.
+        """Distance in m from the hull to the nearest obstacle in the newest truth sample; None before the first.
 
-        At most the range of the search.
+        Distances above `Case.clearance_range` are cut off.
         """
         ...
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
-        """Return the tick at which the stack last received a scan of this lidar (or any), or None."""
+        """Return the tick at which the stack last received a scan of the lidar `sensor`; None if it never did.
+
+        If `sensor` is None, scans of all lidars count.
+        """
         ...
 
     @property
     def travelled(self) -> float:
-        """Distance driven in m, without teleportation."""
+        """Distance driven so far in m, without teleportation."""
         ...
 
     @property
     def belief(self) -> Belief | None:
-        """Latest belief that the stack published."""
+        """Latest belief that the stack published; None before the first."""
         ...
 
     @property
@@ -78,12 +84,12 @@ class Situation(Protocol):
 
     @property
     def plan(self) -> Path | None:
-        """Plan that the robot follows."""
+        """Plan that the robot follows; None if it follows none."""
         ...
 
     @property
     def goal(self) -> Goal | None:
-        """Current goal of the robot."""
+        """Goal that the robot drives to; None if there is none."""
         ...
 
     @property
@@ -92,7 +98,7 @@ class Situation(Protocol):
         ...
 
     def of(self, robot: str) -> Situation:
-        """Return the state for the robot of this name."""
+        """Return the state from the point of view of the robot with this name."""
         ...
 
     def region(self, name: str) -> Polygon:
@@ -105,14 +111,14 @@ class Situation(Protocol):
 
 
 class Stage(Situation, Protocol):
-    """The run as actions change it."""
+    """Changes that actions can make to the run, from the point of view of one robot."""
 
     def of(self, robot: str) -> Stage:
-        """Return the stage for the robot of this name."""
+        """Return the stage of the robot with this name."""
         ...
 
     def spawn(self, body: Body) -> None:
-        """Add a body to physics, ray casting and map pictures from the next tick on."""
+        """Add a body to physics, ray casting and pictures from the next tick on; replaces a body of the same name."""
         ...
 
     def add_pedestrian(self, walker: WalkingPedestrian) -> None:
@@ -120,14 +126,14 @@ class Stage(Situation, Protocol):
         ...
 
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Return whether a pedestrian of `radius` m fits at `place` without touching anything.
+        """Return whether a pedestrian of `radius` m at `place` (x, y in m) would touch nothing.
 
-        If `walls_only` is true, only walls count.
+        With `walls_only`, it may touch anything but walls.
         """
         ...
 
     def rng(self, name: str) -> np.random.Generator:
-        """Return a new generator of the random stream with this name."""
+        """Return a new generator of the random stream with this name, see `Streams.generator`."""
         ...
 
     def remove(self, name: str) -> None:
@@ -139,38 +145,38 @@ class Stage(Situation, Protocol):
         ...
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the path that moves an object now and the seconds since its start; None without a script."""
+        """Return the path that moves an object now, and the time in s since its start; None if no path moves it."""
         ...
 
     def mass(self, name: str) -> float:
-        """Return the mass in kg of an object that can be pushed; 0 for scripted and missing objects."""
+        """Return the mass in kg of an object; 0 if it cannot be pushed or does not exist."""
         ...
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Move a body along a path that starts now."""
+        """Move an object along a path that starts now."""
         ...
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Place an object somewhere else at rest and end its script."""
+        """Place an object at `pose`, at rest, and end its motion along a path."""
         ...
 
     def place_robot(self, pose: Pose2) -> None:
-        """Place the robot somewhere else at rest without informing the stack."""
+        """Place the robot at `pose`, at rest, without informing the stack."""
         ...
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
-        """Apply an impulse (N s, world frame) at the center of the robot or of an object with a mass.
+        """Apply an impulse (x, y) in N s at the center of an object with a mass, or of the robot if `name` is None.
 
-        It is spread evenly over `seconds`, or over one physics tick for 0.
+        The impulse is spread evenly over `seconds`, or over one physics tick if `seconds` is 0.
         """
         ...
 
     def add_friction_patch(self, name: str, patch: Patch) -> None:
-        """Change the friction of a patch of floor; replaces a patch of the same name."""
+        """Change the friction of a part of the floor; replaces a patch of the same name."""
         ...
 
     def send_goal(self, name: str) -> None:
-        """Preempt the current task with one of the goals that events of the scenario send."""
+        """Send the goal with this name, one of `Case.sent`, to the stack. It preempts the current task."""
         ...
 
     def cancel_goal(self) -> None:
@@ -178,13 +184,13 @@ class Stage(Situation, Protocol):
         ...
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Send a zone command to the costmap filters of the stack; return why it had no effect, or ""."""
+        """Send a command to the costmap filters of the stack. Return why it had no effect, or "" if it had one."""
         ...
 
     def record_world_event(self, event: Event) -> None:
-        """Add an event of the world to the events of all robots; tick 0 stands for now."""
+        """Add an event of the world to the events of all robots. A tick of 0 is replaced by the current tick."""
         ...
 
     def record_event(self, event: Event) -> None:
-        """Add an event of this robot; tick 0 stands for now."""
+        """Add an event to those of this robot. A tick of 0 is replaced by the current tick."""
         ...

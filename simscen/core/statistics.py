@@ -1,6 +1,6 @@
-"""Statistics without scipy, whose import takes half a second.
+"""Bootstrap, sign test, Holm's correction, Wilson interval, and chi-square distribution.
 
-Bootstrap, sign test, Holm's correction, Wilson interval, and chi-square.
+They do not use scipy, whose import takes half a second.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ import numpy as np
 MIN_PAIRS = 5
 """Minimum number of pairs for an interval: a bootstrap of four values is not meaningful."""
 RESAMPLES = 10_000
+"""Number of bootstrap resamples, unless MAX_DRAWS requires fewer."""
 MAX_DRAWS = 20_000_000
-"""Limit of drawn pairs. Beyond it, the number of resamples is reduced to a tenth of RESAMPLES at least."""
+"""Maximum number of values drawn by a bootstrap, which limits its time. There are at least RESAMPLES / 10 resamples."""
 CONFIDENCE = 0.95
+"""Probability with which the bootstrap interval contains the true mean."""
 _LN_2 = math.log(2.0)
 _DRAWS_PER_BATCH = 1 << 20
 
@@ -23,10 +25,10 @@ _DRAWS_PER_BATCH = 1 << 20
 def bootstrap_mean_interval(
     differences: Sequence[float], rng: np.random.Generator, weights: Sequence[float] | None = None
 ) -> tuple[float, float] | None:
-    """Return the 95 % interval of the mean difference, optionally weighted; None for less than MIN_PAIRS pairs.
+    """Return lower and upper limit of the mean of paired differences; None for fewer than MIN_PAIRS pairs.
 
-    Percentile bootstrap with RESAMPLES resamples. (Efron and Tibshirani: An Introduction to the Bootstrap, 1993,
-    chapter 13.)
+    `weights` are those of the pairs in the mean, by default equal. Percentile bootstrap with RESAMPLES resamples (Efron
+    and Tibshirani: An Introduction to the Bootstrap, 1993, chapter 13).
     """
     if len(differences) < MIN_PAIRS:
         return None
@@ -44,12 +46,10 @@ def bootstrap_mean_interval(
 
 
 def sign_test(more: int, less: int) -> float:
-    """Return the p-value of the exact two-sided sign test.
+    """Return the p-value of the exact two-sided sign test for `more` pairs with an increase and `less` with a decrease.
 
-    `more` pairs have an increase and `less` pairs a decrease; pairs without a difference do not count.
-
-    For passes that became failures and vice versa, this is McNemar's exact test. (Conover: Practical Nonparametric
-    Statistics, 1999, section 3.4.)
+    Pairs without a difference do not count. If the pairs are outcomes that changed from pass to fail or from fail to
+    pass, this is McNemar's exact test (Conover: Practical Nonparametric Statistics, 1999, section 3.4).
     """
     pairs, fewer = more + less, min(more, less)
     term = math.exp(math.lgamma(pairs + 1) - math.lgamma(fewer + 1) - math.lgamma(pairs - fewer + 1) - pairs * _LN_2)
@@ -61,9 +61,10 @@ def sign_test(more: int, less: int) -> float:
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """Return p-values adjusted for multiple tests; the probability of any false one stays below the level.
+    """Return the p-values of several tests, adjusted for their number, in the same order.
 
-    (Holm: A Simple Sequentially Rejective Multiple Test Procedure, 1979.)
+    If the adjusted values are compared with a significance level, the probability that any test is significant by
+    chance is at most this level (Holm: A Simple Sequentially Rejective Multiple Test Procedure, 1979).
     """
     adjusted, largest = [0.0] * len(p_values), 0.0
     for rank, index in enumerate(sorted(range(len(p_values)), key=p_values.__getitem__)):
@@ -77,10 +78,11 @@ Z_95 = 1.959963984540054
 
 
 def wilson_interval(successes: float, runs: int, z: float = Z_95) -> tuple[float, float]:
-    """Return the Wilson score interval of a rate after `successes` of `runs`.
+    """Return lower and upper limit of the success rate after `successes` of `runs`: the Wilson score interval.
 
-    It is also valid at 0 and 1, where the normal interval has no width. (Wilson 1927, JASA 22(158).) If two runs count
-    as one, and one of them succeeded, that is half a success. Raises ValueError without runs.
+    Unlike the normal interval, it has a width at rates of 0 and 1 (Wilson 1927, JASA 22(158)). `successes` can be
+    fractional, for example half a success for two runs that count as one. Raises ValueError if `runs` is 0 or if there
+    are more successes than runs.
     """
     if runs < 1 or not 0 <= successes <= runs:
         raise ValueError(f"{successes} successes of {runs} runs")
@@ -106,9 +108,10 @@ def chi2_quantile(probability: float, freedom: int) -> float:
 
 
 def chi2_cdf(value: float, freedom: int) -> float:
-    """Return the chi-square distribution function at a value > 0: the regularized gamma P(freedom/2, value/2).
+    """Return the cumulative distribution function of chi-square at `value` > 0, for `freedom` degrees of freedom.
 
-    Computed by its power series, whose terms are all positive (Abramowitz and Stegun 1964, 6.5.29).
+    It is the regularized gamma function P(freedom/2, value/2), computed by its power series, whose terms are all
+    positive (Abramowitz and Stegun 1964, 6.5.29).
     """
     a, x = freedom / 2.0, value / 2.0
     term = total = 1.0 / a
@@ -121,9 +124,10 @@ def chi2_cdf(value: float, freedom: int) -> float:
 
 
 def nees_mean_bounds(samples: int, dimensions: int, probability: float) -> tuple[float, float]:
-    """Return the bounds of the mean NEES of a consistent estimator over `samples` with this probability.
+    """Return the bounds between which the mean NEES of a consistent estimator lies with this probability.
 
-    chi2(dimensions x samples) / samples, two-sided (Bar-Shalom et al. 2001).
+    The mean is over `samples` independent samples of an error with this number of `dimensions`. The bounds are the
+    two-sided quantiles of chi2(dimensions x samples) / samples (Bar-Shalom et al. 2001).
     """
     tail, freedom = (1.0 - probability) / 2.0, dimensions * samples
     return chi2_quantile(tail, freedom) / samples, chi2_quantile(1.0 - tail, freedom) / samples

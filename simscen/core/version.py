@@ -1,4 +1,4 @@
-"""Version of simscen and location of its files, importable without the rest of the package."""
+"""Version of simscen and location of its files; imports no other module of the package."""
 
 from pathlib import Path
 

@@ -1,1 +1,1 @@
-"""Pass criteria: one file for each, with its specification and its evaluation."""
+"""Pass criteria: their specifications, and how they judge the trace of a run."""

@@ -1,4 +1,4 @@
-"""Base classes of pass criteria and of metrics from plugins, and the choice of a metric by its key."""
+"""Base classes of criteria and of the metrics of plug-ins, and the specification that selects such a metric."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ if TYPE_CHECKING:
 
 
 class Criterion(ABC):
-    """Requirement on the trace of a run.
+    """Requirement on the trace of a run. Subclasses are the specifications of the entries of `pass`.
 
-    *Given* the same trace and case *then* the findings are the same. Every checked bound yields a finding, so a
-    criterion without findings has checked nothing.
+    *Given* the same trace and case *then* the findings are the same. Each bound that is checked gives a finding, so
+    that no findings mean that nothing was checked.
     """
 
     @property
     def clearance_range(self) -> float:
-        """Distance in m up to which the criterion needs the clearance; 0 if it does not use the clearance."""
+        """Distance in m around the robot up to which clearance must be measured; 0 if the criterion does not use it."""
         return 0.0
 
     @property
     def horizon(self) -> float:
-        """Minimum simulated time in s for a decision."""
+        """Simulated time in s before which the criterion cannot pass."""
         return 0.0
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """Evidence in the log that the criterion needs; None for everything in a log of simscen."""
+        """Evidence that the criterion needs from the log; None for everything that a log of simscen contains."""
         return None
 
     @abstractmethod
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each bound, in the order of the specification."""
+        """Return one finding for each bound that is checked, in the order of the specification."""
 
 
 class Measure(ABC):
-    """Metric that a scenario requests for a run. Unlike a criterion, it has no bound and cannot fail a run.
+    """Metric of a plug-in, which a scenario requests under `metrics`. It has no bound and cannot fail a run.
 
-    *Given* the same trace and case *then* the same number.
+    *Given* the same trace and case *then* the result is the same.
     """
 
     unit: ClassVar[str] = ""
@@ -52,22 +52,22 @@ class Measure(ABC):
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """Evidence in the log that the metric needs; None for everything in a log of simscen."""
+        """Evidence that the metric needs from the log; None for everything that a log of simscen contains."""
         return None
 
     @abstractmethod
     def measure(self, trace: Trace, case: Case) -> float | str:
-        """Return the value, finite and in SI units, or the reason why this run has none."""
+        """Return the value in SI units, which must be finite, or the reason why this run has no value."""
 
 
 class AnyMeasure(Choice):
-    """Metric of an installed package. The shipped metrics are reported for every run."""
+    """Metric of an installed plug-in, selected by its key. simscen's own metrics are reported for every run."""
 
     group: ClassVar[str] = "metric"
 
     @property
     def measure(self) -> Measure:
-        """Selected metric."""
+        """The metric that is selected."""
         measure = self.chosen
         assert isinstance(measure, Measure)
         return measure

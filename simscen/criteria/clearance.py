@@ -1,4 +1,4 @@
-"""Distance to the robot: `clearance` from obstacles, and `personal_space` of pedestrians."""
+"""The criteria `clearance` and `personal_space`: minimum distances from obstacles and from pedestrians."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
 
 
 SEARCH_MARGIN_M = 0.5
-"""Distance in m beyond the bound up to which the clearance is measured."""
+"""Clearance is measured this far beyond the bound, so that a verdict can state the margin."""
 
 
 class Clearance(Spec, Criterion):
     """The robot kept a minimum distance from everything solid.
 
     What is measured: the smallest true distance between the robot's hull and the surface of anything solid, over the
-        whole run. It is searched 2 m around the robot, and further where a bound asks for it.
-    When it fails: it is below `min`.
+        whole run. Surfaces within 2 m of the robot are searched, or within `min` plus 0.5 m if this is more.
+    When it fails: the distance is below `min`.
     Why this: a near miss can become a collision; the margin shows the risk before the first contact.
-    Source: bench-mr's ClearingMetric, but from the true geometry, not from a map or a scan.
+    Source: bench-mr's ClearingMetric, but computed from the true geometry, not from a map or a scan.
 
     Example: `clearance: {min: 0.1 m}`
     """
@@ -41,7 +41,7 @@ class Clearance(Spec, Criterion):
 
     @property
     def clearance_range(self) -> float:
-        """Bound plus a small distance, so that margins are visible."""
+        """Distance in m around the robot up to which clearance must be measured."""
         return self.min + SEARCH_MARGIN_M
 
     @property
@@ -50,7 +50,7 @@ class Clearance(Spec, Criterion):
         return frozenset({Evidence.CLEARANCE})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return the finding for the smallest clearance. An infinite clearance is valid; nan is not."""
+        """Return the finding for the smallest clearance, which may be infinite. Raises InvalidTrace if one is nan."""
         distances = clearance(trace).values[:, 0]
         if not len(distances):
             return [undecided("clearance", "no clearance was recorded", f"≥ {self.min:.2f} m")]
@@ -65,7 +65,7 @@ class Clearance(Spec, Criterion):
 
 
 DRIVING_SPEED_M_S = 0.1
-"""Speed in m/s above which a robot is driving; people may approach a slower robot."""
+"""Speed above which a robot counts as driving for `while_driving`."""
 
 
 class PersonalSpace(Spec, Criterion):
@@ -73,10 +73,10 @@ class PersonalSpace(Spec, Criterion):
 
     What is measured: the smallest true gap between the robot's footprint and the body of a pedestrian, over the whole
         run.
-    When it fails: it is below `min`.
-    Why this: people feel a robot that passes close by as a threat long before any contact; 0.45 m is where Hall's
-        intimate space begins.
-    Source: Hall 1966; the space intrusions of HuNavSim and of Francis et al. 2023, by the gap between surfaces.
+    When it fails: the gap is below `min`.
+    Why this: people feel threatened by a robot that passes close by, long before any contact. The default of 0.45 m is
+        the border of Hall's intimate space.
+    Source: Hall 1966; the space intrusions of HuNavSim and of Francis et al. 2023, with the gap between surfaces.
 
     Inconclusive if the run had no pedestrians.
 
@@ -84,9 +84,9 @@ class PersonalSpace(Spec, Criterion):
     """
 
     min: NonNegativeLength = INTIMATE_SPACE_M
-    """Smallest allowed gap."""
+    """Smallest allowed gap in meters."""
     while_driving: bool = False
-    """Ignore moments at which the robot is slower than 0.1 m/s, because people may approach a standing robot."""
+    """Check only while the robot drives at more than 0.1 m/s, because people may approach a standing robot."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -94,7 +94,7 @@ class PersonalSpace(Spec, Criterion):
         return POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return the finding for the smallest distance."""
+        """Return the finding for the smallest gap."""
         limit = f"≥ {self.min:.2f} m"
         try:
             gaps = pedestrian_gap(trace, case)

@@ -23,24 +23,25 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 MOVING_SPEED_M_S = 0.1
-"""Speed in m/s below which the robot did not cause the contact, as in the CollisionTest of CARLA."""
+"""Speed up to which the robot did not cause a contact, as in the CollisionTest of CARLA."""
 
 LOOKBACK_S = 0.1
-"""Time in s before the contact in which the speed counts, because the contact itself stops the robot."""
+"""The fastest motion in this time before a contact decides who caused it, because the contact stops the robot."""
 
 MAX_DETAILS = 5
 """Maximum number of contacts that a finding lists."""
 
 
 class Collisions(Spec, Criterion):
-    """The robot had no more and no harder contacts than allowed.
+    """The robot had not more collisions than allowed, and none was harder than allowed.
 
-    What is measured: contacts between the robot's body and anything but the ground, each counted when it begins, and
-        the impulse of each.
-    When it fails: more contacts than `max`, or one with an impulse above `max_impulse`.
-    Why this: contacts come from the physics. Counting scans shorter than the robot's radius, as Arena does, misses
-        everything that the lidar does not see.
-    Source: Arena's get_collisions for counting rising edges; ScenarioRunner's CollisionTest for who caused it.
+    What is measured: the number of contacts that begin between the robot and anything but the ground, and the impulse
+        of each contact.
+    When it fails: there are more contacts than `max`, or one has an impulse above `max_impulse`.
+    Why this: the physics engine reports all contacts. Arena counts scans with ranges below the robot's radius instead,
+        which misses everything that the lidar does not see.
+    Source: Arena's get_collisions, which also counts beginning contacts; ScenarioRunner's CollisionTest for
+        `caused_by_robot`.
 
     Example: `collisions: {max: 0}`
     """
@@ -50,11 +51,12 @@ class Collisions(Spec, Criterion):
     max_impulse: Annotated[Impulse, Field(ge=0)] | None = None
     """Maximum impulse of a contact in N s."""
     object: ObjectName | None = Field(default=None, alias="with")
-    """Only contacts with this object, by name."""
+    """Count only contacts with the object of this name."""
     people: bool = False
-    """Only contacts with people: pedestrians and members of crowds."""
+    """Count only contacts with people: pedestrians and members of crowds."""
     caused_by_robot: bool = False
-    """Only contacts at which the robot itself was moving, not those with something that hit it while it stood."""
+    """Count only contacts before which the robot itself moved, and not those with something that hit a standing
+    robot."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -64,7 +66,10 @@ class Collisions(Spec, Criterion):
         return frozenset({Evidence.CONTACTS, *speed_needed, *people_needed})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return findings for the number of collisions and for the largest impulse."""
+        """Return findings for the number of collisions and, if it is bounded, for the largest impulse.
+
+        Raises MissingEvidence with `caused_by_robot` if the trace has no velocity.
+        """
         if not len(trace.truth) and not trace.of_kind(EventKind.COLLISION_STARTED):
             return [undecided("collisions", "neither the robot's path nor its contacts were recorded")]
         hits = [event for event in trace.of_kind(EventKind.COLLISION_STARTED) if self.object in (None, event.name)]
@@ -106,7 +111,7 @@ def _impulse(hit: Event) -> float:
 
 
 def _is_caused_by_robot(trace: Trace, hit: Event, case: Case) -> bool:
-    """Return whether any point of the robot's hull moved faster than MOVING_SPEED_M_S before the contact."""
+    """Return whether any point of the robot moved faster than MOVING_SPEED_M_S within LOOKBACK_S before the contact."""
     radius = max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)
     linear, turning = speed(trace), turn_rate(trace)
     if not len(linear):

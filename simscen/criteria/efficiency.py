@@ -1,4 +1,4 @@
-"""Efficiency of a drive: `time_to_goal` and `path_length`."""
+"""The criteria `time_to_goal` and `path_length`: the robot arrived in time and without detours."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 
 class TimeToGoal(Spec, Criterion):
-    """The robot reached its goal in time.
+    """The robot reached its goals in time.
 
-    What is measured: simulated time from the first goal's acceptance to the report that the last one is reached; with
-        `goal`, from that goal's acceptance to the report that it is reached. Goals that events send count too; those
-        that they preempt, and goals that are expected to fail, need not be reached.
-    When it fails: it took longer, or the goal was never reached.
-    Why this: a robot that hesitates also arrives. Use goals_reached to check the true arrival.
+    What is measured: the simulated time from the acceptance of the first goal to the report that the last goal is
+        reached. With `goal`, the time from the acceptance of this goal to the report that it is reached. Goals that
+        events send count too. Preempted goals and goals that are expected to fail need not be reached.
+    When it fails: the time is longer than `max`, or a goal was not reached.
+    Why this: a robot that hesitates arrives too, but late. Use goals_reached to check the true position on arrival.
     Source: the time of the BARN challenge and of Nav2's own benchmarks (nav2#3239).
 
     Example: `time_to_goal: {max: 45 s}`
@@ -41,7 +41,7 @@ class TimeToGoal(Spec, Criterion):
     max: PositiveDuration
     """Maximum simulated time in seconds."""
     goal: GoalName | None = None
-    """Measure only this goal; default: all goals."""
+    """Measure the time of the goal with this name; default: the time of all goals together."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -49,7 +49,7 @@ class TimeToGoal(Spec, Criterion):
         return frozenset({Evidence.NAVIGATION})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding, or one for each goal with the same name."""
+        """Return one finding for all goals or, with `goal`, one for each goal of this name."""
         outcomes = goal_outcomes(trace, case)
         if self.goal is not None:
             own = [outcome for outcome in outcomes if matches_goal_name(outcome.goal.name, self.goal)]
@@ -74,7 +74,7 @@ class TimeToGoal(Spec, Criterion):
             return self._judge_without_start(trace, what, outcome)
         if outcome.reached is not None:
             return at_most(what, trace.seconds(outcome.reached - start), self.max, "s", at=(trace, outcome.reached))
-        if outcome.preempted:
+        if outcome.was_preempted:
             return undecided(what, outcome.summary)
         expected = f"to be there within {self.max:.2f} s"
         so_far = trace.seconds(trace.end - start)
@@ -94,7 +94,11 @@ class TimeToGoal(Spec, Criterion):
         return missed(what, "never reached", expected, (trace, tick), [detail])
 
     def _judge_without_start(self, trace: Trace, what: str, outcome: GoalOutcome) -> Finding:
-        """Return the finding for a goal without an acceptance. A log that starts later can contain the arrival."""
+        """Return the finding for a goal without a recorded acceptance.
+
+        The criterion fails if the robot never reported on the goal in a completed run. Otherwise the log may have begun
+        after the acceptance.
+        """
         expected = f"to be there within {self.max:.2f} s"
         if outcome.end is None and has_ended(trace):
             return missed(
@@ -104,15 +108,18 @@ class TimeToGoal(Spec, Criterion):
 
 
 class PathLength(Spec, Criterion):
-    """The robot drove no further than a maximum length.
+    """The robot drove no farther than allowed.
 
-    What is measured: the length of the true path in the plane, in moves of at least 1 cm, over the whole run; its ratio
-        to the shortest path of a disc with the robot's inscribed radius from the start through all goals, except
-        those at which the robot is expected to fail.
-    When it fails: the path is longer than `max`, or than `max_ratio` times the shortest path.
+    What is measured: the length of the robot's true path in the plane, in moves of at least 1 cm, over the whole run;
+        and the ratio of this length to that of the shortest path. The shortest path leads a disc with the robot's
+        inscribed radius from the start through all goals, except those at which the robot is expected to fail.
+    When it fails: the path is longer than `max`, or longer than `max_ratio` times the shortest path.
     Why this: detours and search patterns cost energy and time although every goal is reached.
-    Source: HuNavSim and bench-mr for the length; SEAN's "path efficiency" is this ratio. SPL (Anderson 2018) is its
-        inverse over many runs.
+    Source: HuNavSim and bench-mr for the length; SEAN's "path efficiency" for the ratio. SPL (Anderson 2018) is the
+        inverse of the ratio, averaged over many runs.
+
+    The ratio is inconclusive if a goal was not reached, unless the path is already too long, and if an event sends a
+    goal, because the shortest path is then unknown.
 
     Example: `path_length: {max_ratio: 1.4}`
     """
@@ -120,7 +127,7 @@ class PathLength(Spec, Criterion):
     max: PositiveLength | None = None
     """Maximum length in meters."""
     max_ratio: Ratio | None = None
-    """Maximum multiple of the shortest path; 1 is a perfect drive."""
+    """Maximum ratio to the shortest path; 1 is a drive along the shortest path."""
 
     @model_validator(mode="after")
     def _check_bounds(self) -> PathLength:
@@ -134,7 +141,7 @@ class PathLength(Spec, Criterion):
         return frozenset({Evidence.TRUTH})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return findings for the length and for the ratio, both with margins in m."""
+        """Return findings for the length and for the ratio, as far as they are bounded. The margins are in m."""
         path = drive(trace)
         findings = [] if self.max is None else [_judge_length(trace, path, "path_length", self.max)]
         if self.max_ratio is not None:
@@ -159,7 +166,10 @@ class PathLength(Spec, Criterion):
 
 
 def shortest_path_length(trace: Trace, case: Case) -> tuple[float, str]:
-    """Return the length in m of the shortest path through all goals, or nan and the reason why there is none."""
+    """Return the length in m of the shortest path through all goals, and "".
+
+    If the length is unknown, return nan and the reason.
+    """
     names = [goal.name for goal in case.goals if goal.name not in case.expected]
     repeated = sorted({name for name in names if names.count(name) > 1})
     unknown = [name for name in names if not math.isfinite(case.shortest.get(name, math.nan))]

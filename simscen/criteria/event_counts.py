@@ -1,4 +1,4 @@
-"""Criteria that count events: `replans` and `recoveries`."""
+"""The criteria `replans` and `recoveries`, which count events."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 Count = Annotated[int, Field(ge=0, le=100_000)]
+"""Number of events."""
 MAX_DETAILS = 8
 """Maximum number of events that a finding lists."""
 
@@ -46,10 +47,10 @@ class CountBounds(Spec):
     def judge_count(
         self, trace: Trace, what: str, noun: str, events: Sequence[Event], detail: Sequence[str]
     ) -> list[Finding]:
-        """Return one finding for each bound. In a truncated log, a number below `min` is inconclusive.
+        """Return one finding for each bound on the number of `events`.
 
-        `what` is the measured quantity, e.g. "replans"; `noun` names one event in the singular; `detail` are the lines
-        that explain a failure.
+        `what` is the measured quantity, e.g. "replans". `noun` is the singular for one event. `detail` are lines that
+        explain a failure. If the log is truncated, a number below `min` is inconclusive.
         """
         at = (trace, events[-1].tick) if events else None
         findings = counted(what, len(events), noun, self.min, self.max, at=at, detail=detail)
@@ -59,10 +60,10 @@ class CountBounds(Spec):
 
 
 class Replans(CountBounds, Criterion):
-    """The number of times that the robot replanned was within its bounds.
+    """The robot replanned as often as it should.
 
-    What is measured: the number of plans made for any reason but a new goal.
-    When it fails: fewer than `min` or more than `max`.
+    What is measured: the number of plans that were made for another reason than a new goal.
+    When it fails: the number is below `min` or above `max`.
     Why this: a scenario that drops a pallet on the plan proves nothing unless the robot had to replan; and a robot
         that replans all the time does not follow any plan.
     Source: Nav2's navigate_to_pose_w_replanning trees.
@@ -71,9 +72,10 @@ class Replans(CountBounds, Criterion):
     """
 
     reason: ReplanReason | None = None
-    """Only plans made for this reason: `blocked` (the old plan was blocked), `missed` (the robot had left it), `tight`
-    (an obstacle came too near to it), `better` (obstacles went away), `window` (the local window of a robot without a
-    map moved), `recovery` (after a recovery), or `rate` (periodic replanning)."""
+    """Count only plans that were made for this reason: `blocked` (the old plan was blocked), `missed` (the robot had
+    left the old plan), `tight` (an obstacle had come too near to the old plan), `better` (obstacles had gone away),
+    `window` (the local window of a robot without a map had moved), `recovery` (after a recovery), or `rate` (periodic
+    replanning)."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -93,19 +95,19 @@ class Replans(CountBounds, Criterion):
 
 
 class Recoveries(CountBounds, Criterion):
-    """The number of recovery behaviors that ran was within its bounds.
+    """The robot ran recovery behaviors as often as it should.
 
     What is measured: the number of recovery behaviors that started.
-    When it fails: fewer than `min` or more than `max`.
-    Why this: a scenario about getting unstuck proves something only if the robot was stuck; in all others recoveries
-        are the first sign of trouble.
+    When it fails: the number is below `min` or above `max`.
+    Why this: a scenario about getting unstuck proves something only if the robot was stuck. In other scenarios,
+        recoveries are the first sign of trouble.
     Source: Nav2's recovery node and behavior server (spin, wait, backup, clear costmap).
 
     Example: `recoveries: {min: 1, name: spin}`
     """
 
     name: BehaviorName | None = None
-    """Only this behavior."""
+    """Count only the recovery behavior with this name."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:

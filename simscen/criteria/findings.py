@@ -1,4 +1,13 @@
-"""Findings from measured numbers: the margin is the distance to the limit, and its sign decides."""
+"""Functions that create the findings of criteria.
+
+Parameters with the same name have the same meaning in all functions:
+
+- `what`: measured quantity, e.g. "path_length".
+- `value` and `limit`: numbers in `unit`; `measured` and `limit`: the same as text if there is no number.
+- `at`: the trace, and the tick that decided the finding; None if it does not belong to a time.
+- `context`: text after the limit, e.g. "after lidar.off".
+- `detail`: lines that explain a failure.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +22,11 @@ if TYPE_CHECKING:
 
 
 class InvalidTrace(ValueError):
-    """A signal is not a finite number, so that nothing can be judged."""
+    """The trace contains invalid values, for example nan, so that no criterion can be judged."""
 
 
 class MissingEvidence(ValueError):
-    """The trace lacks evidence for a criterion, which is then inconclusive."""
+    """The trace lacks what a criterion needs, so that this criterion is inconclusive."""
 
 
 def at_most(
@@ -30,11 +39,9 @@ def at_most(
     context: str = "",
     detail: Sequence[str] = (),
 ) -> Finding:
-    """Return a finding that passes if `value` <= `limit`.
+    """Return a finding that passes if `value` <= `limit`. Raises InvalidTrace if `value` is nan.
 
-    `what` is the measured quantity, e.g. "path_length", and `detail` are lines that explain a failure. `at` is the tick
-    of the smallest margin, `context` the text after the limit ("after lidar.off"). Raises InvalidTrace
-    if `value` is nan, because comparisons with nan are meaningless.
+    The margin is the distance of the value from the limit.
     """
     return _bound(what, value, limit, unit, limit - value, "≤", at, context, detail)
 
@@ -49,7 +56,10 @@ def at_least(
     context: str = "",
     detail: Sequence[str] = (),
 ) -> Finding:
-    """Return a finding that passes if `value` >= `limit`; otherwise like `at_most`."""
+    """Return a finding that passes if `value` >= `limit`. Raises InvalidTrace if `value` is nan.
+
+    The margin is the distance of the value from the limit.
+    """
     return _bound(what, value, limit, unit, value - limit, "≥", at, context, detail)
 
 
@@ -63,7 +73,10 @@ def counted(
     at: tuple[Trace, int] | None = None,
     detail: Sequence[str] = (),
 ) -> list[Finding]:
-    """Return one finding for each bound on a number of events. `noun` names one event in the singular."""
+    """Return one finding for each bound on a number of events: at least `low`, and at most `high`.
+
+    None means that there is no such bound. `noun` is the singular for one event.
+    """
     measured = f"{count} {noun}" if count == 1 else f"{count} {_plural(noun)}"
     bounds = [] if low is None else [(count - low, f"≥ {low}")]
     bounds += [] if high is None else [(high - count, f"≤ {high}")]
@@ -84,24 +97,24 @@ def counted(
 
 
 def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = ()) -> Finding:
-    """Return an inconclusive finding: there is nothing to check, or the trace is too short."""
+    """Return an inconclusive finding; `because` is the reason, e.g. that there is nothing to check."""
     return Finding(Status.INCONCLUSIVE, what, because, limit, detail=tuple(detail))
 
 
 def missed(
     what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None, detail: Sequence[str] = ()
 ) -> Finding:
-    """Return a failed finding without a numeric value."""
+    """Return a failed finding without numbers."""
     return Finding(Status.FAIL, what, measured, limit, None, "", None, *_tick_and_place(at), detail=tuple(detail))
 
 
 def held(what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None) -> Finding:
-    """Return a passed finding without a numeric value."""
+    """Return a passed finding without numbers."""
     return Finding(Status.PASS, what, measured, limit, None, "", None, *_tick_and_place(at))
 
 
-def quantity(value: float, unit: str, digits: int = 2) -> str:
-    """Format a number for reports, e.g. "0.84 s"."""
+def format_quantity(value: float, unit: str, digits: int) -> str:
+    """Return a number with its unit as text, e.g. "0.84 s" for 2 decimal digits."""
     return f"{value:.{digits}f} {unit}".rstrip()
 
 
@@ -119,11 +132,11 @@ def _bound(
     if math.isnan(value):
         raise InvalidTrace(f"{what} is not a number")
     digits = decimals(value, limit)
-    text = f"{relation} {quantity(limit, unit, digits)} {context}".rstrip()
+    text = f"{relation} {format_quantity(limit, unit, digits)} {context}".rstrip()
     return Finding(
         _status(margin),
         what,
-        quantity(value, unit, digits),
+        format_quantity(value, unit, digits),
         text,
         margin,
         unit,
@@ -149,7 +162,10 @@ def _tick_and_place(at: tuple[Trace, int] | None) -> tuple[int | None, tuple[flo
 
 
 def decimals(value: float, limit: float) -> int:
-    """Return enough decimals to distinguish both numbers, unlike "0.50 s > 0.50 s"."""
+    """Return the number of decimal digits with which both numbers differ as text, from 2 to 9; 2 for equal numbers.
+
+    With fewer digits, a report could state that 0.50 s is greater than 0.50 s.
+    """
     if value == limit or not math.isfinite(value) or not math.isfinite(limit):
         return 2
     return next((digits for digits in range(2, 9) if f"{value:.{digits}f}" != f"{limit:.{digits}f}"), 9)

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import GetJsonSchemaHandler, PlainValidator
-from pydantic_core import CoreSchema, PydanticCustomError
 
-from simscen.core.messages.navigation import FAILED, ErrorCode, Goal, error_code
+from simscen.core.messages.navigation import FAILED, Goal
 from simscen.core.records.events import Event, EventKind
+from simscen.criteria.error_codes import code_of
 from simscen.criteria.trace_signals.ground_truth import truth
-from simscen.spec.base import Spec
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
@@ -27,9 +25,10 @@ _GOAL_ENDS = (*_ARRIVED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 
 @dataclass(frozen=True)
 class GoalOutcome:
-    """Tick at which the robot accepted a goal, and the event that ended it; None if it was not reported.
+    """What the robot reported about a goal.
 
-    `failure` is the expected failure: "failed", or the name of an error code; "" for a goal that must be reached.
+    `accepted` is the tick at which it accepted the goal, and `end` the event that ended it; None if not reported.
+    `failure` is the failure that the scenario expects: "failed", or the name of an error code; "" if none is expected.
     """
 
     goal: Goal
@@ -39,32 +38,32 @@ class GoalOutcome:
 
     @property
     def reached(self) -> int | None:
-        """The tick at which the robot reported the goal reached or passed."""
+        """The tick at which the robot reported the goal as reached or passed; None if it did not."""
         return self.end.tick if self.end is not None and self.end.kind in _ARRIVED else None
 
     @property
     def must_be_reached(self) -> bool:
-        """True unless the goal was preempted or is expected to fail."""
-        return not self.preempted and not self.failure
+        """Whether the goal was not preempted and is not expected to fail."""
+        return not self.was_preempted and not self.failure
 
     @property
     def failed_as_expected(self) -> bool:
-        """True if the goal failed, with the expected error code if there is one."""
+        """Whether the goal failed, with the expected error code if the scenario names one."""
         if self.end is None or self.end.kind != EventKind.GOAL_FAILED:
             return False
         return self.failure in (FAILED, code_of(self.end))
 
     @property
-    def preempted(self) -> bool:
-        """True if another goal was sent before this one was reached; Nav2 drops a goal then."""
+    def was_preempted(self) -> bool:
+        """Whether another goal was sent before this one was reached. Nav2 then drops this goal."""
         return self.end is not None and bool(self.end.data.get("preempted_by"))
 
     @property
     def summary(self) -> str:
-        """The outcome in words."""
+        """The outcome in words, e.g. "failed with NO_VALID_PATH"."""
         if self.end is None:
             return "never accepted" if self.accepted is None else "still under way"
-        if self.preempted:
+        if self.was_preempted:
             return f"preempted by {self.end.data['preempted_by']}"
         code = self.end.data.get("error_name") or self.end.data.get("error_code")
         return self.end.kind.removeprefix("goal.") + (f" with {code}" if code else "")
@@ -73,10 +72,11 @@ class GoalOutcome:
 def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
     """Return the outcome of each goal of the scenario and of each goal that an event sent, by time of acceptance.
 
-    If several goals have the same name, the k-th of them is matched with the k-th report under this name. A goal of the
-    scenario that was never accepted comes last; the goal of an event that did not send it is left out. A via pose
-    without reports of its own takes the outcome of the goal at which its drive stops, because Nav2 reports the status
-    of the whole action only.
+    Goals of the scenario that were never accepted come last. Goals that an event could have sent but did not are left
+    out. If several goals have the same name, the first reports under this name belong to the first goal, and so on.
+
+    Nav2 reports only the status of a whole action. A via pose without reports of its own therefore gets the outcome of
+    the next goal at which the robot stops.
     """
     reports = _reports(trace)
     earlier = _earlier_uses([goal.name for goal in case.goals])
@@ -95,17 +95,17 @@ def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
 
 
 def outcome_start(outcome: GoalOutcome) -> float:
-    """Return the tick at which the robot accepted the goal, or first reported on it; inf if it never did."""
+    """Return the tick at which the robot accepted the goal, else that of its end; inf if neither was reported."""
     if outcome.accepted is not None:
         return outcome.accepted
     return math.inf if outcome.end is None else outcome.end.tick
 
 
 def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[GoalOutcome]) -> tuple[int, float]:
-    """Return the tick at which the robot was truly nearest to a via pose during its drive, and the distance in meters.
+    """Return the tick at which the true position was nearest to a via pose, and the distance in m.
 
-    The stack reports a via pose as passed once the robot is near enough; it may come nearer afterwards. The whole drive
-    counts: from the acceptance of this pose to the end of the goal at which the drive stops.
+    A stack reports a via pose as passed once the robot is near enough, although the robot may come nearer after that.
+    The search therefore lasts from the acceptance of the pose to the end of the next goal at which the robot stops.
     """
     later = outcomes[outcomes.index(outcome) :]
     stop = next((each for each in later if not each.goal.via), None)
@@ -124,6 +124,7 @@ def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[Goal
 def _with_outcome_of_drive(
     outcome: GoalOutcome, later: list[GoalOutcome], reports: Mapping[str, list[_Report]]
 ) -> GoalOutcome:
+    """Return the outcome, or for a via pose without reports, that of the first of the `later` goals with a stop."""
     stop = next((each for each in later if not each.goal.via), None)
     if not outcome.goal.via or outcome.goal.name in reports or stop is None or stop.end is None:
         return outcome
@@ -132,7 +133,7 @@ def _with_outcome_of_drive(
 
 
 def _earlier_uses(names: list[str]) -> list[int]:
-    """Return, for each name, how often it occurs before."""
+    """Return, for each name in the list, how often it occurs earlier in the list."""
     uses: dict[str, int] = {}
     counts = []
     for name in names:
@@ -142,7 +143,7 @@ def _earlier_uses(names: list[str]) -> list[int]:
 
 
 _Report = tuple[int | None, Event | None]
-"""Tick at which a goal was accepted, and the event that ended it."""
+"""Tick at which a goal was accepted, and the event that ended it; None if not reported."""
 
 
 def _reports(trace: Trace) -> dict[str, list[_Report]]:
@@ -161,51 +162,3 @@ def _reports(trace: Trace) -> dict[str, list[_Report]]:
 
 def _nth(reports: list[_Report], k: int) -> _Report:
     return reports[k] if k < len(reports) else (None, None)
-
-
-def parse(value: Any) -> ErrorCode:
-    """Parse an error code such as GOAL_OCCUPIED or 206. Raises a validation error that lists the names."""
-    if isinstance(value, ErrorCode):
-        return value
-    if isinstance(value, str) and value in ErrorCode.__members__:
-        return ErrorCode[value]
-    if isinstance(value, int) and not isinstance(value, bool):
-        code = error_code(value)
-        if isinstance(code, ErrorCode):
-            return code
-    raise PydanticCustomError(
-        "error_code",
-        "unknown error code `{value}`; expected one of: {names}",
-        {"value": str(value), "names": ", ".join(ErrorCode.__members__)},
-    )
-
-
-class _CodeSchema:
-    """JSON schema of an error code: one of the names or numbers."""
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"enum": [*ErrorCode.__members__, *(int(code) for code in ErrorCode)]}
-
-
-Code = Annotated[ErrorCode, PlainValidator(parse), _CodeSchema()]
-
-
-def code_of(event: Event) -> str:
-    """Return the error code of an event: its name in Nav2, or the number, or "NONE"."""
-    name, number = event.data.get("error_name"), event.data.get("error_code")
-    if isinstance(name, str) and name:
-        return name
-    code = error_code(number) if isinstance(number, int) else None
-    if isinstance(code, ErrorCode):
-        return code.name
-    return ErrorCode.NONE.name if number is None else str(number)
-
-
-class ExpectedError(Spec):
-    """Error code with which a goal is expected to fail.
-
-    Example: `expect: {error_code: GOAL_OCCUPIED}`
-    """
-
-    error_code: Code
-    """Error code of Nav2, by name or number."""

@@ -26,42 +26,42 @@ if TYPE_CHECKING:
 
 
 class GoalsReached(Spec, Criterion):
-    """Every goal was reached: the robot reported it, and its true pose was at the goal at that moment.
+    """Every goal was reached: the robot reported so, and its true pose was then at the goal.
 
-    A goal with `expect` must fail with the expected error code. Poses that navigate_through_poses passes must be
-    passed closely enough with any heading. At a goal with `on_reached: {wait: …}`, the robot must stay for that time.
+    A goal with `expect` must fail with the expected error code instead. With navigate_through_poses, the robot must
+    pass close to the poses, with any heading. At a goal with `on_reached: {wait: …}`, it must stay for this time.
 
-    Goals of events count from the moment they are sent. A preempted goal is dropped, as in Nav2: it is reported as
-    preempted and need not be reached, unlike the remaining goals. If `goals` names it, the result is inconclusive.
+    Goals of events must be reached too, if they are sent. A preempted goal is dropped, as in Nav2, and need not be
+    reached. If `goals` names a preempted goal, the result is inconclusive.
 
-    The stack decides with its estimated pose. The true pose may therefore be beyond the goal's tolerance by a margin
-    for localization. To require accuracy, give a `tolerance`, or set the margin to 0.
+    The stack decides by its estimated pose that a goal is reached. Therefore, the true pose may exceed the goal's
+    tolerance by a margin for localization. To require accuracy, set a `tolerance`, or set the margin to 0.
 
-    What is measured: distance and heading error between the goal and the robot's true pose at the tick of the
-        robot's report, for each goal.
-    When it fails: a goal was not reported reached, or was reported while the true pose was out of tolerance, or later
-        than `within`.
-    Why this: the report of a robot is only as good as its localization. The metrics of Arena use the report alone,
-        those of BARN the distance alone, so that neither detects a lost robot that reports success.
-    Source: Nav2's SimpleGoalChecker for the tolerances; BARN challenge, run.py, for judging by the truth.
+    What is measured: for each goal, the distance and the heading error between the goal and the robot's true pose at
+        the tick at which the robot reports that the goal is reached.
+    When it fails: the robot did not report a goal as reached, reported it while the true pose was out of tolerance, or
+        reported it later than `within`.
+    Why this: the report of a robot is only as good as its localization. Arena uses only the report, and BARN only the
+        distance, so that neither detects a lost robot that reports success.
+    Source: Nav2's SimpleGoalChecker for the tolerances; BARN challenge, run.py, for judging by the true pose.
 
     Example: `goals_reached: {goals: [shelf], tolerance: 0.3 m, within: 60 s}`
     """
 
     goals: Annotated[list[GoalName], Field(min_length=1, max_length=1000)] | None = None
-    """Names of the goals to check, in every loop (`shelf#2`: in the second one); default: all goals, including those of
-    events."""
+    """Names of the goals to check; default: all goals, including those of events. `shelf` is checked in every loop,
+    `shelf#2` only in the second loop."""
     tolerance: PositiveLength | None = None
     """Maximum distance of the true position; default: the goal's own tolerance plus `localization_margin`."""
     yaw_tolerance: PositiveAngle | None = None
     """Maximum error of the true heading; default: the goal's own tolerance plus `localization_yaw_margin`."""
     localization_margin: NonNegativeLength = 0.15
-    """Added to the goal's own tolerance, because a robot stops when its estimated position is within the tolerance.
-    With 0, the true position must be within the tolerance."""
+    """Distance added to the goal's own tolerance, because a robot stops when its estimated position is within the
+    tolerance. With 0, the true position must be within the tolerance."""
     localization_yaw_margin: NonNegativeAngle = 0.1
-    """Added to the goal's own tolerance of the heading."""
+    """Angle added to the goal's own tolerance of the heading."""
     within: PositiveDuration | None = None
-    """Maximum time from the acceptance of each goal to its arrival."""
+    """Maximum time from the acceptance of each goal to the report that it is reached."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -69,7 +69,7 @@ class GoalsReached(Spec, Criterion):
         return POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return findings on distance, heading and time of each goal, or one finding for a missed goal."""
+        """Return findings for distance, heading, and time of each goal reached, and one finding for each other goal."""
         outcomes = goal_outcomes(trace, case)
         chosen = [
             outcome
@@ -80,7 +80,7 @@ class GoalsReached(Spec, Criterion):
         if not chosen and not findings:
             return [undecided("goals_reached", "the scenario has no goals", "reached")]
         for outcome in chosen:
-            if outcome.failure and not outcome.preempted:
+            if outcome.failure and not outcome.was_preempted:
                 findings.append(_judge_expected_failure(trace, outcome))
             elif outcome.reached is None:
                 findings.append(self._judge_unreached(trace, outcome))
@@ -88,7 +88,7 @@ class GoalsReached(Spec, Criterion):
                 is_via = outcome.goal.via
                 findings += self._judge_via(trace, outcome, outcomes) if is_via else self._judge_reached(trace, outcome)
                 findings += _judge_wait(trace, case, outcome, outcomes)
-        if self.goals is None and all(outcome.preempted for outcome in chosen):
+        if self.goals is None and all(outcome.was_preempted for outcome in chosen):
             findings.append(undecided("goals_reached", "every goal was preempted", "reached"))
         return findings
 
@@ -106,7 +106,7 @@ class GoalsReached(Spec, Criterion):
         return findings
 
     def _judge_unreached(self, trace: Trace, outcome: GoalOutcome) -> Finding:
-        if not outcome.preempted:
+        if not outcome.was_preempted:
             return _not_reached(trace, outcome)
         assert outcome.end is not None
         if self.goals is None:
@@ -143,7 +143,7 @@ class GoalsReached(Spec, Criterion):
         return findings
 
     def _judge_via(self, trace: Trace, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> list[Finding]:
-        """Return the finding for a via pose: the smallest distance counts, and any heading is allowed."""
+        """Return findings for the smallest distance to a via pose and for its time."""
         tick, distance = closest_approach(trace, outcome, outcomes)
         limit, context = self._limit(outcome), "from the pose at the closest approach"
         findings = [at_most(f"goal {outcome.goal.name}", distance, limit, "m", at=(trace, tick), context=context)]
@@ -164,7 +164,7 @@ class GoalsReached(Spec, Criterion):
 
 
 def _judge_expected_failure(trace: Trace, outcome: GoalOutcome) -> Finding:
-    """Return the finding for a goal at which the robot must fail with the expected code."""
+    """Return the finding for a goal that the scenario expects to fail."""
     what, expected = f"goal {outcome.goal.name}", _expected(outcome)
     if outcome.end is None and not has_ended(trace):
         return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}", expected)
@@ -178,7 +178,10 @@ def _expected(outcome: GoalOutcome) -> str:
 
 
 def _judge_wait(trace: Trace, case: Case, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> list[Finding]:
-    """Return the finding on the required waiting time at a goal before the next goal."""
+    """Return the finding for the time that the robot waited at a goal; none if no wait is required or no goal follows.
+
+    The time ends when the next goal of the scenario is accepted.
+    """
     later = next(
         (each for each in outcomes if outcome_start(each) > outcome_start(outcome) and each.goal in case.goals), None
     )
@@ -201,6 +204,7 @@ def _not_reached(trace: Trace, outcome: GoalOutcome) -> Finding:
 
 
 def _believed_distance(trace: Trace, outcome: GoalOutcome) -> list[str]:
+    """Return a line that states where the robot believed to be when it reported the goal; none if unknown."""
     tick, goal = outcome.reached, outcome.goal.pose
     if tick is None or not len(trace.belief):
         return []

@@ -1,4 +1,4 @@
-"""The criterion `keepout`: regions and masks that the robot must not enter."""
+"""The criterion `keepout`: the robot did not enter a region or the occupied cells of a mask."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ if TYPE_CHECKING:
     DistanceFunction = Callable[[Array], Array]
 
 RESOLUTION_M = 0.005
-"""Resolution in m of the search for the smallest distance between two samples."""
+"""The smallest distance between two samples is found with this accuracy."""
 
 
 class Keepout(Spec, Criterion):
-    """The robot stayed with its whole hull out of a region, or out of the occupied cells of a keepout mask.
+    """No part of the robot entered a region, or the occupied cells of a keepout mask.
 
-    What is measured: the smallest distance between the robot's footprint and the region, or the occupied cells of the
-        mask, over the whole run, with straight motion between two samples of the truth. Inside, it is negative: the
-        distance to move the robot out again (out of the deepest convex piece if footprint or region is not convex; out
-        of the deepest rectangle of equal cells of a mask).
-    When it fails: it is below `distance`.
+    What is measured: the smallest distance between the robot's footprint and the region or the occupied cells, over the
+        whole run, with straight motion between two samples of the truth. If they overlap, the distance is negative: it
+        is the shortest way by which the robot could be moved out. Shapes that are not convex are divided into convex
+        pieces, and masks into rectangles of equal cells; the deepest overlap of two pieces counts.
+    When it fails: the distance is below `distance`.
     Why this: a keepout filter affects the costmap of the planner, but recoveries and controllers can leave the plan.
     Source: Nav2's keepout filter tutorial.
 
-    Inconclusive if no cell of the mask is occupied, or if the zone was never enabled with `while_on`.
+    Inconclusive if no cell of the mask is occupied, or with `while_on`, if the zone was never enabled.
 
     Example: `keepout: {region: wet floor, distance: 10 cm}`
     """
@@ -53,13 +53,13 @@ class Keepout(Spec, Criterion):
     mask: MaskFile | None = None
     """Instead of a region: map YAML file of a filter mask, relative to this file; only occupied cells are forbidden.
 
-    The stack only gets the mask if `stack.keepout_mask` names it as well."""
+    The stack receives the mask only if `stack.keepout_mask` names it as well."""
     distance: NonNegativeLength = 0.0
-    """Minimum distance from the region."""
+    """Minimum distance from the region or the occupied cells."""
     while_on: bool = False
     """Check only while the zone is enabled by the action `keepout`; default: the whole run."""
     grace: Duration = 0.0
-    """Time for leaving the zone after it was enabled; only with `while_on`."""
+    """Time that the robot has for leaving the zone after it was enabled; only with `while_on`."""
 
     @model_validator(mode="after")
     def _check_region_or_mask(self) -> Keepout:
@@ -95,7 +95,10 @@ class Keepout(Spec, Criterion):
         return [at_least(what, distance, self.distance, "m", at=(trace, tick), context="while it was on")]
 
     def _distance_function(self, case: Case) -> DistanceFunction | str:
-        """Return a function from poses (n, 3) to distances (n,) of the footprint, or the reason why there is none."""
+        """Return a function that computes distances (n,) of the footprint at poses (n, 3).
+
+        If there is nothing to keep out of, return the reason.
+        """
         hull = case.footprint or POINT
         if self.region is None:
             mask = case.masks.get(self.mask or "")
@@ -117,8 +120,9 @@ class Keepout(Spec, Criterion):
 def _nearest(trace: Trace, poses: Samples, case: Case, distances: DistanceFunction) -> tuple[float, int]:
     """Return the smallest signed distance along the driven path, and its tick. Teleportation is not part of the path.
 
-    If no point of the robot moves by more than d, the distance changes by at most d. Intervals that cannot improve the
-    smallest known distance by RESOLUTION_M are skipped, the others are bisected.
+    Intervals between two samples are bisected as long as they may contain a distance that is smaller by at least
+    RESOLUTION_M than the smallest one found so far: while no point of the robot moves by more than d, the distance
+    changes by at most d.
     """
     radius = max(math.hypot(x, y) for x, y in case.footprint or POINT)
     yaw = np.unwrap(poses.values[:, 2])

@@ -1,4 +1,4 @@
-"""Criteria for the localizer: its error, its recovery after a kidnapping, and the consistency of its covariance."""
+"""The criteria `localization_error`, `relocalized_within`, and `localization_consistency`, which judge localization."""
 
 from __future__ import annotations
 
@@ -9,45 +9,48 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.core.geometry import Array
+from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, missed, undecided
-from simscen.criteria.timeline import Span, end_reason, has_ended, never_started, spans
-from simscen.criteria.trace_signals.ground_truth import DIMENSIONS, first_sustained, nees_samples, pose_error
+from simscen.criteria.timeline import Span, end_reason, first_sustained, has_ended, never_started, spans
+from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, nees_samples, pose_error
 from simscen.spec.base import Spec
 from simscen.spec.places import DisturbanceName
 from simscen.spec.quantities import Duration, PositiveAngle, PositiveDuration, PositiveLength, Quantity
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
-    from simscen.core.records.trace import Samples, Trace
+    from simscen.core.records.trace import Trace
 
 NO_BELIEF = "the robot never reported an estimated pose"
+"""Reason of inconclusive findings."""
 
 
 class LocalizationError(Spec, Criterion):
     """The localization error of the robot stayed small.
 
-    What is measured: the distance between estimated and true position (and the heading error) whenever the robot
-        publishes its belief, and all the time while its newest belief is over 1 s old; without any alignment.
-    When it fails: the largest, the root mean square or the last error exceeds its bound.
+    What is measured: the distance between the estimated and the true position, and the heading error, each time that
+        the stack publishes a belief, and all the time while its newest belief is over 1 s old. The trajectories are not
+        aligned, because an alignment would hide the error.
+    When it fails: the largest error, the root mean square, or the last error exceeds its bound.
     Why this: with an error of half a meter, a robot reaches goals only by chance, until an obstacle is near.
-    Source: evo's APE (metrics.py) and Beluga's benchmarks; alignment would hide the measured error.
+    Source: evo's APE (metrics.py) and Beluga's benchmarks.
 
     Example: `localization_error: {max: 0.3 m, rmse: 0.1 m, after: 5 s}`
     """
 
     max: PositiveLength | None = None
-    """Maximum distance."""
+    """Bound on the largest distance."""
     rmse: PositiveLength | None = None
-    """Maximum root mean square of the distance."""
+    """Bound on the root mean square of the distance."""
     final: PositiveLength | None = None
-    """Maximum distance at the end of the run."""
+    """Bound on the distance at the end of the run."""
     max_yaw: PositiveAngle | None = None
-    """Maximum heading error."""
+    """Bound on the largest heading error."""
     after: Duration = 0.0
-    """Start of the evaluation in simulated time, after the filter has converged."""
+    """Simulated time at which the evaluation begins, so that the filter can converge before."""
 
     @model_validator(mode="after")
     def _check_bounds(self) -> LocalizationError:
@@ -57,7 +60,7 @@ class LocalizationError(Spec, Criterion):
 
     @property
     def horizon(self) -> float:
-        """Minimum simulated time in s for a decision."""
+        """Simulated time in s before which the criterion cannot pass."""
         return self.after
 
     @property
@@ -75,7 +78,7 @@ class LocalizationError(Spec, Criterion):
             last = trace.seconds(int(error.ticks[-1]))
             because = f"the last belief is from t = {last:.2f} s, but the evaluation begins at {self.after:.2f} s"
             return [undecided("localization_error", because)]
-        return self._bounds(trace, type(error)(error.ticks[is_counted], error.values[is_counted]))
+        return self._bounds(trace, Samples(error.ticks[is_counted], error.values[is_counted]))
 
     def _bounds(self, trace: Trace, error: Samples) -> list[Finding]:
         distances, angles = error.values.T
@@ -110,14 +113,16 @@ def _worst(trace: Trace, error: Samples, values: Array, what: str, limit: float,
 class RelocalizedWithin(Spec, Criterion):
     """The robot relocalized in time.
 
-    What is measured: time from the start of `after` (or of the run) until the belief, once lost, is within the
-        tolerances of the true pose again and stays there for `hold`; each time that it happens.
-    When it fails: that took longer than `time`.
-    Why this: after a wrong initial pose or a kidnapping, the robot must correct its belief. A belief that crosses
-        the truth by chance is not correct.
+    A robot is lost if its belief is not within the tolerances of the true pose.
+
+    What is measured: the time from each start of `after`, or from the start of the run, until the belief of a lost
+        robot is within the tolerances again and stays there for `hold`.
+    When it fails: the time is longer than `time`.
+    Why this: after a wrong initial pose or a kidnapping, the robot must correct its belief. A belief that is near the
+        true pose for an instant, by chance, is not corrected.
     Source: the kidnapped robot problem, Thrun, Burgard, Fox: Probabilistic Robotics, chapters 7 and 8.
 
-    Inconclusive if the robot was never lost, or if the run ended before the time.
+    Inconclusive if the robot was never lost within `time`, or if the run ended too early for a decision.
 
     Example: `relocalized_within: {time: 20 s, after: kidnapped, tolerance: 0.3 m}`
     """
@@ -125,7 +130,7 @@ class RelocalizedWithin(Spec, Criterion):
     time: PositiveDuration
     """Maximum time in seconds."""
     after: DisturbanceName | None = None
-    """Event or fault after which the robot is lost; default: the start of the run."""
+    """Name of the event or fault that makes the robot lost; default: the robot is lost from the start of the run."""
     tolerance: PositiveLength = 0.25
     """Maximum position error."""
     yaw_tolerance: PositiveAngle = 0.25
@@ -140,7 +145,7 @@ class RelocalizedWithin(Spec, Criterion):
         return POSITION | {Evidence.BELIEF, *started}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each start of `after`."""
+        """Return one finding for each start of `after`, or one for the start of the run."""
         error = pose_error(trace)
         if not len(error):
             return [undecided("relocalized_within", NO_BELIEF)]
@@ -188,16 +193,18 @@ class RelocalizedWithin(Spec, Criterion):
 class LocalizationConsistency(Spec, Criterion):
     """The covariance of the estimated pose matched its error.
 
-    What is measured: the normalized estimation error squared e' P⁻¹ e of the estimated pose (x, y, wrapped heading)
-        with its covariance P, sampled every `every` seconds, averaged over the run; 3 for a correct covariance.
-    When it fails: the average is above what a consistent belief keeps with this probability (the robot is
-        overconfident), or, with `both_sides`, below the lower bound; or a covariance is singular, like that of a
-        collapsed particle set.
+    What is measured: the normalized estimation error squared (NEES) e' P⁻¹ e, where e is the error of the estimated
+        pose (x, y, yaw) and P is its covariance. One sample is taken per `every`. The average over the run is 3 if the
+        covariance is correct.
+    When it fails: the average is above a bound that a consistent belief keeps with `probability`: the robot is
+        overconfident. It also fails if a covariance is singular, like that of a collapsed particle set. With
+        `both_sides`, it also fails if the average is below a lower bound.
     Why this: a filter that is wrong but has a small covariance does not recover.
     Source: Bar-Shalom, Li, Kirubarajan 2001, section 5.4; filterpy's stats.NEES.
 
-    The bounds are those of a mean of independent samples. Errors of one run are correlated, so `every` should be longer
-    than they last; the strict test is over runs at fixed times, as `simscen bench nav` takes it.
+    The bounds assume that the samples are independent. Errors that follow each other in a run are similar, so `every`
+    should be longer than an error typically lasts. For a strict test, compare many runs at the same time, as
+    `simscen bench nav` does.
 
     Example: `localization_consistency: {every: 5 s, after: 10 s}`
     """
@@ -205,15 +212,15 @@ class LocalizationConsistency(Spec, Criterion):
     probability: Annotated[float, Field(ge=0.5, le=0.9999), Quantity("ratio")] = 0.95
     """Probability with which a consistent belief passes."""
     every: PositiveDuration = 5.0
-    """Seconds between two samples."""
+    """Time between two samples."""
     after: Duration = 0.0
-    """Start of the evaluation in simulated time, after the filter has converged."""
+    """Simulated time at which the evaluation begins, so that the filter can converge before."""
     both_sides: bool = False
     """Also fail if the covariance is too large."""
 
     @property
     def horizon(self) -> float:
-        """Minimum simulated time in s for a decision."""
+        """Simulated time in s before which the criterion cannot pass."""
         return self.after
 
     @property
@@ -222,7 +229,7 @@ class LocalizationConsistency(Spec, Criterion):
         return POSITION | {Evidence.BELIEF, Evidence.COVARIANCE}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return findings for the average and its upper bound, and with `both_sides` also for its lower bound."""
+        """Return the finding for the upper bound of the average, and with `both_sides` also for the lower bound."""
         samples = self._sampled(trace)
         if samples is None:
             return [undecided("localization_consistency", "the belief has no covariance")]
@@ -241,14 +248,13 @@ class LocalizationConsistency(Spec, Criterion):
         return findings
 
     def _bounds(self, count: int) -> tuple[float | None, float]:
+        """Return lower bound (None without `both_sides`) and upper bound of the average of `count` samples."""
         if self.both_sides:
             return nees_mean_bounds(count, DIMENSIONS, self.probability)
         return None, chi2_quantile(self.probability, DIMENSIONS * count) / count
 
     def _sampled(self, trace: Trace) -> Samples | None:
-        """Return the NEES sampled at regular times from `after` to the last belief."""
-        from simscen.core.records.trace import Samples
-
+        """Return the NEES sampled at regular times from `after` to the last belief; None without covariances."""
         all_samples = nees_samples(trace)
         if not len(all_samples):
             return None

@@ -1,4 +1,4 @@
-"""Registry of criteria. A new criterion needs one line here."""
+"""Entries of `pass`: all criteria by key. A new criterion of simscen needs one line here."""
 
 from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal
@@ -12,7 +12,7 @@ from simscen.spec.places import Name
 
 
 class AnyCriterion(Choice):
-    """One pass criterion."""
+    """Entry of `pass`: exactly one criterion with its modifiers."""
 
     group: ClassVar[str] = "criterion"
     modifiers: ClassVar[frozenset[str]] = frozenset({"id", "severity", "then"})
@@ -62,7 +62,7 @@ class AnyCriterion(Choice):
 
     @property
     def chosen(self) -> BaseModel:
-        """Criterion; `whenever` and `then` are combined."""
+        """The specification of the criterion. For `whenever` and `then`, it is the Response that combines them."""
         if self.whenever is None:
             return super().chosen
         from simscen.criteria.temporal import Response
@@ -71,7 +71,7 @@ class AnyCriterion(Choice):
 
 
 def verdict_names(criteria: Sequence[AnyCriterion]) -> list[str]:
-    """Return the name of each criterion's verdict. Repeated ids get a number: speed, speed#2."""
+    """Return the name of the verdict of each criterion: its id, or its key. Repeated names get a number: speed#2."""
     seen: dict[str, int] = {}
     names = []
     for entry in criteria:

@@ -1,4 +1,4 @@
-"""Criteria on the reported result of the navigation: `result`, `error_code`, and `no_false_success`."""
+"""The criteria `result`, `error_code`, and `no_false_success`, which judge the reported result of the navigation."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from simscen.core.messages.navigation import matches_goal_name
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
+from simscen.criteria.error_codes import ErrorCodeValue, code_of
 from simscen.criteria.findings import at_most, held, missed, undecided
-from simscen.criteria.goal_outcomes import Code, GoalOutcome, closest_approach, code_of, goal_outcomes, outcome_start
+from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes, outcome_start
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.ground_truth import true_pose
 from simscen.spec.base import Spec
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
 class Result(Spec, Criterion):
     """Navigation ended with the required result, which can be a failure.
 
-    What is measured: the result the robot reports at the end, and its error code.
-    When it fails: another result, another code, or none at all when the run ended.
+    What is measured: the result that the robot reports at the end of navigation, and its error code.
+    When it fails: the result or the error code is another one, or the run ended without a result.
     Why this: a robot must reject a goal inside an obstacle with the correct error code.
     Source: nav2_simple_commander's TaskResult; the error codes of nav2_msgs' actions.
 
@@ -35,7 +36,7 @@ class Result(Spec, Criterion):
 
     status: Literal["SUCCEEDED", "FAILED", "CANCELED"]
     """Required result."""
-    error_code: Code | None = None
+    error_code: ErrorCodeValue | None = None
     """Required error code of Nav2, by name or number."""
 
     @property
@@ -45,7 +46,7 @@ class Result(Spec, Criterion):
         return frozenset({Evidence.NAVIGATION, *codes})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for the result, and one for the code if it is given."""
+        """Return one finding for the result, and one for the error code if one is required."""
         end = _last(trace, EventKind.NAVIGATION_ENDED)
         if end is None:
             return [_missing_result(trace, "result", self.status)]
@@ -56,20 +57,20 @@ class Result(Spec, Criterion):
 
 
 class ErrorCodeIs(Spec, Criterion):
-    """The robot reported this error code, for a goal or for the navigation as a whole.
+    """The robot reported the required error code, for a goal or for the whole navigation.
 
-    What is measured: the error code of the last report about the goal, or of the end of navigation.
-    When it fails: another code, or no report when the run ended.
-    Why this: with several goals, the end of navigation has only one of their codes.
+    What is measured: the error code of the last report about the goal or, without `goal`, of the end of navigation.
+    When it fails: the error code is another one, or the run ended without a report.
+    Why this: with several goals, the end of navigation has the error code of only one of them.
     Source: the error codes of nav2_msgs' actions.
 
     Example: `error_code: {code: NO_VALID_PATH, goal: shelf}`
     """
 
-    code: Code
-    """By name or number; NONE = no error."""
+    code: ErrorCodeValue
+    """Required error code of Nav2, by name or number; NONE for no error."""
     goal: GoalName | None = None
-    """Name of the goal; default: the navigation as a whole."""
+    """Name of the goal; default: the whole navigation."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -113,20 +114,22 @@ def _missing_result(trace: Trace, what: str, expected: str) -> Finding:
 
 
 class NoFalseSuccess(Spec, Criterion):
-    """The robot never reports success at a wrong place. Reported failures pass.
+    """The robot reported no success that was not true. A reported failure is allowed.
 
-    What is measured: the true distance to the goal whenever the robot reports it reached; and whether navigation was
-        reported SUCCEEDED with every goal reached that was not preempted by another.
-    When it fails: a goal was reported reached from further away than `tolerance`, or SUCCEEDED with a goal missing.
-    Why this: a failed delivery is retried, but a false success is not noticed. Arena reports
+    What is measured: the true distance to each goal when the robot reports it as reached; and, when it reports that
+        navigation SUCCEEDED, whether every goal was reached, except preempted ones.
+    When it fails: the robot was farther than `tolerance` from a goal that it reported as reached, or it reported
+        SUCCEEDED although a goal was not reached.
+    Why this: a failed delivery is repeated, but a false success remains unnoticed. Arena, for example, reports
         GOAL_REACHED without ever checking the goal.
-    Source: BARN challenge, run.py, for the meter.
+    Source: BARN challenge, run.py, for the default tolerance of 1 m.
 
     Example: `no_false_success: {tolerance: 0.5 m}`
     """
 
     tolerance: PositiveLength = 1.0
-    """Distance beyond which a reported success is false. Larger than the goal tolerance, which goals_reached checks."""
+    """True distance from the goal above which a reported success is false. It is larger than the tolerance of goals,
+    which goals_reached checks."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -134,7 +137,7 @@ class NoFalseSuccess(Spec, Criterion):
         return POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each goal reported as reached, and one for the end of navigation."""
+        """Return one finding for each goal that was reported as reached, and one for each false SUCCEEDED."""
         outcomes = goal_outcomes(trace, case)
         ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
         unknown = [
@@ -176,9 +179,10 @@ def _goal_names(case: Case) -> set[str]:
 
 
 def _judge_success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Finding | None:
-    """Return a failed finding if the k-th end of navigation does not match its goals, otherwise None.
+    """Return a failed finding if the k-th end of navigation was reported as SUCCEEDED without all its goals, else None.
 
-    It covers the goals since the previous end. The first one covers all goals of the scenario, accepted or not.
+    An end of navigation covers the goals since the previous end. The first end also covers all goals of the scenario,
+    even if they were never accepted.
     """
     end = ended[k]
     if end.name != "SUCCEEDED":
@@ -194,6 +198,6 @@ def _judge_success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -
 
 
 def _end_index(outcome: GoalOutcome, ended: tuple[Event, ...]) -> int | None:
-    """Return the index of the end of navigation that belongs to a goal: the first one after its acceptance."""
+    """Return the index of the end of navigation that covers a goal: the first one after its acceptance, or None."""
     end_tick = math.inf if outcome.end is None else outcome.end.tick
     return next((k for k, end in enumerate(ended) if outcome_start(outcome) < end.tick or end_tick <= end.tick), None)

@@ -1,8 +1,8 @@
-"""The criterion `smoothness`: acceleration, jerk, SPARC, and LDLJ."""
+"""The criterion `smoothness`: bounds on acceleration, jerk, SPARC, and LDLJ."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -27,16 +27,19 @@ if TYPE_CHECKING:
 class Smoothness(Spec, Criterion):
     """The robot drove smoothly.
 
-    What is measured: from the true speed over ground, over the whole run: its absolute change by time (acceleration),
-        its absolute second difference by time squared (jerk), and two dimensionless measures of smoothness, spectral
-        arc length (SPARC, 0 = smooth) and log dimensionless jerk (LDLJ, larger = smoother).
-    When it fails: the largest acceleration or jerk or the mean jerk is above its bound, or SPARC or LDLJ below.
-    Why this: jerk tips cargo over and is uncomfortable; an oscillating controller wears out gears although it arrives.
-    Source: Balasubramanian et al. 2015 and the authors' code for SPARC and LDLJ; HuNavSim and Arena also report
-        jerk, HuNavSim as a first difference, Arena without the time step.
+    What is measured: four quantities, all computed from the true speed over ground of the whole run. Acceleration is
+        the absolute difference of two samples, divided by the time step. Jerk is the absolute second difference,
+        divided by the square of the time step. SPARC (spectral arc length; 0 is perfectly smooth) and LDLJ (log
+        dimensionless jerk; larger is smoother) are dimensionless.
+    When it fails: the largest acceleration, the largest jerk, or the mean jerk is above its bound, or SPARC or LDLJ is
+        below its bound.
+    Why this: jerk makes cargo fall over and is uncomfortable. A robot with an oscillating controller reaches its goals,
+        but wears out its gears.
+    Source: Balasubramanian et al. 2015 and the authors' code for SPARC and LDLJ. HuNavSim and Arena also report
+        jerk: HuNavSim as a first difference, Arena without the time step.
 
-    SPARC is sensitive to slow oscillation, LDLJ to stops, and both depend on the duration: use them only in scenarios
-    with a fixed drive. They are inconclusive for a robot that never moved.
+    SPARC is sensitive to slow oscillation, LDLJ to stops. Both depend on the duration, so that only runs with the same
+    drive can be compared. They are inconclusive for a robot that never moved.
 
     Example: `smoothness: {max_acceleration: 1 m/s^2, max_jerk: 60 m/s^3}`
     """
@@ -80,6 +83,7 @@ class Smoothness(Spec, Criterion):
 
 
 def _largest(trace: Trace, case: Case, name: SignalName, limit: float, unit: str) -> Finding:
+    """Return the finding for the largest magnitude of a signal."""
     values = _read(trace, case, name)
     if isinstance(values, str):
         return undecided(name, values, f"≤ {limit:g} {unit}")
@@ -102,7 +106,7 @@ def _read(trace: Trace, case: Case, name: SignalName) -> Array | str:
         return str(reason)
 
 
-def _dimensionless(trace: Trace, name: str, limit: float) -> Finding:
+def _dimensionless(trace: Trace, name: Literal["sparc", "ldlj"], limit: float) -> Finding:
     speeds = speed(trace)
     if not len(speeds) or speeds.values.max() < MOVED_SPEED_M_S:
         return undecided(name, "the robot never moved", f"≥ {limit:g}")

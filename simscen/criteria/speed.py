@@ -1,4 +1,4 @@
-"""The criterion `speed`: speed and turn rate of the robot."""
+"""The criterion `speed`: bounds on the speed and the turn rate of the robot."""
 
 from __future__ import annotations
 
@@ -26,15 +26,17 @@ if TYPE_CHECKING:
 class Speed(Spec, Criterion):
     """The robot never went too fast.
 
-    What is measured: the largest true speed over ground, and the largest true turn rate, over the whole run, or while
-        the robot's center was in a region. With a mask of speed limits, also the largest excess of the true speed over
-        the limit of the cell at the robot's true center.
-    When it fails: one is above its bound; the speed is more than `tolerance` above a limit of the mask, for which the
-        highest limit within `grace` before and after counts.
-    Why this: slopes, slip and overshoot can exceed the limits in the parameters of the controller.
+    What is measured: the largest true speed over ground and the largest true turn rate, over the whole run, or while
+        the robot's center is in a region. With a mask of speed limits, also the difference between the true speed and
+        the limit of the cell at the robot's true center; of all limits from `grace` before to `grace` after, the
+        highest one counts.
+    When it fails: the speed is above `max`, the turn rate is above `max_turn_rate`, or the speed is more than
+        `tolerance` above the limit of the mask.
+    Why this: on slopes, by slip, or by overshoot, a robot can exceed the limits that its controller is given.
     Source: ScenarioRunner's MaxVelocityTest.
 
-    Inconclusive if the robot never was in the region, or in a limited part of the mask for longer than twice the grace.
+    Inconclusive if the robot was never in the region, or never in limited cells of the mask for longer than two times
+    `grace`.
 
     Example: `speed: {max: 0.5 m/s}`
     """
@@ -46,18 +48,19 @@ class Speed(Spec, Criterion):
     in_: RegionName | None = Field(default=None, alias="in")
     """Check only while the robot's center is in the region with this name."""
     while_on: bool = False
-    """Check only while the limit in the region is enabled by the action `speed_zone`, from `grace` after that; default:
-    the whole run."""
+    """Check only while the action `speed_zone` has enabled the limit in the region, beginning `grace` after the switch;
+    default: the whole run."""
     mask: SpeedMask | None = None
-    """A filter mask of speed limits: file, type, base and multiplier, as `stack.speed_mask` has them.
+    """Filter mask of speed limits: file, type, base and multiplier, as in `stack.speed_mask`.
 
-    The stack only gets the mask if it is also given there."""
+    The stack receives the mask only if `stack.speed_mask` names it as well."""
     full_speed: PositiveSpeed | None = None
     """Speed that corresponds to 100 % in the mask."""
     tolerance: NonNegativeSpeed = 0.05
     """Maximum speed above a limit of the mask."""
     grace: Duration = 1.0
-    """Time for slowing down at a lower limit or after a zone was enabled, and tolerance for leaving it early."""
+    """Time that the robot has for slowing down after it enters a lower limit or a zone is enabled. It may also
+    accelerate this long before it leaves a limit."""
 
     @model_validator(mode="after")
     def _check_bounds(self) -> Speed:
@@ -88,7 +91,7 @@ class Speed(Spec, Criterion):
         return frozenset({Evidence.TRUTH, Evidence.VELOCITY, *place, *switched})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each bound."""
+        """Return one finding for each given bound."""
         bounds = [("speed", self.max, "m/s"), ("turn_rate", self.max_turn_rate, "rad/s")]
         found = [self._fastest(trace, case, name, limit, unit) for name, limit, unit in bounds if limit is not None]
         return found if self.mask is None else [*found, self._by_mask(trace, case, self.mask)]
@@ -114,6 +117,7 @@ class Speed(Spec, Criterion):
         return at_most(what, float(signal.values[k, 0]), limit, unit, at=(trace, int(signal.ticks[k])), context=context)
 
     def _by_mask(self, trace: Trace, case: Case, mask: SpeedMask) -> Finding:
+        """Return the finding for the limits of a mask."""
         limit_text, signal = f"≤ the limits of {mask.file}", ground_truth.speed(trace)
         if not len(signal):
             return undecided("speed", "no velocity was recorded", limit_text)
@@ -123,7 +127,7 @@ class Speed(Spec, Criterion):
         if inside is None:
             return undecided("speed", f"the world has no region `{self.in_}`", limit_text)
         limits = mask.over(case.masks[mask.file].grid)
-        local_limits = limits.along(ground_truth.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
+        local_limits = limits.at_points(ground_truth.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
         highest = _highest_around(local_limits, signal.ticks, round(self.grace * trace.tick_rate))
         limited = inside & np.isfinite(highest)
         if not limited.any():
@@ -136,7 +140,10 @@ class Speed(Spec, Criterion):
         return at_most("speed", value, limit, "m/s", at=(trace, int(signal.ticks[k])), context=context)
 
     def _inside(self, trace: Trace, case: Case, signal: Samples) -> ground_truth.Flags | None:
-        """Return whether the robot's center was in the region; always without a region, None for an unknown one."""
+        """Return, for each sample, whether the robot's center was in the region; None if the world has no such region.
+
+        Without `in`, all samples are True.
+        """
         if self.in_ is None:
             return np.ones(len(signal), dtype=bool)
         if self.in_ not in case.regions:
@@ -146,7 +153,7 @@ class Speed(Spec, Criterion):
 
 
 def _highest_around(values: Array, ticks: Ticks, reach: int) -> Array:
-    """Return, for each sample, the largest value within `reach` ticks."""
+    """Return, for each sample, the largest of the `values` at most `reach` ticks before or after it."""
     first = np.searchsorted(ticks, ticks - reach, side="left")
     end = np.searchsorted(ticks, ticks + reach, side="right")
     padded = np.append(values, -np.inf)

@@ -1,4 +1,4 @@
-"""Criteria on stopping and on standstill: `stopped_within` and `stuck`."""
+"""The criteria `stopped_within` and `stuck`: the robot stopped when it had to, and did not stand still otherwise."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from simscen.core.records.verdict import Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import MissingEvidence, at_most, held, missed, undecided
 from simscen.criteria.goal_outcomes import goal_outcomes
-from simscen.criteria.timeline import Span, end_reason, never_started, spans
-from simscen.criteria.trace_signals.ground_truth import Flags, drive, first_sustained, speed, truth, turn_rate
+from simscen.criteria.timeline import Span, end_reason, first_sustained, never_started, spans
+from simscen.criteria.trace_signals.ground_truth import Flags, drive, speed, truth, turn_rate
 from simscen.spec.base import Spec
 from simscen.spec.places import DisturbanceName
 from simscen.spec.quantities import PositiveAngularSpeed, PositiveDuration, PositiveLength, PositiveSpeed
@@ -23,21 +23,22 @@ if TYPE_CHECKING:
 
 
 STALE_SCAN_S = 0.2
-"""Age in s above which a finding mentions that the newest scan is old: two periods of a 10 Hz lidar."""
+"""Age of the newest scan above which a finding calls the robot blind: two periods of a 10 Hz lidar."""
 
 
 class StoppedWithin(Spec, Criterion):
     """The robot stopped in time after a fault or an event.
 
-    What is measured: the time from each start of `after` until the robot's true speed and turn rate are at most
-        `speed` and `turn_rate` for the duration `hold`.
-    When it fails: that took longer than `time`; or, with `stay`, the robot moved again before the fault ended.
-    Why this: a robot without sensor data must not drive. The true speed counts, because wheels can roll after the
-        command is zero.
+    What is measured: the time from each start of `after` until the robot stands. It stands if its true speed is at most
+        `speed` and its true turn rate at most `turn_rate` for the duration `hold`.
+    When it fails: the time is longer than `time`; or, with `stay`, the robot moves again before the fault or event
+        ends.
+    Why this: a robot without sensor data must not drive. The true speed counts, because a robot can roll on after a
+        command of zero.
     Source: Nav2's collision monitor, whose source_timeout stops a robot without sensor data.
 
-    Inconclusive if `after` never started, if the fault or the run ended before `time`, or if the robot was already
-    standing when `after` started.
+    Inconclusive if `after` never started, if the fault, event, or run ended before `time`, or if the robot was already
+    standing at each start of `after`.
 
     Example: `stopped_within: {time: 0.5 s, after: lidar.off}`
     """
@@ -61,7 +62,10 @@ class StoppedWithin(Spec, Criterion):
         return frozenset({Evidence.TRUTH, Evidence.VELOCITY, Evidence.DISTURBANCES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each start of `after`, and a second one with `stay`."""
+        """Return one finding for each start of `after`, and with `stay` a second one if the robot stopped.
+
+        Raises MissingEvidence if the trace has no velocity.
+        """
         if not len(trace.velocity):
             raise MissingEvidence("the robot's true velocity was not recorded")
         happened = spans(trace, self.after)
@@ -119,7 +123,7 @@ def _stood_before(trace: Trace, is_standing: Flags, tick: int) -> bool:
 
 
 def _describe_motion(trace: Trace, start: int, end: int) -> list[str]:
-    """Describe the motion of the robot between two ticks."""
+    """Return lines that describe the motion of the robot between two ticks."""
     path, speeds = drive(trace), speed(trace)
     length, seconds = path.until(end) - path.until(start), trace.seconds(end - start)
     received = trace.scans[trace.scans <= end]
@@ -134,11 +138,10 @@ def _describe_motion(trace: Trace, start: int, end: int) -> list[str]:
 class Stuck(Spec, Criterion):
     """The robot was never stuck: it made progress while it had a goal.
 
-    What is measured: the longest time during which it stayed within `radius` of one position, while a goal was under
-        way.
-    When it fails: that is longer than `max`.
+    What is measured: the longest time for which the robot stayed within `radius` of one position while it had a goal.
+    When it fails: the time is longer than `max`.
     Why this: a robot that spins and backs up for a minute before it arrives passes all other criteria.
-    Source: Nav2's SimpleProgressChecker, whose defaults these are; ScenarioRunner's ActorBlockedTest.
+    Source: Nav2's SimpleProgressChecker, including its defaults; ScenarioRunner's ActorBlockedTest.
 
     Example: `stuck: {max: 10 s}`
     """
@@ -146,7 +149,7 @@ class Stuck(Spec, Criterion):
     max: PositiveDuration = 10.0
     """Maximum time in seconds."""
     radius: PositiveLength = 0.5
-    """Distance in meters that counts as progress."""
+    """Distance in meters that the robot must move away from a position to make progress."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -172,9 +175,12 @@ class Stuck(Spec, Criterion):
 
 
 def _standstills(poses: Samples, start: int, end: int, radius: float) -> list[tuple[int, int]]:
-    """Return the duration and end in ticks of each time in which the robot stayed within `radius`.
+    """Return the duration and the end, in ticks, of each period in which the robot stayed within `radius` m.
 
-    The times are consecutive from tick `start` to `end`, as a progress checker measures them."""
+    The periods follow each other from tick `start` to `end`: as in a progress checker, a new one begins as soon as the
+    robot is more than `radius` away from its position at the begin of the previous one. The list is empty without
+    samples.
+    """
     first, last = np.searchsorted(poses.ticks, (start, end + 1), side="left").tolist()
     if first == last:
         return []

@@ -1,4 +1,4 @@
-"""Temporal criteria: `always`, `eventually`, `until`, and `whenever … then`."""
+"""The criteria `always`, `eventually`, `until`, and `whenever … then`, on conditions that a scenario defines."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from pydantic import BaseModel
 
 from simscen.criteria.stl.condition import Condition, Release, Windowed, until_horizon, window_horizon
-from simscen.criteria.stl.criterion import TemporalCriterion, describe_response, describe_until, describe_windowed
+from simscen.criteria.stl.criterion import TemporalCriterion
+from simscen.criteria.stl.description import describe_response, describe_until, describe_windowed
 from simscen.criteria.stl.robustness import (
     EvaluationContext,
     response_robustness,
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class WindowedCriterion(Windowed, TemporalCriterion):
-    """A condition that must be true at every moment or at some moment of a window, depending on the `operator`."""
+    """Base class of `always` and `eventually`: a condition that must be true in a window at every or at one sample."""
 
     operator: ClassVar[Literal["always", "eventually"]]
 
@@ -35,24 +36,24 @@ class WindowedCriterion(Windowed, TemporalCriterion):
 
     @property
     def horizon(self) -> float:
-        """Minimum simulated time in s for a decision: the whole window, or its first moment."""
+        """Simulated time in s before which the criterion cannot pass: the end or the begin of the window."""
         return window_horizon(self.operator, self, self)
 
     def evaluate(self, context: EvaluationContext) -> Robustness:
-        """Return the robustness, decided by the worst moment of `always` or the best of `eventually`."""
+        """Return the robustness: that of the worst sample for `always`, of the best one for `eventually`."""
         return windowed_robustness(self.operator, self, self, context)
 
 
 class Always(WindowedCriterion):
-    """A condition is true at every moment of the run, or of a window of it.
+    """A condition is true at all times of the run, or of a part of it (a window).
 
-    What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the
-        moment at which the whole condition was nearest to being false.
-    When it fails: the condition was false at some sample.
-    Why this: the other criteria cover most tests; this one covers anything that has a signal.
+    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is that of the
+        sample at which the condition was nearest to being false.
+    When it fails: the condition was false at a sample.
+    Why this: the other criteria cover the most frequent requirements. This one covers all that signals can express.
     Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
 
-    Inconclusive if the window goes on after the end of the run and the condition was not false before.
+    Inconclusive if the run ended before the end of the window, and the condition was never false until then.
 
     Example: `always: {signal: clearance, op: ">=", value: 10 cm}`
     """
@@ -61,15 +62,16 @@ class Always(WindowedCriterion):
 
 
 class Eventually(WindowedCriterion):
-    """A condition is true at some moment of the run, or of a window of it.
+    """A condition is true at least once in the run, or in a part of it (a window).
 
-    What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the
-        moment at which the whole condition held best, or was nearest to holding.
+    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is that of the
+        sample at which the condition was met best, or was nearest to being met.
     When it fails: the condition was true at no sample.
-    Why this: that a robot arrived, or that a disturbance had an effect at all, is decided by a single moment.
+    Why this: some requirements must be met only once, for example that a robot arrives or that a disturbance has an
+        effect.
     Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
 
-    Inconclusive if the window goes on after the end of the run and the condition was not true before.
+    Inconclusive if the run ended before the end of the window, and the condition was never true until then.
 
     Example: `eventually: {signal: goal_distance, op: "<=", value: 0.25 m, within: 60 s}`
     """
@@ -78,15 +80,17 @@ class Eventually(WindowedCriterion):
 
 
 class Until(Release, TemporalCriterion):
-    """The condition `hold` was true until the condition `release` became true, which happened within the window.
+    """The condition `hold` is true until the condition `release` becomes true, which must happen within the window.
 
-    What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the best
-        release: the lesser of the margins of `release` there and of `hold` at every sample before it.
-    When it fails: `release` was not true in the window, or `hold` was false before it was.
-    Why this: order matters. Neither always nor eventually can require that a robot does not move before it has a map.
+    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin for a release
+        at one sample is the smallest of the margin of `release` at this sample and those of `hold` before. The best
+        release counts.
+    When it fails: `release` was not true in the window, or `hold` was false before `release` became true.
+    Why this: only this criterion can require an order, for example that a robot does not move before it is localized.
     Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
 
-    Inconclusive if the window goes on after the end of the run, with `hold` true so far and no release.
+    Inconclusive if the run ended before the end of the window, and until then, `hold` was always true and `release`
+    always false.
 
     Example: `until: {hold: {signal: speed, op: "<=", value: 0.01 m/s}, release: {signal: localized}, within: 5 s}`
     """
@@ -101,43 +105,44 @@ class Until(Release, TemporalCriterion):
 
     @property
     def horizon(self) -> float:
-        """Minimum simulated time in s for a decision: the first moment at which the release counts."""
+        """Simulated time in s before which the criterion cannot pass: the begin of the window."""
         return until_horizon(self.release, self)
 
     def evaluate(self, context: EvaluationContext) -> Robustness:
-        """Return the robustness, decided by the best release or by what broke `hold` before it."""
+        """Return the robustness: that of the best release."""
         return until_robustness(self.hold, self.release, self, context)
 
 
 class Whenever(Windowed):
-    """Whenever one condition (`whenever`) is true, another one (`then`) is true too, or becomes true in time.
+    """Each time that one condition (the premise, `whenever`) is true, another one (the response, `then`) is true too.
 
-    What is measured: how far each signal is from its bound at each sample of the truth. The margin is the smallest one
-        of the response (`then`) over all samples at which the premise (`whenever`) was true.
-    When it fails: at some sample, the premise was true and the response was not.
-    Why this: a robot that is lost, blind, or too near must react, each time and in time; for a response within some
-        seconds, write `then: {eventually: {…, within: 2 s}}`.
+    For a response within some seconds, write `then: {eventually: {…, within: 2 s}}`.
+
+    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is the
+        smallest margin of the response at all samples at which the premise was true.
+    When it fails: at a sample, the premise was true and the response was not.
+    Why this: a robot that is lost, blind, or too close to something must react in time, and each time.
     Source: the bounded response pattern of Dwyer, Avrunin and Corbett 1999; robust semantics of Donzé and Maler 2010.
 
-    Inconclusive if the premise was never known to be true, because then nothing was tested (unless `required: false`),
-    and if the window of a response goes on after the end of the run.
+    Inconclusive if the run ended before the time for a response was over. Also inconclusive if the premise was never
+    certainly true, because then nothing was tested; `required: false` lets such a run pass.
 
     Example: `{whenever: {signal: scan_age, op: ">", value: 0.3 s}, then: {eventually: {signal: speed, op: "<", value: 1 cm/s, within: 1 s}}}`
     """  # noqa: E501 (an example is on one line)
 
     required: bool = True
-    """Whether the premise must be true at least once. With `false`, a run in which it never was passes."""
+    """Whether the premise must be true at least once. With `false`, a run in which it never was true passes."""
 
 
 class Response(Spec, TemporalCriterion):
-    """The premise `whenever` and the response `then`, which are separate keys of a scenario."""
+    """The criterion `whenever … then`: combines the premise and the response, which are separate keys in a scenario."""
 
     premise: Whenever
     response: Condition
 
     @classmethod
     def of(cls, premise: BaseModel | None, response: BaseModel | None) -> Response:
-        """Return the criterion of two validated parts."""
+        """Return the criterion with this premise and response, which must be a Whenever and a Condition."""
         assert isinstance(premise, Whenever) and isinstance(response, Condition)
         return cls.model_construct(premise=premise, response=response)
 
@@ -151,10 +156,10 @@ class Response(Spec, TemporalCriterion):
 
     @property
     def horizon(self) -> float:
-        """Minimum simulated time in s for a decision: until the last response to a premise in the window is due."""
+        """Simulated time in s before which the criterion cannot pass: when the last response is due."""
         return window_horizon("always", self.response, self.premise)
 
     def evaluate(self, context: EvaluationContext) -> Robustness:
-        """Return the robustness, decided by the worst response; undecided if the premise never was true."""
+        """Return the robustness: that of the worst response; undecided if the premise was never true."""
         premise, required = self.premise, self.premise.required
         return response_robustness(premise, self.response, premise, context, required=required)

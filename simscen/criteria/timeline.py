@@ -1,4 +1,4 @@
-"""Intervals in which faults, events, marks, and zones were active in a run, and how the run ended."""
+"""Intervals of a run in which faults, events, and zones were active or a state lasted, and how the run ended."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from simscen.core.records.events import EventKind
 
 if TYPE_CHECKING:
     from simscen.core.environment.costmap_filters import Filter
-    from simscen.core.records.trace import Samples, Trace
+    from simscen.core.records.trace import Samples, Ticks, Trace
+    from simscen.criteria.trace_signals.ground_truth import Flags
 
 _STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
 NEVER_SWITCHED = "no event switched the zone on or off: leave `while_on` out to judge the whole run"
+"""Reason of inconclusive findings."""
 
 
 @dataclass(frozen=True)
 class Span:
     """Interval from `start` to `end` in ticks.
 
-    `has_end_event` is True if an event of the log ended the interval, and False if it lasts to the end of the run.
+    `has_end_event` is True if an event in the log ended the interval, and False if it lasts to the end of the run.
     """
 
     start: int
@@ -32,10 +34,10 @@ class Span:
 
 
 def spans(trace: Trace, label: str) -> list[Span]:
-    """Return the intervals of the fault, event or mark `label`, by start.
+    """Return the intervals in which the fault, event or mark with this label was active, in the order of their starts.
 
-    An interval without an end or without duration lasts to the end of the run. Several entries of a scenario may share
-    a label; starts and ends are paired within each entry.
+    An interval lasts to the end of the run if the log contains no end for it, or if it has no duration. Several entries
+    of a scenario may have the same label; each end belongs to a start of its own entry.
     """
     starts = [event for event in trace.of_kind(*_STARTS) if event.name == label]
     ends = [event for event in trace.of_kind(*_ENDS) if event.name == label]
@@ -52,7 +54,7 @@ def _span(trace: Trace, start: int, end: int | None) -> Span:
 
 
 def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:
-    """Return why nothing can be judged after `label`, and a detail line with the labels that did start."""
+    """Return text that the fault or event `label` never started, and detail lines with the labels that did start."""
     started = sorted({event.name for event in trace.of_kind(*_STARTS)})
     names = ", ".join(f"`{name}`" for name in started) or "nothing"
     return f"`{label}` never started; the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})", [
@@ -61,21 +63,22 @@ def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:
 
 
 def end_reason(trace: Trace) -> str:
-    """Return why the run ended, in words."""
+    """Return why the run ended, in words, or that the log is truncated."""
     ends = trace.of_kind(EventKind.RUN_ENDED)
     return ends[-1].name if ends else "the log stops there"
 
 
 def has_ended(trace: Trace) -> bool:
-    """Return True if the run was completed, also by its time limit, and False for a truncated log."""
+    """Return whether the log contains the end of the run; False for a truncated log."""
     return bool(trace.of_kind(EventKind.RUN_ENDED))
 
 
 def enabled_spans(trace: Trace, what: Filter, region: str | None, grace: float) -> list[tuple[int, int]]:
-    """Return the intervals (first tick, last tick) in which a zone, or the mask of a costmap filter, was enabled.
+    """Return the intervals (first tick, last tick) in which the zone in `region` was enabled.
 
-    The first `grace` seconds after each switch-on are left out. A zone whose first switch is off was on from the
-    start. The list is empty if nothing was switched.
+    If `region` is None, the intervals are those of the mask of the costmap filter `what`. The first `grace` seconds
+    after each switch-on are left out. If the first switch is a switch-off, the zone was on from the start. The list is
+    empty if no event switched the zone.
     """
     switches = [e for e in trace.of_kind(EventKind.ZONE_SWITCHED) if (e.name, e.data["filter"]) == (region or "", what)]
     if not switches:
@@ -93,8 +96,28 @@ def enabled_spans(trace: Trace, what: Filter, region: str | None, grace: float) 
 
 
 def clip_samples(samples: Samples, first: int, last: int) -> Samples:
-    """Return the samples from tick `first` to `last`, with the value held at both ends."""
+    """Return the samples from tick `first` to `last`.
+
+    Samples at these two ticks are added with the newest values (sample and hold), unless they are outside of `samples`.
+    """
     inner = samples.ticks[(samples.ticks > first) & (samples.ticks < last)]
     ticks = np.unique(np.concatenate(([first], inner, [last])))
     ticks = ticks[(ticks >= samples.ticks[0]) & (ticks <= samples.ticks[-1])]
     return type(samples)(ticks, samples.at(ticks))
+
+
+def first_sustained(ticks: Ticks, is_true: Flags, hold: int, end: int) -> tuple[int | None, bool]:
+    """Return the first tick from which a state lasts for at least `hold` ticks, and True.
+
+    `is_true` states whether the state is true at each of the `ticks`. It lasts until the next tick at which it is not
+    true, or until `end`. If it never lasts that long, return the tick from which it lasts until `end`, and False. This
+    tick is None if the state is not true at the last of the `ticks`.
+    """
+    begins = np.flatnonzero(is_true & ~np.concatenate(([False], is_true[:-1])))
+    breaks = np.flatnonzero(~is_true & np.concatenate(([False], is_true[:-1])))
+    stops = np.full(len(begins), end, dtype=np.int64)
+    stops[: len(breaks)] = ticks[breaks]
+    lasting = stops - ticks[begins] >= hold
+    if lasting.any():
+        return int(ticks[begins[int(np.argmax(lasting))]]), True
+    return (int(ticks[begins[-1]]), False) if len(is_true) and is_true[-1] else (None, False)

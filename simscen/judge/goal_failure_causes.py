@@ -13,7 +13,8 @@ from simscen.core.messages.navigation import ErrorCode, Goal
 from simscen.core.records.case import Case, Passage
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
-from simscen.criteria.goal_outcomes import GoalOutcome, code_of, goal_outcomes, outcome_start
+from simscen.criteria.error_codes import code_of
+from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes, outcome_start
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from simscen.criteria.base import AnyMeasure
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.timeline import end_reason, has_ended
-from simscen.criteria.trace_signals.sampling import check_recorded_signals, time_gaps
+from simscen.criteria.trace_signals.trace_checks import check_recorded_signals, time_gaps
 from simscen.judge.disturbances import disturbance_outcomes, missing_disturbances
 from simscen.judge.evaluation import apply_expectation, judge, outcome_of_verdicts
 from simscen.judge.failure_causes import explain_failures

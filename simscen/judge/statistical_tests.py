@@ -9,8 +9,8 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from simscen.core.records.comparison import ScenarioChange
 from simscen.core.records.run_result import Outcome, RunResult
-from simscen.core.records.session_events import ScenarioChange
 from simscen.core.records.study import ClaimResult, ClaimStatus
 from simscen.core.statistics import holm, sign_test
 from simscen.model.acceptance import PassRate

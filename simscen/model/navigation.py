@@ -33,7 +33,7 @@ def _text_or_mapping(value: Any) -> str:
 
 Expectation = Annotated[
     Annotated[Literal["succeeded", "failed"], Tag("text")]
-    | Annotated[Spec, LazySpec("simscen.criteria.goal_outcomes", "ExpectedError"), Tag("mapping")],
+    | Annotated[Spec, LazySpec("simscen.criteria.error_codes", "ExpectedError"), Tag("mapping")],
     Discriminator(_text_or_mapping),
 ]
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from simscen.core.records.session_events import (
+from simscen.core.records.comparison import (
     BaselineComparison,
     Comparison,
     MetricDifference,
@@ -77,18 +77,19 @@ def outcome_text(outcomes: OutcomeCounts) -> str:
 def excluded_text(against: BaselineComparison) -> str:
     """Return which runs are not compared, and why, or ""."""
     parts = []
-    if against.broken:
-        parts.append(f"{pairs_text(against.broken)} with an error")
-    if against.alone:
-        parts.append(f"{against.alone} {'run' if against.alone == 1 else 'runs'} without a partner")
+    if against.error_pairs:
+        parts.append(f"{pairs_text(against.error_pairs)} with an error")
+    if against.unpaired_runs:
+        parts.append(f"{against.unpaired_runs} {'run' if against.unpaired_runs == 1 else 'runs'} without a partner")
     return "left out: " + ", ".join(parts) if parts else ""
 
 
 def unequal_progress_text(against: BaselineComparison) -> str:
     """Return a note on the pairs in which only one run reached its goals, with their number; "" without such pairs."""
-    if not against.parted:
+    if not against.pairs_with_one_arrival:
         return ""
-    return f"in {pairs_text(against.parted)} only one run reached its goals, so their metrics are not compared"
+    pairs = pairs_text(against.pairs_with_one_arrival)
+    return f"in {pairs} only one run reached its goals, so their metrics are not compared"
 
 
 def comparison_headline(baseline: str, against: BaselineComparison) -> str:

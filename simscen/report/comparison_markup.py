@@ -3,7 +3,7 @@
 from dataclasses import replace
 from html import escape
 
-from simscen.core.records.session_events import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
+from simscen.core.records.comparison import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
 from simscen.report.comparison import (
     MAX_CHANGES,
     MAX_FLIPS,

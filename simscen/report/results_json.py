@@ -5,9 +5,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from types import TracebackType
 from typing import Any, TextIO
 
+from simscen.core.records.comparison import Comparison
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.run_store import RunStore
-from simscen.core.records.session_events import Comparison, RunFinished, SessionEvent, SessionFinished
+from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.core.records.study import Study
 from simscen.judge.metrics.comparison import comparison_data
 from simscen.judge.metrics.session_summary import SessionFigures, SessionSummary, session_summary_data

@@ -58,7 +58,10 @@ TESTS_OF_MODULE = {
     "criteria/stl/condition": [[f"{_STL}/test_condition.py"], [f"{_STL}/test_decision_horizon.py"], TEMPORAL],
     "criteria/stl/robustness": [TEMPORAL, [f"{_STL}/test_robustness.py", "tests/properties/test_three_valued.py"]],
     "criteria/stl/operators": [TEMPORAL, [f"{_STL}/test_operators.py"]],
-    "criteria/stl/criterion": [TEMPORAL, [f"{_STL}/test_criterion.py", f"{_STL}/test_description.py"]],
+    **{
+        f"criteria/stl/{of}": [TEMPORAL, [f"{_STL}/test_criterion.py", f"{_STL}/test_description.py"]]
+        for of in ("criterion", "description")
+    },
     "criteria/trace_signals/distances": [
         [f"{_SIGNALS}/test_{of}.py" for of in ("distances", "readers", "motion_signals")],
         TEMPORAL,
@@ -71,10 +74,10 @@ TESTS_OF_MODULE = {
         [f"{_SIGNALS}/test_readers.py", f"{_SIGNALS}/test_motion_signals.py"],
         TEMPORAL,
     ],
-    "criteria/trace_signals/ground_truth": [
-        [f"{_SIGNALS}/test_ground_truth.py", f"{_SIGNALS}/test_nees.py"],
-        ["golden"],
-    ],
+    **{
+        f"criteria/trace_signals/{of}": [[f"{_SIGNALS}/test_ground_truth.py", f"{_SIGNALS}/test_nees.py"], ["golden"]]
+        for of in ("ground_truth", "estimation_errors")
+    },
     "criteria/trace_signals/sparc_ldlj": [
         [f"{_SIGNALS}/test_sparc_ldlj.py"],
         ["tests/unit/criteria/test_smoothness_and_consistency.py"],

@@ -15,8 +15,8 @@ from simscen.core.geometry import Array
 from simscen.core.random_streams import Streams
 from simscen.core.records.trace import Trace
 from simscen.core.statistics import bootstrap_mean_interval, chi2_quantile, nees_mean_bounds
-from simscen.criteria.trace_signals.ground_truth import DIMENSIONS, nees_samples
-from simscen.criteria.trace_signals.ground_truth import nees as nees_of_errors
+from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, nees_samples
+from simscen.criteria.trace_signals.estimation_errors import nees as nees_of_errors
 from simscen.model.localizers import Amcl, AmclParameters, Localizer
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.rows import TICK_RATE_HZ

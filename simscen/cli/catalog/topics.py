@@ -13,7 +13,7 @@ from pydantic_core import PydanticUndefined
 
 from simscen.actions.base import AnyAction
 from simscen.advanced.spec import MedialAxisPlanner
-from simscen.criteria import goal_outcomes
+from simscen.criteria import error_codes
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
 from simscen.model import (
@@ -129,7 +129,7 @@ _SCENARIO: dict[str, type[BaseModel]] = {
     "payload": scenario.Payload,
     "goals": scenario.GoalEntry,
     "navigation": navigation.Navigation,
-    "expect": goal_outcomes.ExpectedError,
+    "expect": error_codes.ExpectedError,
     "on_reached": navigation.OnReached,
     "events": EventEntry,
     "then": StepEntry,

@@ -10,7 +10,8 @@ import typer
 
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, InvalidInput, Problem
-from simscen.core.records.session_events import Comparison, RunFinished
+from simscen.core.records.comparison import Comparison
+from simscen.core.records.session_events import RunFinished
 from simscen.judge.metrics.comparison import compare_sessions, comparison_data, labeled_key
 from simscen.judge.statistical_tests import Significance
 from simscen.report.comparison import Links, session_comparison_lines
@@ -80,7 +81,7 @@ def command(
         Significance(alpha, min_effect),
     )
     (against,) = comparison.against
-    if not against.pairs + against.broken:
+    if not against.pairs + against.error_pairs:
         hint = "run the same scenarios with the same seeds in both"
         raise InvalidInput([Problem(str(candidate), 0, 0, "SC811", f"no run has a counterpart in {baseline}", hint)])
     is_worse = any(change.is_worse for change in against.changes)

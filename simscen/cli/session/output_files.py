@@ -20,16 +20,10 @@ import typer
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
 from simscen.core.files import require_not_input, require_regular_file
+from simscen.core.records.comparison import Comparison
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.run_store import RunStore
-from simscen.core.records.session_events import (
-    Comparison,
-    RunFinished,
-    RunStarted,
-    SessionEvent,
-    SessionFinished,
-    SessionStarted,
-)
+from simscen.core.records.session_events import RunFinished, RunStarted, SessionEvent, SessionFinished, SessionStarted
 from simscen.core.records.study import ClaimStatus, Study
 from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.report.junit import Family, xml_parts

@@ -1,1 +1,1 @@
-"""The simulated environment as plain data: world, map, costmap filters, terrain, pedestrians."""
+"""Plain data of the simulated environment: world, map, costmap filters, scenery, pedestrians."""

@@ -1,4 +1,4 @@
-"""Costmap filter masks and zones with the meaning of nav2_costmap_2d: keepout and speed limits."""
+"""Keepout areas and speed limits of the costmap filters, as masks and as zones, with the meaning of nav2_costmap_2d."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FilterMasks:
-    """Filter masks of a stack: keepout areas and speed limits. None means no such mask."""
+    """Filter masks that a stack receives; None if it receives no mask of this kind."""
 
     keepout: OccupancyGrid | None = None
     speed: SpeedLimits | None = None
@@ -27,7 +27,10 @@ class FilterMasks:
 
 @dataclass(frozen=True, eq=False)
 class SpeedLimits:
-    """Mask of speed limits; a cell of value v allows `base + multiplier * v` m/s, or percent of full speed."""
+    """Mask of speed limits.
+
+    A cell of value v allows a speed of `base + multiplier * v`, in percent of full speed if `percent`, else in m/s.
+    """
 
     grid: OccupancyGrid
     percent: bool
@@ -37,29 +40,30 @@ class SpeedLimits:
     @property
     def has_limits(self) -> bool:
         """Whether any cell limits the speed."""
-        return any(self.of(int(value), 1.0) is not None for value in np.unique(self.grid.cells))
+        return any(self.limit_of_cell(int(value), 1.0) is not None for value in np.unique(self.grid.cells))
 
     def at(self, pose: Pose2, full_speed: float) -> float | None:
-        """Return the limit in m/s at the pose of the robot, or None.
+        """Return the limit in m/s at the pose of the robot in the map frame; None if there is no limit.
 
         `full_speed` is the top speed of the controller in m/s.
         """
         value = int(self.grid.values_at(np.array([[pose.x, pose.y]]))[0])
-        return self.of(value, full_speed)
+        return self.limit_of_cell(value, full_speed)
 
-    def along(self, points: Array, full_speed: float) -> Array:
-        """Return the limits (n,) in m/s at points (n, 2); inf for no limit."""
+    def at_points(self, points: Array, full_speed: float) -> Array:
+        """Return the limits (n,) in m/s at points (n, 2) of the map frame; inf for no limit."""
         values = self.grid.values_at(points)
         limits = np.full(len(points), np.inf)
         for value in np.unique(values).tolist():
-            limit = self.of(value, full_speed)
+            limit = self.limit_of_cell(value, full_speed)
             limits[values == value] = np.inf if limit is None else limit
         return limits
 
-    def of(self, value: int, full_speed: float) -> float | None:
-        """Return the limit in m/s for the value of a cell, or None.
+    def limit_of_cell(self, value: int, full_speed: float) -> float | None:
+        """Return the limit in m/s for the value of a cell; None if there is no limit.
 
-        As in Nav2's SpeedFilter, a limit of 0, below 0, or above 100 percent means no limit.
+        As in Nav2's SpeedFilter, there is no limit if the value or the limit is 0 or negative, or if the limit is above
+        100 percent.
         """
         limit = self.base + self.multiplier * value
         if value <= 0 or limit <= 0 or (self.percent and limit > 100):
@@ -68,7 +72,10 @@ class SpeedLimits:
 
 
 def in_keepout_mask(mask: OccupancyGrid, points: Array) -> npt.NDArray[np.bool_]:
-    """Return which of the points (n, 2) a keepout mask forbids; lighter cells do not forbid anything."""
+    """Return which of the points (n, 2) of the map frame lie in occupied cells of a keepout mask.
+
+    Cells with lower values do not forbid anything.
+    """
     return np.asarray(mask.values_at(points) == OCCUPIED)
 
 
@@ -78,9 +85,9 @@ Block = tuple[int, int, int, int, int]
 
 @dataclass(frozen=True)
 class MaskBlocks:
-    """The cells of a mask with values from 1 to 100, as `blocks` that do not overlap.
+    """Compact form of a filter mask for logs: the cells with values from 1 to 100, as `blocks` that do not overlap.
 
-    `resolution` is in m per cell, and `origin` is the corner of cell (0, 0), as in OccupancyGrid.
+    `resolution` is in m per cell, and `origin` is the pose of the corner of cell (0, 0), as in OccupancyGrid.
     """
 
     resolution: float
@@ -89,7 +96,7 @@ class MaskBlocks:
 
     @property
     def grid(self) -> OccupancyGrid:
-        """The mask as a grid, just large enough for all blocks."""
+        """The mask as the smallest grid that contains all blocks; other cells are free."""
         width = max((column + width for column, _, width, _, _ in self.blocks), default=0)
         height = max((row + height for _, row, _, height, _ in self.blocks), default=0)
         cells = np.full((height, width), FREE, dtype=np.int8)
@@ -108,13 +115,13 @@ class MaskBlocks:
         return boxes
 
     def to_mask_frame(self, poses: Array) -> Array:
-        """Return poses (n, 3) of the map frame in the frame of the mask."""
+        """Transform poses (n, 3) as x, y, yaw from the map frame to the frame of the mask."""
         local = self.origin.inverse().apply(poses[:, :2])
         return np.column_stack((local, poses[:, 2] - self.origin.yaw))
 
 
 def mask_blocks(grid: OccupancyGrid) -> MaskBlocks:
-    """Return the blocks of a mask: runs of equal cells in a row, extended over the following rows with the same run."""
+    """Return the blocks of a mask: runs of equal cells in a row, joined with equal runs in the following rows."""
     blocks: list[Block] = []
     first_row: dict[tuple[int, int, int], int] = {}
     for row in range(len(grid.cells) + 1):
@@ -137,11 +144,12 @@ def _runs(cells: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
 
 
 Filter = Literal["keepout", "speed"]
+"""Kind of a costmap filter."""
 
 
 @dataclass(frozen=True, eq=False)
 class Zones:
-    """State of the costmap filters: `keepout` polygons, and `speed` polygons with their limits in m/s."""
+    """Enabled zones and masks: `keepout` polygons, and `speed` polygons with limits in m/s, all in the map frame."""
 
     keepout: tuple[Polygon, ...] = ()
     speed: tuple[tuple[Polygon, float], ...] = ()
@@ -150,9 +158,10 @@ class Zones:
 
 @dataclass(frozen=True)
 class ZoneSwitch:
-    """Command that enables or disables a zone, or, if `region` is None, a whole filter with its zones and mask.
+    """Command that enables or disables the zone in a region.
 
-    `speed_limit` (m/s) sets the limit of a zone of the speed filter; None keeps its limit.
+    If `region` is None, the command applies to the filter with all its zones and its mask. `speed_limit` in m/s is the
+    new limit of a zone of the speed filter; None keeps the limit.
     """
 
     filter: Filter

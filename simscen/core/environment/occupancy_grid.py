@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
+"""Values of cells."""
 
 MAX_CELLS = 2**24
-"""Largest map that `refined` creates. Costs and distances of this many cells take about 200 MB."""
+"""Maximum number of cells of a map that `refined` returns. Its costs and distances take about 200 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +39,7 @@ class OccupancyGrid:
         return self.cells.shape[0], self.cells.shape[1]
 
     def refined(self, max_cell_size: float) -> OccupancyGrid:
-        """Return the map with its cells split into equal parts, at most `max_cell_size` m wide if MAX_CELLS allows it.
+        """Return the map with each cell split into smaller ones, at most `max_cell_size` m wide if MAX_CELLS allows it.
 
         Cells as large as a robot are too coarse for goals and for the position of walls.
         """
@@ -72,5 +73,6 @@ class OccupancyGrid:
 
 @cached_on_instance
 def _split(grid: OccupancyGrid, parts: int) -> OccupancyGrid:
+    """Return the grid with each cell split into `parts` x `parts` cells. Cached, because all runs use the same grid."""
     cells = grid.cells.repeat(parts, axis=0).repeat(parts, axis=1)
     return OccupancyGrid(cells, grid.resolution / parts, grid.origin)

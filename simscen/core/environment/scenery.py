@@ -1,4 +1,4 @@
-"""Visible parts of a world that the messages of a run do not contain, for replay pages and pictures."""
+"""Visible parts of a world that replay pages and pictures show, but that no message of a run contains."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ else:
 
 @dataclass(frozen=True)
 class MovableObject:
-    """Movable object with its start pose and its outlines from above.
+    """Movable object at its start pose.
 
-    `outlines` are in the frame of the object. `closed` and `opened` are the poses of a door panel, whose frame is at
-    the hinge. `mass` is in kg; 0 for an object that cannot be pushed.
+    `outlines` are those of its parts, seen from above, in the frame of the object. `closed` and `opened` are the poses
+    of a door panel, whose frame is at the hinge; None for other objects. `mass` is in kg; 0 for an object that cannot
+    be pushed.
     """
 
     name: str
@@ -40,7 +41,8 @@ class MovableObject:
 class DrivableSurface:
     """Surface on which wheels can roll: a ramp, a sill, or a platform.
 
-    `height` of the highest point is in m. `uphill` is the rise per meter along x and y; zeros for a level surface.
+    `height` is the height of the highest point in m. `uphill` is the rise per meter along x and y; zeros for a level
+    surface.
     """
 
     name: str
@@ -51,7 +53,7 @@ class DrivableSurface:
 
 @dataclass(frozen=True)
 class FrictionRegion:
-    """Region whose floor friction differs from 1, the value of dry concrete, from the start."""
+    """Region whose floor has another friction than dry concrete (1) at the start of the run."""
 
     region: str
     outline: Polygon
@@ -60,9 +62,10 @@ class FrictionRegion:
 
 @dataclass(frozen=True)
 class FilterZone:
-    """Zone of a costmap filter of `robot` at the start of the run. `speed_limit` is in m/s; 0 for none.
+    """Zone or mask of a costmap filter at the start of the run.
 
-    The zone of a filter mask has `cells` instead of a region and an outline.
+    A zone has a `region` and an `outline`, a mask has `cells`. `speed_limit` is in m/s; 0 for none. `robot` is the name
+    of the robot whose stack has the filter.
     """
 
     filter: Filter
@@ -75,7 +78,11 @@ class FilterZone:
 
 @dataclass(frozen=True)
 class CompressedGrid:
-    """Occupancy grid as plain data; `data` is its int8 cells in row order, compressed by zlib, in base64."""
+    """Occupancy grid that can be written as JSON.
+
+    `width` and `height` are in cells, and `resolution` is in m per cell. `data` contains the int8 cells row by row,
+    compressed by zlib, in base64.
+    """
 
     width: int
     height: int
@@ -85,14 +92,14 @@ class CompressedGrid:
 
     @classmethod
     def of(cls, grid: OccupancyGrid) -> CompressedGrid:
-        """Return the compressed grid."""
+        """Return the grid in compressed form."""
         packed = zlib.compress(np.ascontiguousarray(grid.cells).tobytes(), 9)
         height, width = grid.shape
         return cls(width, height, grid.resolution, grid.origin, base64.b64encode(packed).decode("ascii"))
 
     @property
     def grid(self) -> OccupancyGrid:
-        """The uncompressed grid. Raises ValueError if it is damaged."""
+        """The uncompressed grid. Raises ValueError if `data` is damaged."""
         try:
             cells = np.frombuffer(zlib.decompress(base64.b64decode(self.data)), dtype=np.int8)
         except zlib.error as error:
@@ -102,7 +109,11 @@ class CompressedGrid:
 
 @dataclass(frozen=True)
 class Scenery:
-    """Visible parts of the world at the start of a run. `map` is set if it differs from the map of the robot."""
+    """Visible parts of the world at the start of a run.
+
+    `things` are movable objects, `ground` are drivable surfaces, `floors` are regions with another friction, and
+    `zones` are those of costmap filters. `map` is set if the map of the world differs from the map of the robot.
+    """
 
     places: Mapping[str, Pose2] = field(default_factory=dict)
     things: tuple[MovableObject, ...] = ()

@@ -1,4 +1,4 @@
-"""A world as plain data: solids, bodies, named places, map, floor friction, and pedestrians."""
+"""Plain data of a world: solids, bodies, named places, map, floor friction, and pedestrians."""
 
 from __future__ import annotations
 
@@ -12,19 +12,25 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Body, Solid, TriangleMesh
 
 Polygon = tuple[tuple[float, float], ...]
+"""Corners (x, y) in m, in order; the last one is connected to the first one."""
 
 GRAVITY_M_S2 = 9.81
-"""Gravitational acceleration, downwards."""
+"""Gravitational acceleration, positive downwards."""
 
 
 @dataclass(frozen=True)
 class World:
-    """Everything in the world except the robots: `solids` are fixed, `bodies` can move.
+    """Everything in the world except the robots.
 
-    `doors` maps the name of a door, which is also the name of its body, to the poses of the body when closed and open.
-    `friction` maps names of `regions` to the friction of their floor; it is 1 elsewhere. `bounds` is (min x, min y, max
-    x, max y) in m. With `has_open_ground`, the level ground reaches beyond `bounds`. `grid` is set if the world has its
-    own occupancy map (a ROS map). `notes` are warnings of the importer, each with file and element.
+    Attributes:
+        solids: Parts that never move.
+        bodies: Objects that can move.
+        doors: Poses of each door panel when closed and when open, by the name of its body.
+        friction: Friction of the floor by name of region; 1 elsewhere.
+        bounds: (min x, min y, max x, max y) in m.
+        has_open_ground: Whether the level ground reaches beyond `bounds`.
+        grid: Occupancy map that the world was loaded from (a ROS map); None for other worlds.
+        notes: Warnings of the importer, each with file and element.
     """
 
     name: str
@@ -42,10 +48,10 @@ class World:
 
 @dataclass(frozen=True)
 class BuiltWorld:
-    """World that is prepared once and shared by all its runs.
+    """World that is prepared once for all its runs.
 
-    It contains only numpy arrays, so that it survives a fork. `mesh` fuses all fixed solids. `map` is the occupancy
-    grid that robots get.
+    `mesh` contains all fixed solids, and `map` is the occupancy grid that robots get. Both consist of numpy arrays,
+    which remain valid in worker processes that are forked.
     """
 
     world: World
@@ -59,7 +65,10 @@ DISC_CORNERS = 32
 
 @dataclass(frozen=True)
 class Patch:
-    """Patch of floor: its `outline`, its `friction` for rubber wheels, and the last tick at which it exists."""
+    """Part of the floor with another friction.
+
+    `friction` is that of rubber wheels. `until` is the last tick at which the patch exists; inf for the whole run.
+    """
 
     outline: Polygon
     friction: float
@@ -67,7 +76,7 @@ class Patch:
 
 
 def disc_outline(center: tuple[float, float], radius: float) -> Polygon:
-    """Return the outline of a disc as a polygon."""
+    """Return a polygon with DISC_CORNERS corners on the circle around `center` with `radius` in m."""
     turns = [2 * math.pi * k / DISC_CORNERS for k in range(DISC_CORNERS)]
     return tuple((center[0] + radius * math.cos(turn), center[1] + radius * math.sin(turn)) for turn in turns)
 
@@ -77,6 +86,7 @@ Behavior = Literal["regular", "impassive", "surprised", "scared", "curious", "th
 Unseen = Literal["robots", "people", "objects"]
 """What a pedestrian can ignore; "people" are other pedestrians."""
 Repeat = Literal["once", "loop", "back_and_forth"]
+"""Order in which a pedestrian walks to its goals."""
 
 BODY_HEIGHT_M = 1.7
 """Height of the upright cylinder that represents a pedestrian."""
@@ -84,11 +94,11 @@ BODY_HEIGHT_M = 1.7
 
 @dataclass(frozen=True)
 class WalkingPedestrian:
-    """Pedestrian that starts at rest at `pose` and walks to `goals` (x, y in m) in turn.
+    """Pedestrian that starts at rest at `pose` and walks to `goals` (x, y in m) one after the other.
 
     `speed` is the preferred speed in m/s; `radius` and `height` of the body are in m. Pedestrians of the same `group`
-    stay together. `blind_to` lists what the pedestrian ignores. Reactions other than regular and impassive begin within
-    `reacts_within` m of a robot and last `reacts_for` s.
+    stay together. `blind_to` lists what the pedestrian ignores. Behaviors other than regular and impassive are
+    reactions: they begin within `reacts_within` m of a robot and last for `reacts_for` s.
     """
 
     name: str
@@ -107,9 +117,9 @@ class WalkingPedestrian:
 
 @dataclass(frozen=True)
 class PedestrianAction:
-    """Action of a pedestrian: it reached a goal, began a reaction, or ended one.
+    """Something that a pedestrian did: it reached a goal, began a reaction to a robot, or ended it (calmed).
 
-    `about` is the number of the goal (from 1) or the name of the robot.
+    `name` is that of the pedestrian. `about` is the number of the goal (from 1) or the name of the robot.
     """
 
     name: str

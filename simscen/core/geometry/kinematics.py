@@ -13,6 +13,7 @@ class Twist(NamedTuple):
 
 
 STOP = Twist()
+"""Velocity of a robot at rest."""
 
 
 WheelValues = tuple[float, float, float, float]
@@ -21,11 +22,12 @@ WheelValues = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class MecanumWheels:
-    """Four mecanum wheels of `radius`, at distances `half_base` (x) and `half_track` (y) from the center, in m.
+    """Kinematics of a base with four mecanum wheels.
 
-    `slant` is the cotangent of the angle between roller and wheel axle: 1 for 45 degrees. Seen from above, the upper
-    rollers point to the center, and the lower ones form an O. Kinematics of Taheri, Qiao and Ghaeminezhad, "Kinematic
-    Model of a Four Mecanum Wheeled Mobile Robot", IJCA 113(3), 2015, for any slant.
+    The wheels have the given `radius` and the distances `half_base` (along x) and `half_track` (along y) from the
+    center, in m. `slant` is the cotangent of the angle between roller and wheel axle: 1 for 45 degrees. Seen from
+    above, the upper rollers point to the center, and the lower ones form an O. Source: Taheri, Qiao and Ghaeminezhad,
+    "Kinematic Model of a Four Mecanum Wheeled Mobile Robot", IJCA 113(3), 2015, here for any slant.
     """
 
     radius: float
@@ -35,11 +37,14 @@ class MecanumWheels:
 
     @property
     def lever(self) -> float:
-        """Distance in m that a wheel rolls per radian of rotation of the base."""
+        """Distance in m that a wheel rolls when the base rotates by one radian."""
         return self.half_track + self.slant * self.half_base
 
     def speeds(self, motion: Twist) -> WheelValues:
-        """Return the wheel rotations in rad (or rad/s) for a motion of the base in m and rad (or per second)."""
+        """Return the wheel speeds in rad/s for a velocity of the base.
+
+        For a displacement in m and rad instead of a velocity, the result is in rad.
+        """
         forward, left, turn = motion.vx, self.slant * motion.vy, self.lever * motion.wz
         return (
             (forward - left - turn) / self.radius,
@@ -49,7 +54,10 @@ class MecanumWheels:
         )
 
     def motion(self, speeds: WheelValues) -> Twist:
-        """Return the least-squares motion of the base for wheel rotations: the pseudo-inverse of `speeds`."""
+        """Return the velocity of the base that fits the wheel speeds in rad/s best: the pseudo-inverse of `speeds`.
+
+        For wheel rotations in rad instead of speeds, the result is a displacement in m and rad.
+        """
         front_left, front_right, rear_left, rear_right = (self.radius * speed / 4 for speed in speeds)
         return Twist(
             front_left + front_right + rear_left + rear_right,

@@ -1,4 +1,4 @@
-"""Parts of triangle meshes: submeshes, convexity, tiles of faces for lookup by position, and drivable surfaces."""
+"""Operations on triangle meshes: submeshes, convexity test, tiles of nearby faces, and detection of drivable solids."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ if TYPE_CHECKING:
 MAX_CONVEX_FACES = 400
 """Meshes with more faces are treated as concave without a test."""
 _YZX, _ZXY = (1, 2, 0), (2, 0, 1)
+"""Orders of coordinates in a cross product."""
 CONVEX_TOLERANCE_M = 1e-6
 """Distance in m by which vertices of a convex mesh may lie outside the plane of a face."""
 
 
 def submesh(vertices: Array, faces: Faces) -> Mesh:
-    """Return the given faces with only the vertices that they use."""
+    """Return a mesh of the given faces, with only the vertices that they use."""
     if faces.size < len(vertices) // 8:
         used, indices = np.unique(faces, return_inverse=True)
         return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
@@ -37,7 +38,7 @@ def submesh(vertices: Array, faces: Faces) -> Mesh:
 
 
 def submesh_between_heights(vertices: Array, faces: Faces, heights: tuple[float, float]) -> Mesh:
-    """Return the faces that are partly between two heights, with the vertices that they use."""
+    """Return a mesh of the faces that are partly between `heights`, the lowest and the highest z in m."""
     low, high = heights
     below, above = (outside[faces] for outside in (vertices[:, 2] < low, vertices[:, 2] > high))
     outside_range = (below[:, 0] & below[:, 1] & below[:, 2]) | (above[:, 0] & above[:, 1] & above[:, 2])
@@ -58,7 +59,11 @@ def is_convex(mesh: Mesh) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class FaceTiles:
-    """Faces in square tiles: `faces[starts[k]:starts[k + 1]]` are tile k, with bounds `low` and `high` (n, 2)."""
+    """Faces of a mesh, sorted into n square tiles of the plane to find those near a point quickly.
+
+    Tile k contains `faces[starts[k]:starts[k + 1]]`. All corners of its faces lie between `low[k]` and `high[k]`, given
+    as x and y in m.
+    """
 
     faces: Faces
     starts: Numbers
@@ -69,11 +74,11 @@ class FaceTiles:
         return len(self.low)
 
     def tile(self, number: int) -> Faces:
-        """Return the faces of a tile."""
+        """Return the faces of the tile with this index."""
         return self.faces[self.starts[number] : self.starts[number + 1]]
 
     def near(self, x: float, y: float, within: float) -> npt.NDArray[np.bool_]:
-        """Return which tiles may have a face within `within` m of a point."""
+        """Return which tiles may have a face within `within` m of the point (x, y)."""
         point = (x, y)
         outside = np.maximum(np.maximum(self.low - point, point - self.high), 0.0)
         found: npt.NDArray[np.bool_] = (outside * outside).sum(axis=1) <= within * within
@@ -81,7 +86,7 @@ class FaceTiles:
 
 
 def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
-    """Sort faces into square tiles with an edge of `edge` m, by the center of each face."""
+    """Sort faces by their centers into square tiles of `edge` x `edge` m."""
     corners = vertices[faces, :2]
     squares = np.floor(corners.mean(axis=1) / edge)
     order = np.lexsort((squares[:, 1], squares[:, 0]))
@@ -94,13 +99,14 @@ def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
 
 
 FLOOR_HEIGHT_M = 0.005
-"""Faces below this height are left to the ground plane, on which wheels roll smoothly."""
+"""Height up to which faces are ignored: wheels roll on the ground plane instead, which has no edges."""
 MAX_SLOPE_RAD = math.radians(50)
-"""Steeper faces are walls for every robot: rubber on dry concrete (friction 1) holds up to 45°."""
+"""Slope above which faces are walls for every robot: rubber on dry concrete (friction 1) holds up to 45°."""
 SOLIDS_PER_BATCH = 64
 """Number of solids that are compared with all others at once, to limit memory."""
 
-Owners = frozenset[int]
+SolidIndices = frozenset[int]
+"""Indices into `TriangleMesh.names`."""
 
 
 def face_normals(mesh: TriangleMesh) -> Array:
@@ -120,11 +126,11 @@ def upward_faces(mesh: TriangleMesh, max_slope: float = MAX_SLOPE_RAD) -> Mask:
 
 
 @cached_on_instance
-def drivable_solids(mesh: TriangleMesh, reach: float) -> Owners:
+def drivable_solids(mesh: TriangleMesh, reach: float) -> SolidIndices:
     """Return the indices of the fixed solids that wheels can roll on if they can climb steps of `reach` m.
 
-    A solid with an upward face at most `reach` m above the floor is drivable, and so are solids that wheels can reach
-    from a drivable solid. All other solids are walls, which only the hull of the robot touches.
+    A solid is drivable if its upward faces begin at most `reach` m above the floor, or if their bounding box is at most
+    `reach` m away from that of a drivable solid. All other solids are walls: only the hull of the robot touches them.
     """
     faces = np.flatnonzero(upward_faces(mesh))
     corners = mesh.vertices[mesh.faces[faces]]

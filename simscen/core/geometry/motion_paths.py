@@ -1,4 +1,4 @@
-"""Poses, speeds and steps of bodies on scripted paths."""
+"""Poses of bodies on scripted paths, and bounds of their speed and of their movement per tick."""
 
 import itertools
 import math
@@ -15,7 +15,7 @@ MAX_STEP_M = 0.1
 """Longest distance that any part of a scripted body may move per tick. Contact is tested once per tick, so a faster
 body could pass through a robot unnoticed. All robots are wider than this."""
 Step = tuple[float, float, float]
-"""Displacement along x and y in m, and rotation in rad; or their rates per second."""
+"""Displacement along x and y in m, and rotation in rad; or a velocity in m/s and rad/s."""
 _new_pose = tuple.__new__  # faster than the constructor of the class
 
 
@@ -41,7 +41,7 @@ def pose_at(path: MotionPath, seconds: float) -> Pose2:
 
 
 class PathSampler:
-    """Path at height `z` that is sampled at increasing times; values of the current segment are cached."""
+    """Samples a path at height `z` (m). It caches values of the current segment, so that increasing times are fast."""
 
     def __init__(self, path: MotionPath, z: float) -> None:
         self._path, self._z = path, z
@@ -52,7 +52,7 @@ class PathSampler:
         self._leg: PathSegment
 
     def at(self, seconds: float) -> Pose3:
-        """Return `pose_at` as a pose in space."""
+        """Return the pose in space, `seconds` after the path started; equal to `pose_at` in the plane."""
         path, z = self._path, self._z
         if not self._even:
             return Pose3.planar(pose_at(path, seconds), z)
@@ -97,7 +97,7 @@ class PathSegment(NamedTuple):
 
     @classmethod
     def of(cls, path: MotionPath, number: int) -> "PathSegment":
-        """Return the segment with this index."""
+        """Return the segment from pose `number` to the next one."""
         (x, y, yaw), to = path.poses[number], path.poses[number + 1]
         begin, end = path.times[number : number + 2]
         *_, qz, qw = Pose3.planar(Pose2(x, y, wrap(yaw)))
@@ -105,9 +105,9 @@ class PathSegment(NamedTuple):
 
 
 def top_speed(path: MotionPath, reach: float = 0.0) -> float:
-    """Return an upper bound in m/s of the speed of any point within `reach` m of the origin; inf for jumps.
+    """Return an upper bound in m/s of the speed of any point within `reach` m of the origin of the body.
 
-    The bound is exact for linear and smooth easing.
+    The result is inf if the path contains a jump. The bound is exact for linear and smooth easing.
     """
     speeds = [_speed(path, leg, reach) for leg in range(len(path.times) - 1)]
     if path.mode == "loop" and _meters(_step(path.poses[-1], path.poses[0]), reach) > 0:
@@ -116,9 +116,10 @@ def top_speed(path: MotionPath, reach: float = 0.0) -> float:
 
 
 def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
-    """Return an upper bound in m of the distance that a point within `reach` m moves within `seconds`.
+    """Return an upper bound in m of the distance that a point within `reach` m of the origin moves in any `seconds`.
 
-    Jumps do not count, as in worlds of Gazebo: a segment without duration, or a loop that does not close.
+    Jumps are left out: a segment without duration, or a loop that does not end where it begins. Worlds of Gazebo
+    contain such jumps on purpose.
     """
     durations = [end - begin for begin, end in itertools.pairwise(path.times)]
     lengths = [_speed(path, leg, reach) * duration if duration > 0 else 0.0 for leg, duration in enumerate(durations)]
@@ -140,8 +141,8 @@ def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
     return max(*after, *before)
 
 
-def too_fast(name: str, step: float) -> str:
-    """Return the message for a scripted body that moves `step` m in one tick."""
+def too_fast_message(name: str, step: float) -> str:
+    """Return the error message for a scripted body that moves `step` m in one tick, more than MAX_STEP_M."""
     return (
         f"`{name}` moves up to {step:.2g} m in one physics tick; contact with the robot can be missed if it moves more "
         f"than {MAX_STEP_M:g} m"
@@ -149,6 +150,7 @@ def too_fast(name: str, step: float) -> str:
 
 
 def _interpolate(time: float, times: Sequence[float], values: Sequence[float]) -> float:
+    """Return the value at `time` by linear interpolation; the first or last value outside of `times`."""
     if time <= times[0] or time >= times[-1]:
         return values[0] if time <= times[0] else values[-1]
     k = bisect_right(times, time)
@@ -157,7 +159,7 @@ def _interpolate(time: float, times: Sequence[float], values: Sequence[float]) -
 
 
 class SweptSegment(NamedTuple):
-    """Straight segment in the plane in m, and the largest `deviation` of the path from it."""
+    """Straight segment from (x, y) to (to_x, to_y), and the largest `deviation` of a path from it, in m."""
 
     x: float
     y: float
@@ -167,7 +169,7 @@ class SweptSegment(NamedTuple):
 
 
 def swept_segments(path: MotionPath) -> list[SweptSegment]:
-    """Return the segments that contain all positions on a path."""
+    """Return segments such that each position on the path is within `deviation` of one of them."""
     (x, y, _), *_ = poses = path.poses
     legs = range(len(path.times) - 1)
     return [SweptSegment(*poses[leg][:2], *poses[leg + 1][:2], _deviation(path, leg)) for leg in legs] or [
@@ -176,7 +178,7 @@ def swept_segments(path: MotionPath) -> list[SweptSegment]:
 
 
 def _deviation(path: MotionPath, leg: int) -> float:
-    """Return a bound of the deviation: a cubic curve lies in the hull of its control points."""
+    """Return an upper bound of the deviation in m: a cubic curve lies in the convex hull of its control points."""
     if path.ease != "spline":
         return 0.0
     third = (path.times[leg + 1] - path.times[leg]) / 3
@@ -184,6 +186,7 @@ def _deviation(path: MotionPath, leg: int) -> float:
 
 
 def _speed(path: MotionPath, leg: int, reach: float) -> float:
+    """Return an upper bound of the speed in m/s on segment `leg` of any point within `reach` m of the origin."""
     step, seconds = _step(path.poses[leg], path.poses[leg + 1]), path.times[leg + 1] - path.times[leg]
     if path.ease == "spline":
         # The velocity along a cubic curve is a quadratic Bézier curve, which lies within its control points.
@@ -197,6 +200,7 @@ def _speed(path: MotionPath, leg: int, reach: float) -> float:
 
 
 def _on_curve(path: MotionPath, leg: int, part: float) -> Pose2:
+    """Return the pose of a spline after the fraction `part` of the time of segment `leg`."""
     begin, end = path.poses[leg], path.poses[leg + 1]
     duration = path.times[leg + 1] - path.times[leg]
     smooth_part = part * part * (3.0 - 2.0 * part)
@@ -230,6 +234,7 @@ def _step(begin: Pose2, end: Pose2) -> Step:
 
 
 def _meters(step: Step, reach: float) -> float:
+    """Return an upper bound in m of the displacement of any point within `reach` m of the origin."""
     return math.hypot(step[0], step[1]) + reach * abs(step[2])
 
 

@@ -1,4 +1,7 @@
-"""Polygons in the plane: distances to points, decomposition into convex pieces, and separation of two polygons."""
+"""Polygons in the plane: distances to points, validity, decomposition into convex pieces, and signed separation.
+
+A polygon is a sequence of corners (x, y) in m. Its last corner is connected to the first one.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +20,13 @@ if TYPE_CHECKING:
 Corner = tuple[float, float]
 
 MIN_WIDTH_M = 1e-6
-"""Thinner polygons have no area."""
+"""Width below which a polygon counts as one without area."""
 POINT = ((0.0, 0.0),)
-"""Outline of a body without extent: only its position counts."""
+"""Outline of a body that is only a point."""
 
 
-def distance_to_polygon(point: Pose2, corners: Sequence[tuple[float, float]]) -> float:
-    """Return the distance in m from a point to a filled polygon; 0 inside."""
+def distance_to_polygon(point: Pose2, corners: Sequence[Corner]) -> float:
+    """Return the distance in m from a point to a filled polygon; 0 inside. The heading has no effect."""
     edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
     if polygon_contains(corners, (point.x, point.y)):
         return 0.0
@@ -41,7 +44,7 @@ def points_in_polygon(corners: Sequence[Corner], points: Array) -> npt.NDArray[n
 
 
 def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
-    """Return the distance in m of a position inside a polygon from its border; -1 outside."""
+    """Return the distance in m from a position inside a polygon to its border; -1 for a position outside."""
     if not polygon_contains(corners, (pose.x, pose.y)):
         return -1.0
     return min(
@@ -50,7 +53,7 @@ def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
 
 
 def polygon_defect(ring: Sequence[Corner]) -> str | None:
-    """Return why a ring of corners is not the border of one area, as words after "it"; None if it is.
+    """Return what is wrong with a ring of corners, such as "encloses no area"; None if it is the border of one area.
 
     Repeated corners count once, so a ring may end with its first corner.
     """
@@ -73,7 +76,7 @@ def polygon_defect(ring: Sequence[Corner]) -> str | None:
 
 
 def without_repeated_corners(ring: Sequence[Corner]) -> tuple[Corner, ...]:
-    """Return the corners without those equal to the previous one."""
+    """Return the corners without those that equal the corner before them."""
     return tuple(corner for k, corner in enumerate(ring) if corner != ring[k - 1])
 
 
@@ -114,7 +117,7 @@ def _lies_between(a: Corner, b: Corner, point: Corner) -> bool:
     return all(min(a[k], b[k]) <= point[k] <= max(a[k], b[k]) for k in (0, 1))
 
 
-def distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> float:
+def distance_to_segment(x: float, y: float, a: Corner, b: Corner) -> float:
     """Return the distance in m from (x, y) to the segment from a to b."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     squared = dx * dx + dy * dy
@@ -123,7 +126,7 @@ def distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[flo
     return math.hypot(x - a[0] - along * dx, y - a[1] - along * dy)
 
 
-def polygon_contains(corners: Sequence[tuple[float, float]], point: tuple[float, float]) -> bool:
+def polygon_contains(corners: Sequence[Corner], point: Corner) -> bool:
     """Return whether a point is inside a polygon. Points on an edge may count either way."""
     return (
         sum(_ray_crosses_edge(point, a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)) % 2 == 1
@@ -138,21 +141,25 @@ def segments_cross(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
     )
 
 
-def _ray_crosses_edge(point: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> bool:
-    """Return whether a ray from the point along +x crosses the edge (half-open, so that corners count once)."""
+def _ray_crosses_edge(point: Corner, a: Corner, b: Corner) -> bool:
+    """Return whether a ray from the point along +x crosses the edge from a to b.
+
+    Of the two ends of an edge, only the lower one belongs to it, so that a ray through a corner crosses one edge.
+    """
     if (a[1] > point[1]) == (b[1] > point[1]):
         return False
     return point[0] < a[0] + (point[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
 
 
 Piece = tuple[Corner, ...]
+"""Convex polygon, counterclockwise."""
 
 
 def convex_pieces(ring: Sequence[Corner]) -> list[Piece]:
     """Decompose a valid ring into convex counterclockwise polygons that cover it exactly once.
 
-    Ear clipping, then removal of unnecessary diagonals (Hertel and Mehlhorn, 1983): at most four times the minimum
-    number of pieces. Raises ValueError for a ring that intersects itself.
+    Ear clipping, then removal of unnecessary diagonals (Hertel and Mehlhorn, 1983). The result has at most four times
+    the minimum number of pieces. Raises ValueError for a ring that intersects itself.
     """
     corners = without_repeated_corners(ring)
     if sum(signed_double_area(corners[0], a, b) for a, b in pairwise(corners)) < 0:
@@ -176,6 +183,7 @@ def _triangles(corners: list[Corner]) -> list[Piece]:
 
 
 def _triangle_at(corners: Sequence[Corner], k: int) -> tuple[Corner, Corner, Corner]:
+    """Return corner k with the corners before and after it."""
     return corners[k - 1], corners[k], corners[(k + 1) % len(corners)]
 
 
@@ -196,6 +204,7 @@ def _is_ear(corners: Sequence[Corner], k: int) -> bool:
 
 
 def _merge_triangles(triangles: Sequence[Piece]) -> list[Piece]:
+    """Join neighboring triangles and pieces as long as the results are convex."""
     pieces = dict(enumerate(triangles))
     owner = {edge: number for number, piece in pieces.items() for edge in _edges(piece)}
     for a, b in list(owner):
@@ -226,11 +235,12 @@ def _is_convex(corners: Sequence[Corner]) -> bool:
 
 
 def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) -> Array:
-    """Return the signed distance (n,) in m between `moving` at `poses` (n, 3) and `fixed`, both filled polygons.
+    """Return the signed distance (n,) in m between two filled polygons: `moving` at `poses` (n, 3), and `fixed`.
 
-    Positive values are the distance between the nearest points. Negative values are the shortest translation that would
-    separate the polygons; for concave polygons, that of the pair of convex pieces with the deepest penetration, a lower
-    bound. `moving` may be a single point. Raises ValueError for a polygon that intersects itself.
+    A positive value is the distance between the nearest points. A negative value means that the polygons overlap: its
+    magnitude is the length of the shortest translation that separates them. For concave polygons, it is that of the
+    pair of convex pieces with the deepest overlap, which is a lower bound. `moving` may be a single point. Raises
+    ValueError for a polygon that intersects itself.
     """
     pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
     others = [_array(piece) for piece in convex_pieces(fixed)]
@@ -245,15 +255,14 @@ def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) 
 
 
 POSES_PER_BATCH = 64
-"""Number of poses that share one search for nearby boxes; consecutive poses of a drive are close together."""
+"""Number of consecutive poses with one common search for nearby boxes; they are close together in a drive."""
 
 
 def separation_from_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) -> Array:
-    """Return `separation` from the nearest of many rectangles (m, 4) as min x, min y, max x, max y; inf for none.
+    """Return the smallest `separation` (n,) of `moving` at `poses` (n, 3) from any of many rectangles.
 
-    If rectangles overlap the polygon, the deepest one counts. Only rectangles that can be the nearest are compared:
-    their distance from the position of the robot differs from that of the hull by at most the radius of the hull. The
-    same holds for a batch of poses and their mean position.
+    `boxes` (m, 4) are min x, min y, max x, max y in m. The result is inf if there are none. For speed, only rectangles
+    that can be the nearest are compared exactly, first for a batch of poses and then for each pose.
     """
     pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
     reach = max(float(np.hypot(*piece.T).max()) for piece in pieces)
@@ -271,7 +280,10 @@ def separation_from_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) 
 
 
 def _can_be_nearest(points: Array, boxes: Array, reach: float) -> npt.NDArray[np.bool_]:
-    """Return which boxes (m, 4) can be the nearest to anything within `reach` of the points (n, 2)."""
+    """Return which boxes (m, 4) can be the nearest to a polygon that lies within `reach` m of each point (n, 2).
+
+    The distances of a box from the point and from the polygon differ by at most `reach`. The result is (n, m).
+    """
     beside = np.maximum(boxes[:, :2] - points[:, np.newaxis], points[:, np.newaxis] - boxes[:, 2:])
     outside = np.maximum(beside, 0.0)
     gaps = np.hypot(outside[..., 0], outside[..., 1])
@@ -284,7 +296,7 @@ def _array(corners: Sequence[Corner]) -> Array:
 
 
 def _transformed_corners(poses: Array, corners: Array) -> Array:
-    """Return corners (h, 2) of the robot frame in the world frame, (n, h, 2)."""
+    """Return the corners (h, 2) of a polygon at each of the `poses` (n, 3), as (n, h, 2)."""
     c, s = np.cos(poses[:, 2])[:, np.newaxis], np.sin(poses[:, 2])[:, np.newaxis]
     turned = np.stack((c * corners[:, 0] - s * corners[:, 1], s * corners[:, 0] + c * corners[:, 1]), axis=2)
     placed: Array = turned + poses[:, np.newaxis, :2]
@@ -292,10 +304,11 @@ def _transformed_corners(poses: Array, corners: Array) -> Array:
 
 
 def _convex_separation(moving: Array, still: Array) -> Array:
-    """Return the separation of convex counterclockwise polygons (n, h, 2) and (n, r, 2).
+    """Return the separations (n,) of n pairs of convex counterclockwise polygons, (n, h, 2) and (n, r, 2).
 
-    By the separating axis theorem, two convex polygons overlap unless an edge of one has the other polygon outside. The
-    least overlap along the edge normals is the shortest translation that separates them.
+    By the separating axis theorem, two convex polygons are apart if and only if one of them lies on the outer side of
+    an edge of the other. If they overlap, the smallest overlap along an edge normal is the shortest translation that
+    separates them.
     """
     along = np.maximum(_separation_along_normals(still, moving), _separation_along_normals(moving, still))
     apart = np.minimum(_distance_to_border(moving, still), _distance_to_border(still, moving))
@@ -304,7 +317,10 @@ def _convex_separation(moving: Array, still: Array) -> Array:
 
 
 def _separation_along_normals(polygon: Array, points: Array) -> Array:
-    """Return the largest distance over the edges of `polygon` (n, m, 2) of the nearest of `points` (n, k, 2)."""
+    """Return the largest signed distance (n,) along an outward edge normal from `polygon` to `points`.
+
+    `polygon` is (n, m, 2), and `points` are (n, k, 2). For each edge, the innermost of the points counts.
+    """
     if polygon.shape[1] < 2:
         return np.full(len(points), -np.inf)
     along = np.roll(polygon, -1, axis=1) - polygon
@@ -315,7 +331,7 @@ def _separation_along_normals(polygon: Array, points: Array) -> Array:
 
 
 def _distance_to_border(points: Array, polygon: Array) -> Array:
-    """Return the distance of the points (n, k, 2) to the border of `polygon` (n, m, 2)."""
+    """Return the smallest distance (n,) of the points (n, k, 2) to the border of `polygon` (n, m, 2)."""
     along = np.roll(polygon, -1, axis=1) - polygon
     squared = np.maximum((along**2).sum(axis=2), np.finfo(np.float64).tiny)[:, np.newaxis]
     offset = points[:, :, np.newaxis] - polygon[:, np.newaxis]
@@ -326,8 +342,9 @@ def _distance_to_border(points: Array, polygon: Array) -> Array:
 
 
 def path_corners(path: Array, tolerance: float) -> list[int]:
-    """Return the indices, without both ends, between which a path (n, 2) is within `tolerance` m of straight lines.
+    """Return the indices of the inner corners of a path (n, 2), simplified to straight lines.
 
+    The path deviates from the lines by at most `tolerance` m. The first and the last point are not in the result.
     Source: Douglas and Peucker, Algorithms for the reduction of the number of points (1973).
     """
     line, offsets = path[-1] - path[0], path - path[0]

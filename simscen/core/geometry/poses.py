@@ -33,6 +33,7 @@ def wrap_array(angles: Array) -> Array:
 
 
 Vector = tuple[float, float, float]
+"""(x, y, z)."""
 
 
 def rotated(turn: tuple[float, float, float, float], vector: Vector) -> Vector:
@@ -53,7 +54,7 @@ def forward_and_left(turn: tuple[float, float, float, float]) -> tuple[Vector, V
 
 
 class Pose2(NamedTuple):
-    """Position and heading in the plane; read `a_from_b` as the pose of frame b in frame a."""
+    """Position (m) and heading (rad) in the plane. A variable `a_from_b` is the pose of frame b in frame a."""
 
     x: float
     y: float
@@ -84,7 +85,7 @@ class Pose2(NamedTuple):
         return _new_pose(Pose2, (along, left, turned if turned != -_PI else _PI))
 
     def apply(self, points: Array) -> Array:
-        """Return points (n, 2) of the frame of this pose in its parent frame."""
+        """Transform points (n, 2) from the frame at this pose to its parent frame."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         moved: Array = points @ np.array([[c, s], [-s, c]]) + np.array([self.x, self.y])
         return moved
@@ -95,7 +96,7 @@ class Pose2(NamedTuple):
 
 
 class Pose3(NamedTuple):
-    """Position and unit quaternion (x, y, z, w) in space."""
+    """Position (m) and orientation in space; the orientation is a unit quaternion (x, y, z, w)."""
 
     x: float = 0.0
     y: float = 0.0
@@ -121,7 +122,10 @@ class Pose3(NamedTuple):
 
     @classmethod
     def planar(cls, pose: Pose2, z: float = 0.0) -> Pose3:
-        """Return a pose of the plane at height `z`. An infinite heading, as of broken odometry, becomes nan."""
+        """Return the pose in space of a pose in the plane at height `z` (m).
+
+        An infinite heading, which corrupted odometry can have, becomes nan.
+        """
         x, y, yaw = pose
         half = yaw / 2 if _isfinite(yaw) else math.nan
         return _new_pose(cls, (x, y, z, 0.0, 0.0, _sin(half), _cos(half)))
@@ -148,7 +152,7 @@ class Pose3(NamedTuple):
         return np.array([[a, d, 2 * (x * z + y * w)], [b, e, 2 * (y * z - x * w)], [c, f, 1 - 2 * (x * x + y * y)]])
 
     def apply(self, points: Array) -> Array:
-        """Return points (n, 3) of the frame of this pose in its parent frame."""
+        """Transform points (n, 3) from the frame at this pose to its parent frame."""
         moved: Array = points @ self.rotation().T + np.array(self.position)
         return moved
 
@@ -166,7 +170,7 @@ class Pose3(NamedTuple):
         )  # fmt: skip
 
     def _moved(self, point: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Return a point of this frame in the parent frame; upright poses do not need numpy for this."""
+        """Transform a point from this frame to the parent frame; without numpy if the pose is level, for speed."""
         if self.qx != 0 or self.qy != 0:
             x, y, z = self.apply(np.array([point]))[0].tolist()
             return x, y, z

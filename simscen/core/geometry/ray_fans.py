@@ -1,4 +1,7 @@
-"""Rays in packets of 16 for Embree (`RTCRayHit16`), fans of lidar rays, and the ray caster protocol."""
+"""Interface of ray casters, fans of rays such as those of a lidar, and their buffers for Embree.
+
+Embree casts rays in packets of 16 (`RTCRayHit16`).
+"""
 
 from __future__ import annotations
 
@@ -17,20 +20,25 @@ Singles = npt.NDArray[np.float32]
 PACKET_SIZE = 16
 """Number of rays per packet."""
 _ROWS = 21
-"""Values per ray: start, nearest, direction, time, end, mask, id, flags; then 9 of the hit."""
+"""Number of values per ray, one row of a packet each.
+
+In order: start (3), minimum distance, direction (3), time, maximum distance, mask, id, flags, and 9 values of the hit.
+"""
 _END, _MASK, _HIT = 8, 9, 17
+"""Row of the maximum distance, row of the mask, and first row of the ids of the hit."""
 _PACKET_ALIGNMENT, _VALUE_BYTES = 64, 4
 """Alignment of packets, and size of values, in bytes."""
 _ALL_BITS = 0xFFFFFFFF
+"""As a mask: the ray hits all geometries. As an id: nothing was hit."""
 MIN_DIRECTION_COMPONENT = 2e-18
 """Smaller direction components are set to 0. Embree treats components within 1e-18 as positive, but groups the rays of
 a packet by the signs of their components, so that a packet with such rays would not hit anything."""
 
 
 class RayPackets:
-    """Buffer of rays: `starts` and `directions` (packets, 3, 16), and `ends` (packets, 16), which become the hits.
+    """Buffer of `count` rays for Embree: `starts` and `directions` (packets, 3, 16), and `ends` (packets, 16).
 
-    Rays whose end is before their start are skipped; they fill up the last packet.
+    `ends` are the maximum lengths of the rays in m. Embree overwrites them with the distances of the hits.
     """
 
     def __init__(self, count: int) -> None:
@@ -50,7 +58,10 @@ class RayPackets:
         """Address of each packet."""
 
     def put(self, starts: Array, directions: Array, ends: float | Singles) -> None:
-        """Set the rays: they begin at `starts` (n, 3) and extend along `directions` (n, 3) up to `ends`."""
+        """Set the rays: they begin at `starts` (n, 3) and extend along `directions` (n, 3) up to the lengths `ends`.
+
+        Rays of negative length, which Embree skips, fill up the last packet.
+        """
         for rows, values in ((self.starts, starts), (self.directions, directions)):
             flat = np.zeros((len(rows) * PACKET_SIZE, 3), dtype=np.float32)
             flat[: self._count] = values
@@ -61,17 +72,18 @@ class RayPackets:
         self.ends[:] = last.reshape(-1, PACKET_SIZE)
 
     def distances(self) -> Singles:
-        """Return the current length (n,) of each ray."""
+        """Return the current length (n,) of each ray in m: the distance of the hit after Embree has cast the rays."""
         return self.ends.flatten()[: self._count]
 
 
 ALL_PACKETS = slice(None)
+"""All packets of a fan."""
 
 
 class RayFan:
     """Evenly spaced rays in one plane with a common origin, as those of a lidar.
 
-    Holds the buffers that each scan overwrites: origin, directions and lengths.
+    All scans use the same buffers, which each scan overwrites.
     """
 
     def __init__(self, first: float, increment: float, count: int) -> None:
@@ -87,16 +99,16 @@ class RayFan:
         return self._count
 
     def at(self, pose: Pose3) -> tuple[Array, Array]:
-        """Return origins (n, 3) and unit directions (n, 3) of the rays of a fan with its frame at `pose`."""
+        """Return origins (n, 3) and unit directions (n, 3) of the rays if the frame of the fan is at `pose`."""
         (x, y), rotation = self._flat[:, : self._count], pose.rotation()
         return np.repeat([pose.position], self._count, axis=0), np.column_stack((x, y, np.zeros_like(x))) @ rotation.T
 
     def set_origin(self, x: float, y: float, z: float, packets: slice = ALL_PACKETS) -> None:
-        """Set the origin of the rays in some `packets`."""
+        """Set the origin (m) of the rays in the given packets."""
         self.rays.starts[packets] = np.array(((x,), (y,), (z,)), dtype=np.float32)
 
     def set_directions(self, forward: Vector, left: Vector, packets: slice = ALL_PACKETS) -> None:
-        """Compute the directions in some `packets`, with the x and y axes of the fan along `forward` and `left`."""
+        """Set the directions of the rays in the given packets; `forward` and `left` are the x and y axes of the fan."""
         directions = self.rays.directions[packets]
         flat = (
             self._flat
@@ -108,11 +120,14 @@ class RayFan:
         directions[:] = turned.reshape(3, -1, PACKET_SIZE).swapaxes(0, 1)
 
     def set_length(self, reach: float) -> None:
-        """Limit the length of all rays."""
+        """Set the maximum length of all rays in m."""
         self.rays.ends[:] = reach
 
-    def towards(self, x: float, y: float, min_dot: float) -> list[slice]:
-        """Return the ranges of rays whose dot product with (x, y) is at least `min_dot`, and some neighbors."""
+    def rays_towards(self, x: float, y: float, min_dot: float) -> list[slice]:
+        """Return the ranges of rays whose unit direction has a dot product of at least `min_dot` with (x, y).
+
+        (x, y) is in the frame of the fan. The ranges may contain a few more rays at their ends.
+        """
         far = math.hypot(x, y)
         if min_dot > far:
             return []
@@ -129,7 +144,7 @@ class RayFan:
 
 
 class RayCaster(Protocol):
-    """Casts rays against all solids except the robot that carries the sensor."""
+    """Finds what rays hit: all solids except the robot that carries the sensor."""
 
     @abstractmethod
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
@@ -142,8 +157,9 @@ class RayCaster(Protocol):
         ...
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Array | Singles:
-        """Return the distances (n,) of a fan with its frame at `pose`; values beyond `reach` mean no hit.
+        """Return the distances (n,) in m for the rays of a fan with its frame at `pose`.
 
-        Faster than `cast`, because all rays have the same origin.
+        Values beyond `reach` mean that nothing was hit. Implementations can be faster than `cast`, because all rays
+        have the same origin.
         """
         return self.cast(*fan.at(pose), reach)

@@ -1,4 +1,4 @@
-"""Poses of scripted bodies at many ticks, computed in one batch."""
+"""Poses of objects on scripted paths, computed in one batch for many ticks because this is faster."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -13,23 +13,23 @@ _new_pose = tuple.__new__  # faster than the constructor of the class
 
 
 class PredictedPoses:
-    """Poses of objects at `ticks`, as far as scripted paths determine them.
+    """Poses of all objects at each of `ticks`, a range in which only scripted paths move objects.
 
-    `names` are the objects that move during these ticks, and `table` (ticks, names, 7) has their poses. `all_objects`
-    has a pose of each object by name, moving or at rest; only the poses of objects at rest are used.
+    `names` are the objects that move, and `table` (ticks, names, 7) contains their poses as x, y, z and a quaternion.
+    `all_objects` contains all objects by name; only the poses of those at rest are used.
     """
 
     def __init__(self, ticks: range, names: tuple[str, ...], table: Array, all_objects: Mapping[str, Pose3]) -> None:
         self.ticks, self.names, self.table, self.all_objects = ticks, names, table, all_objects
         self.complete = len(names) == len(all_objects)
-        """Whether all objects move."""
+        """Whether no object is at rest."""
 
     def at(self, tick: int) -> "PosesAtTick | None":
         """Return the poses at a tick, or None outside of `ticks`."""
         return PosesAtTick(self, self.ticks.index(tick)) if tick in self.ticks else None
 
     def farther_than(self, point: Vector, distance: float) -> set[str]:
-        """Return the moving objects that stay more than `distance` m away from a point."""
+        """Return the moving objects that stay more than `distance` m away from `point` at all ticks."""
         offsets = self.table[:, :, :3] - point
         nearest = (offsets * offsets).sum(axis=2).min(axis=0)
         return {
@@ -38,7 +38,7 @@ class PredictedPoses:
 
     @cached_property
     def columns(self) -> dict[str, int]:
-        """Column of each moving object in the table."""
+        """Index of each moving object in the second dimension of `table`."""
         return {name: column for column, name in enumerate(self.names)}
 
     @cached_property
@@ -49,7 +49,7 @@ class PredictedPoses:
 
 
 class PosesAtTick(Mapping[str, Pose3]):
-    """Poses of all objects at the tick of one `row` of `predicted.table`; each pose is created on access."""
+    """Poses of all objects by name at one tick, that of `row` of `predicted.table`. Each pose is created on access."""
 
     __slots__ = ("predicted", "row")
 
@@ -79,13 +79,14 @@ class PosesAtTick(Mapping[str, Pose3]):
 
 
 class BatchPathSampler:
-    """Samples many paths at many times at once, bit-identical to `PathSampler.at`. Each path is at a constant height.
+    """Samples many paths at many times at once, with exactly the results of `PathSampler.at`.
 
-    Segments with rotation or easing are sampled one by one, because a sine of numpy may differ in the last bit. Most
-    segments have a constant heading.
+    Segments with rotation or easing are sampled one by one, because the sine of numpy may differ in the last bit. They
+    are rare: most segments have a constant heading.
     """
 
     def __init__(self, paths_and_heights: Sequence[tuple[MotionPath, float]]) -> None:
+        """Take the paths, each with its constant height in m."""
         self._tracks = [PathSampler(*pair) for pair in paths_and_heights]
         self._z = np.array([z for _, z in paths_and_heights])
         paths = [path for path, _ in paths_and_heights]
@@ -109,7 +110,7 @@ class BatchPathSampler:
         self._turns = self._legs[7] != 0
 
     def at(self, seconds: Array) -> Array:
-        """Return poses (n, m, 7) at times (n, m), each relative to the start of its path."""
+        """Return poses (n, m, 7) of the m paths at n times; `seconds` (n, m) are relative to the start of each path."""
         running = seconds - self._start
         local = self._phase + np.where(running > 0, running, 0.0)
         since = local - self._first
@@ -131,4 +132,4 @@ class BatchPathSampler:
 
 
 _PLACEHOLDER = PathSegment(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-"""Placeholder of paths that are sampled one by one."""
+"""Segment in place of those of a path that is sampled one by one; `turn` is not 0, which selects this."""

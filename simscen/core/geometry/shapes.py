@@ -1,4 +1,4 @@
-"""Shapes, solids and bodies. Physics, ray casting and maps use the same solids.
+"""Shapes, solids, bodies, and the paths that move bodies. Physics, ray casting and maps use the same solids.
 
 Each shape is given in its own frame: boxes, cylinders, capsules and cones are centered, with z as their axis. Sizes are
 in m.
@@ -84,7 +84,7 @@ Shape = Box | Cylinder | Sphere | Capsule | Ellipsoid | Cone | Extrusion | Mesh
 
 @dataclass(frozen=True)
 class Solid:
-    """Shape at a pose: `pose` is the frame of the shape in the frame of the owner."""
+    """Shape at a pose. `pose` is the pose of the shape in the frame of its body, or in the world if it is fixed."""
 
     shape: Shape
     pose: Pose3 = Pose3()
@@ -97,8 +97,8 @@ class Solid:
 class Body:
     """Rigid body that can move.
 
-    `pose` is its start pose, and `solids` are in its own frame. `mass` is in kg; 0 means that only the scenario moves
-    it. `path` scripts its motion.
+    `pose` is its start pose in the world, and `solids` are in its own frame. `mass` is in kg; 0 means that it cannot be
+    pushed: only the scenario moves it. `path` is the path on which it moves from the start of the run.
     """
 
     name: str
@@ -112,8 +112,8 @@ class Body:
 class MotionPath:
     """Path through planar poses: at path time `times[k]` (s), a body on the path is at `poses[k]`.
 
-    The path time is `phase` until `start` seconds after the start of the path, and increases from then on. `mode` is
-    "once" (stay at the end), "loop" (start over), or "back_and_forth". `ease` is the motion between two poses:
+    The body first waits for `start` seconds at path time `phase`; then the path time increases. `mode` is "once" (stay
+    at the end), "loop" (start over), or "back_and_forth". `ease` is the motion between two poses:
 
     - "linear": constant velocity.
     - "smooth": from rest to rest, with 3 u² - 2 u³ of the distance after the fraction u of the time; the peak speed is
@@ -132,20 +132,21 @@ class MotionPath:
     phase: float = 0.0
 
     def elapsed(self, seconds: float) -> float:
-        """Return the path time `seconds` after the start of the path, before folding of repetitions."""
+        """Return the path time, `seconds` after the path started. It keeps increasing when the path repeats."""
         return self.phase + max(0.0, seconds - self.start)
 
     def has_ended(self, seconds: float) -> bool:
-        """Return whether the motion has ended `seconds` after the start of the path."""
+        """Return whether the motion has ended, `seconds` after the path started."""
         return self.mode == "once" and self.elapsed(seconds) >= self.times[-1]
 
 
 @dataclass(frozen=True)
 class TriangleMesh:
-    """Fused solids: `vertices` (n, 3), `faces` (m, 3), and the index into `names` of the owner of each face.
+    """One mesh of many solids: `vertices` (n, 3) in m, and `faces` (m, 3).
 
-    `frictions` are the surface frictions by the same index; empty if all are 1. `hulls` are the vertices of solids
-    known to be convex, and None for others; empty if not computed.
+    `owners` (m,) are the indices of the solids that the faces belong to. `names`, `frictions`, and `hulls` have one
+    element per solid. `frictions` are those of the surfaces; empty if all are 1. `hulls` are the ranges of the vertices
+    of convex solids, and None for other solids; empty if convexity was not tested.
     """
 
     vertices: Array
@@ -157,16 +158,17 @@ class TriangleMesh:
 
 
 MAX_SAGITTA_M = 0.0005
-"""Greatest depth by which a facet cuts into a circle: half of the resolution of lidars."""
+"""Greatest depth by which a facet may cut into a circle: half of the resolution of lidars."""
 FACET_COUNT_RANGE = (12, 192)
 """Smallest and greatest number of facets of a circle."""
 
 
 def facet_count(radius: float, max_sagitta: float = MAX_SAGITTA_M) -> int:
-    """Return the number of facets with which no facet cuts deeper than `max_sagitta` m into a circle.
+    """Return the number of facets that approximate a circle of `radius` m.
 
-    The result is a multiple of 4 within FACET_COUNT_RANGE. A chord over the angle 2π/n cuts r (1 - cos(π/n)) into a
-    circle. With a multiple of 4 the extents along x and y are exact.
+    No facet cuts deeper than `max_sagitta` m into the circle, unless this requires more facets than FACET_COUNT_RANGE
+    allows. One of n facets cuts by r (1 - cos(π/n)). The result is a multiple of 4, so that the extents along x and y
+    are exact.
     """
     fewest, most = FACET_COUNT_RANGE
     needed = math.pi / math.acos(1 - max_sagitta / radius) if radius > max_sagitta else fewest

@@ -1,4 +1,4 @@
-"""Goals and their names, paths, results (with the names and numbers of Nav2), and the belief of a localizer."""
+"""Goals, paths, beliefs, and results of navigation, with the names and error codes of Nav2."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array, Pose2
 
 RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup", "retrace"]
-"""Recovery behaviors with Nav2's names."""
+"""Recovery behavior; `retrace` is one of simscen, the others have Nav2's names."""
 
 ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate"]
-"""Reason for a new plan to the same goal: the old one is blocked, the robot left it, an obstacle is too close to it, a
-better one is free, the rolling window moved, a recovery ended, or the planning period has passed."""
+"""Reason for a new plan to the same goal.
+
+In this order: the old plan is blocked, the robot has left it, an obstacle is too close to it, a better plan is
+possible, the rolling window has moved, a recovery has ended, or the planning period has passed.
+"""
 
 
 class ErrorCode(IntEnum):
@@ -57,9 +60,9 @@ _THROUGH_POSES = {**{code + 100: code for code in range(200, 209)}, **{code + 10
 
 
 def error_code(number: int) -> ErrorCode | int:
-    """Return Nav2's error code for a number, or an unknown number itself.
+    """Return Nav2's error code with this number, or the number itself if ErrorCode does not contain it.
 
-    The codes of the actions through several poses become those of the same errors of the actions to one pose.
+    For an error of an action through several poses, return the code of the same error of the action to one pose.
     """
     number = _THROUGH_POSES.get(number, number)
     return ErrorCode(number) if number in {int(code) for code in ErrorCode} else number
@@ -76,10 +79,11 @@ class TaskResult(str, Enum):
 
 @fast_dataclass()
 class Goal:
-    """Pose to reach in the map frame within tolerances (m, rad), in at most `timeout` simulated seconds.
+    """Pose in the map frame that the robot must reach within the tolerances (m, rad).
 
-    A `via` goal is passed within its tolerance without a stop and with any heading, in one plan with the next goal
-    (Nav2's NavigateThroughPoses). `wait` is the time in simulated seconds to stay there (Nav2's WaitAtWaypoint).
+    `timeout` is the maximum simulated time in s; None for no limit. A `via` goal is only passed: without a stop, with
+    any heading, and in one plan with the next goal (Nav2's NavigateThroughPoses). `wait` is the simulated time in s for
+    which the robot stays at the goal (Nav2's WaitAtWaypoint).
     """
 
     name: str
@@ -91,13 +95,13 @@ class Goal:
     wait: float = 0.0
 
     def at(self, pose: Pose2) -> Goal:
-        """Return the same goal at another pose or in another frame."""
+        """Return the same goal with another pose, for example in another frame."""
         return Goal(self.name, pose, self.xy_tolerance, self.yaw_tolerance, self.timeout, self.via, self.wait)
 
 
 @fast_dataclass(eq=False)
 class Path:
-    """Planned path: `points` (n, 3) are x, y, yaw in the map frame; `tick` is the time of planning."""
+    """Planned path: `points` (n, 3) are x, y, yaw in the map frame; `tick` is the tick at which it was planned."""
 
     points: Array = field(default_factory=lambda: np.empty((0, 3)))
     tick: int = 0
@@ -109,9 +113,10 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Initial estimate for a localizer: `pose`, or None if the robot can be anywhere on the map.
+    """Initial estimate for a localizer.
 
-    `std` are the standard deviations of x, y (m) and yaw (rad).
+    `pose` is in the map frame; None if the robot can be anywhere on the map. `std` are the standard deviations of x, y
+    (m) and yaw (rad).
     """
 
     pose: Pose2 | None
@@ -120,10 +125,10 @@ class Estimate:
 
 @fast_dataclass(eq=False)
 class Belief:
-    """Output of a localizer: `pose` in the map frame and its covariance (3, 3) over (x, y, yaw).
+    """Output of a localizer: the estimated `pose` in the map frame and its covariance (3, 3) over x, y (m), yaw (rad).
 
     `map_from_odom` is the transform that the localizer publishes on /tf. `particles` (n, 4) are x, y, yaw, weight;
-    empty for a localizer without particles. `updated` is the tick of the newest measurement that it used.
+    empty for a localizer without particles. `updated` is the tick of the newest measurement that the estimate uses.
     """
 
     pose: Pose2
@@ -137,20 +142,23 @@ Mode = Literal["navigate_to_pose", "navigate_through_poses", "follow_waypoints"]
 """Nav2's navigation actions: one goal after the other, all goals in one drive, or waypoints with a task at each."""
 
 FAILED = "failed"
-"""Expected end of a goal that fails with any error code."""
+"""Value of `expect` for a goal that must fail, no matter with which error code."""
 
 
 def loop_goal_name(name: str, loop: int) -> str:
-    """Return the name of a goal in the given loop over the list of goals, counted from 1."""
+    """Return the name of a goal in a loop over the list of goals: `shelf` in loop 1, `shelf#2` in loop 2."""
     return name if loop == 1 else f"{name}#{loop}"
 
 
 LOOP_NAME = re.compile(r"(.+)#[0-9]+")
-"""Name of a goal in a loop after the first."""
+"""Pattern of `loop_goal_name` for loops after the first."""
 
 
 def matches_goal_name(name: str, requested: str | None) -> bool:
-    """Return whether a goal matches a name: `shelf` matches in every loop, `shelf#2` only in the second."""
+    """Return whether the goal `name` is meant by `requested`.
+
+    A request of `shelf` means the goal in every loop, `shelf#2` only in the second loop, and None any goal.
+    """
     if requested is None or name == requested:
         return True
     loop = LOOP_NAME.fullmatch(name)

@@ -1,4 +1,7 @@
-"""Sensor readings. Each contains the instance name of its sensor and the tick at which it was taken."""
+"""Sensor readings, and their conversion for sensors that are tilted.
+
+Each reading contains the name of its sensor in the robot file and the tick at which it was measured.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
 PoseCovariance = tuple[float, float, float, float, float, float, float, float, float]
 """Covariance of x, y (m) and yaw (rad), row by row."""
 UNKNOWN_POSE_COVARIANCE: PoseCovariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Zeros mean unknown, as in ROS."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +33,7 @@ class Scan:
     `ranges` (n,) are in m; by REP 117, inf if nothing was hit up to `range_max`, -inf if a hit is closer than
     `range_min`, and nan if a beam gave no valid measurement. Beam k points at `angle_min + k * angle_increment` in the
     lidar frame, which is at `mount` in the base frame of the robot. For a lidar that is not level, `tilted_mount` is
-    its full pose and `mount` its projection on the plane; see `level_readings.level_scan`.
+    its pose in space and `mount` the projection of this pose on the plane; see `level_scan`. None for a level lidar.
     """
 
     sensor: str
@@ -47,7 +51,7 @@ class Scan:
         return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
 
     def points(self) -> Array:
-        """Return the hits (m, 2) in the base frame of the robot, without beams that hit nothing."""
+        """Return the points (m, 2) that beams hit, in the base frame of the robot."""
         hit = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
         angles, ranges = self.angles()[hit], self.ranges[hit]
         flat = np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles)))
@@ -61,7 +65,7 @@ class Odometry:
     """Dead reckoning: `pose` in the odom frame, `twist` in the base frame.
 
     `twist_variance` contains the variances of the errors of vx, vy and wz, which are independent. `pose_covariance` is
-    that of the accumulated error in the odom frame. As in ROS, zeros in all places mean that it is unknown.
+    the covariance of the accumulated error in the odom frame. As in ROS, only zeros mean that it is unknown.
     """
 
     sensor: str
@@ -74,10 +78,10 @@ class Odometry:
 
 @fast_dataclass()
 class Imu:
-    """Angular velocity (rad/s) and specific force (m/s², including gravity) about x, y, z of the sensor frame.
+    """Reading of an IMU: angular velocity (rad/s) about, and acceleration (m/s²) along x, y, z of the sensor frame.
 
-    The sensor frame is at `mount` in the base frame; by default both are the same. The variances are those of the
-    white noise of each axis; a constant bias comes on top. 0 = unknown, as in ROS.
+    As measured by accelerometers, a sensor at rest has an upward acceleration of 1 g. The sensor frame is at `mount` in
+    the base frame. The variances are those of the white noise of each axis, without the bias; 0 if unknown, as in ROS.
     """
 
     sensor: str
@@ -91,7 +95,7 @@ class Imu:
 
 @fast_dataclass()
 class Bump:
-    """State of a bumper."""
+    """Reading of a bumper: `pressed` is True while the robot touches something."""
 
     sensor: str
     tick: int
@@ -100,10 +104,10 @@ class Bump:
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """Camera frame: `rgb` (h, w, 3) uint8, `depth` (h, w) in m along the optical axis, inf if nothing was hit.
+    """Image of a depth camera: `rgb` (h, w, 3), and `depth` (h, w) in m along the optical axis, inf if nothing was hit.
 
-    The camera is at `mount` in the base frame of the robot and looks along the x axis. `field_of_view` is the
-    horizontal angle in rad for square pixels; 0 if unknown.
+    The camera is at `mount` in the base frame of the robot and looks along the x axis of its own frame. `field_of_view`
+    is the horizontal angle in rad; 0 if unknown. Pixels are square.
     """
 
     sensor: str
@@ -119,20 +123,19 @@ Readings = tuple[Reading, ...]
 
 
 MIN_HEIGHT_M = 0.05
-"""Hits below this height are the floor; a lidar that is mounted lower uses half its own height."""
+"""Height below which `level_scan` takes hits for the floor, or half the height of the lidar if this is less."""
 MAX_HEIGHT_M = 2.0
-"""Hits above this height are above the robot (`max_obstacle_height` of Nav2's costmap)."""
+"""Height above which `level_scan` ignores hits; `max_obstacle_height` of Nav2's costmap."""
 AT_BASE = Pose3()
-"""Mount of a sensor in the base frame."""
+"""Mount of a sensor whose frame is the base frame."""
 
 
 def level_scan(scan: Scan) -> Scan:
-    """Return the scan that a level lidar at the same place would report, as pointcloud_to_laserscan does.
+    """Convert the scan of a tilted lidar to that of a level lidar at the same position, like pointcloud_to_laserscan.
 
-    Each level beam reports the nearest range of the tilted beams in its direction. Hits count only between MIN_HEIGHT_M
-    and MAX_HEIGHT_M; a tilted beam without a hit counts as inf. Without such a beam, the range is nan, because what is
-    at these heights remains unknown. For a lidar that is mounted upside down this is exact. Other directions are
-    rounded to the nearest beam.
+    Each level beam gets the nearest hit of the tilted beams in its direction, rounded to the nearest beam. Only hits
+    between MIN_HEIGHT_M and MAX_HEIGHT_M count; a tilted beam without a hit gives inf. If no tilted beam gives a range,
+    the result is nan, because it is unknown what is in this direction. The scan of a level lidar is returned unchanged.
     """
     if scan.tilted_mount is None:
         return scan
@@ -153,9 +156,9 @@ def level_scan(scan: Scan) -> Scan:
 
 
 def imu_in_base_frame(imu: Imu) -> Imu:
-    """Return the reading rotated to the axes of the base.
+    """Return the reading rotated to the axes of the base frame.
 
-    The acceleration remains that at the position of the sensor, including the centripetal acceleration there.
+    The acceleration is still that at the position of the sensor, where the centripetal acceleration is included.
     """
     if imu.mount == AT_BASE:
         return imu
@@ -172,9 +175,10 @@ def imu_in_base_frame(imu: Imu) -> Imu:
 def _level_beams(
     mount: Pose3, yaw: float, first: float, increment: float, count: int
 ) -> tuple[float, float, Array, Array, Array]:
-    """Return angle_min and angle_increment of the level scan, and for each tilted beam three arrays (count,).
+    """Return angle_min and angle_increment of the level scan, and three arrays (count,) for the tilted beams.
 
-    These are the index of the level beam, and the horizontal and the vertical part of its unit vector.
+    The arrays are the index of the level beam that a tilted beam contributes to, and the horizontal and the vertical
+    part of the unit vector along the tilted beam.
     """
     rotation = mount.rotation()
     angles = first + increment * np.arange(count, dtype=np.float64)

@@ -1,1 +1,1 @@
-"""What a run records: trace, events, verdicts, results and session events."""
+"""Records of runs and sessions: trace, events, verdicts, results, and studies."""

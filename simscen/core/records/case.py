@@ -1,4 +1,4 @@
-"""The parts of a scenario that judging needs besides the trace, and a run with everything known about it."""
+"""Case, the parts of a scenario that criteria need besides the trace, and Run, a judged run with its case and trace."""
 
 import math
 from collections.abc import Mapping
@@ -20,10 +20,10 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Passage:
-    """A narrow place on the shortest path to a goal: a line between two static solids, in the world frame.
+    """Narrow passage on the shortest path to a goal: a line between two static solids.
 
-    A robot on this path must cross the line, so that an obstacle on the line blocks it. `between` contains the names of
-    the solids; "" for a solid without a name.
+    A robot on this path must cross the line, so that an obstacle on the line blocks it. `goal` is the name of the goal.
+    `ends` are in m in the world frame. `between` contains the names of the solids; "" for a solid without a name.
     """
 
     goal: str
@@ -50,24 +50,30 @@ class Passage:
 
 
 ROBOT_NAME = ""
-"""Name of a single robot."""
+"""Name of the robot in a scenario with only one robot."""
 CLEARANCE_RANGE_M = 2.0
-"""Distance in m around the robot within which clearance is always measured."""
+"""Distance around the robot within which clearance is measured in every run; farther only if a criterion needs it."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """The parts of a scenario that judging needs. They are stored in the log, so that no other file is needed.
+    """The parts of a scenario that criteria need. They are stored in the log, so that judging needs no other file.
 
     Attributes:
+        start: Start pose of the robot.
+        goals: Goals of the scenario, in order.
         shortest: For each goal name, the length in m of the shortest path from the previous goal (or the start) through
             the static world for a disc of the robot's inscribed radius; inf if there is none.
+        regions: Regions of the world by name.
+        footprint: Footprint of the robot in the base frame; empty if unknown.
+        inscribed_radius: Radius in m of the largest circle around the base that fits in the footprint.
+        time_limit: Maximum simulated time of the run in s.
         clearance_range: Distance in m around the robot within which clearance was measured. Larger values are cut off.
-        disturbances: The events and then the faults of the scenario.
+        disturbances: The events of the scenario, followed by its faults.
         sent: Goals that events can send.
-        passages: Narrow places on the shortest paths, goal by goal, in driving direction.
+        passages: Narrow passages on the shortest paths, goal by goal, in driving direction.
         masks: Filter masks that criteria refer to, by file name.
-        expected: For each goal that is expected to fail, "failed" or the name of an error code.
+        expected: For each goal that is expected to fail, by name: "failed", or the name of an error code.
     """
 
     start: Pose2
@@ -92,7 +98,7 @@ class Case:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """A run: its `result` (outcome, verdicts, metrics), and the `trace` and `case` from which it was judged.
+    """A run: its `result` (outcome, verdicts, metrics), and the `trace` and `case` that the result is based on.
 
     Attributes:
         log: MCAP file of the run; None if none was requested.
@@ -119,7 +125,7 @@ class Run:
 
     @property
     def passed(self) -> bool:
-        """Whether all criteria passed; never for a run that could not be completed."""
+        """Whether all criteria passed; False for a run that could not be completed."""
         return self.result.outcome is Outcome.PASSED
 
     @property
@@ -128,7 +134,7 @@ class Run:
         return self.result.outcome.good
 
     def verdict(self, name: str) -> Verdict:
-        """Return the verdict of a criterion by id, e.g. `run.verdict("path_length").status`. Raises KeyError."""
+        """Return the verdict with the id `name`, e.g. "path_length". Raises KeyError if there is none."""
         found = {verdict.id: verdict for verdict in self.result.verdicts}
         if name not in found:
             raise KeyError(f"no criterion has the id {name!r}; there are: {', '.join(found)}")

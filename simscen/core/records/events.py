@@ -1,4 +1,4 @@
-"""Events of a run, and the disturbances that a scenario schedules with their outcomes."""
+"""Events that a run records, disturbances that a scenario schedules, and what faults can target."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,10 +6,14 @@ from enum import Enum
 from typing import Literal
 
 Value = str | int | float | bool | None | list["Value"] | dict[str, "Value"]
+"""JSON data."""
 
 
 class EventKind(str, Enum):
-    """Kinds of events. The comment of each kind explains the name of the event; its data follow after the semicolon."""
+    """Kinds of events.
+
+    The comment beside each kind says what `Event.name` contains, and after the semicolon, the keys of `Event.data`.
+    """
 
     GOAL_ACCEPTED = "goal.accepted"  # goal; x, y, yaw
     GOAL_REACHED = "goal.reached"  # goal; index
@@ -52,7 +56,7 @@ class EventKind(str, Enum):
 
 @dataclass(frozen=True)
 class Event:
-    """Event at `tick`; EventKind defines the meaning of `name` and `data`, which is JSON data."""
+    """Event that was recorded at `tick`. The meaning of `name` and `data` depends on the kind; see EventKind."""
 
     tick: int
     kind: EventKind
@@ -64,9 +68,9 @@ class Event:
 class Disturbance:
     """Event or fault that a scenario schedules.
 
-    `when` is its trigger as written, "" for a fault from the start. If `required`, the run fails unless it happens.
-    `line` is the line in the scenario file; 0 if unknown. For a step of a sequence, `after` is the index of the event
-    before it.
+    `when` is the trigger as written in the scenario; "" for a fault that is active from the start. If `required`, the
+    run fails unless the disturbance takes place. `line` is the line in the scenario file; 0 if unknown. For a step of a
+    sequence, `after` is the index of the event before it; None for other disturbances.
     """
 
     name: str
@@ -78,7 +82,7 @@ class Disturbance:
 
     @property
     def trigger(self) -> str:
-        """Description of the trigger, e.g. "when time: 10 s"."""
+        """Trigger in words, e.g. "when time: 10 s"."""
         if self.after is not None:
             return f"then when {self.when}" if self.when else "then at once"
         return f"when {self.when}" if self.when else "from the start"
@@ -86,10 +90,11 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class DisturbanceOutcome:
-    """Outcome of a disturbance: the ticks at which its trigger `fired`, and whether it changed anything (`happened`).
+    """Outcome of a disturbance.
 
-    `effect` describes in one line what the disturbance changed, or why it had no effect. `tick` is the first tick at
-    which it changed something, or at which it failed to.
+    `fired` are the ticks at which its trigger fired. `happened` is True if it took effect. `effect` describes in one
+    line what it changed, or why it had no effect. `tick` is the tick of the first change, or of the first attempt if
+    nothing changed; None if there was no attempt.
     """
 
     disturbance: Disturbance
@@ -100,21 +105,21 @@ class DisturbanceOutcome:
 
     @property
     def missing(self) -> bool:
-        """Whether it had to happen and did not."""
+        """Whether the disturbance was required but did not take place."""
         return self.disturbance.required and not self.happened
 
 
 READING_KINDS = ("Scan", "Odometry", "Imu", "Bump", "Image")
-"""The classes of core.messages.sensor_data."""
+"""What faults of sensors change: readings of these classes of core.messages.sensor_data."""
 COMMAND = "Command"
-"""Kind of `cmd_vel`: velocity commands from the stack to the base."""
+"""What faults of `cmd_vel` change: velocity commands from the stack to the base."""
 WHEELS = "Wheels"
-"""Kind of `wheels`: the motion that the motors execute for a command, and the motion that odometry measures."""
+"""What faults of `wheels` change: the motion that the motors execute, and the motion that odometry measures."""
 BELIEF = "Belief"
-"""Kind of `localizer`: the estimated pose that the navigator receives."""
+"""What faults of `localizer` change: the estimated pose that the navigator receives."""
 MAP = "Map"
-"""Kind of `map`: the map that the stack receives."""
+"""What faults of `map` change: the map that the stack receives."""
 KIND_BY_INSTANCE = {"cmd_vel": COMMAND, "wheels": WHEELS, "localizer": BELIEF, "map": MAP}
-"""Kinds of the targets of faults besides sensors, by name in a scenario; a sensor of the same name takes precedence."""
+"""What faults change, by the name in a scenario that is not a sensor. A sensor of the same name takes precedence."""
 FAULT_TARGET_KINDS = (*READING_KINDS, *KIND_BY_INSTANCE.values())
-"""All values of `affects` of a fault."""
+"""All elements that the set `affects` of a fault can contain."""

@@ -1,4 +1,4 @@
-"""Result of a run: the record that all reports are based on."""
+"""Result of a run, on which all reports are based, and the key that identifies a run in a session."""
 
 import shlex
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from simscen.core.records.verdict import Verdict
 
 
 class Outcome(str, Enum):
-    """Outcome of a run. `error` means that the run could not be completed, which says nothing about the robot."""
+    """Outcome of a run. ERROR means that the run could not be completed; the robot may or may not be the cause."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -26,7 +26,7 @@ class Outcome(str, Enum):
 
 
 REPEAT_SUFFIX = "again"
-"""Suffix of the second of two runs that must be equal; not allowed as the name of a stack."""
+"""Suffix of the stack name in the key of a repetition; not allowed as the name of a stack."""
 _SEPARATOR = "@"
 """Separator of variation and stack in folder names; not allowed in their names."""
 
@@ -34,10 +34,11 @@ _SEPARATOR = "@"
 @total_ordering
 @dataclass(frozen=True, slots=True)
 class RunKey:
-    """Identity of a run: scenario id, seed, variation ("" if there is none), and stack name if there are several.
+    """Identifies a run in a session.
 
-    `stack_name` ends with `.again` for the second of two runs that must be equal. Keys are ordered by scenario,
-    variation, seed, and stack.
+    `scenario` is the id of the scenario. `variation` and `stack_name` are "" if there is only one. If each run is
+    repeated to check that it is deterministic, `stack_name` ends with `again` for the repetition. Keys are ordered by
+    scenario, variation, seed, and stack.
     """
 
     scenario: str
@@ -54,30 +55,30 @@ class RunKey:
 
     @property
     def test(self) -> str:
-        """Name for `-k`: the scenario id, with the variation in brackets like a pytest parameter."""
+        """Name that the option `-k` selects: the scenario id, with the variation in brackets as in pytest."""
         return scenario_title(self.scenario, self.variation)
 
     @property
     def folder(self) -> str:
-        """Folder of the run within that of its scenario, e.g. "seed-7", "seed-7-slow", or "seed-7-speed=0.5@slow"."""
+        """Folder of the run in the folder of its scenario, e.g. "seed-7", "seed-7-slow", or "seed-7-speed=0.5@slow"."""
         label = _SEPARATOR.join(part for part in (self.variation, self.stack_name) if part)
         return "-".join(part for part in (f"seed-{self.seed}", label) if part)
 
     @property
     def twin(self) -> "RunKey":
-        """Key of the second of two runs that must be equal."""
+        """Key of the repetition of this run, which must have the same result."""
         return replace(self, stack_name=".".join(part for part in (self.stack_name, REPEAT_SUFFIX) if part))
 
     @property
     def first(self) -> "RunKey":
-        """Key of the first of two runs that must be equal; the key itself for any other run."""
+        """Key of the run that this one repeats; the key itself if this is no repetition."""
         return (
             replace(self, stack_name=self.stack_name[: -len(REPEAT_SUFFIX)].removesuffix(".")) if self.repeats else self
         )
 
     @property
     def repeats(self) -> bool:
-        """Whether this is a second run that is only compared with the first."""
+        """Whether this is a repetition, which is only compared with the first run."""
         return self.stack_name == REPEAT_SUFFIX or self.stack_name.endswith(f".{REPEAT_SUFFIX}")
 
 
@@ -90,9 +91,9 @@ def scenario_title(scenario: str, variation: str) -> str:
 class RunFailure:
     """Reason why a run could not be completed.
 
-    `kind` is the error type in JUnit: crashed, timeout, out-of-memory, invalid, interrupted, not-run, or internal.
-    `tail` is the end of the worker's output, which must be shown literally. `by_stack`: the stack under test crashed,
-    did not answer, or answered with something invalid.
+    `kind` is the error type in JUnit, such as crashed, timeout, out-of-memory, invalid, interrupted, not-run, or
+    internal. `tail` is the end of the worker's output, to be shown unchanged. `by_stack` is True if the stack under
+    test crashed, did not answer, or gave an invalid answer.
     """
 
     kind: str
@@ -103,21 +104,22 @@ class RunFailure:
 
 @dataclass(frozen=True)
 class RunResult:
-    """Result of a run. It does not depend on the machine, the clock, or the working folder.
+    """Result of a run. It does not depend on the machine, the time of day, or the working folder.
 
     Attributes:
         path: Scenario file relative to the root.
-        verdicts: Verdicts of required events and faults that did not happen, then those of the criteria.
-        lines: Line of each verdict in the scenario file, in the same order; empty or 0 if unknown.
+        verdicts: Verdicts of required events and faults that did not take place, followed by those of the criteria.
+        lines: Line of each verdict in the scenario file, in the same order. A line is 0 if unknown; empty if all are.
+        metrics: Value of each metric; None if the run has no value for it.
         undefined: Reason for each metric that is None.
         events: Number of events by kind.
         disturbances: Outcome of each event and fault of the scenario.
         ended: Reason why the simulation stopped.
         simulated: Simulated time in s.
-        tick_rate: Ticks per second of the findings.
-        error: Failure of a run that could not be completed; set exactly if the outcome is ERROR.
-        stack: NAME=VALUE of the --stack that was used, with files relative to the root; "" for the scenario's own.
-        reason: Reason in the scenario for an expected failure or for skipping it.
+        tick_rate: Ticks per second, for the ticks in findings.
+        error: Reason why the run could not be completed; None exactly if the outcome is not ERROR.
+        stack: Value of the option --stack, with files relative to the root; "" for the stack of the scenario.
+        reason: Reason that the scenario gives for an expected failure or for skipping the run.
     """
 
     key: RunKey
@@ -142,7 +144,7 @@ class RunResult:
 
     @property
     def again(self) -> str:
-        """Command that repeats the run, from the root of the scenario."""
+        """Command that repeats the run, to be executed in the root of the scenario."""
         varied = ["--variation", self.key.variation] if self.key.variation else []
         chosen = ["--stack", self.stack] if self.stack else []
         return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed), *varied, *chosen])

@@ -1,4 +1,4 @@
-"""Results of many runs in little memory."""
+"""Compressed storage of the results of many runs, as a list and by key, for sessions with very many runs."""
 
 import pickle
 import sys
@@ -10,14 +10,14 @@ from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunFinished
 
 MAX_UNCOMPRESSED = 2000
-"""Number of results that are kept uncompressed, for speed."""
+"""Number of results that a store keeps uncompressed, because this is faster."""
 
 
 class RunStore(Sequence[RunFinished]):
-    """Results of runs. Those after the first MAX_UNCOMPRESSED are compressed to about 1 kB each, and decompressed when
-    they are read.
+    """List of results. Those after the first MAX_UNCOMPRESSED are compressed, to about 1 kB each.
 
-    Iterate over it instead of making a list of it.
+    A compressed result is decompressed each time it is read. Iterate over the store instead of converting it to a list,
+    which would need memory for all results at once.
     """
 
     def __init__(self, runs: Iterable[RunFinished] = ()) -> None:
@@ -40,11 +40,11 @@ class RunStore(Sequence[RunFinished]):
             self.append(run)
 
     def in_order(self) -> "RunStore":
-        """Return the same results sorted by file, scenario, variation, seed, and stack."""
+        """Return a store with the same results, sorted by file, scenario, variation, seed, and stack."""
         return self.select(sorted(range(len(self)), key=self._order.__getitem__))
 
     def select(self, indices: Iterable[int]) -> "RunStore":
-        """Return the results with these indices, without decompressing them."""
+        """Return a store with the results at these indices. Nothing is decompressed."""
         found = RunStore()
         found._sample = self._sample
         for index in indices:
@@ -84,7 +84,7 @@ class RunStore(Sequence[RunFinished]):
 
 
 class FinishedRuns(Mapping[RunKey, RunFinished]):
-    """The last result of each run, by key."""
+    """Newest result of each run, by key."""
 
     def __init__(self) -> None:
         self._index: dict[RunKey, int] = {}
@@ -96,7 +96,7 @@ class FinishedRuns(Mapping[RunKey, RunFinished]):
         self.store.append(run)
 
     def index(self, key: RunKey) -> int | None:
-        """Return the index of a run's result in `store`, or None."""
+        """Return the index in `store` of the newest result of a run; None if there is no result."""
         return self._index.get(key)
 
     def __getitem__(self, key: RunKey) -> RunFinished:

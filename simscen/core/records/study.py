@@ -1,4 +1,4 @@
-"""Result of a study: many runs of one scenario, the claim about them, and what influences their margins."""
+"""Result of a study: pass rate of many runs of one scenario, the claim about it, and what influences the margins."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from simscen.core.records.run_result import RunKey
 
 
 class ClaimStatus(str, Enum):
-    """Outcome of a claim. BLOCKED: errors of simscen in some runs prevent a decision."""
+    """Decision on a claim. BLOCKED means that simscen could not complete some runs, which prevents a decision."""
 
     HELD = "held"
     REFUTED = "refuted"
@@ -23,13 +23,16 @@ class ClaimResult:
 
     Attributes:
         method: Statistical method that decides the claim.
-        confidence: Probability, for example 0.95, with which the decision that the claim holds must be right.
+        min_rate: Claimed minimum of the pass rate.
+        confidence: Probability, for example 0.95, with which a decision that the claim holds must be right.
         max_runs: Maximum number of runs.
+        status: Decision on the claim.
         passed: Number of passed runs among `runs`.
         runs: Number of runs that decide the claim.
         errors: Number of runs that could not be completed.
-        limits: Lower and upper confidence limits of the pass rate, each with the probability `confidence`; for the
-            method `anytime`, both together. None for `sprt`, which has no valid limits, and before the first run.
+        limits: Lower and upper confidence limit of the pass rate. Each limit is valid with the probability
+            `confidence`; for the method `anytime`, both are valid at once with this probability. None for `sprt`, which
+            has no valid limits, and before the first run.
         target: Pass rate of a robot that `sprt` should accept; None for other methods.
         power: Minimum probability that `sprt` does not reject such a robot; None for other methods.
     """
@@ -49,9 +52,10 @@ class ClaimResult:
 
 @dataclass(frozen=True)
 class RateRow:
-    """Pass rate of the runs in which the parameter `path` has a `value` or is in a range of values.
+    """Pass rate of the runs in which a parameter has one value or lies in one range of values.
 
-    `limits` are those of the 95 % interval; None where the runs are not random.
+    `path` is the YAML path of the parameter, and `value` is the value or range as text. `limits` are those of the 95 %
+    confidence interval; None if the runs are not random.
     """
 
     path: str
@@ -65,9 +69,10 @@ class RateRow:
 class ParameterEffect:
     """Association of a parameter with the margin of a criterion over `runs`.
 
-    `effect` is Spearman's rank correlation for numbers, from -1 to 1: negative if a larger value makes the margin
-    smaller. For other values (`is_ordered` False) it is epsilon squared of the Kruskal-Wallis test, from 0 to 1. `p` is
-    the p-value, adjusted for the number of tests (Holm).
+    `path` is the YAML path of the parameter. `is_ordered` is True if its values are numbers. `effect` is then
+    Spearman's rank correlation, from -1 to 1: negative if the margin falls as the value rises. For other values,
+    `effect` is epsilon squared of the Kruskal-Wallis test, from 0 to 1. `p` is the p-value, adjusted for the number of
+    tests (Holm).
     """
 
     path: str
@@ -85,17 +90,17 @@ class Study:
     Attributes:
         scenario: Id of the scenario.
         is_random: Whether the runs are independent random draws, so that a pass rate has an interval.
-        passed: Runs that passed.
-        failed: Runs that did not; a stack that crashes or does not answer counts as failed.
-        errors: Runs that simscen could not complete.
-        claim: Result of `acceptance`, if the scenario has it.
-        limits: 95 % confidence interval of the pass rate; None where the runs are not random.
+        passed: Number of runs that passed.
+        failed: Number of runs that failed. A stack that crashes or does not answer counts as failed.
+        errors: Number of runs that simscen could not complete.
+        claim: Result of the claim under `acceptance`; None if the scenario has none.
+        limits: 95 % confidence limits of the pass rate; None if the runs are not random.
         rates: Pass rate by value of each varied parameter.
         effects: Association of parameters with margins, strongest first.
-        worst: Smallest margin of each criterion that has one: its run, and the margin with its unit.
-        values: Values of the varied parameters by run.
-        coverage: Share of the pairs of values of two parameters that occurred in a run; None for random values.
-        accepted: Share of the drawn values that meet `require`; None without it.
+        worst: Smallest margin of each criterion that has margins: the run, the margin, and its unit.
+        values: Values of the varied parameters by run, and by YAML path.
+        coverage: Of all pairs of values of two parameters, the fraction that occurred in a run; None for random values.
+        accepted: Fraction of the drawn values that met the condition `require`; None if the scenario has none.
     """
 
     scenario: str

@@ -1,7 +1,7 @@
-"""Recorded run on the lockstep clock: one Moment per beat, and sampled signals.
+"""Recorded run: a Moment for each beat while the run is simulated, and the Trace of the whole run for judging it.
 
-The MCAP recorder and the TraceBuilder process the same moments, and reading a log gives the same Trace. A run can
-therefore be judged later without a simulation.
+The simulation passes each Moment to the MCAP recorder and to the TraceBuilder. Reading the log gives the same Trace, so
+that a run can be judged again without simulating it.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
     Ticks = npt.NDArray[np.int64]
 else:
-    Ticks = object  # annotations are not evaluated; commands that only read files need no numpy
+    Ticks = object  # annotations are not evaluated, and numpy's types take long to import
 
 
 class Truth(NamedTuple):
     """True state of the robot: `pose` of its base in the world frame, `twist` in the base frame.
 
-    `clearance` is the distance in m from the robot to the nearest obstacle, negative if they overlap, and at most the
-    range that was searched. `objects` are the poses of movable objects.
+    `clearance` is the distance in m from the robot to the nearest obstacle, negative if they overlap, and cut off at
+    `Case.clearance_range`. `objects` are the poses of movable objects in the world frame, by name.
     """
 
     pose: Pose3
@@ -43,7 +43,7 @@ class Truth(NamedTuple):
 
 
 class DeferredTruth(Protocol):
-    """Sample of the ground truth that is computed on demand."""
+    """Sample of the ground truth that is computed only if it is needed."""
 
     def truth(self) -> Truth:
         """Return the ground truth."""
@@ -51,7 +51,7 @@ class DeferredTruth(Protocol):
 
 
 class LogLine(NamedTuple):
-    """Log message of a stack for /rosout: severity as in rcl_interfaces, name of the logger, and text."""
+    """Log message of a stack for /rosout: `level` of severity as in rcl_interfaces, `name` of the logger, and text."""
 
     level: int
     name: str
@@ -59,7 +59,7 @@ class LogLine(NamedTuple):
 
 
 class CostGrid(NamedTuple):
-    """Published costmap: "global" or "local", its frame, and costs as occupancy 0 … 100 or -1, as in Nav2."""
+    """Costmap as Nav2 publishes it: its `name`, "global" or "local", its frame, and the costs as 0 … 100 or -1."""
 
     name: str
     frame: str
@@ -68,9 +68,10 @@ class CostGrid(NamedTuple):
 
 @fast_dataclass(eq=False)
 class Decision:
-    """Output of the stack for a beat: its `command`, and what it publishes; None if there is nothing new.
+    """Output of the stack for a beat: the velocity `command` for the base, and what the stack publishes.
 
-    `odometry` contains the new output of its odometry filter, if it has one.
+    A belief or plan is None, and a tuple is empty, if nothing new is published. `lines` are log messages. `odometry` is
+    the output of the odometry filter of the stack.
     """
 
     command: Twist
@@ -85,10 +86,11 @@ class Decision:
 
 @fast_dataclass(eq=False)
 class Moment:
-    """One beat of the lockstep: ground truth, readings with faults applied, decision of the stack, and events.
+    """Everything that is recorded at one beat.
 
-    `sample` is None on beats between two samples of the ground truth. `events` are those of the world and the scenario;
-    `decision.events` are those of the stack. A trace contains both, in this order.
+    `sample` is the sample of the ground truth; None on beats without one. `readings` are those that the stack received,
+    with faults applied. `events` are those of the world and the scenario; `decision.events` are those of the stack. A
+    trace contains both, in this order.
     """
 
     tick: int
@@ -99,23 +101,29 @@ class Moment:
 
     @property
     def truth(self) -> Truth | None:
-        """The true state of the robot; None on beats between two samples."""
+        """The true state of the robot; None on beats without a sample."""
         sample = self.sample
         return sample if sample is None or isinstance(sample, Truth) else sample.truth()
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Complete run. The tick of a sample is the beat at which it arrived, even if it was measured earlier.
+    """Recording of a whole run. The tick of a sample is the beat at which it arrived, even if it was measured earlier.
 
-    truth:      x, y, yaw in the world              (m, m, rad)
-    velocity:   vx, vy, wz in the base frame        (m/s, m/s, rad/s), at truth's ticks
-    clearance:  hull to nearest obstacle            (m), at truth's ticks
-    belief:     x, y, yaw in the map and the upper triangle of its covariance: xx, xy, xyaw, yy, yyaw, yawyaw
-    odometry:   x, y, yaw in the odom frame, of the first odometry sensor
-    command:    vx, vy, wz as sent to the wheels, on changes and at least 20 times per second
-    objects:    name → x, y, yaw of movable objects, on changes and at least once per second
-    scans:      ticks at which the stack received a scan
+    Attributes:
+        tick_rate: Ticks per second.
+        truth: True x, y, yaw of the robot in the world frame (m, m, rad).
+        velocity: True vx, vy, wz of the robot in the base frame (m/s, m/s, rad/s), at the ticks of `truth`.
+        clearance: Distance from the hull to the nearest obstacle (m), at the ticks of `truth`.
+        belief: Estimated x, y, yaw in the map frame, followed by the upper triangle of the covariance: xx, xy, xyaw,
+            yy, yyaw, yawyaw.
+        odometry: x, y, yaw in the odom frame, of the first odometry sensor.
+        command: vx, vy, wz as sent to the wheels, at each change and at least 20 times per second.
+        scans: Ticks at which the stack received a scan.
+        plans: Plans in the order in which they were made.
+        events: Events of the world, the scenario, and the stack, in order.
+        objects: x, y, yaw of each movable object by name, at each change and at least once per second.
+        end: Last tick of the run.
     """
 
     tick_rate: int
@@ -140,14 +148,14 @@ class Trace:
         return tuple(event for event in self.events if event.kind in kinds)
 
     def place(self, tick: int) -> tuple[float, float]:
-        """Return the true position of the robot at a tick."""
+        """Return the true position (x, y) of the robot in m at a tick."""
         x, y, _ = self.truth.at(np.array([tick]))[0]
         return float(x), float(y)
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Sampled signal: `ticks` (n,) in ascending order, and `values` (n, k)."""
+    """Sampled signal: `ticks` (n,) in ascending order, and `values` (n, k), k values per sample."""
 
     ticks: Ticks
     values: Array
@@ -156,5 +164,8 @@ class Samples:
         return len(self.ticks)
 
     def at(self, ticks: Ticks) -> Array:
-        """Return the latest value at each of `ticks` (sample and hold); before the first sample, the first value."""
+        """Return the values (m, k) at each of the `ticks` (m,): those of the newest sample (sample and hold).
+
+        Before the first sample, the values are those of the first sample.
+        """
         return self.values[np.maximum(np.searchsorted(self.ticks, ticks, side="right") - 1, 0)]

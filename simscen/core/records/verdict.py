@@ -1,4 +1,4 @@
-"""Verdicts of criteria, declarations of expected failures, and the evidence that a log holds for a verdict."""
+"""Verdicts of criteria, declarations of expected failures, and the evidence that a verdict needs from a log."""
 
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
@@ -6,7 +6,11 @@ from enum import Enum
 
 
 class Status(str, Enum):
-    """Status of a verdict. INCONCLUSIVE: the trace does not contain what is needed to decide."""
+    """Status of a finding or verdict.
+
+    INCONCLUSIVE means that the trace does not contain what is needed to decide. ERROR means that nothing was checked,
+    or that the trace is invalid.
+    """
 
     PASS = "pass"
     FAIL = "fail"
@@ -16,10 +20,18 @@ class Status(str, Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One checked bound: the measured value, its limit, and the time and place with the smallest margin.
+    """One checked bound: a measured value and its limit.
 
-    `margin` is in `unit`, and negative if the limit is violated; None if the bound has no margin. `what` is a phrase
-    such as "path_length" or "goal shelf"; `detail` explains a failure in one line each.
+    Attributes:
+        what: Measured quantity, such as "path_length" or "goal shelf".
+        measured: Measured value as text.
+        limit: Limit as text.
+        margin: Distance of the value from the limit in `unit`, negative if the limit is violated; None if the bound has
+            no margin.
+        value: Measured value in `unit`; None if it is not a number.
+        tick: Tick with the smallest margin; None if the bound does not belong to a time.
+        place: True position (x, y) of the robot in m at this tick; None if unknown.
+        detail: Lines that explain the result.
     """
 
     status: Status
@@ -36,7 +48,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of a criterion. The worst finding decides; reports show the tightest finding of a pass."""
+    """Result of a criterion: the status of its worst finding.
+
+    `criterion` is the key of the criterion, and `id` the name of the verdict in reports. `severity` is "fail" if a
+    violation fails the run, and "warn" if it is only reported.
+    """
 
     criterion: str
     id: str
@@ -45,22 +61,23 @@ class Verdict:
 
     @property
     def status(self) -> Status:
-        """The worst status of the findings; ERROR if there are none, since then nothing was checked."""
+        """The worst status of the findings, in the order ERROR, FAIL, INCONCLUSIVE, PASS; ERROR if there are none."""
         order = [Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS]
         return min((f.status for f in self.findings), key=order.index, default=Status.ERROR)
 
     @property
     def tightest(self) -> Finding | None:
-        """The deciding finding: the one with the smallest margin among those with the status of the verdict."""
+        """The finding with the smallest margin among those with the status of the verdict; None without findings."""
         deciding = [f for f in self.findings if f.status is self.status]
         return min(deciding, key=lambda f: f.margin if f.margin is not None else float("inf"), default=None)
 
 
 @dataclass(frozen=True)
 class ExpectedFailure:
-    """Reason why a run is expected to fail; `criteria` are the ids of the verdicts that fail, () for any.
+    """Statement of a scenario that its runs fail, and for which reason.
 
-    `line` is the line in the scenario file; 0 if unknown.
+    `criteria` are the ids of the verdicts that must fail; empty if any may fail. `line` is the line in the scenario
+    file; 0 if unknown.
     """
 
     reason: str
@@ -69,7 +86,7 @@ class ExpectedFailure:
 
 
 class Evidence(str, Enum):
-    """Kind of information about a run. The value completes the message "the log lacks …"."""
+    """Kind of information in a log that a criterion may need. The value completes the message "the log lacks …"."""
 
     TRUTH = "the true pose of the robot"
     VELOCITY = "the true velocity of the robot"
@@ -91,15 +108,16 @@ class Evidence(str, Enum):
 
 
 POSITION = frozenset({Evidence.TRUTH, Evidence.ALIGNMENT})
-"""Evidence for comparing the true position with places on the map."""
+"""Evidence that is needed to compare the true position with positions on the map."""
 
 
 @dataclass(frozen=True)
 class LogCoverage:
-    """Evidence that a log lacks, each with the reason: `missing` completely, or `partial` for a part of the time.
+    """States which evidence a log lacks, each with the reason.
 
-    `recorded_by_simscen` is False for the log of another recorder, whose signals may be irregular or not finite. If
-    signals in simscen's own logs are irregular or not finite, the simulation or the log is broken.
+    `missing` evidence is not in the log at all, `partial` evidence only for a part of the time. The log of another
+    recorder (`recorded_by_simscen` False) may contain signals that are irregular or not finite. In a log of simscen,
+    such signals mean that the simulation or the log is broken.
     """
 
     missing: Mapping[Evidence, str] = field(default_factory=dict)
@@ -107,11 +125,11 @@ class LogCoverage:
     recorded_by_simscen: bool = True
 
     def lacking(self, required: Set[Evidence]) -> list[Evidence]:
-        """Return the required evidence that is missing completely."""
+        """Return the required evidence that is not in the log at all."""
         return [evidence for evidence in Evidence if evidence in self.missing and evidence in required]
 
     def with_gaps(self, gaps: Mapping[Evidence, str]) -> "LogCoverage":
-        """Return the coverage with additional evidence that covers only a part of the time."""
+        """Return the coverage with more partial evidence: `gaps` contains the reason for each."""
         return replace(self, partial={**gaps, **self.partial})
 
 

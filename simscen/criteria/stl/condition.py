@@ -1,4 +1,4 @@
-"""Specification of conditions: comparisons of signals, combined by logical and temporal operators."""
+"""Specification of conditions: comparisons of signals, combined by logical and temporal operators (STL)."""
 
 from __future__ import annotations
 
@@ -15,55 +15,60 @@ from simscen.spec.quantities import UNITS, AnyQuantity, Duration, PositiveDurati
 
 Op = Literal[">=", ">", "<=", "<"]
 OPERATORS = ("signal", "all", "any", "not_", "always", "eventually", "until", "whenever")
+"""Fields of a condition of which exactly one is given."""
 ARGUMENT_KEYS = ("object", "point", "goal", "region", "fault", "event", "recovery", "with_")
+"""Fields of a condition that contain an argument of the signal."""
 
 
 class Condition(Spec):
-    """A statement that is true or false at each moment of a run: a signal compared with a bound, or a combination.
+    """Statement that is true or false at each time of a run: a signal compared with a bound, or a combination of these.
 
-    Takes exactly one of signal, all, any, not, always, eventually, until, whenever; the other keys belong to a signal.
+    Exactly one of the keys signal, all, any, not, always, eventually, until, and whenever must be given. `then` belongs
+    to whenever; all other keys belong to signal.
     """
 
     signal: SignalName | None = None
-    """A named signal; `simscen explain signals` lists them."""
+    """Name of a signal; `simscen explain signals` lists them."""
     op: Op | None = None
-    """Comparison of the signal with `value`; omitted for a yes-or-no signal."""
+    """How the signal is compared with `value`; omitted for a yes-or-no signal."""
     value: Annotated[float, AnyQuantity()] | None = None
-    """Bound, with a unit of the signal's dimension or in SI units."""
+    """Bound, with a unit or in SI units."""
     scale: Annotated[float, AnyQuantity()] | None = None
-    """Amount that makes this signal comparable with others: margins are divided by the scales of their signals."""
+    """Amount by which margins of this signal are divided, so that they can be compared with those of signals in other
+    units."""
     object: MoverName | None = None
-    """Movable object to which `distance_to` is measured."""
+    """Movable object to which the signal `distance_to` is measured."""
     point: PlaceOrPoint | None = None
-    """Point to which `distance_to` is measured: x and y in meters, or a place by name."""
+    """Point to which the signal `distance_to` is measured: x and y in meters, or a place by name."""
     goal: GoalName | None = None
-    """Goal of `distance_to` or `goal_active`."""
+    """Goal for the signals `distance_to` and `goal_active`."""
     region: RegionName | None = None
-    """Region of `in_region`."""
+    """Region for the signal `in_region`."""
     fault: DisturbanceName | None = None
-    """Fault of `fault_active` or `started`, e.g. `lidar.off`."""
+    """Fault for the signals `fault_active` and `started`, e.g. `lidar.off`."""
     event: EventName | None = None
-    """Event of `event_active` or `started`."""
+    """Event for the signals `event_active` and `started`."""
     recovery: BehaviorName | None = None
-    """Recovery of `recovery_active`."""
+    """Recovery behavior for the signal `recovery_active`."""
     with_: ObjectName | None = Field(default=None, alias="with")
-    """Object of `in_collision`."""
+    """Object for the signal `in_collision`."""
     all: Annotated[list[Condition], Field(min_length=1, max_length=50)] | None = None
-    """True while all of these are true."""
+    """True while all conditions of this list are true."""
     any: Annotated[list[Condition], Field(min_length=1, max_length=50)] | None = None
-    """True while at least one of these is true."""
+    """True while at least one condition of this list is true."""
     not_: Condition | None = Field(default=None, alias="not")
-    """True while this is false."""
+    """True while the given condition is false."""
     always: Windowed | None = None
-    """True if this is true at every moment of the window from now on."""
+    """True if the given condition is true at all times of its window."""
     eventually: Windowed | None = None
-    """True if this is true at some moment of the window from now on."""
+    """True if the given condition is true at least once in its window."""
     until: Release | None = None
-    """True if `hold` is true from now on until `release` is."""
+    """True if `hold` is true from now on until `release` becomes true."""
     whenever: Condition | None = None
-    """With `then`: true if, from now on, `then` is true whenever this is. Undecided if this never is."""
+    """True if, from now on, the condition `then` is true each time that the given one is. Undecided if the given one is
+    never true."""
     then: Condition | None = None
-    """Condition that must be true whenever `whenever` is."""
+    """Condition that must be true each time that the condition of `whenever` is true."""
 
     @field_validator("op", mode="before")
     @classmethod
@@ -101,38 +106,38 @@ class Condition(Spec):
 
     @property
     def definition(self) -> Signal:
-        """Definition of the compared signal. Raises AssertionError for a combination."""
+        """Definition of the compared signal. Only a comparison has one; a combination raises AssertionError."""
         assert self.signal is not None
         return SIGNALS[self.signal]
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """The arguments of the signal, by key."""
+        """The arguments of the signal, by YAML key."""
         return {name.rstrip("_"): value for name in ARGUMENT_KEYS if (value := getattr(self, name)) is not None}
 
     def comparisons(self) -> Iterator[Condition]:
-        """Yield each comparison of a signal, in the order in which it is written."""
+        """Yield all comparisons in this condition, in the order of the operands; itself if it is a comparison."""
         if self.signal is not None:
             yield self
         for part in self.parts():
             yield from part.comparisons()
 
     def parts(self) -> list[Condition]:
-        """Return the operands."""
+        """Return the conditions that this condition combines; empty for a comparison."""
         until = () if self.until is None else (self.until.hold, self.until.release)
         single = (self.not_, self.always, self.eventually, *until, self.whenever, self.then)
         return [*(self.all or ()), *(self.any or ()), *(part for part in single if part is not None)]
 
 
 class Window(Spec):
-    """Interval of time from each moment on; without any key, the rest of the run."""
+    """Interval of time relative to the time at which a condition is evaluated; without any key, the rest of the run."""
 
     within: PositiveDuration | None = None
-    """From now until this many seconds ahead."""
+    """The window lasts from now until this time from now."""
     after: PositiveDuration | None = None
-    """From this many seconds ahead to the end of the run."""
+    """The window lasts from this time from now until the end of the run."""
     between: Annotated[list[Duration], Field(min_length=2, max_length=2)] | None = None
-    """From the first to the second number of seconds ahead."""
+    """The window lasts from the first to the second of these times from now."""
 
     @model_validator(mode="after")
     def _check_interval(self) -> Window:
@@ -145,27 +150,27 @@ class Window(Spec):
 
     @property
     def interval(self) -> tuple[float, float | None]:
-        """Begin and end in seconds ahead; an end of None is the end of the run."""
+        """Begin and end in s from now; an end of None is the end of the run."""
         if self.between is not None:
             return self.between[0], self.between[1]
         return self.after or 0.0, self.within
 
 
 class Windowed(Window, Condition):
-    """A condition, and the interval of time in which it is evaluated."""
+    """Condition, and the window in which it is evaluated."""
 
 
 class Release(Window):
-    """`hold` must be true until `release` is, and `release` must become true in the window."""
+    """Two conditions: `hold` must be true until `release` becomes true, which must happen in the window."""
 
     hold: Condition
-    """Condition that must be true up to the moment before the release."""
+    """Condition that must be true at all times before the release."""
     release: Condition
-    """Condition that ends the wait."""
+    """Condition that must become true; from then on, `hold` may be false."""
 
 
 def _dimension_of(value: Any) -> str:
-    """Return the dimension of the unit at the end of a text, or ""."""
+    """Return the dimension of the unit at the end of a text; "" without a known unit."""
     unit = str(value).split(maxsplit=1)[-1]
     return next((dimension for dimension, units in UNITS.items() if unit in units), "")
 
@@ -191,6 +196,7 @@ def _check_signal(condition: Condition, name: str, signal: Signal) -> None:
 
 
 def _check_decidable(op: Op, value: float, name: str, signal: Signal) -> None:
+    """Raise ValueError if no value between the minimum and the maximum of the signal can change the comparison."""
     minimum, maximum, unit = signal.minimum, signal.maximum, f" {signal.unit}".rstrip()
     never_below = {">=": value <= minimum, ">": value < minimum, "<": value <= minimum, "<=": value < minimum}[op]
     never_above = {"<=": value >= maximum, "<": value > maximum, ">": value >= maximum, ">=": value > maximum}[op]
@@ -205,9 +211,10 @@ for _model in (Condition, Windowed, Release):
 
 
 def decision_horizon(condition: Condition, holds: bool = True) -> float:
-    """Return the minimum time in s after which it can be known that a condition is true, or false (not `holds`).
+    """Return the earliest time in s from now at which it can be known that a condition is true.
 
-    A window without an end is decided by the end of the run and adds nothing.
+    If `holds` is False, return the earliest time at which it can be known that the condition is false. A window without
+    an end adds nothing, because it is decided by the end of the run.
     """
     if condition.all is not None or condition.any is not None:
         needs_all = (condition.all is not None) == holds
@@ -225,12 +232,15 @@ def decision_horizon(condition: Condition, holds: bool = True) -> float:
 
 
 def window_horizon(operator: str, part: Condition, window: Window, holds: bool = True) -> float:
-    """Return the horizon in s of `always` or `eventually`: the whole window, or its first moment."""
+    """Return the `decision_horizon` in s of `operator`, "always" or "eventually", over the condition `part`.
+
+    It is the end of the window if the condition must be known in the whole window, else the begin of the window.
+    """
     begin, end = window.interval
     needs_whole_window = (operator == "always") == holds
     return (begin if not needs_whole_window or end is None else end) + decision_horizon(part, holds)
 
 
 def until_horizon(release: Condition, window: Window) -> float:
-    """Return the horizon in s of a release in a window: its first moment."""
+    """Return the earliest time in s from now at which `until` can be known to be true: with a release at once."""
     return window.interval[0] + decision_horizon(release)

@@ -1,4 +1,4 @@
-"""Base class of the temporal criteria: verdict, margin, and decisive moment of a condition on signals."""
+"""Base class of the temporal criteria: finds out whether a condition on signals is met, by which margin, and when."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from simscen.core.records.verdict import Evidence, Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.clearance import SEARCH_MARGIN_M
-from simscen.criteria.findings import decimals, quantity, undecided
+from simscen.criteria.findings import undecided
+from simscen.criteria.stl.description import describe, describe_limit, describe_signal, describe_value
 from simscen.criteria.stl.robustness import (
     TIE_MARGIN,
     Bound,
@@ -25,16 +26,16 @@ from simscen.criteria.trace_signals.sampling import SignalUnavailable
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Trace
-    from simscen.criteria.stl.condition import Condition, Op, Window
+    from simscen.criteria.stl.condition import Condition
     from simscen.criteria.stl.robustness import Witness
 
 
 class TemporalCriterion(Criterion):
-    """A criterion that combines comparisons of named signals."""
+    """Criterion that consists of a condition on named signals."""
 
     @abstractmethod
     def compared(self) -> list[Condition]:
-        """Return all comparisons, in the order in which they are written."""
+        """Return all comparisons in the condition, in the order of the operands."""
 
     @abstractmethod
     def formula(self) -> str:
@@ -46,19 +47,19 @@ class TemporalCriterion(Criterion):
 
     @property
     def clearance_range(self) -> float:
-        """The largest bound on the clearance plus a margin, in meters."""
+        """Distance in m around the robot up to which clearance must be measured: beyond all bounds on the clearance."""
         bounds = [one.value for one in self.compared() if one.signal == "clearance" and one.value is not None]
         return max((bound + SEARCH_MARGIN_M for bound in bounds), default=0.0)
 
     @property
     def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs: that of all compared signals."""
+        """Evidence that the criterion needs from the log: that of all compared signals."""
         compared = self.compared()
         objects = {Evidence.OBJECTS} if any(one.object is not None for one in compared) else set()
         return frozenset(objects).union(*(signal_evidence(one.signal) for one in compared if one.signal is not None))
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return the finding for the condition at the first sample, with the decisive moment."""
+        """Return one finding: whether the condition is true at the start of the run, and the sample that decides."""
         formula = self.formula()
         try:
             result = self.evaluate(EvaluationContext(trace, case, has_ended(trace)))
@@ -98,7 +99,10 @@ class TemporalCriterion(Criterion):
 
 
 def _untested_finding(response: ResponseRobustness, formula: str, optional: bool) -> Finding:
-    """Return the inconclusive finding of a condition whose premise was never true."""
+    """Return the inconclusive finding for a `whenever` whose premise was never true.
+
+    If `optional`, it has a line about the key `required`, which only the criterion itself has, not a nested `whenever`.
+    """
     premise = describe(response.condition)
     if response.may_have_held:
         because = f"the run ended before it was known whether `{premise}` was true, so nothing was tested"
@@ -113,100 +117,9 @@ def _detail(trace: Trace, formula: str, witness: Witness) -> tuple[str, ...]:
 
 
 def _margin_unit(compared: list[Condition]) -> str | None:
-    """Return the common unit of the signals, "" if all have scales, or None if their units differ."""
+    """Return the unit of the margin: that of all compared signals, or "" if all have scales; None if units differ."""
     measured = [one for one in compared if not one.definition.is_boolean]
     if measured and all(one.scale is not None for one in measured):
         return ""
     units = {one.definition.unit for one in measured}
     return units.pop() if len(units) == 1 and all(one.scale is None for one in measured) else None
-
-
-_SIGNS: dict[Op, str] = {">=": "≥", ">": ">", "<=": "≤", "<": "<"}
-_OPPOSITE: dict[Op, Op] = {">=": "<", ">": "<=", "<=": ">", "<": ">="}
-
-
-def describe(condition: Condition) -> str:
-    """Return all of it in words: "whenever localization_error > 0.5 m, then eventually within 5 s speed < 1 m/s"."""
-    if condition.signal is not None:
-        return f"{describe_signal(condition)} {_bound(condition)}".rstrip()
-    if condition.all is not None:
-        return " and ".join(_grouped(part) for part in condition.all)
-    if condition.any is not None:
-        return " or ".join(_grouped(part) for part in condition.any)
-    if condition.not_ is not None:
-        return f"not {_grouped(condition.not_)}"
-    if condition.always is not None:
-        return describe_windowed("always", condition.always, condition.always)
-    if condition.eventually is not None:
-        return describe_windowed("eventually", condition.eventually, condition.eventually)
-    if condition.until is not None:
-        return describe_until(condition.until.hold, condition.until.release, condition.until)
-    assert condition.whenever is not None and condition.then is not None
-    return describe_response(condition.whenever, condition.then)
-
-
-def describe_windowed(operator: str, part: Condition, window: Window) -> str:
-    """Return `always` or `eventually` in a window, in words."""
-    return f"{' '.join(filter(None, (operator, describe_window(window))))} {_grouped(part)}"
-
-
-def describe_until(hold: Condition, release: Condition, window: Window) -> str:
-    """Return `hold` until `release` in a window, in words."""
-    return " ".join(filter(None, (_grouped(hold), "until", describe_window(window), _grouped(release))))
-
-
-def describe_response(premise: Condition, response: Condition) -> str:
-    """Return "whenever …, then …"."""
-    return f"whenever {describe(premise)}, then {describe(response)}"
-
-
-def describe_window(window: Window) -> str:
-    """Return a window in words; "" for the rest of the run."""
-    if window.between is not None:
-        return f"between {window.between[0]:g} s and {window.between[1]:g} s"
-    if window.after is not None:
-        return f"after {window.after:g} s"
-    return "" if window.within is None else f"within {window.within:g} s"
-
-
-def describe_signal(condition: Condition) -> str:
-    """Return the signal and its arguments: "distance_to cart"."""
-    arguments = " ".join(str(value) for value in condition.arguments.values())
-    return f"{condition.signal} {arguments}".rstrip()
-
-
-def describe_value(witness: Witness) -> str:
-    """Return the decisive value with its unit."""
-    comparison = witness.comparison
-    signal = comparison.definition
-    if signal.is_boolean:
-        return "yes" if witness.value else "no"
-    assert comparison.value is not None
-    if math.isinf(witness.value):
-        return "infinite"
-    return quantity(witness.value, signal.unit, decimals(witness.value, comparison.value))
-
-
-def describe_limit(witness: Witness) -> str:
-    """Return the bound of the decisive value."""
-    comparison = witness.comparison
-    signal = comparison.definition
-    if signal.is_boolean:
-        return "no" if witness.negated else "yes"
-    assert comparison.value is not None and comparison.op is not None
-    op = _OPPOSITE[comparison.op] if witness.negated else comparison.op
-    digits = decimals(witness.value, comparison.value)
-    return f"{_SIGNS[op]} {quantity(comparison.value, signal.unit, digits)}"
-
-
-def _bound(condition: Condition) -> str:
-    signal = condition.definition
-    if signal.is_boolean:
-        return ""
-    assert condition.op is not None and condition.value is not None
-    return f"{_SIGNS[condition.op]} {condition.value:g} {signal.unit}".rstrip()
-
-
-def _grouped(condition: Condition) -> str:
-    """Return the condition in words, in parentheses unless it is a single comparison."""
-    return describe(condition) if condition.signal is not None else f"({describe(condition)})"

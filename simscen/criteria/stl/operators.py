@@ -1,10 +1,12 @@
-"""Temporal operators on robustness values, sampled at any times: how well a condition holds over a window.
+"""Temporal operators of signal temporal logic (STL) on sampled robustness values.
 
-The operators follow the quantitative semantics of Donzé and Maler 2010, over samples: `always` is the smallest and
-`eventually` the largest value of the samples in the window; `until` is the best value over all samples at which
-`release` may become true. Unlike rtamt, which passes vacuously beyond the end of a trace, each operator is evaluated
-twice, with the worst and with the best continuation of the trace (Deshmukh et al. 2017, robust online monitoring). The
-true value lies between these two results. If they have different signs, the condition is undecided.
+The robustness of a condition is the margin by which it is true; it is negative if the condition is false. The operators
+follow Donzé and Maler 2010: `always` is the smallest and `eventually` the largest value of the samples in the window.
+`until` is the best value over all samples at which `release` may become true.
+
+A window can go on after the last sample. Each operator is therefore evaluated twice, with the worst and with the best
+continuation of the trace (Deshmukh et al. 2017, robust online monitoring). The true value lies between these two
+results. If they have different signs, the condition is undecided.
 
 Samples need not be evenly spaced. A window without a sample uses the newest sample before its end (sample and hold).
 """
@@ -31,9 +33,9 @@ if TYPE_CHECKING:
 class Continuation(NamedTuple):
     """Assumption about the time after the last sample.
 
-    `value_after_end` is the value assumed there: the worst or the best. `run_ended` is True if the run ended at the
-    last sample, so that a window without an end stops there. It is False if the log is truncated and the run may have
-    gone on.
+    `value_after_end` is the robustness assumed for this time: the worst or the best. `run_ended` is True if the run
+    ended at the last sample, so that a window without an end stops there. It is False for a truncated log, after which
+    the run may have gone on.
     """
 
     value_after_end: float
@@ -42,10 +44,10 @@ class Continuation(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SampleWindows:
-    """The windows of all samples, as inclusive ranges of sample indices: `first` and `last` for each sample.
+    """Window of each sample: its `first` and its `last` sample index, inclusive.
 
-    `first` is the number of samples if the window begins after the last one. `past_end` is True where the window
-    reaches beyond the last sample. `unbounded` windows last to the end of the run.
+    `first` is the number of samples if the window begins after the last one. `past_end` is True if the window reaches
+    beyond the last sample. If `unbounded`, all windows last to the end of the run.
     """
 
     first: Indices
@@ -55,7 +57,10 @@ class SampleWindows:
 
     @classmethod
     def of_samples(cls, ticks: Ticks, period: int, begin: int, end: int | None) -> SampleWindows:
-        """Return the windows from `begin` to `end` ticks after each sample; `period` is the usual spacing in ticks."""
+        """Return the windows from `begin` to `end` ticks after each sample; an end of None is the end of the run.
+
+        `period` is the usual spacing of samples in ticks.
+        """
         count = len(ticks)
         first = np.searchsorted(ticks, ticks + begin, side="left")
         if end is None:
@@ -68,12 +73,12 @@ class SampleWindows:
 
 
 def always(values: Array, windows: SampleWindows, continuation: Continuation) -> Array:
-    """Return the smallest value in the window of each sample."""
+    """Return, for each sample, the smallest value in its window."""
     return -eventually(-values, windows, Continuation(-continuation.value_after_end, continuation.run_ended))
 
 
 def eventually(values: Array, windows: SampleWindows, continuation: Continuation) -> Array:
-    """Return the largest value in the window of each sample."""
+    """Return, for each sample, the largest value in its window."""
     largest = _range_maximum(values, windows.first, windows.last)
     open_end = windows.past_end | (windows.unbounded and not continuation.run_ended) | (windows.first >= len(values))
     values_in_window: Array = np.where(open_end, np.maximum(largest, continuation.value_after_end), largest)
@@ -81,11 +86,13 @@ def eventually(values: Array, windows: SampleWindows, continuation: Continuation
 
 
 def until(hold: Array, release: Array, windows: SampleWindows, continuation: Continuation) -> Array:
-    """Return the robustness of `hold` until `release` in the window of each sample.
+    """Return, for each sample, the robustness of: `hold` is true until `release` becomes true in the window.
 
-    It is the minimum of three terms, which avoids a search over pairs of samples: (1) `release` becomes true somewhere
-    in the window; (2) `hold` is true from now to the start of the window; (3) from the start of the window, `hold` is
-    true until `release` is, which here may also be after the window.
+    The result is the smallest robustness of three conditions, which avoids a search over pairs of samples:
+
+    1. `release` becomes true in the window.
+    2. `hold` is true from now to the begin of the window.
+    3. From the begin of the window on, `hold` is true until `release` becomes true, no matter whether in the window.
     """
     count = len(hold)
     from_window = np.append(_unbounded_until(hold, release, windows, continuation), continuation.value_after_end)
@@ -95,7 +102,11 @@ def until(hold: Array, release: Array, windows: SampleWindows, continuation: Con
 
 
 def _unbounded_until(hold: Array, release: Array, windows: SampleWindows, continuation: Continuation) -> Array:
-    """Return the robustness without a window, computed backwards: released now, or held now and released later."""
+    """Return the robustness of `until` without a window.
+
+    It is computed from the last sample backwards: `release` is true now, or `hold` is true now and `until` at the next
+    sample.
+    """
     later = -math.inf if windows.unbounded and continuation.run_ended else continuation.value_after_end
     results = []
     for holds, releases in np.column_stack((hold, release))[::-1].tolist():
@@ -107,8 +118,8 @@ def _unbounded_until(hold: Array, release: Array, windows: SampleWindows, contin
 def _range_maximum(values: Array, first: Indices, last: Indices) -> Array:
     """Return the maximum of values[first[k]] … values[last[k]] for each k; -inf for an empty range.
 
-    Uses a sparse table: level j has the maximum of 2^j values from each index on, and two overlapping ranges of that
-    length cover any other range.
+    Uses a sparse table: level j contains, for each index, the maximum of the 2^j values from there on. Any range is the
+    union of two such ranges, which may overlap.
     """
     widths = last - first + 1
     found = np.full(len(first), -np.inf)

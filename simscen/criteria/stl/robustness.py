@@ -1,8 +1,10 @@
-"""Robustness of a condition on a run at each sample, and the moment that is decisive for it.
+"""Robustness of a condition at each sample of a run: the margin by which it is true, negative if it is false.
 
 The robustness of a comparison is the distance of its signal from the bound, positive if the comparison is true. If
-signal and bound are equal, it is the smallest number with the correct sign, so that `>=` and `>` differ and the sign
-alone is the verdict. A yes-or-no signal has an infinite robustness, so that other signals determine the margin.
+signal and bound are equal, it is the smallest number with the correct sign: thus `>=` and `>` differ, and the sign
+alone decides the verdict. The robustness of a yes-or-no signal is infinite, so that other signals determine the margin.
+
+A witness states which comparison decides the robustness, and at which sample.
 """
 
 from __future__ import annotations
@@ -29,19 +31,21 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 TIE_MARGIN = sys.float_info.min
-"""Robustness of a signal that equals its bound, with the sign of the verdict."""
+"""Magnitude of the robustness if a signal equals its bound."""
 
 HOLD_VIOLATED, RESPONSE_DUE = "`hold` was false", "the response was due"
-"""Notes of a witness."""
+"""Texts of the notes of a witness."""
 
 Bound = Literal["low", "high"]
+"""Bound of the interval in which the robustness lies."""
 
 
 @dataclass(frozen=True)
 class Witness:
-    """The decisive comparison, its decisive sample, and the value of the signal there; `negated` below a `not`.
+    """Comparison that decides the robustness of a condition.
 
-    `notes` are other samples that explain the verdict, each with a text.
+    `sample` is the index of the decisive sample, and `value` the value of the signal there. `negated` is True if the
+    comparison is below a `not`. `notes` are other samples that explain the verdict: a text and an index each.
     """
 
     comparison: Condition
@@ -57,20 +61,21 @@ class Witness:
 
 @dataclass(frozen=True, eq=False)
 class Robustness:
-    """Interval of the robustness at each sample, over all possible continuations of the run.
+    """Interval in which the robustness of a condition lies, at each sample (n,).
 
-    `low` assumes the worst for everything unknown, `high` the best. The verdict is known if both have the same sign.
+    `low` assumes the worst for everything that is unknown, such as the time after the last sample; `high` assumes the
+    best. The condition is decided at a sample if both have the same sign. Subclasses correspond to the operators.
     """
 
     low: Array
     high: Array
 
     def bound(self, bound: Bound) -> Array:
-        """Return `low` or `high`."""
+        """Return the array `low` or `high`."""
         return self.low if bound == "low" else self.high
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the witness that decides the value at a sample where the verdict is known."""
+        """Return the witness that decides this bound at a sample. The condition must be decided there."""
         raise NotImplementedError
 
     def parts(self) -> Sequence[Robustness]:
@@ -78,7 +83,7 @@ class Robustness:
         return ()
 
     def untested(self) -> Iterator[ResponseRobustness]:
-        """Yield each `whenever` in it whose premise was never true."""
+        """Yield the robustness of each `whenever` in the condition whose premise was never certainly true."""
         for part in self.parts():
             yield from part.untested()
 
@@ -118,7 +123,7 @@ class _BooleanRobustness(Robustness):
 
 @dataclass(frozen=True, eq=False)
 class _WindowRobustness(Robustness):
-    """Robustness of `always` or `eventually`: the first sample of the window with its value decides."""
+    """Robustness of `always` or `eventually`; the first sample of the window that has the same value decides."""
 
     part: Robustness
     windows: SampleWindows
@@ -138,7 +143,7 @@ class _UntilRobustness(Robustness):
     windows: SampleWindows
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the witness of the best release, or that of `hold` before it if it is worse."""
+        """Return the witness of `release` at the best release, or of `hold` before it if its value is lower."""
         end = int(self.windows.last[sample]) + 1
         first = int(self.windows.first[sample]) - sample
         hold, release = self.hold.bound(bound)[sample:end], self.release.bound(bound)[sample:end]
@@ -162,10 +167,11 @@ class _UntilRobustness(Robustness):
 
 @dataclass(frozen=True, eq=False)
 class ResponseRobustness(Robustness):
-    """Robustness of `whenever … then`: always, the premise is false or the response is true.
+    """Robustness of `whenever … then`, which means: at all samples, the premise is false or the response is true.
 
-    `reach` is the slice of samples at which the premise counts. If the premise was never certainly true there, nothing
-    was tested: it does not pass, unless `required` is False.
+    `premise` and `response` are the robustness of both parts, `implied` that of "the premise is false or the response
+    is true", and `condition` is the premise itself. `reach` is the slice of samples at which the premise counts. If
+    `required` and the premise was never certainly true there, nothing was tested, and the condition cannot pass.
     """
 
     premise: Robustness
@@ -177,34 +183,34 @@ class ResponseRobustness(Robustness):
     required: bool
 
     @property
-    def tested(self) -> bool:
-        """True if the premise was certainly true at some sample."""
+    def was_tested(self) -> bool:
+        """Whether the premise was certainly true at a sample."""
         return bool((self.premise.low[self.reach] > 0).any())
 
     @property
     def may_have_held(self) -> bool:
-        """True if the premise may have been true at some sample, depending on the continuation of the run."""
+        """Whether the premise may have been true at a sample, depending on what happened after the last sample."""
         return bool((self.premise.high[self.reach] > 0).any())
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the witness of the worst response, with a note when it was due."""
+        """Return the witness of the worst response, with a note that states when it was due."""
         at = _first_equal(self.implied.bound(bound), self.bound(bound)[sample], sample, self.windows)
         return self.implied.witness(at, bound).with_note(RESPONSE_DUE, at)
 
     def parts(self) -> Sequence[Robustness]:
-        """Return premise and response."""
+        """Return the robustness of premise and response."""
         return (self.premise, self.response)
 
     def untested(self) -> Iterator[ResponseRobustness]:
-        """Yield itself and each nested `whenever` whose premise was never certainly true."""
-        if self.required and not self.tested:
+        """Yield this robustness, and that of each nested `whenever`, if its premise was never certainly true."""
+        if self.required and not self.was_tested:
             yield self
         yield from super().untested()
 
 
 @dataclass(frozen=True, eq=False)
 class EvaluationContext:
-    """A run on which conditions are evaluated, at each sample of the truth.
+    """Run on which conditions are evaluated, at each sample of the truth.
 
     `run_ended` is False for a truncated log, after which the run may have gone on.
     """
@@ -219,7 +225,7 @@ class EvaluationContext:
         return usual_period(self.trace.truth.ticks)
 
     def sample_windows(self, window: Window) -> SampleWindows:
-        """Return the window of each sample. Raises InvalidTrace if it is shorter than the spacing of samples."""
+        """Return the window of each sample. Raises InvalidTrace if windows are too short to contain a sample."""
         start, end = window.interval
         rate, last = self.trace.tick_rate, None
         if end is not None:
@@ -241,7 +247,8 @@ class EvaluationContext:
 def robustness(condition: Condition, context: EvaluationContext, begin: int = 0) -> Robustness:
     """Return the robustness of a condition at each sample.
 
-    `begin` is the first sample at which it counts. Raises SignalUnavailable or InvalidTrace if a signal is unusable.
+    `begin` is the first sample at which the condition counts; it determines at which samples the premise of a
+    `whenever` counts. Raises SignalUnavailable if the trace lacks a signal, and InvalidTrace if a signal is not finite.
     """
     if condition.signal is not None:
         return _compare(condition, context)
@@ -270,7 +277,7 @@ def windowed_robustness(
     context: EvaluationContext,
     begin: int = 0,
 ) -> Robustness:
-    """Return the robustness of `condition` always or eventually in a window."""
+    """Return the robustness of: `condition` is always or eventually true in a window; `begin`: see `robustness`."""
     windows = context.sample_windows(window)
     return _windowed(operator, robustness(condition, context, _start(windows, begin)), windows, context)
 
@@ -278,7 +285,7 @@ def windowed_robustness(
 def until_robustness(
     hold: Condition, release: Condition, window: Window, context: EvaluationContext, begin: int = 0
 ) -> Robustness:
-    """Return the robustness of `hold` until `release` in a window."""
+    """Return the robustness of: `hold` is true until `release` becomes true in a window; `begin`: see `robustness`."""
     windows = context.sample_windows(window)
     holds, releases = robustness(hold, context, begin), robustness(release, context, _start(windows, begin))
     low, high = (
@@ -296,9 +303,10 @@ def response_robustness(
     begin: int = 0,
     required: bool = True,
 ) -> ResponseRobustness:
-    """Return the robustness of: whenever `premise` is true in the window, `response` is.
+    """Return the robustness of: each time that `premise` is true in a window, `response` is true too.
 
-    If the premise is `required` but never certainly true, `low` is -inf, because nothing was tested.
+    A window of None is the rest of the run; `begin`: see `robustness`. If the premise is `required` to be true at least
+    once, but was never certainly true, `low` is -inf, because nothing was tested.
     """
     windows = context.rest_of_run if window is None else context.sample_windows(window)
     start = _start(windows, begin)
@@ -310,7 +318,7 @@ def response_robustness(
     found = ResponseRobustness(
         always.low, always.high, premise_part, response_part, implied, windows, premise, slice(start, end), required
     )
-    return replace(found, low=np.full_like(found.low, -math.inf)) if required and not found.tested else found
+    return replace(found, low=np.full_like(found.low, -math.inf)) if required and not found.was_tested else found
 
 
 def _windowed(
@@ -322,11 +330,12 @@ def _windowed(
 
 
 def _start(windows: SampleWindows, begin: int) -> int:
-    """Return the first sample of the window of sample `begin`; beyond the run it is the number of samples."""
+    """Return the first sample of the window of sample `begin`; the number of samples if there is none."""
     return int(windows.first[begin]) if begin < len(windows.first) else len(windows.first)
 
 
 def _continuations(context: EvaluationContext) -> list[tuple[Bound, Continuation]]:
+    """Return the assumption about the time after the last sample for each bound."""
     return [("low", Continuation(-math.inf, context.run_ended)), ("high", Continuation(math.inf, context.run_ended))]
 
 
@@ -337,6 +346,7 @@ def _combine(parts: Sequence[Robustness], how: Literal["all", "any"]) -> Robustn
 
 
 def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
+    """Return the robustness of a comparison."""
     assert condition.signal is not None
     trace = context.trace
     values = read_signal(condition.signal, trace, context.case, condition.arguments)
@@ -355,7 +365,7 @@ def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
 
 
 def _distances(condition: Condition, values: Array) -> Array:
-    """Return the distances to the bound, divided by `scale` if given; positive if the comparison is true."""
+    """Return the distances of a signal from the bound, positive if the comparison is true, and divided by `scale`."""
     assert condition.value is not None
     above = condition.op in (">=", ">")
     distances = (values - condition.value if above else condition.value - values) / (condition.scale or 1.0)

@@ -1,1 +1,1 @@
-"""Signals that criteria compare: their definitions, their readers, and their sampling."""
+"""Signals that criteria compare: their catalog, the functions that read them from a trace, and their sampling."""

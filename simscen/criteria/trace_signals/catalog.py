@@ -1,4 +1,4 @@
-"""Catalog of the named signals that temporal criteria compare and `simscen explain signals` lists."""
+"""Catalog of all signals by name. Temporal criteria compare them, and `simscen explain signals` lists them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from simscen.core.geometry import Array
 from simscen.core.records.verdict import Evidence
 from simscen.criteria.trace_signals import distances, readers
-from simscen.criteria.trace_signals.ground_truth import BELIEF_TIMEOUT_S
+from simscen.criteria.trace_signals.estimation_errors import BELIEF_TIMEOUT_S
 from simscen.criteria.trace_signals.sampling import SignalArguments, SignalQuery
 from simscen.spec.quantities import UNITS
 
@@ -29,16 +29,24 @@ SignalName = Literal[
 ]  # fmt: skip
 
 YES_OR_NO = "yes or no"
+"""Dimension of a signal with the values 0 and 1."""
 NUMBER = "number"
+"""Dimension of a signal without unit."""
 
 
 @dataclass(frozen=True)
 class Signal:
-    """Definition of a quantity that has a value at each sample of the truth.
+    """Definition of a signal: a quantity that has a value at each sample of the truth.
 
-    `dimension` is one of spec.quantities.UNITS, "number", or "yes or no". `read` returns the values of a run.
-    `evidence` is what a log must contain besides the truth, which is the clock. Values lie between `minimum` and
-    `maximum`, inclusive. Exactly one of `required_arguments` must be given; `optional_arguments` may be.
+    Attributes:
+        text: Description for the reference page.
+        dimension: A key of spec.quantities.UNITS, NUMBER, or YES_OR_NO.
+        read: Function that returns the values (n,) of a run in SI units.
+        evidence: What a log must contain for this signal, besides the truth.
+        minimum: Smallest possible value.
+        maximum: Greatest possible value.
+        required_arguments: Keys of arguments of which exactly one must be given.
+        optional_arguments: Keys of arguments that may be given.
     """
 
     text: str
@@ -57,7 +65,7 @@ class Signal:
 
     @property
     def is_boolean(self) -> bool:
-        """True for a yes-or-no signal."""
+        """Whether this is a yes-or-no signal."""
         return self.dimension == YES_OR_NO
 
 
@@ -110,7 +118,7 @@ SIGNALS: dict[SignalName, Signal] = {
     ),
     "time": Signal("Simulated time since the start.", "duration", readers.time, frozenset()),
     "goal_distance": Signal(
-        "True straight-line distance to the goal accepted last; to the first goal before any is accepted.",
+        "True straight-line distance to the goal accepted last, or to the first goal before any goal is accepted.",
         "length",
         readers.goal_distance,
         {Evidence.ALIGNMENT, Evidence.NAVIGATION},
@@ -149,8 +157,8 @@ SIGNALS: dict[SignalName, Signal] = {
         {Evidence.ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT},
     ),
     "localization_error": Signal(
-        "Distance between the newest estimated position and the true one of the same time; the current "
-        "true position if the belief is over 1 s old. Not aligned.",
+        "Distance of the newest estimated position from the true position at the time of the estimate, or from the "
+        "current one if the belief is over 1 s old. Not aligned.",
         "length",
         readers.localization_error,
         {Evidence.ALIGNMENT, Evidence.BELIEF},
@@ -172,8 +180,8 @@ SIGNALS: dict[SignalName, Signal] = {
         "Standard deviation of the estimated heading.", "angle", readers.yaw_std, {Evidence.BELIEF, Evidence.COVARIANCE}
     ),
     "nees": Signal(
-        "Normalized estimation error squared of the belief: 3 on average if its covariance is right; infinite"
-        " if that is singular.",
+        "Normalized estimation error squared of the belief: 3 on average if its covariance is correct; infinite"
+        " if its covariance is singular.",
         NUMBER,
         readers.nees,
         {Evidence.ALIGNMENT, Evidence.BELIEF, Evidence.COVARIANCE},
@@ -266,17 +274,17 @@ SIGNALS: dict[SignalName, Signal] = {
         required_arguments=("fault", "event"),
     ),
 }
-"""Signals by name, in the order of the reference."""
+"""Signals by name, in the order of the reference page."""
 
 
 def signal_evidence(name: SignalName) -> frozenset[Evidence]:
-    """Return the evidence that a log must contain for a signal; the truth is the clock of every signal."""
+    """Return the evidence that a log must contain for a signal, including the truth, which all signals need."""
     return frozenset({*SIGNALS[name].evidence, Evidence.TRUTH})
 
 
 def read_signal(name: SignalName, trace: Trace, case: Case, arguments: SignalArguments) -> Array:
-    """Return a signal at each sample of the truth.
+    """Return the values (n,) of a signal at each sample of the truth, in SI units; 0 or 1 for a yes-or-no signal.
 
-    Raises SignalUnavailable if the trace lacks the data, and InvalidTrace if the data are not finite.
+    Raises SignalUnavailable if the trace lacks the data of the signal, and InvalidTrace if they are not finite.
     """
     return SIGNALS[name].read(SignalQuery(trace, case, arguments))

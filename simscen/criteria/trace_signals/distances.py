@@ -1,4 +1,7 @@
-"""Signals of distances between the robot and objects, goals, pedestrians, and its plan."""
+"""Readers of the signals that are distances from the robot to objects, points, goals, pedestrians, and its plan.
+
+Distances are in m, one value per sample of the truth (n,), unless stated otherwise.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from simscen.core.geometry import Array
 from simscen.core.geometry.polygons import POINT, separation
 from simscen.core.records.events import EventKind
 from simscen.criteria.trace_signals.ground_truth import check_samples
-from simscen.criteria.trace_signals.readers import goal_distance, poses_of
+from simscen.criteria.trace_signals.readers import goal_distance, true_poses
 from simscen.criteria.trace_signals.sampling import SignalQuery, SignalUnavailable
 
 if TYPE_CHECKING:
@@ -24,8 +27,8 @@ _TINY = sys.float_info.min
 
 
 def distance_to(query: SignalQuery) -> Array:
-    """Return the distance from the robot's center to a point, a goal, or the origin of an object."""
-    poses, point, goal = poses_of(query.trace), query.arguments.get("point"), query.arguments.get("goal")
+    """Return the distance from the robot's center to the point, the goal, or the object that the query names."""
+    poses, point, goal = true_poses(query.trace), query.arguments.get("point"), query.arguments.get("goal")
     if isinstance(point, Sequence):
         return np.hypot(poses[:, 0] - float(point[0]), poses[:, 1] - float(point[1]))
     if goal is None:
@@ -38,7 +41,7 @@ def distance_to(query: SignalQuery) -> Array:
 
 
 def _distance_to_object(trace: Trace, name: str, poses: Array) -> Array:
-    """Return the distance to an object; infinite while the object does not exist."""
+    """Return the distance to the origin of an object; inf while the object does not exist."""
     positions = object_positions(trace, name)
     distance = np.hypot(poses[:, 0] - positions[:, 0], poses[:, 1] - positions[:, 1])
     present_distance: Array = np.where(is_present(trace, name), distance, np.inf)
@@ -46,14 +49,17 @@ def _distance_to_object(trace: Trace, name: str, poses: Array) -> Array:
 
 
 def object_positions(trace: Trace, name: str) -> Array:
-    """Return the positions of an object at each truth sample (n, 2 or 3), or its constant position (1, 2)."""
+    """Return the poses (n, 3) of an object at the samples of the truth, or its position (1, 2) if it never moves.
+
+    Raises SignalUnavailable if the trace does not contain the object.
+    """
     if name in trace.objects:
         return check_samples(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
     return _static_position(trace, name)
 
 
 def _static_position(trace: Trace, name: str) -> Array:
-    """Return the position (1, 2) of an object that never moved."""
+    """Return the position (1, 2) at which an object was spawned. Raises SignalUnavailable if it was never spawned."""
     for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
         x, y = event.data.get("x"), event.data.get("y")
         if event.name == name and isinstance(x, int | float) and isinstance(y, int | float):
@@ -62,7 +68,7 @@ def _static_position(trace: Trace, name: str) -> Array:
 
 
 def is_present(trace: Trace, name: str) -> Array:
-    """Return whether an object exists at each truth sample. Objects that were not spawned always exist."""
+    """Return, for each sample of the truth, whether an object exists. Objects that were not spawned always exist."""
     clock = trace.truth.ticks
     changes = [
         event for event in trace.of_kind(EventKind.OBJECT_SPAWNED, EventKind.OBJECT_REMOVED) if event.name == name
@@ -76,7 +82,7 @@ def is_present(trace: Trace, name: str) -> Array:
 
 
 def distance_remaining(query: SignalQuery) -> Array:
-    """Return the remaining length of the newest plan; before the first plan, the true distance to the goal."""
+    """Return the length of the newest plan from the estimated position on; before the first plan, `goal_distance`."""
     belief, clock = check_samples(query.trace.belief, "the belief", query.trace), query.trace.truth.ticks
     if not len(belief):
         raise SignalUnavailable("no belief was recorded")
@@ -88,8 +94,11 @@ def distance_remaining(query: SignalQuery) -> Array:
 
 
 def plan_deviation(query: SignalQuery) -> Array:
-    """Return the distance from the true position to the newest plan; 0 before the first plan."""
-    poses = poses_of(query.trace)
+    """Return the distance from the true position to the newest plan; 0 before the first plan.
+
+    Raises SignalUnavailable if there is no plan.
+    """
+    poses = true_poses(query.trace)
     deviation = np.zeros(len(poses))
     plans = _plans(query.trace, query.trace.truth.ticks)
     if not plans:
@@ -100,7 +109,7 @@ def plan_deviation(query: SignalQuery) -> Array:
 
 
 def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
-    """Return first sample, sample after the last, and points of each plan that was current for at least one sample."""
+    """Return each plan that was the newest one at a sample: first sample, sample after the last, and points (m, 2)."""
     plans = [plan for plan in trace.plans if len(plan.points)]
     begins: list[int] = np.searchsorted(clock, [plan.tick for plan in plans]).tolist()
     ends = [*begins, len(clock)][1:]
@@ -109,7 +118,7 @@ def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
 
 
 def _project_on_path(points: Array, path: Array) -> tuple[Array, Array]:
-    """Return, for points (n, 2), the distances to a path (m, 2), and the remaining length of the path."""
+    """Return, for points (n, 2), the distance (n,) to a path (m, 2), and the length (n,) of the path from there on."""
     if len(path) == 1:
         path = np.vstack((path, path))
     steps = np.diff(path, axis=0)
@@ -123,7 +132,10 @@ def _project_on_path(points: Array, path: Array) -> tuple[Array, Array]:
 
 
 def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
-    """Return the index of the segment (m, 2) nearest to each point (n, 2), computed with matrix products for speed."""
+    """Return the index of the segment nearest to each point (n, 2), computed with matrix products for speed.
+
+    Segment k begins at `begins[k]` and ends at `begins[k] + steps[k]`; both arrays are (m, 2).
+    """
     along = points @ steps.T - (begins * steps).sum(axis=1)
     squared = np.maximum((steps**2).sum(axis=1), _TINY)
     share = np.clip(along / squared, 0.0, 1.0)
@@ -133,11 +145,11 @@ def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
 
 
 INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6
-"""Gaps in m below which the robot is in the intimate, personal, or social space of a person (Hall 1966, HuNavSim)."""
+"""Gap below which the robot is in the intimate, personal, or social space of a person (Hall 1966, HuNavSim)."""
 
 
 def pedestrian_radii(trace: Trace) -> dict[str, float]:
-    """Return the names of all pedestrians of the run, with their radii in m."""
+    """Return the radius in m of each pedestrian of the run, by name."""
     found: dict[str, float] = {}
     for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
         size = event.data.get("size")
@@ -147,14 +159,14 @@ def pedestrian_radii(trace: Trace) -> dict[str, float]:
 
 
 def pedestrian_gap(trace: Trace, case: Case) -> Array:
-    """Return the distance in m to the nearest pedestrian at each truth sample; infinite while none is present.
+    """Return the gap between the robot's footprint and the body of the nearest pedestrian; inf while there is none.
 
-    The inscribed circle replaces a missing footprint. Raises SignalUnavailable if no pedestrian was ever present.
+    The inscribed circle replaces an unknown footprint. Raises SignalUnavailable if the run has no pedestrians.
     """
     radii = pedestrian_radii(trace)
     if not radii:
         raise SignalUnavailable("there were no people")
-    poses = poses_of(trace)
+    poses = true_poses(trace)
     nearest = np.full(len(poses), np.inf)
     for name, radius in sorted(radii.items()):
         positions = np.broadcast_to(object_positions(trace, name)[:, :2], (len(poses), 2))
@@ -164,12 +176,12 @@ def pedestrian_gap(trace: Trace, case: Case) -> Array:
 
 
 def person_distance(query: SignalQuery) -> Array:
-    """Return the distance to people as a signal."""
+    """Return `pedestrian_gap` for the run of the query."""
     return pedestrian_gap(query.trace, query.case)
 
 
 def _footprint_distance(poses: Array, points: Array, case: Case) -> Array:
-    """Return the distances from the footprint of a robot at `poses` (n, 3) to points (n, 2)."""
+    """Return the signed distances (n,) from the footprint of a robot at `poses` (n, 3) to points (n, 2)."""
     offsets = points - poses[:, :2]
     if len(case.footprint) < 3:
         circle: Array = np.hypot(offsets[:, 0], offsets[:, 1]) - case.inscribed_radius

@@ -1,4 +1,8 @@
-"""Reader functions of the named signals, sampled as described in `sampling`."""
+"""Readers of the named signals: functions that compute the values (n,) of a signal at the n samples of the truth.
+
+Signals that are distances to something have their readers in `distances`. A yes-or-no signal has the values 0 and 1.
+All readers raise SignalUnavailable if the trace lacks the data of the signal, and InvalidTrace if they are not finite.
+"""
 
 from __future__ import annotations
 
@@ -13,17 +17,8 @@ from simscen.core.messages.navigation import matches_goal_name
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Samples, Ticks
 from simscen.criteria.timeline import spans
-from simscen.criteria.trace_signals.ground_truth import (
-    BELIEF_TIMEOUT_S,
-    Flags,
-    check_samples,
-    drive,
-    nees_samples,
-    pose_error,
-    speed,
-    teleport_samples,
-    truth,
-)
+from simscen.criteria.trace_signals.estimation_errors import BELIEF_TIMEOUT_S, nees_samples, pose_error
+from simscen.criteria.trace_signals.ground_truth import Flags, check_samples, drive, speed, teleport_samples, truth
 from simscen.criteria.trace_signals.ground_truth import clearance as hull_clearance
 from simscen.criteria.trace_signals.ground_truth import turn_rate as unsigned_turn_rate
 from simscen.criteria.trace_signals.sampling import (
@@ -41,11 +36,11 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 LOCALIZED_STD_M = 0.5
-"""Largest standard deviation of the position of a localized robot in m; Nav2's initial value."""
+"""Largest standard deviation of the position with which a robot counts as localized; AMCL's initial one."""
 
 
 def clearance(query: SignalQuery) -> Array:
-    """Return the distance in m to the nearest surface; infinite where nothing is near."""
+    """Return the distance in m from the hull to the nearest surface; inf while no surface is near."""
     return hold(query.trace, hull_clearance(query.trace), "clearance")[:, 0]
 
 
@@ -70,24 +65,24 @@ def yaw_rate(query: SignalQuery) -> Array:
 
 
 def acceleration(query: SignalQuery) -> Array:
-    """Return the change of the speed over ground since the previous sample, in m/s²."""
+    """Return the change of the speed over ground since the previous sample, per time, in m/s²."""
     return _differences(query.trace, ground_speed(query), 1)
 
 
 def angular_acceleration(query: SignalQuery) -> Array:
-    """Return the change of the yaw rate since the previous sample, in rad/s²."""
+    """Return the change of the yaw rate since the previous sample, per time, in rad/s²."""
     return _differences(query.trace, yaw_rate(query), 1)
 
 
 def jerk(query: SignalQuery) -> Array:
-    """Return |v[k+1] - 2 v[k] + v[k-1]| / dt² of the speed over ground in m/s³."""
+    """Return the magnitude of the jerk in m/s³: |v[k+1] - 2 v[k] + v[k-1]| / dt² of the speed over ground v."""
     return np.abs(_differences(query.trace, ground_speed(query), 2))
 
 
 def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
-    """Return the true speed over ground in m/s at evenly spaced times, and their rate in Hz.
+    """Return the true speed over ground (m,) in m/s, sampled at evenly spaced times, and the sample rate in Hz.
 
-    Raises SignalUnavailable if there is no velocity, or if the samples are too rare for SPARC and LDLJ.
+    Raises SignalUnavailable if there is no velocity, or if the sample rate is too low for SPARC and LDLJ.
     """
     even = evenly_spaced(speed(trace), trace.tick_rate)
     rate = trace.tick_rate / float(even.ticks[1] - even.ticks[0])
@@ -99,17 +94,20 @@ def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
 
 
 def localization_error(query: SignalQuery) -> Array:
-    """Return the distance in m between estimated and true position."""
+    """Return the distance in m between the estimated and the true position, see `pose_error`."""
     return hold(query.trace, pose_error(query.trace), "belief")[:, 0]
 
 
 def localization_yaw_error(query: SignalQuery) -> Array:
-    """Return the angle in rad between estimated and true heading."""
+    """Return the angle in rad between the estimated and the true heading, see `pose_error`."""
     return hold(query.trace, pose_error(query.trace), "belief")[:, 1]
 
 
 def position_std(query: SignalQuery) -> Array:
-    """Return the square root in m of the larger eigenvalue of the covariance of x and y."""
+    """Return the standard deviation in m of the estimated position in its worst direction.
+
+    It is the square root of the larger eigenvalue of the covariance of x and y.
+    """
     xx, xy, _, yy, _, _ = _covariance(query.trace).T
     spread = np.hypot((xx - yy) / 2, xy)
     std: Array = np.sqrt(np.maximum((xx + yy) / 2 + spread, 0.0))
@@ -117,27 +115,27 @@ def position_std(query: SignalQuery) -> Array:
 
 
 def yaw_std(query: SignalQuery) -> Array:
-    """Return the square root in rad of the variance of the heading."""
+    """Return the standard deviation in rad of the estimated heading."""
     return np.sqrt(np.maximum(_covariance(query.trace)[:, 5], 0.0))
 
 
 def nees(query: SignalQuery) -> Array:
-    """Return the NEES of the belief; infinite where the covariance is singular."""
+    """Return the NEES of the newest belief; inf if its covariance is singular."""
     return hold(query.trace, nees_samples(query.trace), "covariance")[:, 0]
 
 
 def belief_age(query: SignalQuery) -> Array:
-    """Return the time in s since the newest belief was published."""
+    """Return the time in s since the newest belief was published; before the first one, since the start."""
     return _age(query.trace, query.trace.belief.ticks)
 
 
 def scan_age(query: SignalQuery) -> Array:
-    """Return the time in s since the newest scan was received."""
+    """Return the time in s since the stack received the newest scan; before the first one, since the start."""
     return _age(query.trace, query.trace.scans)
 
 
 def localized(query: SignalQuery) -> Array:
-    """Return whether there is a recent belief with a small standard deviation."""
+    """Return whether the newest belief is at most BELIEF_TIMEOUT_S old and its position_std at most LOCALIZED_STD_M."""
     if not len(query.trace.belief):
         return np.zeros(len(sample_ticks(query.trace)))
     has_belief = sample_ticks(query.trace) >= query.trace.belief.ticks[0]
@@ -146,18 +144,18 @@ def localized(query: SignalQuery) -> Array:
 
 
 def goal_distance(query: SignalQuery) -> Array:
-    """Return the true distance in m to the current goal."""
-    goals, poses = _current_goals(query.trace, query.case), poses_of(query.trace)
+    """Return the true distance in m to the goal accepted last; to the first goal before any is accepted."""
+    goals, poses = _current_goals(query.trace, query.case), true_poses(query.trace)
     return np.hypot(poses[:, 0] - goals[:, 0], poses[:, 1] - goals[:, 1])
 
 
 def goal_heading_error(query: SignalQuery) -> Array:
-    """Return the angle in rad between the true heading and that of the current goal."""
-    return np.abs(wrap_array(poses_of(query.trace)[:, 2] - _current_goals(query.trace, query.case)[:, 2]))
+    """Return the angle in rad between the true heading and that of the goal of `goal_distance`."""
+    return np.abs(wrap_array(true_poses(query.trace)[:, 2] - _current_goals(query.trace, query.case)[:, 2]))
 
 
 def travelled(query: SignalQuery) -> Array:
-    """Return the distance in m driven so far, as path_length measures it."""
+    """Return the distance in m driven so far, as the criterion path_length measures it."""
     path, clock = drive(query.trace), sample_ticks(query.trace)
     return path.travelled[np.searchsorted(path.ticks, clock, side="right") - 1]
 
@@ -179,22 +177,22 @@ def command_turn_rate(query: SignalQuery) -> Array:
 
 
 def in_region(query: SignalQuery) -> Array:
-    """Return whether the robot's center is inside the region."""
+    """Return whether the robot's center is truly in the region of the query."""
     name = str(query.arguments["region"])
     if name not in query.case.regions:
         raise SignalUnavailable(f"the world has no region `{name}`")
-    return _as_numbers(points_in_polygon(query.case.regions[name], poses_of(query.trace)[:, :2]))
+    return _as_numbers(points_in_polygon(query.case.regions[name], true_poses(query.trace)[:, :2]))
 
 
 def in_collision(query: SignalQuery) -> Array:
-    """Return whether a contact is active."""
+    """Return whether the robot touches something, or the object of the query."""
     return _as_numbers(
         _between(query.trace, EventKind.COLLISION_STARTED, (EventKind.COLLISION_ENDED,), query.arguments.get("with"))
     )
 
 
 def goal_active(query: SignalQuery) -> Array:
-    """Return whether a goal is active: from its acceptance to the report that ends it."""
+    """Return whether a goal, or that of the query, is active: from its acceptance to the report that ends it."""
     ends = (
         EventKind.GOAL_REACHED,
         EventKind.GOAL_PASSED,
@@ -207,14 +205,14 @@ def goal_active(query: SignalQuery) -> Array:
 
 
 def recovery_active(query: SignalQuery) -> Array:
-    """Return whether a recovery is active."""
+    """Return whether a recovery, or that of the query, is active."""
     return _as_numbers(
         _between(query.trace, EventKind.RECOVERY_STARTED, (EventKind.RECOVERY_ENDED,), query.arguments.get("recovery"))
     )
 
 
 def is_active(query: SignalQuery) -> Array:
-    """Return whether the fault or event is active."""
+    """Return whether the fault or event of the query is active."""
     intervals = [
         (span.start, span.end + (not span.has_end_event)) for span in spans(query.trace, _label(query.arguments))
     ]
@@ -222,7 +220,7 @@ def is_active(query: SignalQuery) -> Array:
 
 
 def has_just_started(query: SignalQuery) -> Array:
-    """Return whether this is the sample that follows a start of the fault or event."""
+    """Return whether a sample is the first one after a start of the fault or event of the query."""
     starts = [(span.start, span.start) for span in spans(query.trace, _label(query.arguments))]
     return _as_numbers(_flags(query.trace, starts))
 
@@ -233,7 +231,7 @@ def collision_count(query: SignalQuery) -> Array:
 
 
 def replan_count(query: SignalQuery) -> Array:
-    """Return the number of plans so far that were made for another reason than a new goal."""
+    """Return the number of plans that were made so far for another reason than a new goal."""
     plans = query.trace.of_kind(EventKind.PLAN_MADE)
     return _count(query.trace, [event.tick for event in plans if event.data.get("reason", "goal") != "goal"])
 
@@ -243,17 +241,19 @@ def recovery_count(query: SignalQuery) -> Array:
     return _count(query.trace, [event.tick for event in query.trace.of_kind(EventKind.RECOVERY_STARTED)])
 
 
-def poses_of(trace: Trace) -> Array:
-    """Return x and y in m and yaw in rad of the robot in the world frame at each truth sample, (n, 3)."""
+def true_poses(trace: Trace) -> Array:
+    """Return the true poses (n, 3) of the robot in the world frame: x and y in m, yaw in rad."""
     sample_ticks(trace)
     return truth(trace).values
 
 
 def _velocity(trace: Trace) -> Array:
+    """Return the true vx, vy (m/s) and wz (rad/s) in the base frame, (n, 3)."""
     return hold(trace, check_samples(trace.velocity, "the true velocity", trace), "velocity")
 
 
 def _covariance(trace: Trace) -> Array:
+    """Return the upper triangle of the covariance of the newest belief: xx, xy, xyaw, yy, yyaw, yawyaw, (n, 6)."""
     belief = check_samples(trace.belief, "the belief", trace)
     if not len(belief) or belief.values.shape[1] < 9:
         raise SignalUnavailable("no covariance of the belief was recorded")
@@ -261,6 +261,7 @@ def _covariance(trace: Trace) -> Array:
 
 
 def _commanded(trace: Trace) -> Array:
+    """Return the newest command: vx, vy (m/s) and wz (rad/s), (n, 3); zeros before the first command."""
     clock, command = sample_ticks(trace), check_samples(trace.command, "the command", trace)
     if not len(command):
         raise SignalUnavailable("no command was recorded")
@@ -268,10 +269,11 @@ def _commanded(trace: Trace) -> Array:
 
 
 def _differences(trace: Trace, values: Array, order: int) -> Array:
-    """Return differences of an order divided by the time step to that power; the ends repeat their neighbors.
+    """Return the first or second differences (n,) of `values` (n,), divided by the time step or its square.
 
-    Uneven samples are resampled first, and the differences held at the truth's own samples. Teleportation does not
-    count as a change.
+    `order` is 1 or 2. The first difference at a sample is that to the sample before. Samples at the ends that have no
+    difference get that of their neighbor. Uneven samples are resampled before, and the differences are sampled and held
+    at the samples of the truth. Teleportation does not count as a change.
     """
     ticks = sample_ticks(trace)
     even = evenly_spaced(Samples(ticks, values[:, np.newaxis]), trace.tick_rate)
@@ -292,7 +294,7 @@ def _differences(trace: Trace, values: Array, order: int) -> Array:
 
 
 def _age(trace: Trace, received: Ticks) -> Array:
-    """Return the seconds since the newest of these ticks; before the first, since the start."""
+    """Return the time in s since the newest of the ticks `received`; before the first one, since the start."""
     clock = sample_ticks(trace)
     if not len(received):
         return clock / trace.tick_rate
@@ -302,7 +304,7 @@ def _age(trace: Trace, received: Ticks) -> Array:
 
 
 def _current_goals(trace: Trace, case: Case) -> Array:
-    """Return x, y, yaw of the goal accepted last, (n, 3); of the first goal, (1, 3), if none was accepted."""
+    """Return x, y, yaw of the goal accepted last, (n, 3), or of the first goal, (1, 3), if none was ever accepted."""
     clock = sample_ticks(trace)
     pose_by_name = {goal.name: goal.pose for goal in reversed(case.every_goal)}
     ticks, poses = [], []
@@ -320,11 +322,15 @@ def _current_goals(trace: Trace, case: Case) -> Array:
 
 
 def _label(arguments: SignalArguments) -> str:
+    """Return the name of the fault or event in the arguments."""
     return str(arguments.get("fault") or arguments["event"])
 
 
 def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: object) -> Flags:
-    """Return flags between each event of kind `start` (with `name`, if given) and the next matching one of `ends`."""
+    """Return flags that are True between each event of the kind `start` and the next event that ends it.
+
+    `ends` are the kinds of events that can end it. If `name` is not None, only starts with this name count.
+    """
     intervals: list[tuple[int, float]] = []
     for event in trace.of_kind(start):
         if name in (None, event.name) or (
@@ -338,12 +344,18 @@ def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: 
 
 
 def _is_end(kind: EventKind, name: str, started: str) -> bool:
-    """Return whether an event ends the goal, contact, or recovery `started`; a new goal ends any other goal."""
+    """Return whether an event ends the goal, contact, or recovery `started`.
+
+    The end of navigation and the acceptance of another goal end any goal.
+    """
     return name == started or kind in (EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
 
 
 def _flags(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Flags:
-    """Return flags that are True from `start` to before `end`, and for at least one sample."""
+    """Return flags that are True at the samples in the intervals (start, end), given in ticks, without the end.
+
+    An interval without a sample sets the flag of the next sample.
+    """
     clock = sample_ticks(trace)
     flags = np.zeros(len(clock), dtype=bool)
     for start, end in intervals:
@@ -353,10 +365,12 @@ def _flags(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Flags:
 
 
 def _as_numbers(flags: Flags) -> Array:
+    """Return 1 for True and 0 for False."""
     return flags.astype(np.float64)
 
 
 def _count(trace: Trace, ticks: list[int]) -> Array:
+    """Return how many of the `ticks` have passed at each sample."""
     return np.searchsorted(np.array(sorted(ticks), dtype=np.int64), sample_ticks(trace), side="right").astype(
         np.float64
     )

@@ -1,13 +1,10 @@
-"""Sampling of signals: their common clock, sample and hold of slower signals, and resampling of uneven ones.
-
-A signal has one value for each sample of the truth, whenever it was taken.
+"""Sampling of signals: each signal has one value for each sample of the truth.
 
 - Signals that are published more rarely (belief, command, scans) keep their newest value until the next one. Before the
   first value, the first value counts.
-- Events between two samples count at the sample that follows.
-- Differences over time (acceleration, jerk, SPARC, LDLJ) need even samples. Uneven samples of the truth are resampled
-  to their median spacing by linear interpolation. Across a gap longer than MAX_INTERPOLATED_GAP_S, the signal is
-  unknown.
+- An event between two samples counts at the sample that follows.
+- Differences over time (acceleration, jerk, SPARC, LDLJ) need evenly spaced samples. Uneven samples of the truth are
+  resampled to their median spacing by linear interpolation.
 """
 
 from __future__ import annotations
@@ -20,9 +17,6 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.core.records.trace import Samples, Ticks
-from simscen.core.records.verdict import Evidence
-from simscen.criteria.findings import InvalidTrace
-from simscen.criteria.trace_signals.ground_truth import check_finite
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
@@ -30,19 +24,19 @@ if TYPE_CHECKING:
 
 
 MAX_INTERPOLATED_GAP_S = 0.25
-"""Longest gap across which uneven samples are interpolated."""
+"""Longest gap between samples that is interpolated. With a longer gap, differences over time are unavailable."""
 
 SignalArguments = Mapping[str, object]
-"""Arguments of a signal: object, point, goal, region, fault, event, recovery or with, as the condition names them."""
+"""Arguments of a signal by YAML key: object, point, goal, region, fault, event, recovery, or with."""
 
 
 class SignalUnavailable(ValueError):
-    """The trace lacks the data of a signal, so that nothing can be decided; the message says what is missing."""
+    """The trace lacks the data of a signal, so that a criterion is inconclusive. The message says what is missing."""
 
 
 @dataclass(frozen=True, eq=False)
 class SignalQuery:
-    """A run, and the arguments of the signal that is read from it."""
+    """Input of a reader: the trace and the case of a run, and the arguments of the signal."""
 
     trace: Trace
     case: Case
@@ -50,14 +44,17 @@ class SignalQuery:
 
 
 def sample_ticks(trace: Trace) -> Ticks:
-    """Return the ticks at which signals have values: those of the truth. Raises SignalUnavailable without a truth."""
+    """Return the ticks at which signals have values: those of the truth. Raises SignalUnavailable if there are none."""
     if not len(trace.truth):
         raise SignalUnavailable("the true pose was not recorded")
     return trace.truth.ticks
 
 
 def hold(trace: Trace, samples: Samples, what: str) -> Array:
-    """Return the newest value at each sample of the truth. Raises SignalUnavailable without any value."""
+    """Return the newest values (n, k) of `samples` at each sample of the truth (sample and hold).
+
+    Raises SignalUnavailable if `samples` are empty; `what` is the name of the signal in the message.
+    """
     ticks = sample_ticks(trace)
     if not len(samples):
         raise SignalUnavailable(f"no {what} was recorded")
@@ -72,8 +69,8 @@ def usual_period(ticks: Ticks) -> int:
 def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
     """Return the samples themselves if they are evenly spaced, else resampled to their median spacing.
 
-    Raises SignalUnavailable if there are fewer than two, if their ticks do not increase, or if a gap is too long for
-    interpolation.
+    Raises SignalUnavailable if there are fewer than two samples, if their ticks do not increase, or if a gap is longer
+    than MAX_INTERPOLATED_GAP_S.
     """
     if len(samples) < 2:
         raise SignalUnavailable(f"the run is too short: {_samples(len(samples))} of the truth")
@@ -94,43 +91,5 @@ def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
 
 
 def _samples(count: int) -> str:
+    """Return "1 sample", "2 samples", and so on."""
     return "1 sample" if count == 1 else f"{count} samples"
-
-
-MAX_GAP_S = 1.0
-"""Longest time in s without a sample of the truth; after a longer gap, nothing passes."""
-
-
-def time_gaps(trace: Trace) -> dict[Evidence, str]:
-    """Return the evidence that the trace contains only for a part of the run, each with its first gap.
-
-    The truth and the clearance must have a sample at least every MAX_GAP_S, from the start of the run to its end.
-    """
-    gaps: dict[Evidence, str] = {}
-    if gap := _first_gap(trace, trace.truth.ticks):
-        gaps |= dict.fromkeys((Evidence.TRUTH, Evidence.VELOCITY), f"the truth has no sample {gap}")
-    if gap := _first_gap(trace, trace.clearance.ticks):
-        gaps[Evidence.CLEARANCE] = f"the clearance has no sample {gap}"
-    return gaps
-
-
-def check_recorded_signals(trace: Trace) -> None:
-    """Raise InvalidTrace if a signal that simscen recorded is not finite, or its ticks do not increase."""
-    check_finite(trace)
-    named = [("truth", trace.truth), ("clearance", trace.clearance), ("belief", trace.belief)]
-    for name, samples in named:
-        if (np.diff(samples.ticks) <= 0).any():
-            at = trace.seconds(int(samples.ticks[int(np.argmax(np.diff(samples.ticks) <= 0))]))
-            raise InvalidTrace(f"the samples of the {name} are not in chronological order after t = {at:.2f} s")
-
-
-def _first_gap(trace: Trace, ticks: Ticks) -> str:
-    """Return the first gap that is too long, as text; "" if there is none, or no sample at all."""
-    if not len(ticks):
-        return ""
-    edges = np.concatenate(([0], ticks, [trace.end]))
-    long = np.flatnonzero(np.diff(edges) > MAX_GAP_S * trace.tick_rate)
-    if not len(long):
-        return ""
-    begin, end = edges[long[0]] / trace.tick_rate, edges[long[0] + 1] / trace.tick_rate
-    return f"from t = {begin:.2f} s to {end:.2f} s"

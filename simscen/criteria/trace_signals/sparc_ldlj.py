@@ -1,8 +1,8 @@
 """Smoothness of a speed profile: spectral arc length (SPARC) and log dimensionless jerk (LDLJ).
 
-Source: Balasubramanian, Melendez-Calderon, Roby-Brami, Burdet 2015, "On the analysis of movement smoothness", and the
-authors' own code (siva82kb/SPARC), whose doctests are tests here. SPARC is insensitive to a stop, LDLJ to a slow
-oscillation, and both depend on the duration: compare only drives of the same path.
+SPARC is insensitive to stops, and LDLJ to slow oscillation. Both depend on the duration, so that only drives along the
+same path can be compared. Source: Balasubramanian, Melendez-Calderon, Roby-Brami, Burdet 2015, "On the analysis of
+movement smoothness", and the authors' own code (siva82kb/SPARC).
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ import numpy as np
 from simscen.core.geometry import Array
 
 MOVED_SPEED_M_S = 0.01
-"""Speed in m/s below which a robot does not move; its speed is noise."""
+"""Speed below which a robot counts as standing; it is noise."""
 
 CUTOFF_HZ = 10.0
-"""Frequency above which changes of the speed are noise."""
+"""Frequency above which SPARC ignores changes of the speed, because they are noise."""
 MIN_RATE_HZ = 18.0
-"""Minimum sample rate: nearly twice the cutoff, with a margin for jitter."""
+"""Minimum sample rate: twice the cutoff, with a tolerance of 10 % for logs with jitter."""
 MIN_RELATIVE_AMPLITUDE = 0.05
-"""Share of the largest amplitude; both ends of the spectrum below it are cut off."""
+"""Amplitude, relative to the largest one, below which the two ends of the spectrum are cut off."""
 PADDING_LEVEL = 4
-"""The profile is padded with zeros to 2^4 times its length, for a finer spectrum."""
+"""The profile is padded with zeros to at least 2^PADDING_LEVEL times its length, for a finer spectrum."""
 
 
 def sparc(speeds: Array, rate: float) -> float | None:
-    """Return the spectral arc length of speeds (n,) sampled at `rate` Hz: 0 is smooth, lower is less smooth.
+    """Return the spectral arc length of `speeds` (n,) in m/s, sampled at `rate` Hz: 0 is smooth, lower is less smooth.
 
-    Returns None for a robot that never moved.
+    Return None for a robot that never moved.
     """
     if len(speeds) < 2 or not np.any(speeds):
         return None
@@ -47,9 +47,10 @@ def sparc(speeds: Array, rate: float) -> float | None:
 
 
 def ldlj(speeds: Array, rate: float) -> float | None:
-    """Return -ln(T^3 / v_max^2 * sum(jerk^2) dt) of speeds (n,) sampled at `rate` Hz; larger is smoother.
+    """Return the log dimensionless jerk of `speeds` (n,) in m/s, sampled at `rate` Hz; larger is smoother.
 
-    Returns None for a robot that never moved, or whose acceleration never changed.
+    It is -ln(T^3 / v_max^2 * sum(jerk^2) dt) for a drive of duration T with the top speed v_max. Return None for a
+    robot that never moved, or whose acceleration never changed.
     """
     if not np.any(speeds):
         return None

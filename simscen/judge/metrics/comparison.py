@@ -6,14 +6,8 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from simscen.core.random_streams import Streams
+from simscen.core.records.comparison import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
-from simscen.core.records.session_events import (
-    BaselineComparison,
-    Comparison,
-    Flip,
-    MetricDifference,
-    OutcomeCounts,
-)
 from simscen.core.records.verdict import Status
 from simscen.core.statistics import bootstrap_mean_interval, sign_test
 from simscen.judge.evaluation import EXPECTED
@@ -118,9 +112,9 @@ def _compare_with_baseline(
     return BaselineComparison(
         stack=other,
         pairs=len(completed),
-        broken=len(pairs) - len(completed),
-        alone=len(first.keys() ^ second.keys()),
-        parted=len(completed) - len(same_arrival),
+        error_pairs=len(pairs) - len(completed),
+        unpaired_runs=len(first.keys() ^ second.keys()),
+        pairs_with_one_arrival=len(completed) - len(same_arrival),
         flips=flips,
         p=sign_test(won, len(flips) - won),
         differences=tuple(
@@ -255,8 +249,8 @@ def _baseline_data(against: BaselineComparison) -> dict[str, Any]:
     return {
         "stack": against.stack,
         "pairs": against.pairs,
-        "left_out": {"broken_pairs": against.broken, "runs_without_partner": against.alone},
-        "pairs_of_which_one_arrived": against.parted,
+        "left_out": {"broken_pairs": against.error_pairs, "runs_without_partner": against.unpaired_runs},
+        "pairs_of_which_one_arrived": against.pairs_with_one_arrival,
         "flips": [asdict(flip) for flip in against.flips],
         "flips_p": against.p,
         "differences": [_difference_data(one) for one in against.differences],

@@ -5,7 +5,8 @@ import numpy as np
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Trace
-from simscen.criteria.trace_signals.ground_truth import Drive, nees_samples, pose_error, teleport_samples, truth
+from simscen.criteria.trace_signals.estimation_errors import nees_samples, pose_error
+from simscen.criteria.trace_signals.ground_truth import Drive, teleport_samples, truth
 
 CURVATURE_SPACING_M = 0.3
 """Minimum distance in m of the points for the curvature; closer points are noise (bench-mr)."""

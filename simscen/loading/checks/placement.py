@@ -10,7 +10,7 @@ from simscen.actions.robot import Kidnap
 from simscen.core.environment.world_model import Polygon
 from simscen.core.errors import Problem
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast
+from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast_message
 from simscen.core.geometry.shapes import MotionPath, Solid
 from simscen.core.messages.navigation import Goal
 from simscen.loading.checks.registry import CheckFinding, Keys
@@ -204,7 +204,7 @@ def check_motion_speeds(scene: Scene) -> Iterator[CheckFinding]:
         step = largest_step(path, tick, radius_and_height(solids)[0] if solids else 0.0)
         if step > MAX_STEP_M:
             hint = f"make it {math.ceil(10 * step / MAX_STEP_M) / 10:g} times slower, or raise `physics.tick_rate`"
-            yield CheckFinding(keys, too_fast(name, step), hint, tree=tree)
+            yield CheckFinding(keys, too_fast_message(name, step), hint, tree=tree)
 
 
 def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, MotionPath, Sequence[Solid]]]:

@@ -10,8 +10,9 @@ from importlib.resources import files
 from itertools import groupby
 from urllib.parse import quote
 
+from simscen.core.records.comparison import Comparison
 from simscen.core.records.run_result import Outcome, RunKey
-from simscen.core.records.session_events import Comparison, RunFinished
+from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import Study
 from simscen.report.comparison_markup import as_html
 from simscen.report.picture.palette import css_variables

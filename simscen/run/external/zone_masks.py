@@ -116,7 +116,7 @@ class _SpeedMask:
             return grid
         limits: Array = np.full(grid.shape, np.inf)
         if zones.masks.speed is not None:
-            limits = zones.masks.speed.along(_centers(grid), self._full_speed).reshape(grid.shape)
+            limits = zones.masks.speed.at_points(_centers(grid), self._full_speed).reshape(grid.shape)
         for polygon, limit in zones.speed:
             inside = _cells_inside(grid, polygon)
             limits[inside] = np.minimum(limits[inside], limit)

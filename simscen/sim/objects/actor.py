@@ -15,7 +15,7 @@ from simscen.core.geometry.motion_paths import (
     SweptSegment,
     largest_step,
     swept_segments,
-    too_fast,
+    too_fast_message,
     top_speed,
 )
 from simscen.core.geometry.scripted_poses import BatchPathSampler, PosesAtTick, PredictedPoses
@@ -158,7 +158,7 @@ class ActorBuilder:
         """Return the actor of a body, which is not in the engine yet. Raises RunError for a path that is too fast."""
         radius, height = radius_and_height(body.solids)
         if body.path is not None and (step := largest_step(body.path, 1 / self._tick_rate, radius)) > MAX_STEP_M:
-            raise RunError("invalid", too_fast(body.name, step))
+            raise RunError("invalid", too_fast_message(body.name, step))
         segments, speed = [SweptSegment(body.pose.x, body.pose.y, body.pose.x, body.pose.y)], 0.0
         if body.path is not None:
             segments, speed = swept_segments(body.path), top_speed(body.path, radius)

@@ -12,7 +12,7 @@ import numpy as np
 
 from simscen.core.environment.world_model import Patch
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.geometry.meshes import Owners, drivable_solids, is_convex, submesh
+from simscen.core.geometry.meshes import SolidIndices, drivable_solids, is_convex, submesh
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.sim.bullet import engine, pybullet
@@ -36,7 +36,7 @@ class Terrain:
     def __init__(self, client: int, static: TriangleMesh, max_step: float) -> None:
         """Build the solids; `max_step` is the highest step in m that any robot can climb: the radius of its wheels."""
         self._client = client
-        self.owners: Owners = drivable_solids(static, max_step)
+        self.owners: SolidIndices = drivable_solids(static, max_step)
         self.names: dict[int, str | None] = {}
         self.obstacles = static
         """The rest of the static world, on which no wheel can roll."""

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.geometry.meshes import Owners, drivable_solids, face_normals, is_convex, submesh
+from simscen.core.geometry.meshes import SolidIndices, drivable_solids, face_normals, is_convex, submesh
 from simscen.core.geometry.shapes import Box, Mesh, Solid, TriangleMesh
 from simscen.worlds.geometry.prisms import has_no_drivable_solids
 from simscen.worlds.geometry.triangulation import merge_solids
@@ -59,7 +59,7 @@ def _is_convex_or_height_field(mesh: TriangleMesh, owner: int) -> bool:
     return is_convex(submesh(mesh.vertices, mesh.faces[is_own])) or bool((face_normals(mesh)[is_own, 2] >= 0).all())
 
 
-def _steep_faces(mesh: TriangleMesh, ground: Owners, max_slope: float) -> Iterator[Solid]:
+def _steep_faces(mesh: TriangleMesh, ground: SolidIndices, max_slope: float) -> Iterator[Solid]:
     """Yield a prism for each slope of the ground that is steeper than `max_slope` rad, down to its lowest corner."""
     normal_z = face_normals(mesh)[:, 2]
     is_steep = (normal_z > MAX_WALL_NORMAL_Z) & (normal_z < math.cos(max_slope) - 1e-9)
@@ -70,12 +70,12 @@ def _steep_faces(mesh: TriangleMesh, ground: Owners, max_slope: float) -> Iterat
         yield Solid(Mesh(np.concatenate((base, corners)), _PRISM_FACES), name=mesh.names[int(mesh.owners[face])])
 
 
-def _is_ground_face(mesh: TriangleMesh, ground: Owners) -> npt.NDArray[np.bool_]:
+def _is_ground_face(mesh: TriangleMesh, ground: SolidIndices) -> npt.NDArray[np.bool_]:
     """Return for each face whether it belongs to a solid in `ground`."""
     return np.isin(mesh.owners, sorted(ground))
 
 
-def _walls_at_edges(mesh: TriangleMesh, ground: Owners, max_step: float) -> Iterator[Solid]:
+def _walls_at_edges(mesh: TriangleMesh, ground: SolidIndices, max_step: float) -> Iterator[Solid]:
     """Yield thin walls for the upright faces of the ground, where it drops by more than `max_step` m."""
     is_wall = np.abs(face_normals(mesh)[:, 2]) <= MAX_WALL_NORMAL_Z
     pieces = list(_edge_pieces(mesh, np.flatnonzero(_is_ground_face(mesh, ground) & is_wall)))
@@ -145,7 +145,7 @@ def _edge_pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_
         yield from (_EdgePiece(a, b, outward, owner, float(np.ptp(offsets))) for a, b in pairwise(ends))
 
 
-def _ground_heights(mesh: TriangleMesh, ground: Owners, points: Array) -> Array:
+def _ground_heights(mesh: TriangleMesh, ground: SolidIndices, points: Array) -> Array:
     """Return the heights (n,) in m of the highest ground at points (n, 2); 0 where there is only the floor."""
     from simscen.worlds.raycasting.ray_scene import RayScene
 

@@ -217,7 +217,7 @@ def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: flo
     offset = x - px, y - py, z - pz
     distance = math.hypot(*offset)
     ahead, left, _ = rotated((-i, -j, -k, w), offset)
-    cone = fan.towards(
+    cone = fan.rays_towards(
         ahead, left, math.sqrt(distance * distance - radius * radius) if distance > radius else -math.inf
     )
     ends = fan.rays.ends

@@ -3,9 +3,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from simscen.core.messages.navigation import ErrorCode
 from simscen.core.records.events import Event
-from simscen.criteria.goal_outcomes import Code, code_of
+from simscen.criteria.error_codes import ErrorCodeValue, code_of
 
-ADAPTER = TypeAdapter(Code)
+ADAPTER = TypeAdapter(ErrorCodeValue)
 
 
 @pytest.mark.parametrize("written", ["GOAL_OCCUPIED", 206, ErrorCode.GOAL_OCCUPIED])

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from simscen.criteria.findings import at_least, at_most, counted, missed, quantity
+from simscen.criteria.findings import at_least, at_most, counted, format_quantity, missed
 from simscen.testing.synthetic_trace import synthetic_trace
 
 
@@ -55,4 +55,4 @@ def test_a_place_is_that_of_the_moment():
 
 
 def test_a_quantity_has_its_unit():
-    assert (quantity(1.234, "s"), quantity(1.234, "", 1)) == ("1.23 s", "1.2")
+    assert (format_quantity(1.234, "s", 2), format_quantity(1.234, "", 1)) == ("1.23 s", "1.2")

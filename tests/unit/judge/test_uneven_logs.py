@@ -10,8 +10,8 @@ from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import COMPLETE_COVERAGE, Evidence, LogCoverage, Status
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.registry import AnyCriterion
-from simscen.criteria.trace_signals.sampling import check_recorded_signals, time_gaps
 from simscen.criteria.trace_signals.sparc_ldlj import sparc
+from simscen.criteria.trace_signals.trace_checks import check_recorded_signals, time_gaps
 from simscen.judge.evaluation import judge
 from simscen.judge.run_result import judge_run
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace

@@ -6,15 +6,8 @@ import re
 
 import pytest
 
-from simscen.core.records.session_events import (
-    BaselineComparison,
-    Comparison,
-    Flip,
-    MetricDifference,
-    OutcomeCounts,
-    SessionFinished,
-    SessionStarted,
-)
+from simscen.core.records.comparison import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
+from simscen.core.records.session_events import SessionFinished, SessionStarted
 from simscen.report.comparison import comparison_lines, difference_columns, shorten
 from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import plain_text

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from simscen.criteria.stl.condition import Condition
-from simscen.criteria.stl.criterion import describe, describe_limit, describe_value
+from simscen.criteria.stl.description import describe, describe_limit, describe_value
 from simscen.criteria.stl.robustness import Witness
 
 NEAR = {"signal": "clearance", "op": "<", "value": 0.5}

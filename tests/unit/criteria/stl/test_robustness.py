@@ -129,7 +129,7 @@ def test_a_premise_may_have_held_by_little_when_the_run_ends(clearance: float, m
     formula = validated({"whenever": premise, "then": {"signal": "yaw_rate", "op": "<", "value": 9}})
     found = robustness(formula, EvaluationContext(run([clearance] * 3, [0.0] * 3), CASE, run_ended=True))
     assert isinstance(found, ResponseRobustness)
-    assert not found.tested
+    assert not found.was_tested
     assert found.may_have_held is may_have_held
 
 

@@ -10,16 +10,10 @@ from hypothesis import strategies as st
 
 from simscen.core.records.trace import Samples
 from simscen.criteria.findings import InvalidTrace
-from simscen.criteria.trace_signals.ground_truth import (
-    check_finite,
-    clearance,
-    drive,
-    first_sustained,
-    pose_error,
-    speed,
-    true_pose,
-    turn_rate,
-)
+from simscen.criteria.timeline import first_sustained
+from simscen.criteria.trace_signals.estimation_errors import pose_error
+from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed, true_pose, turn_rate
+from simscen.criteria.trace_signals.trace_checks import check_recorded_signals
 from simscen.testing.synthetic_trace import synthetic_trace
 
 
@@ -143,7 +137,7 @@ def test_first_object_with_a_nonfinite_pose_is_named():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     lost = Samples(trace.truth.ticks, np.full((41, 3), np.nan))
     with pytest.raises(InvalidTrace, match=r"the pose of cart is not finite at t = 0\.00 s"):
-        check_finite(replace(trace, objects={"door": lost, "cart": lost}))
+        check_recorded_signals(replace(trace, objects={"door": lost, "cart": lost}))
 
 
 def test_the_true_pose_at_a_tick_is_the_newest_sample():

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.core.records.trace import Samples
 from simscen.criteria.findings import InvalidTrace
-from simscen.criteria.trace_signals.ground_truth import DIMENSIONS, nees, nees_samples
+from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, nees, nees_samples
 from simscen.testing.synthetic_trace import synthetic_trace
 
 APART = [0.25, 0.0, 0.0, 0.04, 0.0, 0.01]

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from simscen.core.records.comparison import OutcomeCounts
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
-from simscen.core.records.session_events import OutcomeCounts
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.comparison import (
@@ -77,12 +77,12 @@ def test_differences_are_of_pairs_with_the_same_scenario_and_seed() -> None:
     assert (found.pairs, found.baseline, found.value, found.difference) == (1, 10.0, 12.0, 2.0)
     assert (found.lower, found.equal, found.higher, found.p) == (0, 0, 1, 1.0)
     assert found.interval is None
-    assert one.alone == 1
+    assert one.unpaired_runs == 1
 
 
 def test_an_error_is_compared_with_nothing_and_counted() -> None:
     one = against(run("ref", 1), run("mine", 1, outcome=Outcome.ERROR), run("ref", 2), run("mine", 2))
-    assert (one.pairs, one.broken, one.alone, one.flips) == (1, 1, 0, ())
+    assert (one.pairs, one.error_pairs, one.unpaired_runs, one.flips) == (1, 1, 0, ())
     assert of(one, "path_length").pairs == 1
 
 
@@ -100,7 +100,7 @@ def test_a_flip_says_with_which_stack_it_failed_and_why() -> None:
 def test_aborted_run_is_not_compared_by_path_length() -> None:
     gave_up = run("mine", 1, outcome=Outcome.FAILED, time_to_goal=None, path_length=1.0, collisions=2.0)
     one = against(run("ref", 1), gave_up, run("ref", 2), run("mine", 2, path_length=5.5))
-    assert one.parted == 1
+    assert one.pairs_with_one_arrival == 1
     assert (of(one, "path_length").pairs, of(one, "path_length").difference) == (1, 0.5)
     assert (of(one, "collisions").pairs, of(one, "collisions").difference) == (2, 1.0)
 
@@ -179,7 +179,7 @@ def test_of_several_robots_the_same_metrics_are_compared_of_each() -> None:
 
 def test_a_pair_in_which_another_robot_arrived_is_compared_by_collisions_alone() -> None:
     one = against(fleet("ref", a_time_to_goal=None), fleet("mine", b_time_to_goal=None, a_collisions=1.0))
-    assert one.parted == 1
+    assert one.pairs_with_one_arrival == 1
     assert {found.metric: found.difference for found in one.differences} == {"a/collisions": 1.0, "b/collisions": 0.0}
 
 
@@ -264,7 +264,7 @@ def test_each_robot_that_arrives_in_one_run_only_sets_the_pair_apart() -> None:
     one = against(
         run("ref", 1, **both), run("mine", 1, **{**both, "b/time_to_goal": None}), run("ref", 2), run("mine", 2)
     )
-    assert (one.pairs, one.parted) == (2, 1)
+    assert (one.pairs, one.pairs_with_one_arrival) == (2, 1)
 
 
 @pytest.mark.parametrize(("count", "more"), [(1, ""), (2, " (and 1 more)"), (3, " (and 2 more)")])

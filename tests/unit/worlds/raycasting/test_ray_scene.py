@@ -213,7 +213,7 @@ def test_rays_within_a_cone_match_brute_force():
         (x, y), least = rng.normal(size=2), float(rng.uniform(-2.5, 2.5))
         angles = first + increment * np.arange(count)
         met = set(np.flatnonzero(x * np.cos(angles) + y * np.sin(angles) >= least).tolist())
-        told = [ray for rays in RayFan(first, increment, count).towards(x, y, least) for ray in range(count)[rays]]
+        told = [ray for rays in RayFan(first, increment, count).rays_towards(x, y, least) for ray in range(count)[rays]]
         assert met <= set(told)
         beside = set(told) - met
         assert all((ray - 1) % count in met or (ray + 1) % count in met or not met for ray in beside)

@@ -1,0 +1,105 @@
+"""Text of conditions and of their decisive values, for reports."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from simscen.criteria.findings import decimals, format_quantity
+
+if TYPE_CHECKING:
+    from simscen.criteria.stl.condition import Condition, Op, Window
+    from simscen.criteria.stl.robustness import Witness
+
+_SIGNS: dict[Op, str] = {">=": "≥", ">": ">", "<=": "≤", "<": "<"}
+"""Signs as printed."""
+_OPPOSITE: dict[Op, Op] = {">=": "<", ">": "<=", "<=": ">", "<": ">="}
+"""Comparison that is true exactly if the key is false."""
+
+
+def describe(condition: Condition) -> str:
+    """Return a condition in words, e.g. "whenever scan_age > 0.3 s, then (eventually within 1 s speed < 0.01 m/s)"."""
+    if condition.signal is not None:
+        return f"{describe_signal(condition)} {_bound(condition)}".rstrip()
+    if condition.all is not None:
+        return " and ".join(_grouped(part) for part in condition.all)
+    if condition.any is not None:
+        return " or ".join(_grouped(part) for part in condition.any)
+    if condition.not_ is not None:
+        return f"not {_grouped(condition.not_)}"
+    if condition.always is not None:
+        return describe_windowed("always", condition.always, condition.always)
+    if condition.eventually is not None:
+        return describe_windowed("eventually", condition.eventually, condition.eventually)
+    if condition.until is not None:
+        return describe_until(condition.until.hold, condition.until.release, condition.until)
+    assert condition.whenever is not None and condition.then is not None
+    return describe_response(condition.whenever, condition.then)
+
+
+def describe_windowed(operator: str, part: Condition, window: Window) -> str:
+    """Return "always …" or "eventually …", with the window in words; `operator` is one of these two words."""
+    return f"{' '.join(filter(None, (operator, describe_window(window))))} {_grouped(part)}"
+
+
+def describe_until(hold: Condition, release: Condition, window: Window) -> str:
+    """Return "… until …", with the window in words."""
+    return " ".join(filter(None, (_grouped(hold), "until", describe_window(window), _grouped(release))))
+
+
+def describe_response(premise: Condition, response: Condition) -> str:
+    """Return "whenever …, then …" in words."""
+    return f"whenever {describe(premise)}, then {describe(response)}"
+
+
+def describe_window(window: Window) -> str:
+    """Return a window in words, e.g. "within 5 s"; "" for the rest of the run."""
+    if window.between is not None:
+        return f"between {window.between[0]:g} s and {window.between[1]:g} s"
+    if window.after is not None:
+        return f"after {window.after:g} s"
+    return "" if window.within is None else f"within {window.within:g} s"
+
+
+def describe_signal(condition: Condition) -> str:
+    """Return the signal of a comparison with its arguments, e.g. "distance_to cart"."""
+    arguments = " ".join(str(value) for value in condition.arguments.values())
+    return f"{condition.signal} {arguments}".rstrip()
+
+
+def describe_value(witness: Witness) -> str:
+    """Return the decisive value of a signal with its unit, e.g. "0.62 m"; "yes" or "no" for a yes-or-no signal."""
+    comparison = witness.comparison
+    signal = comparison.definition
+    if signal.is_boolean:
+        return "yes" if witness.value else "no"
+    assert comparison.value is not None
+    if math.isinf(witness.value):
+        return "infinite"
+    return format_quantity(witness.value, signal.unit, decimals(witness.value, comparison.value))
+
+
+def describe_limit(witness: Witness) -> str:
+    """Return the bound that the decisive value must meet, e.g. "≥ 0.50 m"; the opposite below a `not`."""
+    comparison = witness.comparison
+    signal = comparison.definition
+    if signal.is_boolean:
+        return "no" if witness.negated else "yes"
+    assert comparison.value is not None and comparison.op is not None
+    op = _OPPOSITE[comparison.op] if witness.negated else comparison.op
+    digits = decimals(witness.value, comparison.value)
+    return f"{_SIGNS[op]} {format_quantity(comparison.value, signal.unit, digits)}"
+
+
+def _bound(condition: Condition) -> str:
+    """Return the bound of a comparison, e.g. "≥ 0.5 m"; "" for a yes-or-no signal."""
+    signal = condition.definition
+    if signal.is_boolean:
+        return ""
+    assert condition.op is not None and condition.value is not None
+    return f"{_SIGNS[condition.op]} {condition.value:g} {signal.unit}".rstrip()
+
+
+def _grouped(condition: Condition) -> str:
+    """Return the condition in words, in parentheses unless it is a single comparison."""
+    return describe(condition) if condition.signal is not None else f"({describe(condition)})"

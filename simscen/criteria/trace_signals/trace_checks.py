@@ -1,0 +1,60 @@
+"""Checks of a whole trace: that its samples have no long gaps, are in chronological order, and are finite."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simscen.core.records.verdict import Evidence
+from simscen.criteria.findings import InvalidTrace
+from simscen.criteria.trace_signals.ground_truth import check_samples, clearance, speed, truth
+
+if TYPE_CHECKING:
+    from simscen.core.records.trace import Ticks, Trace
+
+MAX_GAP_S = 1.0
+"""Longest gap between samples. With a longer one, no criterion that needs the signal can pass."""
+
+
+def time_gaps(trace: Trace) -> dict[Evidence, str]:
+    """Return the evidence that the trace contains only for a part of the run, each with its first gap in words.
+
+    The truth and the clearance must have a sample at least every MAX_GAP_S, from the start of the run to its end.
+    """
+    gaps: dict[Evidence, str] = {}
+    if gap := _first_gap(trace, trace.truth.ticks):
+        gaps |= dict.fromkeys((Evidence.TRUTH, Evidence.VELOCITY), f"the truth has no sample {gap}")
+    if gap := _first_gap(trace, trace.clearance.ticks):
+        gaps[Evidence.CLEARANCE] = f"the clearance has no sample {gap}"
+    return gaps
+
+
+def check_recorded_signals(trace: Trace) -> None:
+    """Raise InvalidTrace if a signal is not finite, or if its ticks do not increase; for logs that simscen recorded.
+
+    All signals are checked, whether a criterion uses them or not. Only odometry is left out: it is a reading, which a
+    fault may have corrupted.
+    """
+    truth(trace), speed(trace), clearance(trace)
+    check_samples(trace.belief, "the belief", trace)
+    check_samples(trace.command, "the command", trace)
+    for name, poses in sorted(trace.objects.items()):
+        check_samples(poses, f"the pose of {name}", trace)
+    named = [("truth", trace.truth), ("clearance", trace.clearance), ("belief", trace.belief)]
+    for name, samples in named:
+        if (np.diff(samples.ticks) <= 0).any():
+            at = trace.seconds(int(samples.ticks[int(np.argmax(np.diff(samples.ticks) <= 0))]))
+            raise InvalidTrace(f"the samples of the {name} are not in chronological order after t = {at:.2f} s")
+
+
+def _first_gap(trace: Trace, ticks: Ticks) -> str:
+    """Return the first gap longer than MAX_GAP_S, as text; "" if there is none, or if there are no samples."""
+    if not len(ticks):
+        return ""
+    edges = np.concatenate(([0], ticks, [trace.end]))
+    long = np.flatnonzero(np.diff(edges) > MAX_GAP_S * trace.tick_rate)
+    if not len(long):
+        return ""
+    begin, end = edges[long[0]] / trace.tick_rate, edges[long[0] + 1] / trace.tick_rate
+    return f"from t = {begin:.2f} s to {end:.2f} s"
