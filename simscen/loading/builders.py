@@ -14,7 +14,7 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry.shapes import Mesh
 from simscen.loading.loaded import CriterionMask, LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
-from simscen.loading.yaml.tree import Key, MappingNode, key_position, value_position
+from simscen.loading.yaml.tree import Keys, MappingNode, key_position, value_position
 from simscen.model.robot import RobotSpec
 from simscen.model.world import WorldSpec
 from simscen.worlds.world_file import world_from_spec
@@ -121,8 +121,8 @@ def _infer_spec(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:
     return infer_robot_spec(urdf, roots, read_mesh)
 
 
-KEEPOUT_KEYS: tuple[Key, ...] = ("stack", "keepout_mask")
-SPEED_KEYS: tuple[Key, ...] = ("stack", "speed_mask", "file")
+KEEPOUT_KEYS: Keys = ("stack", "keepout_mask")
+SPEED_KEYS: Keys = ("stack", "speed_mask", "file")
 
 MAX_BLOCKS = 100_000
 """Largest number of rectangles of equal cells in a mask of a criterion. Each log contains them."""
@@ -156,13 +156,11 @@ def _criterion_mask_blocks(mask: CriterionMask, tree: MappingNode, with_source_l
     return cells
 
 
-def _stack_mask_grid(loaded: LoadedScenario, keys: tuple[Key, ...], source: LoadedMap | None) -> OccupancyGrid | None:
+def _stack_mask_grid(loaded: LoadedScenario, keys: Keys, source: LoadedMap | None) -> OccupancyGrid | None:
     return None if source is None else _mask_grid(source, keys, loaded.tree, loaded.with_source_line)
 
 
-def _mask_grid(
-    source: LoadedMap, keys: tuple[Key, ...], tree: MappingNode, with_source_line: AddSource
-) -> OccupancyGrid:
+def _mask_grid(source: LoadedMap, keys: Keys, tree: MappingNode, with_source_line: AddSource) -> OccupancyGrid:
     try:
         return load_map(source)
     except InvalidInput as error:

@@ -12,7 +12,7 @@ from simscen.criteria.registry import verdict_names
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references
-from simscen.loading.yaml.tree import Key, Node, value_position
+from simscen.loading.yaml.tree import Keys, Node, value_position
 from simscen.model.world import WorldSpec
 from simscen.spec.places import PlaceAllowed, PoseSpec
 
@@ -201,7 +201,7 @@ def _poses_of_references(spec: BaseModel, places: Places) -> Iterator[tuple[Refe
         )
 
 
-def _replace_at(holder: Any, keys: tuple[Key, ...], value: Any) -> Any:
+def _replace_at(holder: Any, keys: Keys, value: Any) -> Any:
     """Return a copy of `holder` (model, list or dict) with `value` at `keys`."""
     if isinstance(holder, RootModel):
         return holder.model_copy(update={"root": _replace_at(holder.root, keys, value)})

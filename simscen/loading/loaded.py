@@ -10,7 +10,7 @@ from simscen.core.external_command import ExternalCommand
 from simscen.core.records.run_result import RunKey, scenario_title
 from simscen.core.records.verdict import ExpectedFailure
 from simscen.loading.stacks.choice import StackChoice
-from simscen.loading.yaml.tree import Key, MappingNode, Position, key_position, value_position
+from simscen.loading.yaml.tree import Key, Keys, MappingNode, Position, key_position, value_position
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import RosMapSpec, WorldSpec
@@ -29,7 +29,7 @@ class LoadedMap:
 class CriterionMask(NamedTuple):
     """Filter mask of a criterion: the map, and the keys of the first criterion that uses it."""
 
-    keys: tuple[Key, ...]
+    keys: Keys
     map: LoadedMap
 
 
@@ -172,7 +172,7 @@ class LoadedScenario:
         """Return the position of the last of `keys`."""
         return key_position(self.tree, keys)
 
-    def problem(self, keys: tuple[Key, ...], code: str, message: str, hint: str = "") -> Problem:
+    def problem(self, keys: Keys, code: str, message: str, hint: str = "") -> Problem:
         """Return a problem at the value of `keys`, with the text of its line."""
         return self.problem_at(self.position_of(*keys), code, message, hint)
 

@@ -37,7 +37,7 @@ def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
     assert isinstance(own_tree, MappingNode)
     robot = {key: value for key, value in own_tree.entries.items() if key in RobotEntry.model_fields}
     own = {key: value for key, value in own_tree.entries.items() if key not in robot and key != PASS}
-    whole = merge_mappings(MappingNode(tree.position, own), _without(tree, ROBOTS, EXPECTED))
+    whole = merge_mappings(MappingNode(tree.position, own), tree.without_keys(ROBOTS, EXPECTED))
     criteria = SequenceNode(tree.position, (*_items(child(tree, PASS)), *_items(child(own_tree, PASS))))
     return MappingNode(
         tree.position,
@@ -66,7 +66,7 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
         name: Entry(entry.key, _with_complete_stack(entry.value, chosen[name]))
         for name, entry in robots.entries.items()
     }
-    rest = _without(tree, STACK)
+    rest = tree.without_keys(STACK)
     return MappingNode(
         tree.position, {**rest.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.position, own))}
     )
@@ -92,10 +92,6 @@ def external_stack_name(tree: MappingNode) -> str | None:
 
 def _items(node: Node | None) -> tuple[Node, ...]:
     return node.items if isinstance(node, SequenceNode) else ()
-
-
-def _without(tree: MappingNode, *keys: str) -> MappingNode:
-    return MappingNode(tree.position, {key: entry for key, entry in tree.entries.items() if key not in keys})
 
 
 def scenario_robot_problems(tree: MappingNode) -> list[Problem]:

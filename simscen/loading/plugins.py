@@ -8,7 +8,8 @@ from typing import Any
 
 from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.spec_walk import Keys, walk
+from simscen.loading.spec_walk import walk
+from simscen.loading.yaml.tree import Keys
 from simscen.spec.choice import Choice
 from simscen.spec.registry import Entry, find, origin_of
 

@@ -21,7 +21,7 @@ from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSp
 from simscen.loading.variations.naming import VariationProblems, merge_problems, number_of
 from simscen.loading.variations.options import Change
 from simscen.loading.yaml.library import Library
-from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, child, node_at, value_position
+from simscen.loading.yaml.tree import Keys, MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import WorldSpec
 
@@ -138,8 +138,7 @@ class ChangedScenario:
         self.file, self.merged_tree = read
         self.path = self._library.sandbox.display_name(self.file)
         self.text = self._library.texts[self.path]
-        entries = {key: one for key, one in self.merged_tree.entries.items() if key != VARIATIONS}
-        self.base_tree = self.tree = replace(self.merged_tree, entries=entries)
+        self.base_tree = self.tree = self.merged_tree.without_keys(VARIATIONS)
         self.changes: tuple[Change, ...] = ()
         if variation:
             number = number_of(variation)
@@ -152,9 +151,8 @@ class ChangedScenario:
         merged, problems = self._library.with_defaults(self.file, tree, [])
         if problems or not isinstance(merged, MappingNode):
             return problems
-        entries = {key: entry for key, entry in merged.entries.items() if key != VARIATIONS}
-        merged = MappingNode(merged.position, entries)
-        return _load_variation(Variation("", merged), self._library, self.file, self._choice)
+        varied = Variation("", merged.without_keys(VARIATIONS))
+        return _load_variation(varied, self._library, self.file, self._choice)
 
 
 def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Path, MappingNode] | list[Problem]:
@@ -317,7 +315,7 @@ def _map(spec: ScenarioSpec, tree: MappingNode, assets: Assets) -> LoadedMap | L
     return assets.map(node)
 
 
-def _mask(mask_path: str | None, tree: MappingNode, keys: tuple[Key, ...], assets: Assets) -> LoadedMap | None:
+def _mask(mask_path: str | None, tree: MappingNode, keys: Keys, assets: Assets) -> LoadedMap | None:
     """Load the filter mask that the stack names at `keys`."""
     node = node_at(tree, keys)
     return assets.map(node) if mask_path is not None and isinstance(node, ScalarNode) else None

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from pydantic import BaseModel, RootModel
 
-from simscen.loading.yaml.tree import Key
+from simscen.loading.yaml.tree import Keys
 from simscen.spec.places import PlaceAllowed, ReferenceTo
 from simscen.spec.quantities import Quantity
 
@@ -14,7 +14,7 @@ from simscen.spec.quantities import Quantity
 class Reference(NamedTuple):
     """Name at `keys` of a scenario that refers to something; `mark` defines the kind of thing."""
 
-    keys: tuple[Key, ...]
+    keys: Keys
     mark: ReferenceTo
     name: str
 
@@ -28,9 +28,7 @@ RobotFilter = Callable[[str | None], bool]
 """Predicate that selects the parts to walk through, by the robot that they name (None: no robot)."""
 
 
-def references(
-    spec: BaseModel, keys: tuple[Key, ...] = (), includes_robot: RobotFilter | None = None
-) -> Iterator[Reference]:
+def references(spec: BaseModel, keys: Keys = (), includes_robot: RobotFilter | None = None) -> Iterator[Reference]:
     """Yield every reference below `spec`, in the order of its fields, without parts that `includes_robot` rejects."""
     robot = getattr(spec, "robot", None)
     if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
@@ -51,7 +49,7 @@ def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | Non
 
 
 def _in_value(
-    value: Any, mark: ReferenceTo | None, keys: tuple[Key, ...], includes_robot: RobotFilter | None
+    value: Any, mark: ReferenceTo | None, keys: Keys, includes_robot: RobotFilter | None
 ) -> Iterator[Reference]:
     if isinstance(value, BaseModel):
         yield from references(value, keys, includes_robot)
@@ -75,9 +73,6 @@ def _mark(kind: Any) -> ReferenceTo | None:
             return marks[0]
         return _mark(get_args(kind)[0])
     return next((found for member in get_args(kind) if (found := _mark(member))), None)
-
-
-Keys = tuple[Key, ...]
 
 
 def walk(

@@ -21,8 +21,8 @@ from simscen.loading.reduction import (
     Rounding,
     max_depth,
     removable_parts,
-    rounded_tree,
     roundings,
+    with_roundings,
     with_seed,
     with_values,
     without_parts,
@@ -231,7 +231,7 @@ class Shrinking:
             def build(
                 exact: Sequence[Keys], changes: Sequence[Rounding] = tuple(changes), tree: MappingNode = before
             ) -> MappingNode:
-                return rounded_tree(tree, [change for change in changes if change.keys not in exact])
+                return with_roundings(tree, [change for change in changes if change.keys not in exact])
 
             self.tree = build(self._minimize([change.keys for change in changes], build))
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
 from simscen.loading.checks.placement import motion_stops
-from simscen.loading.checks.registry import CheckFinding, CheckStage
+from simscen.loading.checks.registry import CheckProblem, CheckStage
 from simscen.loading.checks.scene import TOUCH_M
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted
@@ -41,7 +41,7 @@ def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
 
 
 @BUILT_WORLD.check("SC314", severity="warning")
-def places_in_obstacles(built: BuiltWorld) -> Iterator[CheckFinding]:
+def places_in_obstacles(built: BuiltWorld) -> Iterator[CheckProblem]:
     """Find places inside obstacles."""
     assert built.source.spec is not None
     world = _without_platforms(built.world) if built.source.spec.ramps else built.world
@@ -49,22 +49,22 @@ def places_in_obstacles(built: BuiltWorld) -> Iterator[CheckFinding]:
         solid = blocking_solid(world, (place.x, place.y), TOUCH_M, BLOCKING_HEIGHTS_M)
         if solid is not None:
             message = f'place {quoted(name)} is inside obstacle "{solid}"'
-            yield CheckFinding(("places", name), message, at_key=True)
+            yield CheckProblem(("places", name), message, at_key=True)
 
 
 @BUILT_WORLD.check("SC304", severity="warning")
-def motions_into_obstacles(built: BuiltWorld) -> Iterator[CheckFinding]:
+def motions_into_obstacles(built: BuiltWorld) -> Iterator[CheckProblem]:
     """Find keyframes and waypoints of objects inside obstacles."""
     assert built.source.spec is not None
     for index, thing in enumerate(built.source.spec.objects):
         for keys, what, (x, y) in motion_stops(thing.move) if thing.move is not None else ():
             if solid := blocking_solid(built.world, (x, y), TOUCH_M, BLOCKING_HEIGHTS_M):
                 message = f'{what} of {quoted(thing.name)} ({x:g}, {y:g}) is inside obstacle "{solid}"'
-                yield CheckFinding(("objects", index, "move", *keys), message)
+                yield CheckProblem(("objects", index, "move", *keys), message)
 
 
 @BUILT_WORLD.check("SC315", severity="warning")
-def regions_outside_the_world(built: BuiltWorld) -> Iterator[CheckFinding]:
+def regions_outside_the_world(built: BuiltWorld) -> Iterator[CheckProblem]:
     """Find regions outside the bounds of the world."""
     assert built.source.spec is not None
     left, bottom, right, top = built.world.bounds
@@ -72,7 +72,7 @@ def regions_outside_the_world(built: BuiltWorld) -> Iterator[CheckFinding]:
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
         if max(xs) < left or min(xs) > right or max(ys) < bottom or min(ys) > top:
             message = f"region {quoted(name)} is outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
-            yield CheckFinding(("regions", name), message, at_key=True)
+            yield CheckProblem(("regions", name), message, at_key=True)
 
 
 def _without_platforms(world: World) -> World:

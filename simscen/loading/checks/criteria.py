@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from simscen.loading.checks.events import why_no_recovery
-from simscen.loading.checks.registry import MEANING, CheckFinding, Keys
+from simscen.loading.checks.registry import MEANING, CheckProblem
 from simscen.loading.known_names import goal_names
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.yaml.tree import Keys
 from simscen.model.navigation import expected_failure_name
 
 GOAL_CRITERIA = frozenset({"goals_reached", "time_to_goal", "no_false_success", "stuck", "result", "error_code"})
@@ -22,33 +23,33 @@ LooseBounds = Iterator[tuple[str, str]]
 
 
 @MEANING.check("SC036")
-def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find criteria that need more time than the run has."""
     limit = loaded.spec.time_limit
     for index, entry in enumerate(loaded.spec.pass_):
         horizon = getattr(entry.chosen, "horizon", 0.0)
         if horizon > limit:
             message = f"`{entry.kind}` can never hold: it needs {horizon:g} s, but the time limit is {limit:g} s"
-            yield CheckFinding(("pass", index, entry.kind), message, at_key=True)
+            yield CheckProblem(("pass", index, entry.kind), message, at_key=True)
 
 
 @MEANING.check("SC036")
-def runs_without_motion(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def runs_without_motion(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find a time limit that ends the run before the second sample of the ground truth."""
     period = 1.0 / loaded.spec.physics.truth_rate
     if loaded.spec.time_limit < period:
         message = f"nothing can be judged: the second sample of the ground truth is at t = {period:g} s"
-        yield CheckFinding(("time_limit",), message)
+        yield CheckProblem(("time_limit",), message)
 
 
 @MEANING.check("SC051")
-def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find criteria that no run can pass."""
     for index, entry in enumerate(loaded.spec.pass_):
         check = _IMPOSSIBLE.get(entry.kind)
         reason = _why_no_goals(loaded, entry.kind, entry.chosen) or (check(loaded, entry.chosen) if check else None)
         if reason:
-            yield CheckFinding(("pass", index, entry.kind), f"{entry.kind} can never hold: {reason}", at_key=True)
+            yield CheckProblem(("pass", index, entry.kind), f"{entry.kind} can never hold: {reason}", at_key=True)
 
 
 def _why_no_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
@@ -75,7 +76,7 @@ _IMPOSSIBLE = {"result": _result, "recoveries": _recoveries}
 
 
 @MEANING.check("SC051")
-def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find pairs of criteria that require different results."""
     failing = any(expected_failure_name(goal.expect) for goal in loaded.spec.goals)
     required_results: dict[str, tuple[str, Keys]] = {}
@@ -91,12 +92,12 @@ def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
         if before:
             first = loaded.key_position_of(*before[1])
             message = f"{entry.kind} contradicts {before[0]} at {first.line}:{first.col}: no run can pass both"
-            yield CheckFinding(keys, message, at_key=True)
+            yield CheckProblem(keys, message, at_key=True)
         required_results.setdefault(status, (entry.kind, keys))
 
 
 @MEANING.check("SC051")
-def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find goals after one that is expected to fail, in scenarios that stop at the first failure."""
     spec = loaded.spec
     new_goals = any(action.may_do("new_goal") for step in spec.steps for action in step.actions)
@@ -106,17 +107,17 @@ def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckFinding]:
         if expected_failure_name(goal.expect) and (spec.navigation.loops > 1 or index + 1 < len(spec.goals)):
             following = spec.goal_names[(index + 1) % len(spec.goals)]
             message = f"the robot never gets goal `{following}`: it stops after this goal, which is expected to fail"
-            yield CheckFinding(("goals", index, "expect"), message, "set `on_goal_failure: continue`")
+            yield CheckProblem(("goals", index, "expect"), message, "set `on_goal_failure: continue`")
             return
 
 
 @MEANING.check("SC052", severity="warning")
-def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find bounds that physics or the time limit already guarantee."""
     for index, entry in enumerate(loaded.spec.pass_):
         check = _LOOSE.get(entry.kind)
         for key, reason in check(loaded, entry.chosen) if check else ():
-            yield CheckFinding(("pass", index, entry.kind, key), f"{entry.kind} can hardly fail: {reason}")
+            yield CheckProblem(("pass", index, entry.kind, key), f"{entry.kind} can hardly fail: {reason}")
 
 
 def _loose_speed(loaded: LoadedScenario, speed: Any) -> LooseBounds:
@@ -173,7 +174,7 @@ _LOOSE: dict[str, Callable[[LoadedScenario, Any], LooseBounds]] = {
 
 
 @MEANING.check("SC052", severity="warning")
-def only_warnings(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def only_warnings(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find scenarios in which no criterion can fail the run."""
     if all(entry.severity == "warn" for entry in loaded.spec.pass_):
-        yield CheckFinding(("pass",), "no criterion can fail the run: all are `severity: warn`", at_key=True)
+        yield CheckProblem(("pass",), "no criterion can fail the run: all are `severity: warn`", at_key=True)

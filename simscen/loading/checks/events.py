@@ -7,9 +7,10 @@ from types import SimpleNamespace
 from typing import Any
 
 from simscen.core.messages.navigation import matches_goal_name
-from simscen.loading.checks.registry import MEANING, CheckFinding, Keys
+from simscen.loading.checks.registry import MEANING, CheckProblem
 from simscen.loading.known_names import own_goal_names
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.yaml.tree import Keys
 from simscen.model.disturbances import SequenceStep
 from simscen.model.stack import StackSpec
 from simscen.triggers.base import AnyCondition, Trigger
@@ -28,16 +29,16 @@ MAX_TRUTH_ERROR_M = 0.5
 
 
 @MEANING.check("SC050")
-def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find events and faults that can never happen, whatever the robot does."""
     run = possible_run(loaded)
     for keys, trigger, name, required in run.triggers:
         if trigger is not None and (reason := run.why_never(trigger, keys)):
-            yield CheckFinding(reason[0], f"`{name}` can never happen: {reason[1]}", warning=not required)
+            yield CheckProblem(reason[0], f"`{name}` can never happen: {reason[1]}", warning=not required)
 
 
 @MEANING.check("SC052", severity="warning")
-def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find events and faults with `times` that can happen only once."""
     run = possible_run(loaded)
     for keys, trigger, name, _ in run.triggers:
@@ -45,15 +46,15 @@ def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[CheckFinding]:
             continue
         if run.why_never(trigger, keys) is None:
             message = f"`{name}` happens once, not {trigger.times} times: its condition stays true"
-            yield CheckFinding((*keys, "times"), message)
+            yield CheckProblem((*keys, "times"), message)
     for index, fault in enumerate(loaded.spec.faults):
         if fault.when is not None and fault.when.times > 1 and fault.for_ is None:
             message = f"`{fault.label}` happens once, not {fault.when.times} times: without `for` it lasts to the end"
-            yield CheckFinding(("faults", index, "when", "times"), message, "add `for`: how long it lasts")
+            yield CheckProblem(("faults", index, "when", "times"), message, "add `for`: how long it lasts")
 
 
 @MEANING.check("SC050")
-def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find steps of a story that need more time than the run has, or wait for an earlier step."""
     run = possible_run(loaded)
     limit, needed = loaded.spec.time_limit, dict[int, float]()
@@ -65,12 +66,12 @@ def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckFinding]:
         keys = (*step.keys, "when")
         if needed[number] >= limit > own and needed[step.after] < limit:
             reason = f"its story takes at least {needed[number]:g} s, but the time limit is {limit:g} s"
-            yield CheckFinding(keys, f"`{step.name}` can never happen: {reason}", warning=not step.required)
+            yield CheckProblem(keys, f"`{step.name}` can never happen: {reason}", warning=not step.required)
         for part in step.when.parts():
             name = getattr(part.event, "name", None)
             if name in run.earlier_steps(step):
                 message = f"`{step.name}` waits for `{name}`, which has already happened; a step waits for new events"
-                yield CheckFinding(keys, message)
+                yield CheckProblem(keys, message)
 
 
 def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:

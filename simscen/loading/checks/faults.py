@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from simscen.core.records.events import BELIEF, COMMAND, KIND_BY_INSTANCE, MAP, WHEELS
 from simscen.faults.base import Instance
-from simscen.loading.checks.registry import MEANING, NAMES, CheckFinding, NameScope
+from simscen.loading.checks.registry import MEANING, NAMES, CheckProblem, NameScope
 from simscen.loading.codes import STACK_CANNOT
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.schema.messages import quoted, suggestion
@@ -51,7 +51,7 @@ def _listed_faults(loaded: LoadedScenario) -> Iterator[ListedFault]:
 
 
 @NAMES.check("SC031")
-def unknown_sensors(scope: NameScope) -> Iterator[CheckFinding]:
+def unknown_sensors(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults on a sensor that the robot does not have."""
     loaded = scope.loaded
     for index, entry, instance in _listed_faults(loaded):
@@ -59,11 +59,11 @@ def unknown_sensors(scope: NameScope) -> Iterator[CheckFinding]:
             assert loaded.robot.spec is not None
             hint = suggestion(entry.sensor, instances(loaded, loaded.robot.spec))
             message = f"robot `{loaded.robot.name}` has no sensor called {quoted(entry.sensor)}"
-            yield CheckFinding(("faults", index, "sensor"), message, hint)
+            yield CheckProblem(("faults", index, "sensor"), message, hint)
 
 
 @NAMES.check("SC032")
-def unsuitable_faults(scope: NameScope) -> Iterator[CheckFinding]:
+def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults that cannot affect their sensor, or whose values do not suit it."""
     loaded = scope.loaded
     for index, entry, instance in _listed_faults(loaded):
@@ -77,15 +77,15 @@ def unsuitable_faults(scope: NameScope) -> Iterator[CheckFinding]:
             hint = f"it can affect: {', '.join(suitable)}" if suitable else "it can affect nothing on this robot"
             what = NOUNS.get(instance.kind) or _with_article(loaded.robot.spec.sensors[entry.sensor].kind)
             message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
-            yield CheckFinding(keys, message, hint, at_key=True)
+            yield CheckProblem(keys, message, hint, at_key=True)
         elif unsuitable := entry.fault.unsuitable_key(instance):
             below = (unsuitable[0],) if unsuitable[0] else ()
             message = f"fault `{entry.kind}` does not fit `{entry.sensor}`: {unsuitable[1]}"
-            yield CheckFinding((*keys, *below), message, at_key=True)
+            yield CheckProblem((*keys, *below), message, at_key=True)
 
 
 @NAMES.check("SC032")
-def impossible_map_faults(scope: NameScope) -> Iterator[CheckFinding]:
+def impossible_map_faults(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults on a map that is not used, or during part of a run."""
     loaded = scope.loaded
     for index, entry, instance in _suitable_faults(loaded):
@@ -93,15 +93,15 @@ def impossible_map_faults(scope: NameScope) -> Iterator[CheckFinding]:
             continue
         if loaded.spec.map == "none":
             message = "the map cannot have faults: the scenario has `map: none`"
-            yield CheckFinding(("faults", index, "sensor"), message)
+            yield CheckProblem(("faults", index, "sensor"), message)
         for key, given in (("when", entry.when), ("for", entry.for_)):
             if given is not None:
                 message = f"a fault on the map cannot have `{key}`: the stack gets the map once, before it starts"
-                yield CheckFinding(("faults", index, key), message, at_key=True)
+                yield CheckProblem(("faults", index, key), message, at_key=True)
 
 
 @NAMES.check(STACK_CANNOT)
-def faults_of_other_localizers(scope: NameScope) -> Iterator[CheckFinding]:
+def faults_of_other_localizers(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults on the localizer of a stack that is not one of simscen's own."""
     if isinstance(scope.loaded.spec.stack, StackSpec):
         return
@@ -109,7 +109,7 @@ def faults_of_other_localizers(scope: NameScope) -> Iterator[CheckFinding]:
         if instance.kind == BELIEF:
             message = "only the localizer of simscen's own stacks can have faults"
             hint = "disturb the inputs of the localizer instead: odometry, lidar, imu, or the map"
-            yield CheckFinding(("faults", index, "sensor"), message, hint)
+            yield CheckProblem(("faults", index, "sensor"), message, hint)
 
 
 def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, Instance]]:
@@ -120,7 +120,7 @@ def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, 
 
 
 @NAMES.check("SC032")
-def resampling_after_delay(scope: NameScope) -> Iterator[CheckFinding]:
+def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults that measure again but are listed after a fault that delays the scans."""
     loaded = scope.loaded
     faults = loaded.spec.faults
@@ -132,11 +132,11 @@ def resampling_after_delay(scope: NameScope) -> Iterator[CheckFinding]:
         if resamples and before:
             message = f"`{entry.label}` has no effect: `{before[0]}` before it holds the measurements back"
             hint = f"list it before `{before[0]}`; faults apply in the order of the list"
-            yield CheckFinding(("faults", index, entry.kind), message, hint, at_key=True)
+            yield CheckProblem(("faults", index, entry.kind), message, hint, at_key=True)
 
 
 @MEANING.check("SC050")
-def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find faults that are shorter than the time between two messages of their sensor."""
     if loaded.robot.spec is None:
         return
@@ -152,7 +152,7 @@ def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckFinding]:
             when = "begins and ends" if between else "may begin and end"
             message = f"`{entry.label}` {when} between two messages: `{entry.sensor}` sends {rate:g} per second"
             hint = f"make it last at least {1 / rate:g} s"
-            yield CheckFinding(("faults", index, "for"), message, hint, warning=not (between and entry.required))
+            yield CheckProblem(("faults", index, "for"), message, hint, warning=not (between and entry.required))
 
 
 def _start_time(when: Trigger | None) -> float | None:
@@ -163,13 +163,13 @@ def _start_time(when: Trigger | None) -> float | None:
 
 
 @MEANING.check("SC055", severity="warning")
-def faults_without_effect(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def faults_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find faults whose values have no effect."""
     for index, entry in enumerate(loaded.spec.faults):
         neutral = entry.fault.neutral_values
         if neutral and all(getattr(entry.chosen, key) == value for key, value in neutral.items()):
             message = f"fault `{entry.label}` changes nothing with these values"
-            yield CheckFinding(("faults", index, entry.kind), message, at_key=True)
+            yield CheckProblem(("faults", index, entry.kind), message, at_key=True)
 
 
 def _with_article(noun: str) -> str:

@@ -13,7 +13,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast
 from simscen.core.geometry.shapes import MotionPath, Solid
 from simscen.core.messages.navigation import Goal
-from simscen.loading.checks.registry import CheckFinding, Keys
+from simscen.loading.checks.registry import CheckProblem
 from simscen.loading.checks.scene import (
     SILL_M,
     START,
@@ -23,7 +23,7 @@ from simscen.loading.checks.scene import (
     expected_failure_hint,
     expects_start_failure,
 )
-from simscen.loading.yaml.tree import MappingNode
+from simscen.loading.yaml.tree import Keys, MappingNode
 from simscen.sim.body.outline import radius_and_height
 from simscen.spec.moving_objects import Motion
 from simscen.triggers.base import Trigger
@@ -42,25 +42,25 @@ MotionStop = tuple[Keys, str, tuple[float, float]]
 """Keys below those of the motion, description, and position (x, y) of a keyframe or waypoint."""
 
 
-def blocked_poses(scene: Scene) -> dict[Keys, CheckFinding]:
+def blocked_poses(scene: Scene) -> dict[Keys, CheckProblem]:
     """Return the findings for start, goals and kidnap poses at which the robot cannot be, by their keys in the file."""
     found = [*_start(scene), *_goals(scene), *_kidnaps(scene)]
     return {finding.keys: finding for finding in found}
 
 
 @WORLD.check("SC301")
-def check_robot_poses(scene: Scene) -> Iterator[CheckFinding]:
+def check_robot_poses(scene: Scene) -> Iterator[CheckProblem]:
     """Find start, goal and kidnap poses inside an obstacle or outside the map."""
     yield from scene.cached(blocked_poses).values()
 
 
-def _start(scene: Scene) -> Iterator[CheckFinding]:
+def _start(scene: Scene) -> Iterator[CheckProblem]:
     if not expects_start_failure(scene.loaded.spec):
         solids = (*scene.world.solids, *scene.bodies)
         yield from _pose_problem(scene, START, "the robot's start", scene.start, solids, START_HINT)
 
 
-def _goals(scene: Scene) -> Iterator[CheckFinding]:
+def _goals(scene: Scene) -> Iterator[CheckProblem]:
     for keys, goal in scene.targets:
         code = "GOAL_OUTSIDE_MAP" if scene.area.outside(goal.pose) else "GOAL_OCCUPIED"
         hint = f"move it, or {expected_failure_hint(keys, code)}"
@@ -70,7 +70,7 @@ def _goals(scene: Scene) -> Iterator[CheckFinding]:
         position = goal.pose.x, goal.pose.y
         if not found and (thing := first_solid_in_disc(scene.unmoved_bodies, position, TOUCH_M, scene.z_range)):
             message = f"goal `{goal.name}` is inside `{thing}`, and no event moves or removes `{thing}`"
-            yield CheckFinding(keys, message, hint, warning=True)
+            yield CheckProblem(keys, message, hint, warning=True)
 
 
 def _fits_nearby(scene: Scene, goal: Goal) -> bool:
@@ -90,7 +90,7 @@ def _fits_nearby(scene: Scene, goal: Goal) -> bool:
     return any(scene.footprint_conflict(pose, scene.world.solids) is None for pose in near)
 
 
-def _kidnaps(scene: Scene) -> Iterator[CheckFinding]:
+def _kidnaps(scene: Scene) -> Iterator[CheckProblem]:
     for keys, _, action in scene.actions:
         if isinstance(action, Kidnap):
             what = "the pose to which the robot is kidnapped"
@@ -99,12 +99,12 @@ def _kidnaps(scene: Scene) -> Iterator[CheckFinding]:
 
 def _pose_problem(
     scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
-) -> Iterator[CheckFinding]:
+) -> Iterator[CheckProblem]:
     conflict = scene.area.outside(pose) or scene.footprint_conflict(pose, solids)
     if conflict:
         if scene.loaded.world.sdf is not None:
             hint = _hint_in_gazebo_world(scene, pose, solids, hint)
-        yield CheckFinding(keys, f"{what} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
+        yield CheckProblem(keys, f"{what} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
 
 
 def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], hint: str) -> str:
@@ -119,7 +119,7 @@ def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], 
 
 
 @WORLD.check("SC304")
-def check_spawns(scene: Scene) -> Iterator[CheckFinding]:
+def check_spawns(scene: Scene) -> Iterator[CheckProblem]:
     """Find objects that are spawned inside an obstacle or on the robot."""
     for keys, _, action in scene.actions:
         if isinstance(action, Spawn):
@@ -127,7 +127,7 @@ def check_spawns(scene: Scene) -> Iterator[CheckFinding]:
             when = scene.loaded.spec.events[int(keys[1])].when if is_event else None
             where = _inside_obstacle(scene, action) or _on_robot(scene, action, when)
             if where:
-                yield CheckFinding((*keys, "name"), f"`{action.name}` would appear {where}", "choose another pose")
+                yield CheckProblem((*keys, "name"), f"`{action.name}` would appear {where}", "choose another pose")
 
 
 def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
@@ -165,7 +165,7 @@ def _outline(spawn: Spawn) -> Polygon:
 
 
 @WORLD.check("SC304")
-def check_pedestrians(scene: Scene) -> Iterator[CheckFinding]:
+def check_pedestrians(scene: Scene) -> Iterator[CheckProblem]:
     """Find pedestrians whose start or goals are too close to obstacles."""
     solids = (*scene.world.solids, *scene.immovable_bodies)
     for keys, _, action in scene.actions:
@@ -176,11 +176,11 @@ def check_pedestrians(scene: Scene) -> Iterator[CheckFinding]:
         for below, what, (x, y) in stops:
             if solid := first_solid_in_disc(solids, (x, y), action.radius, (SILL_M, action.height)):
                 message = f'{what} ({x:g}, {y:g}) is closer to obstacle "{solid}" than {action.radius:g} m'
-                yield CheckFinding((*keys, *below), message, "choose a position with enough room")
+                yield CheckProblem((*keys, *below), message, "choose a position with enough room")
 
 
 @WORLD.check("SC304", severity="warning")
-def check_motions(scene: Scene) -> Iterator[CheckFinding]:
+def check_motions(scene: Scene) -> Iterator[CheckProblem]:
     """Find keyframes, waypoints and teleport targets inside the fixed world."""
     for keys, _, action in scene.actions:
         stops: list[MotionStop] = []
@@ -191,20 +191,20 @@ def check_motions(scene: Scene) -> Iterator[CheckFinding]:
         for below, what, (x, y) in stops:
             if solid := first_solid_in_disc(scene.world.solids, (x, y), TOUCH_M, scene.z_range):
                 message = f'{what} ({x:g}, {y:g}) is inside obstacle "{solid}"'
-                yield CheckFinding(
+                yield CheckProblem(
                     (*keys, *below), message, "move it to free space: walls do not stop scripted motions"
                 )
 
 
 @WORLD.check("SC305")
-def check_motion_speeds(scene: Scene) -> Iterator[CheckFinding]:
+def check_motion_speeds(scene: Scene) -> Iterator[CheckProblem]:
     """Find scripted motions so fast that contact with the robot could be missed between two ticks."""
     tick = 1 / scene.loaded.spec.physics.tick_rate
     for keys, tree, name, path, solids in _motions(scene):
         step = largest_step(path, tick, radius_and_height(solids)[0] if solids else 0.0)
         if step > MAX_STEP_M:
             hint = f"make it {math.ceil(10 * step / MAX_STEP_M) / 10:g} times slower, or raise `physics.tick_rate`"
-            yield CheckFinding(keys, too_fast(name, step), hint, tree=tree)
+            yield CheckProblem(keys, too_fast(name, step), hint, tree=tree)
 
 
 def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, MotionPath, Sequence[Solid]]]:

@@ -19,9 +19,10 @@ from simscen.criteria.keepout import Keepout
 from simscen.criteria.localization import LocalizationError
 from simscen.loading.checks.events import MAX_SPEED_RATIO
 from simscen.loading.checks.placement import blocked_poses
-from simscen.loading.checks.registry import CheckFinding, Keys
+from simscen.loading.checks.registry import CheckProblem
 from simscen.loading.checks.scene import START, WORLD, Scene
 from simscen.loading.world_cache import extend_bounds
+from simscen.loading.yaml.tree import Keys
 from simscen.triggers.base import AnyCondition
 from simscen.triggers.robot_state import RobotIn, RobotWithin
 from simscen.worlds.geometry.overlaps import place_polygon, polygons_overlap
@@ -161,7 +162,7 @@ def _start_is_blocked(scene: Scene) -> bool:
 
 
 @WORLD.check("SC050")
-def unreachable_triggers(scene: Scene) -> Iterator[CheckFinding]:
+def unreachable_triggers(scene: Scene) -> Iterator[CheckProblem]:
     """Find events and faults that wait for the robot at a position that it cannot reach."""
     if _start_is_blocked(scene) or scene.may_do():  # an action of an installed package may take the robot anywhere
         return
@@ -169,14 +170,14 @@ def unreachable_triggers(scene: Scene) -> Iterator[CheckFinding]:
     for keys, name, what, corners, distance in scene.cached(trigger_areas):
         center = Pose2(*(sum(values) / len(corners) for values in zip(*corners, strict=True)))
         if not scene.cached(robot_routes).can_enter(starts, center, distance):
-            yield CheckFinding(keys, f"`{name}` can never happen: no route leads the robot to {what}")
+            yield CheckProblem(keys, f"`{name}` can never happen: no route leads the robot to {what}")
         elif robot is not None and min(map(distance, starts)) > MAX_SPEED_RATIO * robot.top_speed * limit:
             reason = f"at {robot.top_speed:g} m/s, its top speed, the robot does not reach {what} within the time limit"
-            yield CheckFinding(keys, f"`{name}` can never happen: {reason}")
+            yield CheckProblem(keys, f"`{name}` can never happen: {reason}")
 
 
 @WORLD.check("SC051")
-def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckFinding]:
+def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckProblem]:
     """Find keepout criteria whose region contains the start or a goal."""
     if _start_is_blocked(scene):
         return
@@ -186,17 +187,17 @@ def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckFinding]:
         region, keys = entry.chosen.region, ("pass", index, "keepout", "region")
         corners = scene.world.regions[region]
         if polygons_overlap(corners, place_polygon(scene.outline, scene.start)):
-            yield CheckFinding(keys, f"keepout can never hold: the robot starts in `{region}`")
+            yield CheckProblem(keys, f"keepout can never hold: the robot starts in `{region}`")
             continue
         inside = [
             goal.name for _, goal in scene.targets if depth_inside_polygon(goal.pose, corners) > goal.xy_tolerance
         ]
         if inside:
-            yield CheckFinding(keys, f"keepout cannot hold if goal `{inside[0]}` is reached: it is in `{region}`")
+            yield CheckProblem(keys, f"keepout cannot hold if goal `{inside[0]}` is reached: it is in `{region}`")
 
 
 @WORLD.check("SC055", severity="warning")
-def goals_reached_at_once(scene: Scene) -> Iterator[CheckFinding]:
+def goals_reached_at_once(scene: Scene) -> Iterator[CheckProblem]:
     """Find goals that the robot has already reached when it is sent to them."""
     if _start_is_blocked(scene):
         return
@@ -206,11 +207,11 @@ def goals_reached_at_once(scene: Scene) -> Iterator[CheckFinding]:
         turned = abs(wrap(before.yaw - goal.pose.yaw))
         if before.distance(goal.pose) <= goal.xy_tolerance and turned <= goal.yaw_tolerance:
             message = f"the robot is already within the tolerances of goal `{goal.name}` when it is sent there"
-            yield CheckFinding(keys, message)
+            yield CheckProblem(keys, message)
 
 
 @WORLD.check("SC052", severity="warning")
-def loose_localization_bounds(scene: Scene) -> Iterator[CheckFinding]:
+def loose_localization_bounds(scene: Scene) -> Iterator[CheckProblem]:
     """Find bounds on the localization error that are larger than the world."""
     if _start_is_blocked(scene):
         return
@@ -221,4 +222,4 @@ def loose_localization_bounds(scene: Scene) -> Iterator[CheckFinding]:
             bound = getattr(entry.chosen, key)
             if bound is not None and 0 < diagonal < bound:
                 message = f"localization_error can hardly fail: the diagonal of the world is {diagonal:.1f} m"
-                yield CheckFinding(("pass", index, "localization_error", key), message)
+                yield CheckProblem(("pass", index, "localization_error", key), message)

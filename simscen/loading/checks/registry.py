@@ -1,10 +1,10 @@
 """Interface of semantic checks, and the stages in which checks run.
 
-A check is a generator function that yields one CheckFinding per problem. It is registered for a stage together with the
+A check is a generator function that yields one CheckProblem per problem. It is registered for a stage together with the
 error code that it reports:
 
     @MEANING.check("SC050")
-    def impossible_events(loaded: LoadedScenario) -> Iterator[CheckFinding]: ...
+    def impossible_events(loaded: LoadedScenario) -> Iterator[CheckProblem]: ...
 
 Stages, in the order in which they run. After errors, later stages are not run:
 
@@ -26,14 +26,11 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
-from simscen.loading.yaml.tree import Key, MappingNode, key_position, value_position
+from simscen.loading.yaml.tree import Keys, MappingNode, key_position, value_position
 from simscen.model.scenario import ScenarioSpec
 
-Keys = tuple[Key, ...]
-"""Keys and indices that lead from the top of a file to a value, e.g. ("goals", 0, "pose")."""
 
-
-class CheckFinding(NamedTuple):
+class CheckProblem(NamedTuple):
     """A problem found by a check: where it is, what is wrong, and what to do.
 
     `keys` lead to the value to mark; with `at_key`, its key is marked instead. They are keys in the checked file, or in
@@ -65,7 +62,7 @@ class Subject(Protocol):
 
 
 S = TypeVar("S", bound=Subject)
-Check = Callable[[S], Iterable[CheckFinding]]
+Check = Callable[[S], Iterable[CheckProblem]]
 C = TypeVar("C", bound=Callable[..., Any])
 
 
@@ -123,6 +120,6 @@ NAMES: CheckStage[NameScope] = CheckStage("names")
 MEANING: CheckStage[LoadedScenario] = CheckStage("meaning")
 
 
-def warnings(findings: Iterable[CheckFinding]) -> Iterator[CheckFinding]:
+def warnings(findings: Iterable[CheckProblem]) -> Iterator[CheckProblem]:
     """Return the findings as warnings."""
     return (finding._replace(warning=True) for finding in findings)

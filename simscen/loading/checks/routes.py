@@ -13,7 +13,7 @@ from simscen.core.messages.navigation import matches_goal_name as is_named
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.placement import blocked_poses
 from simscen.loading.checks.regions import robot_routes
-from simscen.loading.checks.registry import CheckFinding
+from simscen.loading.checks.registry import CheckProblem
 from simscen.loading.checks.scene import START, TIMING, WORLD, Scene, expected_failure_hint, expects_failure
 from simscen.loading.goals import scenario_goals
 from simscen.model.robot import RobotSpec
@@ -30,7 +30,7 @@ class Gap(NamedTuple):
     position: tuple[float, float]
 
 
-def unreachable_goals(scene: Scene) -> list[tuple[CheckFinding, Gap]]:
+def unreachable_goals(scene: Scene) -> list[tuple[CheckProblem, Gap]]:
     """Return a finding for each goal without a route, and the gap that is too narrow.
 
     It is an error if fixed walls block the goal, and a warning if the robot might pass or push what blocks it.
@@ -47,21 +47,21 @@ def unreachable_goals(scene: Scene) -> list[tuple[CheckFinding, Gap]]:
         gap = _widest_gap(scene, goal.pose, solids)
         message = f"goal `{goal.name}` cannot be reached from the start: {gap.description}"
         if solids is not world and routes.is_reachable(starts, goal.pose, world):
-            finding = CheckFinding(keys, message, "no event opens, moves or removes it", warning=True)
+            finding = CheckProblem(keys, message, "no event opens, moves or removes it", warning=True)
         elif scene.may_do():
-            finding = CheckFinding(
+            finding = CheckProblem(
                 keys, message, "unless an action of an installed package opens a route", warning=True
             )
         elif len(scene.certain_walls) < len(world) and routes.is_reachable(starts, goal.pose, scene.certain_walls):
-            finding = CheckFinding(keys, message, _ramp_hint(scene), warning=True)
+            finding = CheckProblem(keys, message, _ramp_hint(scene), warning=True)
         else:
-            finding = CheckFinding(keys, message, f"widen the gap, or {expected_failure_hint(keys, 'NO_VALID_PATH')}")
+            finding = CheckProblem(keys, message, f"widen the gap, or {expected_failure_hint(keys, 'NO_VALID_PATH')}")
         found.append((finding, gap))
     return found
 
 
 @WORLD.check("SC302")
-def check_reachability(scene: Scene) -> Iterator[CheckFinding]:
+def check_reachability(scene: Scene) -> Iterator[CheckProblem]:
     """Find goals that no route leads to."""
     return (finding for finding, _ in scene.cached(unreachable_goals))
 
@@ -142,7 +142,7 @@ class Drive:
 
 
 @TIMING.check("SC303")
-def impossible_time_bounds(scene: Scene) -> Iterator[CheckFinding]:
+def impossible_time_bounds(scene: Scene) -> Iterator[CheckProblem]:
     """Find timeouts, time limits and bounds of criteria that no drive can meet."""
     goals, robot = scenario_goals(scene.loaded.spec), scene.loaded.robot.spec
     failing = any(expects_failure(scene.loaded.spec, goal.name) for goal in goals)
@@ -158,7 +158,7 @@ def impossible_time_bounds(scene: Scene) -> Iterator[CheckFinding]:
         yield from _violated_bounds(scene, Drive(goals, robot, exact))
 
 
-def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckFinding]:
+def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckProblem]:
     spec = scene.loaded.spec
     for index, goal in enumerate(drive.goals[: len(spec.goals)]):
         is_sent = index == 0 or spec.on_goal_failure == "stop"
@@ -166,16 +166,16 @@ def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckFinding]:
             length = drive.lengths[index]
             reason = f"the path of {length:.2f} m takes {length / drive.robot.top_speed:.1f} s {drive.top_speed_text}"
             message = f"goal `{goal.name}` cannot be reached within {goal.timeout:g} s: {reason}"
-            yield CheckFinding(("goals", index, "timeout"), message)
+            yield CheckProblem(("goals", index, "timeout"), message)
     waits = sum(goal.wait for goal in drive.goals)
     if sum(drive.least_times) + waits > spec.time_limit and any(map(_requires_success, spec.pass_)):
         keys = ("time_limit",) if "time_limit" in spec.model_fields_set else ("goals",)
         waiting = f", and the robot waits {waits:g} s at goals" if waits else ""
         message = f"the goals cannot be reached within {spec.time_limit:g} s: {drive.description}{waiting}"
-        yield CheckFinding(keys, message)
+        yield CheckProblem(keys, message)
     for index, entry in enumerate(spec.pass_):
         for key, reason in _violated_criterion_bounds(entry, drive):
-            yield CheckFinding(("pass", index, entry.kind, key), f"{entry.kind} can never hold: {reason}")
+            yield CheckProblem(("pass", index, entry.kind, key), f"{entry.kind} can never hold: {reason}")
 
 
 def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tuple[str, str]]:

@@ -16,12 +16,12 @@ from simscen.core.geometry.shapes import Body, Solid
 from simscen.core.messages.navigation import ErrorCode, Goal, matches_goal_name
 from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.loading.builders import load_map
-from simscen.loading.checks.registry import CheckStage, Keys
+from simscen.loading.checks.registry import CheckStage
 from simscen.loading.goals import event_goals, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.robot_size import RobotSize
 from simscen.loading.world_cache import WorldCache
-from simscen.loading.yaml.tree import MappingNode
+from simscen.loading.yaml.tree import Keys, MappingNode
 from simscen.model.navigation import expected_failure_name
 from simscen.model.scenario import ScenarioSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc, first_solid_in_footprint

@@ -9,11 +9,11 @@ from pydantic import BaseModel, ValidationError
 
 from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at
 from simscen.loading.schema.messages import suggestion
-from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, SequenceNode, dotted_path, existing_keys
+from simscen.loading.yaml.tree import Key, Keys, MappingNode, Node, ScalarNode, SequenceNode, dotted_path, existing_keys
 from simscen.spec.choice import Choice
 from simscen.spec.places import PoseSpec
 
-HINTS_FOR_BOUNDS: dict[tuple[Key, ...], str] = {
+HINTS_FOR_BOUNDS: dict[Keys, str] = {
     ("physics", "truth_rate"): "criteria are judged at these samples; lower rates miss short violations",
 }
 """Reasons for bounds that may surprise users, by the path of the value."""

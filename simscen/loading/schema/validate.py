@@ -12,17 +12,17 @@ from simscen.loading.schema import common_mistakes, messages
 from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at, type_values_at, type_values_with_key
 from simscen.loading.yaml import textfile
 from simscen.loading.yaml.tree import (
-    Key,
+    Keys,
     MappingNode,
     Node,
     Position,
     ScalarNode,
-    SequenceNode,
     child,
     dotted_path,
     existing_keys,
     key_position,
     node_at,
+    nodes_with_keys,
     value_position,
 )
 from simscen.spec.choice import Choice
@@ -92,7 +92,7 @@ def _wrong_version(tree: MappingNode) -> Problem | None:
 
 
 def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Problem:
-    loc: tuple[Key, ...] = error["loc"]
+    loc: Keys = error["loc"]
     kind: str = error["type"]
     if kind == "extra_forbidden":
         return _unknown_key(model, tree, loc)
@@ -117,7 +117,7 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
     return _problem(value_position(tree, loc), *message)
 
 
-def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
+def _unknown_key(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
     key = str(loc[-1])
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     where = f" in `{holder}`" if holder else ""
@@ -140,7 +140,7 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
     return _problem(key_position(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
 
 
-def _missing_key(tree: Node, loc: tuple[Key, ...]) -> Problem:
+def _missing_key(tree: Node, loc: Keys) -> Problem:
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     if isinstance(loc[-1], int):
         return _problem(key_position(tree, loc[:-1]), "SC017", f"`{holder}` has too few values: [{loc[-1]}] is missing")
@@ -148,7 +148,7 @@ def _missing_key(tree: Node, loc: tuple[Key, ...]) -> Problem:
     return _problem(key_position(tree, loc[:-1]), "SC010", f"missing key `{loc[-1]}`{where}")
 
 
-def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error: dict[str, Any]) -> Problem:
+def _wrong_type(model: type[BaseModel], tree: Node, loc: Keys, error: dict[str, Any]) -> Problem:
     """Return the problem of a mapping whose `type` is missing or unknown."""
     node, types = node_at(tree, loc), type_values_at(model, loc)
     if not isinstance(node, MappingNode):
@@ -161,19 +161,12 @@ def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error:
     return _problem(value_position(tree, (*loc, "type")), "SC014", message, messages.suggestion(written, types))
 
 
-def _empty_values(node: Node, loc: tuple[Key, ...] = ()) -> Iterator[tuple[Key, ...]]:
+def _empty_values(tree: Node) -> Iterator[Keys]:
     """Yield the keys of empty values: `off:` instead of `off: {}`, or a forgotten value."""
-    if isinstance(node, MappingNode):
-        for key, entry in node.entries.items():
-            yield from _empty_values(entry.value, (*loc, key))
-    elif isinstance(node, SequenceNode):
-        for index, item in enumerate(node.items):
-            yield from _empty_values(item, (*loc, index))
-    elif node.value is None:
-        yield loc
+    return (keys for keys, node in nodes_with_keys(tree) if isinstance(node, ScalarNode) and node.value is None)
 
 
-def _empty_value_problem(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
+def _empty_value_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
     *holder, key = loc
     if isinstance(key, int):
         return _problem(

@@ -146,8 +146,7 @@ def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Pro
     misplaced = _misplaced(section) if isinstance(section, MappingNode) else []
     if isinstance(spec, list) or misplaced or not isinstance(section, MappingNode):
         return library.with_source(sorted([*misplaced, *(spec if isinstance(spec, list) else [])]))
-    entries = {key: entry for key, entry in section.entries.items() if key != NAV2_PARAMS}
-    return MappingNode(section.position, entries), notes
+    return section.without_keys(NAV2_PARAMS), notes
 
 
 def _read(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:

@@ -155,5 +155,5 @@ def written_value(tree: MappingNode, path: str) -> Any:
         return None
     node: Node | None = tree
     for key in keys:
-        node = None if node is None else child(node, key)
+        node = child(node, key)
     return None if node is None else node.plain

@@ -179,7 +179,7 @@ def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
         return None
     from simscen.model.variations import VariationsSection  # most scenarios have no variations
 
-    own = MappingNode(tree.position, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
+    own = tree.without_keys(VARIATIONS)
     section = check(VariationsSection, MappingNode(tree.position, {VARIATIONS: entry}))
     if isinstance(section, list):
         return section

@@ -8,7 +8,18 @@ import re
 from dataclasses import dataclass
 
 from simscen.loading.schema.messages import quoted, short_value, suggestion
-from simscen.loading.yaml.tree import Entry, Key, MappingNode, Node, Position, ScalarNode, SequenceNode, dotted_path
+from simscen.loading.yaml.tree import (
+    Key,
+    Keys,
+    MappingNode,
+    Node,
+    Position,
+    ScalarNode,
+    SequenceNode,
+    child,
+    dotted_path,
+    replace_at,
+)
 
 LIST_KEYS = frozenset({"goals", "events", "faults", "pass", "metrics", "tags"})
 """Top-level keys of a scenario that contain lists."""
@@ -39,7 +50,7 @@ class Target:
 
     path: str
     position: Position
-    keys: tuple[Key, ...]
+    keys: Keys
 
 
 def resolve_path(path: str, position: Position, tree: MappingNode) -> Target:
@@ -52,7 +63,7 @@ def resolve_path(path: str, position: Position, tree: MappingNode) -> Target:
 
 def set_value(tree: MappingNode, target: Target, value: Node) -> MappingNode:
     """Return the scenario with the value set. New nodes have the position of the path."""
-    changed = _with_value(tree, target.keys, value, target.position)
+    changed = replace_at(tree, target.keys, value, target.position)
     assert isinstance(changed, MappingNode)
     return changed
 
@@ -72,7 +83,7 @@ def split_path(path: str) -> list[str]:
     return parts
 
 
-def _keys(path: str, parts: list[str], tree: MappingNode) -> tuple[Key, ...]:
+def _keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
     node: Node | None = tree
     keys: list[Key] = []
     for number, part in enumerate(parts):
@@ -84,11 +95,7 @@ def _keys(path: str, parts: list[str], tree: MappingNode) -> tuple[Key, ...]:
                 found = _item(path, keys, node, part, parts[number + 1 :])
                 keys += found
                 for key in found:
-                    node = (
-                        node.items[key]
-                        if isinstance(node, SequenceNode) and isinstance(key, int)
-                        else _child(node, key)
-                    )
+                    node = child(node, key)
             case ScalarNode():
                 raise PathError(
                     f"{quoted(path)} leads to nothing: `{dotted_path(keys)}` is {_describe(node)}, without a `{part}`",
@@ -111,11 +118,11 @@ def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list
         return [int(part)]
     matches = [index for index, item in enumerate(items.items) if part in _names(item)]
     if len(matches) > 1 and rest:
-        matches = [index for index in matches if _child(items.items[index], rest[0]) is not None] or matches
+        matches = [index for index in matches if child(items.items[index], rest[0]) is not None] or matches
     kinds = [
         index
         for index, item in enumerate(items.items)
-        if keys and keys[0] in KEYS_BY_KIND and not matches and _child(item, part) is not None
+        if keys and keys[0] in KEYS_BY_KIND and not matches and child(item, part) is not None
     ]
     found = matches or kinds
     if len(found) > 1:
@@ -145,11 +152,6 @@ def _names(item: Node) -> list[str]:
     return [value.value for value in values if isinstance(value, ScalarNode) and isinstance(value.value, str)]
 
 
-def _child(node: Node | None, key: Key) -> Node | None:
-    entry = node.entries.get(str(key)) if isinstance(node, MappingNode) else None
-    return entry.value if entry else None
-
-
 def _describe(leaf: ScalarNode) -> str:
     return short_value(leaf) if leaf.value is not None else "empty"
 
@@ -161,19 +163,3 @@ def _file_hint(keys: list[Key]) -> str:
     if keys[-1] == "pose":
         return f"vary {quoted(dotted_path(keys))} as a whole, or write it as `{{x: …, y: …, yaw: …}}`"
     return ""
-
-
-def _with_value(node: Node | None, keys: tuple[Key, ...], value: Node, position: Position) -> Node:
-    if not keys:
-        return value
-    first, *rest = keys
-    if isinstance(node, SequenceNode) and isinstance(first, int):
-        items = list(node.items)
-        items[first] = _with_value(items[first], tuple(rest), value, position)
-        return SequenceNode(node.position, tuple(items))
-    fields = node if isinstance(node, MappingNode) else MappingNode(position, {})
-    below = fields.entries.get(str(first))
-    entry = Entry(
-        below.key if below else position, _with_value(below.value if below else None, tuple(rest), value, position)
-    )
-    return MappingNode(fields.position, {**fields.entries, str(first): entry})

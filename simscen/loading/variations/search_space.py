@@ -54,7 +54,7 @@ def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
     if entry is None:
         message, hint = "the scenario has no `variations` to search", "add `sampled` with the range of each value"
         return [Problem(*tree.position, "SC010", message, hint)]
-    own = MappingNode(tree.position, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
+    own = tree.without_keys(VARIATIONS)
     section = check(VariationsSection, MappingNode(tree.position, {VARIATIONS: entry}))
     if isinstance(section, list):
         return section

@@ -80,7 +80,7 @@ class Library:
         if not isinstance(tree, MappingNode) or EXTENDS not in tree.entries:
             return tree, problems
         entry = tree.entries[EXTENDS]
-        own = MappingNode(tree.position, {key: value for key, value in tree.entries.items() if key != EXTENDS})
+        own = tree.without_keys(EXTENDS)
         base = self._base_file(entry, path, (*chain, path))
         if isinstance(base, Problem):
             return own, [*problems, base]
