@@ -9,10 +9,10 @@ from simscen.core.geometry import Pose2
 from simscen.loading.checks.scene import expects_failure
 from simscen.loading.goals import event_goals, scenario_goals
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.world_cache import extend_bounds
+from simscen.loading.world_cache import Bounds
 
 
-def with_stops(world: World, loaded: LoadedScenario) -> World:
+def with_stops_in_bounds(world: World, loaded: LoadedScenario) -> World:
     """Return the world with bounds that contain the stops of all robots if it has open ground; else the same object.
 
     Stops are start poses, goals, and poses to which events kidnap a robot, without goals that are expected to fail.
@@ -34,3 +34,10 @@ def _stops(loaded: LoadedScenario) -> Iterator[Pose2]:
     for _, action in (placed for step in spec.steps for placed in step.located_actions()):
         if isinstance(action.chosen, Kidnap) and loaded.includes_robot(action.robot):
             yield action.chosen.pose.pose
+
+
+def extend_bounds(bounds: Bounds, places: list[Pose2]) -> Bounds:
+    """Return the bounds, enlarged to contain the places."""
+    left, bottom, right, top = bounds
+    xs, ys = [place.x for place in places], [place.y for place in places]
+    return min([left, *xs]), min([bottom, *ys]), max([right, *xs]), max([top, *ys])

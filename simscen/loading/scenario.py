@@ -11,15 +11,16 @@ from simscen.loading.checks.runner import check_robot_names, check_scenario
 from simscen.loading.codes import STACK_CANNOT
 from simscen.loading.files.assets import Assets, find_criterion_masks
 from simscen.loading.files.paths import PathSandbox
-from simscen.loading.known_names import places_of, resolve_places, unknown_places
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
+from simscen.loading.named_places import places_of, resolve_places, unknown_places
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import StackChoice, not_a_scenario, recognize_stack_file
 from simscen.loading.stacks.nav2_parameters import with_nav2_parameters
 from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
-from simscen.loading.variations.naming import VariationProblems, merge_problems, number_of
+from simscen.loading.variations.naming import number_of
 from simscen.loading.variations.options import Change
+from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.tree import Keys, MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec

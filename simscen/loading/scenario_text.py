@@ -8,9 +8,9 @@ import yaml
 from simscen.core.errors import InvalidInput
 from simscen.core.records.events import Disturbance
 from simscen.loading.files.paths import PathSandbox
-from simscen.loading.known_names import places_of, resolve_criteria_places
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.multirobot import split_by_robot
+from simscen.loading.named_places import places_of, resolve_criteria_places
 from simscen.loading.plugins import missing_plugins
 from simscen.loading.schema.validate import Model, check
 from simscen.loading.yaml.library import Library

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from simscen.core.environment.world_model import World
 from simscen.core.files import collect_read_files, record_read_file
-from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Solid
 from simscen.loading.builders import load_world
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
@@ -75,10 +74,3 @@ class WorldCache:
             (solids, bounds, radius, z_range, paths),
         ]  # large objects: keep only the last four
         return paths
-
-
-def extend_bounds(bounds: Bounds, places: list[Pose2]) -> Bounds:
-    """Return the bounds, enlarged to contain the places."""
-    left, bottom, right, top = bounds
-    xs, ys = [place.x for place in places], [place.y for place in places]
-    return min([left, *xs]), min([bottom, *ys]), max([right, *xs]), max([top, *ys])

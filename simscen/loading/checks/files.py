@@ -18,7 +18,7 @@ from simscen.loading.files.paths import PathSandbox
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.validate import check_partial
 from simscen.loading.stacks.choice import NAV2_FILE_KIND, STACK_FILE_KIND, recognize_stack_file
-from simscen.loading.variations.naming import VariationProblems, merge_problems
+from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec

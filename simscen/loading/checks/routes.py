@@ -12,8 +12,8 @@ from simscen.core.messages.navigation import Goal
 from simscen.core.messages.navigation import matches_goal_name as is_named
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.placement import blocked_poses
-from simscen.loading.checks.regions import robot_routes
 from simscen.loading.checks.registry import CheckProblem
+from simscen.loading.checks.route_search import robot_routes
 from simscen.loading.checks.scene import START, TIMING, WORLD, Scene, expected_failure_hint, expects_failure
 from simscen.loading.goals import scenario_goals
 from simscen.model.robot import RobotSpec

@@ -16,7 +16,7 @@ from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.checks.scene import TIMING, WORLD, Scene
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
-from simscen.loading.open_ground import with_stops
+from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.loading.robot_size import blocking_world, robot_size
 from simscen.loading.world_cache import WorldCache
 from simscen.worlds.extent import oversize_hint
@@ -36,7 +36,7 @@ def check_in_world(
     to that folder. Raises InvalidInput for unusable files, and UsageError for a picture that cannot be written.
     """
     cache = cache or WorldCache()
-    world = with_stops(cache.world(loaded), loaded)
+    world = with_stops_in_bounds(cache.world(loaded), loaded)
     if not loaded.robots:
         return _check_robot(loaded, world, cache, pictures)
     found = [problem for view in loaded.robots.values() for problem in _check_robot(view, world, cache, pictures)]

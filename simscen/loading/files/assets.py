@@ -11,8 +11,8 @@ from pydantic import BaseModel
 from simscen.core.errors import Problem
 from simscen.core.version import PACKAGE
 from simscen.loading.files.paths import PathProblem
-from simscen.loading.known_names import resolve_places, unknown_places
 from simscen.loading.loaded import CriterionMask, LoadedMap, LoadedRobot, LoadedWorld
+from simscen.loading.named_places import resolve_places, unknown_places
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.spec_walk import references
