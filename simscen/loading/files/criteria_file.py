@@ -13,16 +13,16 @@ from simscen.loading.named_places import NO_WORLD_HINT, place_references, places
 from simscen.loading.schema.messages import quoted
 from simscen.loading.schema.validate import check
 from simscen.loading.yaml.library import Library
-from simscen.loading.yaml.tree import MappingNode, ScalarNode, key_position, node_at, value_position
+from simscen.loading.yaml.tree import MappingNode, key_position, value_position
 from simscen.model.scenario import CriteriaSpec
-from simscen.model.world import WorldSpec
 
 
 @dataclass(frozen=True)
 class LoadedCriteria:
-    """Criteria of a file; `lines` are their lines in `file`, 0 for criteria of a file that it extends.
+    """Criteria of a file.
 
-    `masks` are their filter masks, by file name as written.
+    `lines` has the line of each criterion in `file`; 0 for criteria from a file that it extends. `masks` has the filter
+    masks of the criteria, by path as written. `library` is the reader of the file.
     """
 
     file: Path
@@ -33,14 +33,15 @@ class LoadedCriteria:
     masks: Mapping[str, CriterionMask] = field(default_factory=dict)
 
     def for_robot(self, robot: str) -> "LoadedCriteria":
-        """Return the criteria for one of several robots, or "" for the only robot of a log. Raises InvalidInput.
+        """Return the criteria for a robot of a log; "" is the only robot of a log.
 
-        A file without `robots` applies to every robot.
+        A file without `robots` applies to every robot. Raises InvalidInput if the robot is not in the `robots` of the
+        file.
         """
-        views = multirobot.split_by_robot(self.tree)
-        if robot in views:
-            return _loaded(self.file, views[robot], self.library)
-        if not views:
+        trees = multirobot.split_by_robot(self.tree)
+        if robot in trees:
+            return _loaded(self.file, trees[robot], self.library)
+        if not trees:
             return self
         unknown = f"the log has a robot {quoted(robot)}, which is not listed here"
         message = unknown if robot else "the log has one robot, but several are listed here"
@@ -48,9 +49,9 @@ class LoadedCriteria:
         raise InvalidInput(self.library.with_source([problem]))
 
     def load_world_and_robot(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
-        """Load the world and the robot that the file names, if any. Raises InvalidInput."""
+        """Load the world and the robot that the file names; None if it names none. Raises InvalidInput."""
         assets, robot = Assets(self.library), None
-        world = _world(self.spec, self.tree, self.file, assets)
+        world = assets.world_of(self.spec.world, self.tree, self.file)
         if self.spec.robot is not None:
             robot = assets.robot(self.spec.robot.model, value_position(self.tree, ("robot", "model")))
         if assets.problems:
@@ -59,9 +60,9 @@ class LoadedCriteria:
 
 
 def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedCriteria:
-    """Load the criteria in `path`, with what it `extends` and the `defaults.yaml` next to it, as for a scenario.
+    """Load the criteria in the file `path`, merged with the files that it extends and with `defaults.yaml`.
 
-    Raises InvalidInput with all problems.
+    Other files must lie in `root` or a folder of `world_path`. Raises InvalidInput with all problems.
     """
     library = Library(PathSandbox.around(root, world_path))
     file = library.sandbox.resolve_argument(path)
@@ -78,28 +79,19 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
 
 
 def _loaded(file: Path, tree: MappingNode, library: Library) -> LoadedCriteria:
-    """Return the criteria in a valid tree. Raises InvalidInput for unknown places and unusable masks."""
+    """Return the criteria in a tree of `file`. Raises InvalidInput, for example for unknown places or masks."""
     spec = check(CriteriaSpec, tree)
     if isinstance(spec, list):
         raise InvalidInput(library.with_source(spec))
     assets = Assets(library)
     masks = find_criterion_masks(spec, tree, assets)
     if any(place_references(spec)):
-        known = places_of(_world(spec, tree, file, assets))
+        known = places_of(assets.world_of(spec.world, tree, file))
         assets.problems += unknown_places(spec, tree, known, NO_WORLD_HINT)
         spec = resolve_places(spec, known)
     if assets.problems:
         raise InvalidInput(library.with_source(sorted(assets.problems)))
     display_name = library.sandbox.display_name(file)
-    places = [value_position(tree, ("pass", index)) for index in range(len(spec.pass_))]
-    return LoadedCriteria(
-        file, spec, tuple(p.line if p.path == display_name else 0 for p in places), tree, library, masks
-    )
-
-
-def _world(spec: CriteriaSpec, tree: MappingNode, file: Path, assets: Assets) -> LoadedWorld | None:
-    """Load the world that the file names, if any."""
-    node = node_at(tree, ("world",))
-    if isinstance(spec.world, WorldSpec):
-        return assets.complete_world(spec.world, node, file)
-    return assets.world(node) if spec.world is not None and isinstance(node, ScalarNode) else None
+    positions = [value_position(tree, ("pass", index)) for index in range(len(spec.pass_))]
+    lines = tuple(position.line if position.path == display_name else 0 for position in positions)
+    return LoadedCriteria(file, spec, lines, tree, library, masks)

@@ -1,4 +1,4 @@
-"""Load a file without a scenario: a robot, a world, or criteria to judge logs; and write worlds as `*.world.yaml`."""
+"""Load a robot or a world file without a scenario, and write a world as a `*.world.yaml` file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from simscen.model.world import WorldSpec
 
 @dataclass(frozen=True)
 class RobotFile:
-    """Robot and the reader of its files."""
+    """Robot that was loaded from a file, and the reader of its files."""
 
     robot: LoadedRobot
     library: Library
@@ -31,9 +31,10 @@ class RobotFile:
 
 
 def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -> RobotFile:
-    """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file, or one that ships with simscen, by name.
+    """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file, or a robot that ships with simscen.
 
-    Raises InvalidInput with all problems.
+    `written` is the path of the file, or the name of the shipped robot. Its files must lie in `root` or a folder of
+    `world_path`. Raises InvalidInput with all problems.
     """
     shipped = shipped_robots()
     library = Library(PathSandbox.around(root, world_path))
@@ -54,9 +55,10 @@ def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -
 def load_world_file(
     path: Path, root: Path, world_path: Sequence[Path] = (), unsaved: Mapping[Path, str] | None = None
 ) -> LoadedWorld:
-    """Load the world in a `*.world.yaml`, a ROS map, or an SDF file. Raises InvalidInput with all problems.
+    """Load the world in a `*.world.yaml`, a ROS map, or an SDF file.
 
-    `unsaved` contains the texts of files that are changed in an editor, but not saved.
+    Its files must lie in `root` or a folder of `world_path`. `unsaved` contains the texts of files that are changed in
+    an editor, but not saved. Raises InvalidInput with all problems.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     file = library.sandbox.resolve_argument(path)
@@ -74,13 +76,13 @@ def load_world_file(
 
 
 def world_text(spec: WorldSpec) -> str:
-    """Return a world as the text of a `*.world.yaml`, without default values."""
+    """Return the text of a `*.world.yaml` file with this world, without default values."""
     data = spec.model_dump(mode="json", exclude_defaults=True)
     return to_yaml(_in_order(data), CompactDumper)
 
 
 def _in_order(value: Any) -> Any:
-    """Return data with the version and names first."""
+    """Return data in which the version and the name come first in each mapping."""
     if isinstance(value, list):
         return [_in_order(item) for item in value]
     if not isinstance(value, dict):
@@ -90,15 +92,17 @@ def _in_order(value: Any) -> Any:
 
 
 class CompactDumper(Dumper):
-    """YAML writer that puts each item of a list on one line."""
+    """YAML writer that uses one line for a list of values, and for a mapping that contains a plain value."""
 
 
 def _list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.Node:
+    """Return the node of a list, which is in brackets unless it contains mappings."""
     flat = not any(isinstance(item, dict) for item in value)
     return dumper.represent_sequence("tag:yaml.org,2002:seq", value, flow_style=flat)
 
 
 def _mapping(dumper: yaml.SafeDumper, value: dict[str, Any]) -> yaml.Node:
+    """Return the node of a mapping, which is in braces if it contains a plain value and is not the whole file."""
     flat = any(not isinstance(item, dict | list) for item in value.values()) and "simscen" not in value
     return dumper.represent_mapping("tag:yaml.org,2002:map", value, flow_style=flat)
 
