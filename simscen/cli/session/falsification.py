@@ -107,7 +107,7 @@ class Falsification:
             raise InvalidInput(space)
         self._space = space
         self._checks = Checks(root_folder, request.world_path, request.lenient, stacks=stacks)
-        self._search: Search = make_search(request.method, space.choices, request.search_seed)
+        self._search: Search = make_search(request.method, space.choice_counts, request.search_seed)
         self._variations: dict[str, Variation] = {}
         self._planned: list[PlannedRun] = []
         self._signatures: set[Signature] = set()

@@ -23,7 +23,7 @@ These are control and bidirectional characters, and the surrogates that stand fo
 
 @dataclass(frozen=True)
 class PathSandbox:
-    """Folders from which a scenario may read files: `root`, and those of `--world-path`, which are searched in order."""
+    """Folders from which a scenario may read files: `root`, and those of `--world-path`, searched in order."""
 
     root: Path
     world_path: tuple[Path, ...] = ()
@@ -76,7 +76,7 @@ class PathSandbox:
         return path.relative_to(self.root).as_posix() if path.is_relative_to(self.root) else str(path)
 
     def _in_world_path(self, written: str) -> Path | None:
-        """Return the first existing file or folder with this path below a folder of `--world-path`; None if none exists."""
+        """Return the first existing file or folder with this path in the folders of `--world-path`, or None."""
         if ".." in PurePosixPath(written).parts:
             return None
         candidates = ((folder, _resolved(folder / written)) for folder in self.world_path)

@@ -1,6 +1,6 @@
-"""Names of variations, derived from the values that differ, and problems merged over variations.
+"""Derive names of variations from the values that differ, such as `speed=0.5,mass=10`, and check given names.
 
-Names are short, unique, and valid as folder names.
+Names are short, unique, and valid as names of folders.
 """
 
 import re
@@ -14,7 +14,7 @@ from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNod
 MAX_NAME_CHARS, _MAX_VALUE_CHARS = 100, 40
 _VALID_NAME = re.compile(r"[^\W][\w.,=+%-]*")
 _NUMBERED = re.compile(r"variation-([1-9][0-9]{0,8})")
-_UNSAFE = re.compile(r"[^\w.+%-]+")
+_UNSAFE_CHARS = re.compile(r"[^\w.+%-]+")
 
 
 def name_error(name: str) -> str | None:
@@ -30,7 +30,7 @@ NAME_HINT = (
 
 
 def short_names(targets: Sequence[Target]) -> dict[str, str]:
-    """Return a short unique name for each path: its last part, and as many parts before it as needed."""
+    """Return a short unique name for each path: its last part, with as many parts before it as are needed."""
     parts = {target.path: split_path(target.path) for target in targets}
     part_counts = dict.fromkeys(parts, 1)
     while True:
@@ -45,10 +45,11 @@ def short_names(targets: Sequence[Target]) -> dict[str, str]:
 
 
 def derive_name(keys: dict[str, str], values: dict[str, Node], numbers: dict[str, int], number: int) -> str:
-    """Return the derived name of a variation: `speed=0.5,mass=10`.
+    """Return the derived name of the variation with this `number`: `speed=0.5,mass=10`.
 
-    `keys` has the short name of each path, and `values` its value. A value that is too long is replaced by its number
-    in `numbers`. `number` is that of the variation, and names it if the whole name is too long.
+    `keys` has the short name of each path, `values` its value, and `numbers` the number of this value among the values
+    of the path. A value that is too long is replaced by its number. If the whole name is too long, the number of the
+    variation is its name.
     """
     name = ",".join(f"{keys[path]}={_value(value) or f'no{numbers[path]}'}" for path, value in values.items())
     name = name if name[:1].isalnum() else f"x{name}"
@@ -69,7 +70,8 @@ def number_of(name: str) -> int | None:
 def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
     """Return the names, made unique without regard to case.
 
-    `is_fixed` tells which names the user has set; they stay. A derived name that is taken gets a suffix `+2`, `+3`, …
+    Names for which `is_fixed` is true were given by the author and stay. Another name that is already used gets a
+    suffix: `+2`, `+3`, …
     """
     taken = {name.casefold() for name, fixed in zip(names, is_fixed, strict=True) if fixed}
     found = []
@@ -83,7 +85,7 @@ def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
 
 
 def _value(node: Node) -> str:
-    """Return a value as part of a name; "" if it is too long."""
+    """Return a value as part of a name; "" if it is too long or has nested values."""
     match node:
         case ScalarNode(value=value):
             text = (
@@ -103,4 +105,5 @@ def _value(node: Node) -> str:
 
 
 def _safe(text: str) -> str:
-    return _UNSAFE.sub("_", text.replace(" ", "")).strip("_")
+    """Return a text without spaces, and with `_` for characters that are not allowed in names."""
+    return _UNSAFE_CHARS.sub("_", text.replace(" ", "")).strip("_")

@@ -10,9 +10,9 @@ from simscen.loading.yaml.tree import Position
 
 
 class VariationProblems(NamedTuple):
-    """Problems of one variation.
+    """Problems of the variation called `name`.
 
-    `set_by` maps the position of each value that the variation sets to the path that sets it.
+    `set_by` has the path that set a value, by the position of the value, for all values that the variation changes.
     """
 
     name: str
@@ -21,7 +21,10 @@ class VariationProblems(NamedTuple):
 
 
 def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
-    """Return the problems of all variations, with the names of the affected variations where not all are affected."""
+    """Return each problem once, with a message that says which variations have it, and which varied path is its cause.
+
+    A problem that all variations have, and that is not at a varied value, is returned unchanged.
+    """
     if len(variations) == 1 and not variations[0].name:
         return list(dict.fromkeys(variations[0].problems))
     variations_by_problem: dict[Problem, list[VariationProblems]] = {}
@@ -34,6 +37,7 @@ def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
 
 
 def _with_variation_names(problem: Problem, affected: Sequence[VariationProblems], variation_count: int) -> Problem:
+    """Return a problem of the variations `affected` with a message that says which of them have it."""
     path = affected[0].set_by.get(Position(problem.path, problem.line, problem.col))
     names = [one.name for one in affected if one.name]
     if not names or (path is None and len(names) == variation_count):

@@ -17,7 +17,7 @@ DEFAULTS_FILE = "defaults.yaml"
 EXTENDS = "extends"
 """Key with the path of the file that a file extends."""
 MAX_FILES = 32
-"""Largest number of files that are read for one scenario, including those that it extends."""
+"""Largest number of YAML files of one scenario. Further files cannot be extended."""
 APPEND_SUFFIX = "+"
 """Suffix of a top-level key such as `pass+`, whose items are added to the list `pass` of the extended file."""
 

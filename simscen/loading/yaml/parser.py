@@ -252,7 +252,7 @@ class _Composer:
         return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message)
 
     def _lookalike(self, lines: list[str], first: int, last: int) -> Problem | None:
-        """Return a problem if the lines from `first` to `last` (from 0) have a character that looks like YAML syntax."""
+        """Return a problem if a character in the lines `first` to `last` (from 0) only looks like YAML syntax."""
         for number in range(first, min(last + 1, len(lines))):
             index = find_lookalike(lines[number].partition(" #")[0])
             if index is not None:
