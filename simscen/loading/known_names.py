@@ -1,4 +1,4 @@
-"""Names that a scenario can refer to, and the replacement of names of places by their poses."""
+"""List the names that a scenario can refer to: of places, regions, objects, goals, events, faults, and verdicts."""
 
 from collections.abc import Mapping
 
@@ -20,48 +20,54 @@ NOUNS = {
     "disturbance": "event, fault or mark",
     "verdict": "criterion, event or fault",
 }
+"""Kind of reference → words for what it refers to, in messages.
+
+A "movable" thing can be moved by actions. A "mover" is a movable thing or another robot, and can be followed.
+"""
 
 Names = Mapping[str, list[str] | None]
-"""Known names by kind of reference; None: they are known only when an imported world has been built."""
+"""Valid names by kind of reference. None: not known, because the scenario has an imported world that is not built yet,
+or because a scenario of several robots has verdicts of all of them."""
 
 
 def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
-    """Return all names that a scenario can refer to; those of an imported world need the built `world`."""
+    """Return all names that a scenario can refer to. Names in an imported world are only known with the built `world`."""
     world_names = _names_in_files(loaded) if world is None else _names_in_built_world(loaded, world)
     movable = world_names["movable"]
-    happening = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
+    disturbances = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
     return {
         **world_names,
         "mover": None if movable is None else [*movable, *loaded.other_robots],
         "goal": goal_names(loaded),
         "event": _distinct(event_names(loaded), mark_names(loaded)),
-        "disturbance": _distinct(happening, mark_names(loaded)),
-        "verdict": None if loaded.other_robots else _distinct(verdict_names(loaded.spec.pass_), happening),
+        "disturbance": _distinct(disturbances, mark_names(loaded)),
+        "verdict": None if loaded.other_robots else _distinct(verdict_names(loaded.spec.pass_), disturbances),
     }
 
 
 def goal_names(loaded: LoadedScenario) -> list[str]:
-    """Return the goals of the scenario, then those that its events send."""
-    return own_goal_names(loaded) + _defined(loaded, "new_goal")
+    """Return the names of the goals that the scenario lists, then of those that its events send."""
+    return listed_goal_names(loaded) + _defined(loaded, "new_goal")
 
 
-def own_goal_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of the goals in every loop: as written, or after their place, or goal-1, goal-2, …"""
+def listed_goal_names(loaded: LoadedScenario) -> list[str]:
+    """Return the names of the goals under `goals` in every loop: as written, or after their place, or goal-1, …"""
     loops = range(1, loaded.spec.navigation.loops + 1)
     return [loop_goal_name(name, loop) for loop in loops for name in loaded.spec.goal_names]
 
 
 def event_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of events, each followed by the steps of its story."""
+    """Return the names of the events, each followed by the names of the steps of its sequence."""
     return [step.name for step in loaded.spec.steps]
 
 
 def mark_names(loaded: LoadedScenario) -> list[str]:
-    """Return the marks that events set, in order."""
+    """Return the names of the marks that events set, in order."""
     return _distinct(_defined(loaded, "mark"))
 
 
 def _names_in_files(loaded: LoadedScenario) -> Names:
+    """Return the names of things of the world as far as the files contain them."""
     world = loaded.world.spec
     imported = world is None or loaded.world.map is not None or loaded.world.sdf is not None
     spawned = spawned_names(loaded)
@@ -77,6 +83,7 @@ def _names_in_files(loaded: LoadedScenario) -> Names:
 
 
 def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
+    """Return the names of things of the built world."""
     moving, spawned = [body.name for body in world.bodies], spawned_names(loaded)
     return {
         "place": list(world.places),
@@ -88,19 +95,19 @@ def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
 
 
 def world_object_names(loaded: LoadedScenario, world: World | None = None) -> list[str]:
-    """Return the names of objects in the world; without the built `world`, those of its file."""
+    """Return the names of all objects in the built world; without it, of those in the world file."""
     if world is not None:
         return [*(body.name for body in world.bodies), *(solid.name for solid in world.solids)]
     return _object_names(loaded.world.spec) if loaded.world.spec is not None else []
 
 
 def spawned_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of objects and pedestrians, also those of crowds, that events add to the world."""
+    """Return the names of the objects and pedestrians that events add to the world."""
     return _defined(loaded, "spawn") + pedestrian_names(loaded)
 
 
 def pedestrian_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of pedestrians, also those of crowds."""
+    """Return the names of the pedestrians that events add to the world, alone or in crowds."""
     crowds = [
         action.chosen.names
         for step in loaded.spec.steps
@@ -111,7 +118,7 @@ def pedestrian_names(loaded: LoadedScenario) -> list[str]:
 
 
 def _defined(loaded: LoadedScenario, kind: str) -> list[str]:
-    """Return the names that actions of one kind define; goals of other robots are skipped."""
+    """Return the names of what actions of one kind add, without goals of other robots."""
     actions = [action for step in loaded.spec.steps for action in step.actions]
     relevant = [action for action in actions if kind != "new_goal" or loaded.includes_robot(action.robot)]
     return [str(getattr(action.chosen, "name", "")) for action in relevant if action.kind == kind]
@@ -131,4 +138,5 @@ def _object_names(world: WorldSpec) -> list[str]:
 
 
 def _distinct(*names: list[str]) -> list[str]:
+    """Return the names of all lists, each once."""
     return list(dict.fromkeys(name for part in names for name in part))

@@ -14,28 +14,30 @@ from simscen.spec.places import PlaceAllowed, PoseSpec
 
 Spec = TypeVar("Spec", bound=BaseModel)
 Places = Mapping[str, PoseSpec]
+"""Poses of places by name."""
 PLACEHOLDER_POSE = PoseSpec(x=0.0, y=0.0)
-"""Pose that replaces an unknown place, which is reported as a problem."""
+"""Pose that replaces the name of an unknown place, so that loading can go on. A problem is reported for the name."""
 NO_WORLD_HINT = "name its world with `world:`"
 NO_PLACES_HINT = "the world has no places"
+"""Hints for names of places if there are no places."""
 
 
 def places_of(world: LoadedWorld | None) -> Places:
-    """Return the places of a world, which are all defined in its own file."""
+    """Return the places of a world; {} without a world. Only world files of simscen can define places."""
     return world.spec.places if world is not None and world.spec is not None else {}
 
 
 def resolve_places(spec: Spec, places: Places) -> Spec:
-    """Return the specification with poses and points instead of names of places."""
+    """Return the specification with poses and points instead of the names of places."""
     for reference, pose in _poses_of_references(spec, places):
         spec = _replace_at(spec, reference.keys, pose)
     return spec
 
 
 def resolve_criteria_places(plain: dict[str, Any], spec: BaseModel, places: Places) -> dict[str, Any]:
-    """Return the data of `spec` with poses and points instead of the names of places in its criteria.
+    """Return `plain`, the YAML data of `spec`, with poses and points instead of the names of places in criteria.
 
-    Logs are judged without a world, so criteria in logs cannot refer to its places.
+    Logs contain these data. They are judged without a world, so their criteria cannot refer to its places.
     """
     for reference, pose in _poses_of_references(spec, places):
         if "pass" in reference.keys[:3:2]:  # of the scenario, or of one of its robots
@@ -45,14 +47,14 @@ def resolve_criteria_places(plain: dict[str, Any], spec: BaseModel, places: Plac
 
 
 def place_references(spec: BaseModel) -> Iterator[Reference]:
-    """Yield the references to places."""
+    """Yield the references to places in a specification."""
     return (reference for reference in references(spec) if isinstance(reference.mark, PlaceAllowed))
 
 
 def unknown_places(
     spec: BaseModel, tree: Node, known: Iterable[str], nothing: str = NO_PLACES_HINT
 ) -> Iterator[Problem]:
-    """Yield a problem for each unknown place; `nothing` is the hint if there are no places at all."""
+    """Yield a problem for each name of a place that is not in `known`; `nothing` is the hint if there are no places."""
     names = tuple(known)
     for reference in place_references(spec):
         if reference.name not in names:
@@ -62,7 +64,7 @@ def unknown_places(
 
 
 def _poses_of_references(spec: BaseModel, places: Places) -> Iterator[tuple[Reference, Any]]:
-    """Yield each reference to a place with the value that replaces it."""
+    """Yield each reference to a place, and the pose or point that replaces it."""
     for reference in place_references(spec):
         assert isinstance(reference.mark, PlaceAllowed)
         yield (
@@ -72,7 +74,7 @@ def _poses_of_references(spec: BaseModel, places: Places) -> Iterator[tuple[Refe
 
 
 def _replace_at(holder: Any, keys: Keys, value: Any) -> Any:
-    """Return a copy of `holder` (model, list or dict) with `value` at `keys`."""
+    """Return a copy of `holder`, a model, list, or dict, with `value` at `keys`."""
     if isinstance(holder, RootModel):
         return holder.model_copy(update={"root": _replace_at(holder.root, keys, value)})
     if not keys:

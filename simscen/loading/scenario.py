@@ -16,7 +16,7 @@ from simscen.loading.named_places import places_of, resolve_places, unknown_plac
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import StackChoice, not_a_scenario, recognize_stack_file
-from simscen.loading.stacks.nav2_parameters import with_nav2_parameters
+from simscen.loading.stacks.nav2_expansion import with_nav2_parameters
 from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
 from simscen.loading.variations.naming import number_of
 from simscen.loading.variations.options import Change

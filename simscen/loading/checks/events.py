@@ -8,7 +8,7 @@ from typing import Any
 
 from simscen.core.messages.navigation import matches_goal_name
 from simscen.loading.checks.registry import MEANING, CheckProblem
-from simscen.loading.known_names import own_goal_names
+from simscen.loading.known_names import listed_goal_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Keys
 from simscen.model.disturbances import SequenceStep
@@ -180,7 +180,7 @@ class PossibleRun:
 
     def goal_count(self, goal: str | None) -> int:
         """Return how many goals of this name (None: any name) the robot can get."""
-        own = [name for name in own_goal_names(self.loaded) if matches_goal_name(name, goal)]
+        own = [name for name in listed_goal_names(self.loaded) if matches_goal_name(name, goal)]
         more = sum(
             1 if step.when is None else step.when.times
             for step in self.steps

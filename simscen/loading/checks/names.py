@@ -7,7 +7,7 @@ from simscen.actions.base import Action, AnyAction
 from simscen.core.messages.navigation import LOOP_NAME
 from simscen.criteria.registry import verdict_names
 from simscen.loading.checks.registry import NAMES, ROBOT_NAMES, CheckProblem, NameScope, WrittenScenario
-from simscen.loading.known_names import NOUNS, event_names, known_names, own_goal_names, world_object_names
+from simscen.loading.known_names import NOUNS, event_names, known_names, listed_goal_names, world_object_names
 from simscen.loading.multirobot import ROBOTS
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references, walk
@@ -103,7 +103,7 @@ def duplicate_names_of_actions(scope: NameScope) -> Iterator[CheckProblem]:
     """Find marks and new goals with the name of an event, a fault or a goal."""
     loaded = scope.loaded
     disturbances = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
-    goals = own_goal_names(loaded)
+    goals = listed_goal_names(loaded)
     for keys, action in (placed for step in loaded.spec.steps for placed in step.located_actions()):
         name = getattr(action.chosen, "name", "")
         if action.kind == "mark" and name in disturbances:

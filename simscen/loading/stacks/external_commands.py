@@ -16,12 +16,13 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 
 CHUNK_BYTES = 1 << 20
+"""Amount of a file that is read at once for the digest."""
 EXCLUDED_FOLDERS = frozenset({"__pycache__", "venv", "node_modules", "site-packages"})
 """Folders whose Python files are not part of a stack."""
 MAX_FOLDERS, MAX_SOURCES = 500, 1000
-"""Folders searched and Python files read for the digest of a stack."""
+"""Largest number of folders that are searched, and of Python files that are read, for each source folder of a stack."""
 SIMSCEN_PROGRAM = "simscen"
-"""If PATH has no simscen (virtual environment not activated), the simscen that is running is used instead."""
+"""Program that is started from the running installation if the PATH does not have it (environment not activated)."""
 
 
 def parse_command(
@@ -31,9 +32,10 @@ def parse_command(
     own: Mapping[str, str] | None = None,
     limits: tuple[float, float] = (START_TIMEOUT_S, ANSWER_TIMEOUT_S),
 ) -> ExternalCommand:
-    """Return a command line as a command that starts in `folder`; `own` variables override `environment`.
+    """Return the command in `text`, which is written as in a shell and starts in `folder`.
 
-    Raises ValueError if it cannot be parsed or its program cannot be run.
+    The variables `own` are added to `environment`. `limits` are the times in s for the start of the program and for
+    each answer. Raises ValueError if the command cannot be parsed or its program cannot be run.
     """
     program, *arguments = split_command(text)
     program = str(Path(program).expanduser()) if program.startswith("~") else program
@@ -48,7 +50,7 @@ def parse_command(
 
 
 def why_not_executable(program: str, env: Mapping[str, str], folder: Path) -> str:
-    """Return why a program cannot be run from `folder`; "" if it can."""
+    """Return why a program cannot be run from `folder` with the variables `env`; "" if it can."""
     if "/" not in program:
         found = shutil.which(program, path=_path(env, folder))
         return "" if found else f"no program {quoted(program)} in the PATH"
@@ -65,7 +67,10 @@ def why_not_executable(program: str, env: Mapping[str, str], folder: Path) -> st
 
 
 def _why_no_interpreter(program: str, file: Path) -> str:
-    """Return why the interpreter of a script is missing; the kernel would report the script itself as missing."""
+    """Return why the interpreter of the script `file` cannot be run; "" if it can, or if `file` is not a script.
+
+    Without this check, the kernel would report that the script itself is missing.
+    """
     try:
         with file.open("rb") as stream:
             first = stream.read(256).partition(b"\n")[0]
@@ -83,12 +88,16 @@ def _why_no_interpreter(program: str, file: Path) -> str:
 
 
 def _path(env: Mapping[str, str], folder: Path) -> str:
-    """Return the PATH with relative folders resolved from the folder in which the program starts."""
+    """Return the PATH in `env` with absolute folders; relative ones are resolved from `folder`."""
     return os.pathsep.join(str(folder / part) for part in env.get("PATH", os.defpath).split(os.pathsep))
 
 
 def _digest(argv: Sequence[str], own: Mapping[str, str], env: Mapping[str, str], folder: Path) -> str:
-    """Return the SHA-256 of the arguments, own variables, program, files named by arguments, and their source files."""
+    """Return the SHA-256 of the stack, by which changed stacks are recognized.
+
+    It covers the arguments, the variables `own`, the content of the program and of files that arguments name, and the
+    Python files in the folders of scripts and modules that arguments name.
+    """
     sha = hashlib.sha256(json.dumps([list(argv), sorted(own.items())]).encode())
     found = shutil.which(argv[0], path=_path(env, folder)) if "/" not in argv[0] else None
     for word in (found or argv[0], *argv[1:]):
@@ -105,7 +114,7 @@ def _digest(argv: Sequence[str], own: Mapping[str, str], env: Mapping[str, str],
 
 
 def _source_folders(argv: Sequence[str], folder: Path) -> list[Path]:
-    """Return the folders of the scripts and modules that a command names: their imports come from there."""
+    """Return the folders of the Python scripts and modules that arguments name, from which they import their code."""
     homes: set[Path] = set()
     for before, word in itertools.pairwise(("", *argv)):
         if len(word) >= 4096 or "\0" in word:
@@ -119,7 +128,7 @@ def _source_folders(argv: Sequence[str], folder: Path) -> list[Path]:
 
 
 def _python_files(working_folder: Path) -> Iterator[Path]:
-    """Yield the readable Python files in and below a folder, without those of hidden folders and environments."""
+    """Yield the readable Python files in and below a folder, except those in hidden and excluded folders."""
     for folder, below, names in itertools.islice(os.walk(working_folder), MAX_FOLDERS):
         below[:] = sorted(name for name in below if not name.startswith(".") and name not in EXCLUDED_FOLDERS)
         for file in (Path(folder) / name for name in sorted(names) if name.endswith(".py")):

@@ -1,4 +1,4 @@
-"""Commands of external stacks: the user configuration that defines them, their programs, and their digests."""
+"""Read the user configuration, which defines the commands of external stacks, and report stacks without a command."""
 
 import os
 from collections.abc import Iterable, Mapping
@@ -21,7 +21,7 @@ from simscen.model.stack_files import ExternalStackSpec, UserConfigSpec
 
 @dataclass(frozen=True)
 class UserConfig:
-    """User configuration and the file that it was read from."""
+    """User configuration, and the file that it was read from. `tree` and `library` are None if the file is missing."""
 
     file: Path
     spec: UserConfigSpec
@@ -29,9 +29,10 @@ class UserConfig:
     library: Library | None = field(repr=False, default=None)
 
     def command(self, name: str, environment: Mapping[str, str], folder: Path) -> ExternalCommand | None:
-        """Return the command of an external stack for a call from `folder`; None if the configuration has none.
+        """Return the command of the external stack `name`; None if the configuration does not define it.
 
-        Raises InvalidInput if it cannot be run.
+        `environment` are the variables of the caller, and `folder` is the caller's working folder. Raises InvalidInput
+        if the command cannot be run.
         """
         if name not in self.spec.stacks:
             return None
@@ -55,10 +56,10 @@ class UserConfig:
 
 
 def load_config(file: Path) -> UserConfig:
-    """Return the configuration in `file`; an empty one if it does not exist. Raises InvalidInput with all problems."""
+    """Return the configuration in `file`; an empty one if it does not exist. Raises InvalidInput if it is invalid."""
     if not exists(file):
         return UserConfig(file, UserConfigSpec())
-    # With this root, problems show the absolute path of the file, which is not part of a project.
+    # No file is inside of this root, so problems show the absolute path of the file.
     library = Library(PathSandbox.around(Path(os.devnull), [file.parent]))
     tree, problems = library.read(file)
     spec = check(UserConfigSpec, tree) if tree is not None else []
@@ -68,9 +69,10 @@ def load_config(file: Path) -> UserConfig:
 
 
 def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: Path | None = None) -> Problem | None:
-    """Return the problem that the external stack of a scenario has no command; None if it has one.
+    """Return a problem if the scenario has an external stack without a command; else None.
 
-    `known` are the names of stacks with a command; `config` is the user configuration.
+    `known` are the names of external stacks with a command, and `config` is the user configuration; they are used in
+    the hint.
     """
     stack = loaded.spec.stack
     if not isinstance(stack, ExternalStackSpec) or loaded.external_command is not None:
@@ -84,9 +86,9 @@ def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: P
 
 
 def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config: Path) -> list[Problem]:
-    """Return a problem if several --stack define external stacks of the same run, which can have only one --stack.
+    """Return a problem if several `--stack` give commands to robots of the same scenario; else an empty list.
 
-    `given` are the names of external stacks with a command on the command line.
+    A run can use only one `--stack`. `given` are the names of the external stacks to which `--stack` gives commands.
     """
     own = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
     conflicting = [name for name in given if name in own]

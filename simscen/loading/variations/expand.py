@@ -74,7 +74,7 @@ class Block:
         return math.prod(map(len, self.axes))
 
     def options(self, index: int) -> list[Option]:
-        """Return the options of the combination with this index, from 0. The options of the last axis change fastest."""
+        """Return the options of the combination with this index, from 0. The last axis changes fastest."""
         if self.is_random:
             return [self.axes[0][index]]
         chosen = []
