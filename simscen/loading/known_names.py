@@ -31,7 +31,7 @@ or because a scenario of several robots has verdicts of all of them."""
 
 
 def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
-    """Return all names that a scenario can refer to. Names in an imported world are only known with the built `world`."""
+    """Return all names that a scenario can refer to. For names in an imported world, the built `world` is needed."""
     world_names = _names_in_files(loaded) if world is None else _names_in_built_world(loaded, world)
     movable = world_names["movable"]
     disturbances = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])

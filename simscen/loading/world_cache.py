@@ -65,7 +65,7 @@ class WorldCache:
     def shortest_paths(
         self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]
     ) -> ShortestPaths:
-        """Return the slower search of shortest paths inside of `bounds`, which finds a path if there is one."""
+        """Return the slower search of shortest paths in `bounds`, which finds a path if there is one."""
         for known in self._shortest_paths:
             if known[0] is solids and known[1:4] == (bounds, radius, z_range):
                 return known[4]

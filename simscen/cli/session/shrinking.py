@@ -17,7 +17,6 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.reduction import (
     MAX_DIGITS,
     UNNEEDED_KEYS,
-    Keys,
     Rounding,
     max_depth,
     removable_parts,
@@ -28,7 +27,7 @@ from simscen.loading.reduction import (
     without_parts,
 )
 from simscen.loading.scenario import ChangedScenario
-from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child
+from simscen.loading.yaml.tree import Entry, Keys, MappingNode, Node, ScalarNode, SequenceNode, child
 from simscen.run.process.jobs import Backend, Job
 from simscen.run.sessions.run_session import SessionOptions, run_session
 

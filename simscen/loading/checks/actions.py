@@ -1,4 +1,4 @@
-"""Checks of actions that are impossible or have no effect."""
+"""Checks that find actions of events that are impossible or have no effect."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,7 +11,7 @@ from simscen.loading.yaml.tree import Keys
 
 @MEANING.check("SC050")
 def timed_stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find stops of pedestrians with a duration: pedestrians have no script that could continue."""
+    """Find stops of pedestrians with a duration: pedestrians do not walk on after a stop."""
     pedestrians = pedestrian_names(loaded)
     for step in loaded.spec.steps:
         for keys, action in step.located_actions():
@@ -22,7 +22,7 @@ def timed_stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[CheckProblem]
 
 
 def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
-    """Return name of the event, keys and specification of each action that switches a zone."""
+    """Return the name of the event, the keys, and the specification of each action that switches a zone on or off."""
     return [
         (step.name, (*keys, action.kind), action.chosen)
         for step in loaded.spec.steps
@@ -32,8 +32,8 @@ def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
 
 
 @MEANING.check("SC050")
-def impossible_zone_actions(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find speed zones without a limit."""
+def speed_zones_without_limit(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find actions that switch on a speed zone for which no speed limit is given anywhere."""
     actions = _zone_actions(loaded)
     limited = [zone.region for zone in loaded.spec.stack.speed_zones]
     limited += [action.region for _, _, action in actions if getattr(action, "speed_limit", None)]
@@ -45,7 +45,7 @@ def impossible_zone_actions(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find speed zones whose limit is not below the top speed of the robot."""
+    """Find actions that set a speed limit that is not below the top speed of the robot."""
     robot = loaded.robot.spec
     for _, keys, action in _zone_actions(loaded):
         if robot is None or not _limits_speed(keys, action):
@@ -56,12 +56,13 @@ def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]
 
 
 def _limits_speed(keys: Keys, action: Any) -> bool:
+    """Return whether an action at `keys` that switches a zone switches on a speed zone."""
     return keys[-1] == "speed_zone" and action.enabled and action.region is not None
 
 
 @MEANING.check("SC055", severity="warning")
 def pushes_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find pushes of zero, and pushes of objects without mass."""
+    """Find pushes of zero, and pushes of objects without mass or of pedestrians."""
     world = loaded.world.spec
     spawned = [action.chosen for step in loaded.spec.steps for action in step.actions if action.kind == "spawn"]
     things = [*(world.objects if world else []), *spawned]
@@ -85,8 +86,8 @@ def pushes_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def doors_already_in_state(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find doors that are opened although they are open, or closed although they are closed."""
-    located_actions = [placed for step in loaded.spec.steps for placed in step.located_actions()]
+    """Find actions that open a door that is always open, or close a door that is always closed."""
+    located_actions = [located for step in loaded.spec.steps for located in step.located_actions()]
     if loaded.world.spec is None or any(action.may_do() for _, action in located_actions):
         return
     kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, action in located_actions}

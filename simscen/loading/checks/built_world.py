@@ -1,4 +1,4 @@
-"""Checks of a world file in the built world: places, regions, and motions."""
+"""Checks of the places, regions, and motions in a world file against the geometry of the built world."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,20 +15,20 @@ from simscen.loading.yaml.tree import MappingNode
 from simscen.worlds.geometry.overlaps import blocking_solid
 
 BLOCKING_HEIGHTS_M = 0.02, 0.4
-"""Heights between which an obstacle blocks most robots."""
+"""Lowest and highest z between which an obstacle blocks most robots. World files are checked without a robot."""
 RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M = 0.1, 0.35, 0.03
-"""Wheel radius, maximum slope and maximum step of a robot that climbs typical ramps."""
+"""Wheel radius, maximum slope, and maximum step of an assumed robot that climbs typical ramps."""
 
 
 class BuiltWorld(NamedTuple):
-    """A world and the file that it was built from."""
+    """A world, and the loaded file that it was built from."""
 
     world: World
     source: LoadedWorld
 
     @property
     def tree(self) -> MappingNode | None:
-        """The tree of the world file; None for worlds in other formats."""
+        """The tree of the world file; None for a world in another format."""
         return self.source.tree
 
 
@@ -36,7 +36,7 @@ BUILT_WORLD: CheckStage[BuiltWorld] = CheckStage("built world")
 
 
 def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
-    """Return the problems of a world file in its built world, without the text of their lines; all are warnings."""
+    """Return warnings about a world file, without the texts of their source lines; [] for other formats."""
     return [] if source.spec is None else BUILT_WORLD.problems(BuiltWorld(world, source))
 
 
@@ -54,7 +54,7 @@ def places_in_obstacles(built: BuiltWorld) -> Iterator[CheckProblem]:
 
 @BUILT_WORLD.check("SC304", severity="warning")
 def motions_into_obstacles(built: BuiltWorld) -> Iterator[CheckProblem]:
-    """Find keyframes and waypoints of objects inside obstacles."""
+    """Find keyframes and waypoints of moving objects inside obstacles."""
     assert built.source.spec is not None
     for index, thing in enumerate(built.source.spec.objects):
         for keys, what, (x, y) in motion_stops(thing.move) if thing.move is not None else ():
@@ -76,7 +76,7 @@ def regions_outside_the_world(built: BuiltWorld) -> Iterator[CheckProblem]:
 
 
 def _without_platforms(world: World) -> World:
-    """Return the world with only the solids that block a robot that climbs ramps: places may be on platforms."""
+    """Return the world with only the solids that block a robot that climbs ramps, because places may be on platforms."""
     from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 
     solids = drive_obstacles(world.solids, RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M)

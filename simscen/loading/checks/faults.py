@@ -1,4 +1,4 @@
-"""Checks of faults: can they affect their sensor, can they happen, do they have an effect?"""
+"""Checks of faults: whether they can affect their sensor, whether they can happen, and whether they have an effect."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -16,20 +16,21 @@ from simscen.model.stack import StackSpec
 from simscen.triggers.base import Trigger
 
 NOUNS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
+"""Kind of a target of faults that is no sensor → words in messages."""
 RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
-"""Faults that measure again, which is only possible at the moment of the scan."""
+"""Faults that compute the measurement anew, which is only possible at the time of the measurement."""
 
 
 class ListedFault(NamedTuple):
-    """A fault, its position in the list of faults, and the instance that it affects (None if there is none)."""
+    """A fault, its number in the list from 0, and the instance that it affects (None if the robot does not have it)."""
 
-    position: int
+    number: int
     entry: FaultEntry
     instance: Instance | None
 
 
 def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance]:
-    """Return all targets of faults by name: the robot's sensors, then commands, wheels, localizer and map."""
+    """Return all things that faults can affect, by name: sensors of the robot, `cmd_vel`, `wheels`, and so on."""
     frequency = loaded.spec.stack.controller_frequency
     others = {
         name: Instance(kind, frequency if kind == COMMAND else 0.0, robot.drive if kind == WHEELS else None)
@@ -43,7 +44,7 @@ def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance
 
 
 def _listed_faults(loaded: LoadedScenario) -> Iterator[ListedFault]:
-    """Yield the faults; none if the sensors of the robot are not known yet."""
+    """Yield all faults; nothing for a robot that is only a URDF and not built yet, whose sensors are not known."""
     if loaded.robot.spec is not None:
         known = instances(loaded, loaded.robot.spec)
         for index, entry in enumerate(loaded.spec.faults):
@@ -52,7 +53,7 @@ def _listed_faults(loaded: LoadedScenario) -> Iterator[ListedFault]:
 
 @NAMES.check("SC031")
 def unknown_sensors(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults on a sensor that the robot does not have."""
+    """Find faults of a sensor that the robot does not have."""
     loaded = scope.loaded
     for index, entry, instance in _listed_faults(loaded):
         if instance is None:
@@ -64,7 +65,7 @@ def unknown_sensors(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC032")
 def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults that cannot affect their sensor, or whose values do not suit it."""
+    """Find faults of a kind that cannot affect their sensor, or whose values do not fit the sensor."""
     loaded = scope.loaded
     for index, entry, instance in _listed_faults(loaded):
         if instance is None:
@@ -86,7 +87,7 @@ def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC032")
 def impossible_map_faults(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults on a map that is not used, or during part of a run."""
+    """Find faults of the map in scenarios without a map, and faults of the map with a time."""
     loaded = scope.loaded
     for index, entry, instance in _suitable_faults(loaded):
         if instance.kind != MAP:
@@ -101,8 +102,8 @@ def impossible_map_faults(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 @NAMES.check(STACK_CANNOT)
-def faults_of_other_localizers(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults on the localizer of a stack that is not one of simscen's own."""
+def faults_of_foreign_localizers(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find faults of the localizer of a stack that is not one of simscen's own, and so cannot be disturbed."""
     if isinstance(scope.loaded.spec.stack, StackSpec):
         return
     for index, _, instance in _suitable_faults(scope.loaded):
@@ -113,7 +114,7 @@ def faults_of_other_localizers(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, Instance]]:
-    """Yield position, fault, and instance of each fault that can affect its instance."""
+    """Yield the index, the fault, and the instance of each fault that can affect its instance."""
     for index, entry, instance in _listed_faults(loaded):
         if instance is not None and instance.kind in entry.fault.affects and not entry.fault.unsuitable_key(instance):
             yield index, entry, instance
@@ -121,7 +122,7 @@ def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, 
 
 @NAMES.check("SC032")
 def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults that measure again but are listed after a fault that delays the scans."""
+    """Find faults that compute the measurement anew, but are listed after a fault that delays the messages."""
     loaded = scope.loaded
     faults = loaded.spec.faults
     for index, entry, instance in _listed_faults(loaded):
@@ -137,7 +138,7 @@ def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC050")
 def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find faults that are shorter than the time between two messages of their sensor."""
+    """Find faults that are so short that they can begin and end between two messages of their sensor."""
     if loaded.robot.spec is None:
         return
     rates = {name: getattr(sensor.chosen, "rate", None) for name, sensor in loaded.robot.spec.sensors.items()}
@@ -146,7 +147,7 @@ def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckProblem]:
         rate = rates.get(entry.sensor)
         if entry.for_ is None or rate is None or entry.for_ * rate >= 1 - 1e-9:
             continue
-        begin = _start_time(entry.when)
+        begin = _start_time_s(entry.when)
         between = begin is not None and math.ceil(begin * rate - 1e-6) > (begin + entry.for_) * rate + 1e-6
         if begin is None or between:
             when = "begins and ends" if between else "may begin and end"
@@ -155,8 +156,8 @@ def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckProblem]:
             yield CheckProblem(("faults", index, "for"), message, hint, warning=not (between and entry.required))
 
 
-def _start_time(when: Trigger | None) -> float | None:
-    """Return when a fault begins, in s, if that depends on the time alone."""
+def _start_time_s(when: Trigger | None) -> float | None:
+    """Return the time in s at which a fault begins; None if it depends on something else than the time."""
     if when is None:
         return 0.0
     return float(when.chosen.root) + when.delay if when.time is not None else None  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""Checks that find keepout zones and filter masks that forbid the start or a goal, or that have no effect."""
+"""Checks that find keepout zones and filter masks that forbid the start or a goal, or have no effect."""
 
 from collections.abc import Callable, Iterator, Mapping
 
@@ -24,31 +24,31 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import Keys
 
 ZoneTest = Callable[[Pose2, float], bool]
-"""Function of a pose and a distance in m: whether a zone contains all positions within the distance of the pose."""
+"""Function that takes a pose and a distance in m. Returns whether a zone contains all positions within the distance."""
 
 MIN_DEPTH_M = 0.1
-"""Depth in m inside a zone from which a goal is forbidden, however the costmap rounds the zone to cells."""
+"""Depth inside a zone from which a goal is certainly forbidden. A costmap can round the edge of the zone to cells."""
 ESTIMATE_ERROR_M = 0.5
-"""Possible error of the initial estimate in m. A start is reported only if it is at least this deep inside a zone."""
+"""Possible error of the initial estimate. A start is only reported if it is at least this deep inside a zone."""
 NO_LIMIT_REASON = "no cell of the mask limits the speed with this `base` and `multiplier`"
 
 
 def stack_masks(scene: Scene) -> FilterMasks:
-    """Return the filter masks of the stack. Raises InvalidInput for a mask that cannot be read."""
+    """Load the filter masks of the stack. Raises InvalidInput for a mask that cannot be read."""
     return load_masks(scene.loaded)
 
 
 def criterion_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
-    """Return the masks of criteria, by file. Raises InvalidInput for a mask that cannot be read."""
+    """Load the filter masks of criteria, by path as written. Raises InvalidInput for a mask that cannot be read."""
     return load_criterion_masks(scene.loaded.criterion_masks, scene.loaded.tree, scene.loaded.with_source_line)
 
 
 @WORLD.check("SC302")
-def check_stack_zones(scene: Scene) -> Iterator[CheckProblem]:
-    """Find goals, and starts (a warning), in zones that the stack keeps out of."""
+def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
+    """Find goals in zones that the stack keeps out of, and starts in them (a warning)."""
     regions = scene.world.regions
     zones: list[tuple[Keys, str, ZoneTest]] = [
-        (("stack", "keepout", index), f"in `{region}`", _inside_region(regions[region]))
+        (("stack", "keepout", index), f"in `{region}`", _region_test(regions[region]))
         for index, region in enumerate(scene.loaded.spec.stack.keepout)
     ]
     keepout = scene.cached(stack_masks).keepout
@@ -66,12 +66,13 @@ def check_stack_zones(scene: Scene) -> Iterator[CheckProblem]:
             yield CheckProblem(keys, message, hint, warning=True)
 
 
-def _inside_region(corners: Polygon) -> ZoneTest:
+def _region_test(corners: Polygon) -> ZoneTest:
+    """Return the test for a region."""
     return lambda pose, within: depth_inside_polygon(pose, corners) > within
 
 
 def forbidden_test(mask: OccupancyGrid) -> ZoneTest:
-    """Return a test whether the keepout mask forbids all positions within a distance of a pose."""
+    """Return the test for the area that a keepout mask forbids. It samples the positions as densely as the cells."""
 
     def forbids(pose: Pose2, within: float) -> bool:
         steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, MIN_DEPTH_M))) + 1)
@@ -92,8 +93,8 @@ def masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
 
 
 @WORLD.check("SC311", severity="warning")
-def shades_in_keepout_mask(scene: Scene) -> Iterator[CheckProblem]:
-    """Find keepout masks with cells that are neither free nor occupied."""
+def partly_occupied_mask_cells(scene: Scene) -> Iterator[CheckProblem]:
+    """Find keepout masks with cells that are neither free nor occupied, and so have no effect."""
     keepout = scene.cached(stack_masks).keepout
     if keepout is not None and (keepout.cells == OCCUPIED).any():
         count = np.count_nonzero((keepout.cells > FREE) & (keepout.cells < OCCUPIED))

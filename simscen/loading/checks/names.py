@@ -1,4 +1,4 @@
-"""Checks of names, also of robots: do they exist, are they unique, are they allowed in their place?"""
+"""Checks of names: whether they exist, whether they are unique, and whether they are allowed where they are written."""
 
 from collections.abc import Container, Iterator
 from dataclasses import replace
@@ -31,8 +31,8 @@ def unknown_names(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 @NAMES.check("SC035")
-def immovable_names(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find names of fixed parts of the world, or of robots, where the name of a movable object is expected."""
+def names_of_immovable_things(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find names of fixed parts of the world, or of robots, where only movable objects can be named."""
     loaded = scope.loaded
     known = known_names(loaded, scope.world)
     for reference in references(loaded.spec, includes_robot=loaded.includes_robot):
@@ -49,6 +49,7 @@ def immovable_names(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 def _is_immovable(scope: NameScope, reference: Reference) -> bool:
+    """Return whether a reference to a movable object names something that exists, but cannot be moved."""
     if reference.target not in ("movable", "mover"):
         return False
     objects = known_names(scope.loaded, scope.world)["object"] or ()
@@ -56,14 +57,14 @@ def _is_immovable(scope: NameScope, reference: Reference) -> bool:
 
 
 def _robots_not_allowed(scope: NameScope, reference: Reference) -> tuple[str, ...]:
-    """Return the robots to which a reference must not refer."""
+    """Return the robots to which a reference to a movable object must not refer."""
     own = (scope.loaded.robot_name,) if reference.target == "movable" else ()
     return (*own, *scope.loaded.other_robots)
 
 
 @NAMES.check("SC031")
 def unknown_lidars(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find triggers on the scans of a lidar that the robot does not have."""
+    """Find triggers by the age of the scans of a lidar that the robot does not have."""
     loaded = scope.loaded
     if loaded.robot.spec is None:
         return
@@ -77,7 +78,7 @@ def unknown_lidars(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC033")
 def duplicate_names(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find two goals, two events, or two faults with the same name, and an event and a fault with the same name."""
+    """Find goals, events, or faults with the same name, and events with the name of a fault."""
     loaded = scope.loaded
     lists: dict[str, list[tuple[Keys, str | None]]] = {
         "goal": [(("goals", k), goal.name) for k, goal in enumerate(loaded.spec.goals)],
@@ -99,12 +100,12 @@ def duplicate_names(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 @NAMES.check("SC033")
-def duplicate_names_of_actions(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find marks and new goals with the name of an event, a fault or a goal."""
+def duplicate_marks_and_new_goals(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find marks with the name of an event or fault, and goals of events with the name of another goal."""
     loaded = scope.loaded
     disturbances = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
     goals = listed_goal_names(loaded)
-    for keys, action in (placed for step in loaded.spec.steps for placed in step.located_actions()):
+    for keys, action in (located for step in loaded.spec.steps for located in step.located_actions()):
         name = getattr(action.chosen, "name", "")
         if action.kind == "mark" and name in disturbances:
             message = f"an event or a fault is also called {quoted(name)}; criteria cannot distinguish them"
@@ -119,7 +120,7 @@ def duplicate_names_of_actions(scope: NameScope) -> Iterator[CheckProblem]:
 
 @NAMES.check("SC033")
 def reserved_goal_names(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find goals with names such as `shelf#2`, which are reserved for the second and later loops."""
+    """Find goals with names such as `shelf#2`, which goals get in the second and later loops."""
     for index, goal in enumerate(scope.loaded.spec.goals):
         if goal.name is not None and LOOP_NAME.fullmatch(goal.name):
             message = f"{quoted(goal.name)} is reserved for the goals of the second and later loops"
@@ -168,8 +169,8 @@ def unknown_robots(scenario: WrittenScenario) -> Iterator[CheckProblem]:
 
 
 @ROBOT_NAMES.check("SC043")
-def missing_robots(scenario: WrittenScenario) -> Iterator[CheckProblem]:
-    """Find triggers and actions that must name a robot, because there are several, and do not."""
+def missing_robot_names(scenario: WrittenScenario) -> Iterator[CheckProblem]:
+    """Find triggers and actions that do not name a robot, although they apply to one of several robots."""
     spec = scenario.spec
     if not spec.robots:
         return
@@ -187,7 +188,10 @@ def missing_robots(scenario: WrittenScenario) -> Iterator[CheckProblem]:
 
 
 def _conditions_without_robot(test: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, str]]:
-    """Yield keys and kind of each condition that applies to one robot, or to its fault, but names no robot."""
+    """Yield the keys and the kind of each condition that applies to one robot, or to its fault, but names no robot.
+
+    `faults` are the names of the faults of all robots.
+    """
     if test.robot is not None:
         return
     for key, inner in (("all", test.all), ("any", test.any)):
@@ -204,14 +208,14 @@ def _conditions_without_robot(test: AnyCondition, keys: Keys, faults: Container[
 
 @ROBOT_NAMES.check("SC030")
 def unknown_expected_verdicts(scenario: WrittenScenario) -> Iterator[CheckProblem]:
-    """Find names under `expected.criteria` that no verdict has; a robot's verdicts begin with `<robot>/`."""
+    """Find names under `expected.criteria` that no verdict has. The names of a robot's verdicts begin with `<robot>/`."""
     spec = scenario.spec
     if not spec.robots:
         return
     known = [step.name for step in spec.steps]
     for name, robot in sorted(spec.robots.items()):
-        own = [*verdict_names([*spec.pass_, *robot.pass_]), *(fault.label for fault in robot.faults)]
-        known += [f"{name}/{one}" for one in own]
+        verdicts = [*verdict_names([*spec.pass_, *robot.pass_]), *(fault.label for fault in robot.faults)]
+        known += [f"{name}/{verdict}" for verdict in verdicts]
     for number, expected in enumerate(spec.expected.criteria if spec.expected else ()):
         if expected not in known:
             matches = [one for one in known if one.partition("/")[2] == expected]
