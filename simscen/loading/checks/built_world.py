@@ -76,7 +76,7 @@ def regions_outside_the_world(built: BuiltWorld) -> Iterator[CheckProblem]:
 
 
 def _without_platforms(world: World) -> World:
-    """Return the world with only the solids that block a robot that climbs ramps, because places may be on platforms."""
+    """Return the world with only the solids that block a robot that climbs ramps: places may be on platforms."""
     from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 
     solids = drive_obstacles(world.solids, RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M)

@@ -1,4 +1,4 @@
-"""Recognize the kind of a file (scenario, world, robot, …), and check a file of any kind, as `simscen validate` does."""
+"""Recognize the kind of a file (scenario, world, robot, …), and check a file of any kind."""
 
 from collections.abc import Sequence
 from pathlib import Path

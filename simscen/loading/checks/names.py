@@ -208,7 +208,7 @@ def _conditions_without_robot(test: AnyCondition, keys: Keys, faults: Container[
 
 @ROBOT_NAMES.check("SC030")
 def unknown_expected_verdicts(scenario: WrittenScenario) -> Iterator[CheckProblem]:
-    """Find names under `expected.criteria` that no verdict has. The names of a robot's verdicts begin with `<robot>/`."""
+    """Find names under `expected.criteria` that no verdict has. Those of a robot's verdicts begin with `<robot>/`."""
     spec = scenario.spec
     if not spec.robots:
         return

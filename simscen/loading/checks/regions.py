@@ -1,4 +1,4 @@
-"""Checks of triggers, criteria, and goals that compare positions with the geometry of the world.
+"""Checks of triggers, criteria, and goals that compare positions with each other and with the geometry of the world.
 
 They find trigger areas that the robot cannot reach, keepout regions that contain the start or a goal, goals that the
 robot has already reached when they are sent, and localization bounds that are larger than the world.
@@ -30,7 +30,7 @@ def _start_is_blocked(scene: Scene) -> bool:
 
 @WORLD.check("SC050")
 def unreachable_triggers(scene: Scene) -> Iterator[CheckProblem]:
-    """Find events and faults that wait for the robot at a position that it cannot reach."""
+    """Find events and faults that wait for the robot in an area that it cannot reach, or not within the time limit."""
     if _start_is_blocked(scene) or scene.may_do():  # an action of an installed package may take the robot anywhere
         return
     starts, robot, limit = scene.start_poses, scene.loaded.robot.spec, scene.loaded.spec.time_limit
@@ -79,7 +79,7 @@ def goals_reached_at_once(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC052", severity="warning")
 def loose_localization_bounds(scene: Scene) -> Iterator[CheckProblem]:
-    """Find bounds on the localization error that are larger than the world."""
+    """Find bounds on the localization error that are larger than the diagonal of the world."""
     if _start_is_blocked(scene):
         return
     left, bottom, right, top = scene.world.bounds

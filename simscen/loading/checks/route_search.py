@@ -1,4 +1,7 @@
-"""Search routes of the robot to goals and to areas that triggers wait for; the checks of a scene share the results."""
+"""Search routes of the robot to its goals and to areas that triggers wait for. Checks use the results.
+
+A fast approximate search runs first. If it finds no route, an exact search decides.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -21,21 +24,22 @@ if TYPE_CHECKING:
 
 
 MAX_ROUTE_SILL_M = 0.03
-"""Height of obstacles that a route may cross. For a start or goal, it is the lower SILL_M in scene.py."""
+"""Height of obstacles that a route may cross. For starts and goals, it is the lower SILL_M of scene.py."""
 
 
 @dataclass(frozen=True)
 class RobotRoutes:
-    """Routes of a disc that fits into the footprint: if the disc has no route, neither has the robot.
+    """Routes of the largest disc inside the robot's footprint. If the disc has no route, the robot has none either.
 
-    `stops` are the poses between which routes are needed: starts, goals, and the corners of trigger areas.
+    `stops` are the poses between which routes are needed: starts, goals, and the corners of trigger areas. `solids` are
+    the obstacles that block the robot; by default, the fixed solids of the world.
     """
 
     scene: Scene
     stops: tuple[Pose2, ...]
 
     def is_reachable(self, starts: Sequence[Pose2], goal: Pose2, solids: tuple[Solid, ...]) -> bool:
-        """Return whether a route may lead from a start to the goal; False proves that there is none."""
+        """Return whether a route may lead from one of `starts` to the goal; False proves that there is none."""
         approximate = self._approximate_paths(solids)
         if approximate is not None and any(approximate.length(start[:2], goal[:2]) < float("inf") for start in starts):
             return True
@@ -43,7 +47,11 @@ class RobotRoutes:
         return any(exact_paths.may_reach(start, goal) for start in starts)
 
     def can_enter(self, starts: Sequence[Pose2], towards: Pose2, distance: Callable[[Pose2], float]) -> bool:
-        """Return whether the center of the robot can get from a start to a position where `distance` is at most 0."""
+        """Return whether the center of the robot may get from one of `starts` into an area; False proves the opposite.
+
+        `distance` returns the distance of a pose from the area in m, at most 0 inside. `towards` is a point of the
+        area, to which the search is directed.
+        """
         approximate = self._approximate_paths(self.scene.world.solids)
 
         def is_inside(point: tuple[float, float]) -> bool:
@@ -56,22 +64,22 @@ class RobotRoutes:
         return self._exact_paths(self.scene.world.solids).may_enter(starts, distance)
 
     def length_upper_bound(self, start: Pose2, goal: Pose2) -> float:
-        """Return an upper bound of the shortest route in m; inf if the approximation finds none."""
+        """Return an upper bound on the length of the shortest route in m; inf if the fast search finds no route."""
         approximate = self._paths_around_fixed
         return float("inf") if approximate is None else approximate.length(start[:2], goal[:2])
 
     def length(self, start: Pose2, goal: Pose2) -> float:
-        """Return the length of the shortest route around the fixed solids in m; inf if there is none."""
+        """Return the length of the shortest route in m; inf if there is none."""
         return self._exact_paths(self.scene.world.solids).length(start, goal)
 
     @property
     def z_range(self) -> tuple[float, float]:
-        """Heights in m between which an obstacle blocks a route."""
+        """Lowest and highest z in m between which an obstacle blocks a route."""
         return self.scene.heights_above(MAX_ROUTE_SILL_M)
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Bounds of the world and of all stops, with room to drive around them."""
+        """Bounds of the world, enlarged to contain all stops: (min x, min y, max x, max y) in m."""
         return extend_bounds(self.scene.world.bounds, list(self.stops))
 
     @cached_property
@@ -88,10 +96,10 @@ class RobotRoutes:
 
 
 class TriggerArea(NamedTuple):
-    """An area that a trigger waits for the robot to enter.
+    """Area that the robot must enter before an event or a fault can start.
 
-    `keys` are the position of the condition in the scenario file, and `event` is the name of the event or fault.
-    `distance` returns the distance in m of a pose from the area; it is at most 0 inside.
+    `keys` are those of the condition, and `event` is the name of the event or fault. `corners` has (x, y) in m, or a
+    single point. `distance` returns the distance in m of a pose from the area; it is at most 0 inside.
     """
 
     keys: Keys
@@ -102,7 +110,7 @@ class TriggerArea(NamedTuple):
 
 
 def trigger_areas(scene: Scene) -> list[TriggerArea]:
-    """Return the areas that the robot must enter before an event or a fault can start."""
+    """Return the areas of all triggers of events and faults."""
     spec = scene.loaded.spec
     tests: list[tuple[Keys, str, AnyCondition | None]] = [
         ((*step.keys, "when"), step.name, step.when) for step in spec.steps
@@ -112,7 +120,7 @@ def trigger_areas(scene: Scene) -> list[TriggerArea]:
 
 
 def _areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
-    """Return the areas of all conditions that must be true for a test to be true."""
+    """Yield the areas that the robot must enter for the condition `test` of the event or fault `name` to be true."""
     if not scene.loaded.includes_robot(test.robot) or test.any is not None or test.not_ is not None:
         return
     if test.all is not None:
@@ -136,10 +144,11 @@ def _areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[
 
 
 def _distance_to_region(corners: Polygon, max_distance: float) -> Callable[[Pose2], float]:
+    """Return the function for the distance from the area within `max_distance` m of a region."""
     return lambda pose: distance_to_polygon(pose, corners) - max_distance
 
 
 def robot_routes(scene: Scene) -> RobotRoutes:
-    """Return the routes between the start, all goals and all trigger areas."""
+    """Return the routes between the start, all goals, and all trigger areas of a scene."""
     corners = [Pose2(x, y) for area in scene.cached(trigger_areas) for x, y in area.corners]
     return RobotRoutes(scene, (*scene.start_poses, *(goal.pose for _, goal in scene.targets), *corners))
