@@ -137,7 +137,7 @@ def blocked_spawns(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
-    """Return "inside obstacle …" if an obstacle contains a spawned object, so that nothing could touch it; else None."""
+    """Return "inside obstacle …" if an obstacle contains all of a spawned object, so that nothing can touch it."""
     if spawn.pose is None:
         return None
     corners = place_polygon(_outline(spawn), spawn.pose.pose)

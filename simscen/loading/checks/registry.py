@@ -6,7 +6,8 @@ registered for a stage together with the error code that it reports:
     @MEANING.check("SC050")
     def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]: ...
 
-These are the stages in the order in which they run. If a stage finds errors, later stages do not run.
+These are the stages in the order in which they run. If a stage finds errors, later stages do not run, except that NAMES
+always runs with WORLD_FILE.
 
 | stage | subject | finds, for example | needs |
 |---|---|---|---|
@@ -19,7 +20,7 @@ These are the stages in the order in which they run. If a stage finds errors, la
 | TIMING (`scene.py`) | one robot's view of the scenario | time limits that are too short | the same |
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
@@ -119,8 +120,3 @@ ROBOT_NAMES: CheckStage[WrittenScenario] = CheckStage("robot names")
 WORLD_FILE: CheckStage[LoadedWorld] = CheckStage("world file")
 NAMES: CheckStage[NameScope] = CheckStage("names")
 MEANING: CheckStage[LoadedScenario] = CheckStage("meaning")
-
-
-def warnings(findings: Iterable[CheckProblem]) -> Iterator[CheckProblem]:
-    """Return the findings as warnings."""
-    return (finding._replace(warning=True) for finding in findings)

@@ -32,7 +32,7 @@ class RobotRoutes:
     """Routes of the largest disc inside the robot's footprint. If the disc has no route, the robot has none either.
 
     `stops` are the poses between which routes are needed: starts, goals, and the corners of trigger areas. `solids` are
-    the obstacles that block the robot; by default, the fixed solids of the world.
+    the obstacles that block the robot. Methods without this parameter consider the fixed solids of the world.
     """
 
     scene: Scene

@@ -1,4 +1,4 @@
-"""Checks of settings: uneven rates, too many goals, values without effect, duplicates, and angles in degrees."""
+"""Checks of settings: rates that do not divide the tick rate, too many goals, duplicates, angles in degrees, …"""
 
 import math
 from collections.abc import Iterator
@@ -16,12 +16,12 @@ from simscen.model.navigation import expected_failure_name
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import MAX_GOALS
 
-TICK_RATE = ("physics", "tick_rate")
+TICK_RATE_KEYS = ("physics", "tick_rate")
 
 
 @NAMES.check("SC034")
 def uneven_rates(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find rates that do not divide the physics rate."""
+    """Find rates that do not divide the tick rate."""
     loaded = scope.loaded
     rates: list[tuple[MappingNode, Keys, float]] = [
         (loaded.tree, ("stack", "controller_frequency"), loaded.spec.stack.controller_frequency),
@@ -41,17 +41,20 @@ def uneven_rates(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 def _uneven_rate(loaded: LoadedScenario, tree: MappingNode, keys: Keys, error: str) -> CheckProblem:
-    """Return the finding at the tick rate if that is written, else at the rate or where the rate would be."""
+    """Return the problem of the rate at `keys` in `tree`, the tree of the scenario or of the robot file.
+
+    It is marked at the tick rate if the scenario sets it, else at the rate, or where the rate would be written.
+    """
     owner = "" if tree is loaded.tree else f" of robot `{loaded.robot.name}`"
     message = f"{'.'.join(str(key) for key in keys)}{owner}: {error}"
-    if existing_keys(loaded.tree, TICK_RATE) == TICK_RATE:
-        return CheckProblem(TICK_RATE, message)
+    if existing_keys(loaded.tree, TICK_RATE_KEYS) == TICK_RATE_KEYS:
+        return CheckProblem(TICK_RATE_KEYS, message)
     return CheckProblem(keys, message, at_key=existing_keys(tree, keys) != keys, tree=tree)
 
 
 @NAMES.check("SC016")
 def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find more goals than a run may have, and keys that only the last goal of a drive through poses can have."""
+    """Find more goals than a run may have, and keys that only the last goal of navigate_through_poses can have."""
     spec = scope.loaded.spec
     if len(spec.goals) * spec.navigation.loops > MAX_GOALS:
         message = f"{len(spec.goals)} goals in {spec.navigation.loops} loops exceed the limit of {MAX_GOALS} goals"
@@ -70,12 +73,12 @@ def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckProblem]:
 
 FULL_TURN_RAD = 2 * math.pi
 SPEED_PARAMETERS = ("desired_linear_vel", "max_vel_x", "vx_max")
-"""Speeds of Nav2's controllers."""
+"""Parameters of Nav2's controllers for their forward speed."""
 
 
 @MEANING.check("SC052", severity="warning")
 def late_timeouts(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find timeouts of goals after the end of the run."""
+    """Find timeouts of goals that are longer than the time limit of the run."""
     limit = loaded.spec.time_limit
     for index, (goal, name) in enumerate(zip(loaded.spec.goals, loaded.spec.goal_names, strict=True)):
         if goal.timeout is not None and goal.timeout > limit:
@@ -85,7 +88,7 @@ def late_timeouts(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC053", severity="warning")
 def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find angles of more than one turn without a unit, in the scenario, its world, and its own robot file."""
+    """Find angles of more than one turn without a unit in the scenario, its world, and its own robot file."""
     files: list[tuple[BaseModel | None, MappingNode | None]] = [
         (loaded.spec, loaded.tree),
         (loaded.world.spec, loaded.world.tree),
@@ -124,7 +127,7 @@ def duplicate_entries(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def deprecated_parameters(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find parameters that earlier versions had and that no longer have an effect."""
+    """Find parameters and values of earlier versions."""
     if getattr(loaded.spec.stack, "profile", None) == "simscen":
         yield CheckProblem(("stack", "profile"), "`simscen` is a deprecated name of this profile", "write `advanced`")
     localizer = getattr(loaded.spec.stack, "localizer", None)
@@ -136,7 +139,7 @@ def deprecated_parameters(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def ignored_recovery_parameters(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find parameters of AMCL's recovery that a localizer with `relocalization: scan_matching` does not use."""
+    """Find parameters of AMCL's recovery in a localizer with `relocalization: scan_matching`, which ignores them."""
     localizer = getattr(loaded.spec.stack, "localizer", None)
     if getattr(localizer, "relocalization", None) != "scan_matching":
         return
@@ -162,7 +165,7 @@ def latency_without_values(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def speeds_above_the_top_speed(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find speed limits of zones and speeds of controllers that the robot cannot reach."""
+    """Find speed limits of zones, and speeds of controllers, that are above the top speed of the robot."""
     robot, stack = loaded.robot.spec, loaded.spec.stack
     if robot is None:
         return

@@ -1,4 +1,4 @@
-"""Checks of world files: unique names, objects without extent, duplicates, unknown regions."""
+"""Checks of world files: names that are not unique, things of zero size, duplicates, and unknown regions."""
 
 from collections.abc import Iterator
 
@@ -15,8 +15,8 @@ def _spec(world: LoadedWorld) -> WorldSpec:
 
 
 @WORLD_FILE.check("SC033")
-def shared_names(world: LoadedWorld) -> Iterator[CheckProblem]:
-    """Find obstacles and walls with the name of an object or a door, or obstacles that share a name (a warning)."""
+def duplicate_names_in_world(world: LoadedWorld) -> Iterator[CheckProblem]:
+    """Find obstacles and walls with the name of an object or a door, and obstacles with the same name (a warning)."""
     spec = _spec(world)
     moving = {world_object.name for world_object in spec.objects} | {door.name for door in spec.doors}
     seen: set[str] = set()
@@ -37,7 +37,7 @@ def shared_names(world: LoadedWorld) -> Iterator[CheckProblem]:
 
 @WORLD_FILE.check("SC313")
 def zero_extents(world: LoadedWorld) -> Iterator[CheckProblem]:
-    """Find walls, ramps and doors of zero size, and motions that end where they start (a warning)."""
+    """Find walls, ramps, and doors of zero size, and motions that stay at one pose (a warning)."""
     spec = _spec(world)
     for index, wall in enumerate(spec.walls):
         if all(point == wall.points[0] for point in wall.points):
@@ -56,7 +56,7 @@ def zero_extents(world: LoadedWorld) -> Iterator[CheckProblem]:
 
 @WORLD_FILE.check("SC054", severity="warning")
 def duplicate_shapes(world: LoadedWorld) -> Iterator[CheckProblem]:
-    """Find the same shape at the same pose under another name."""
+    """Find obstacles and objects with the same shape and pose as another one."""
     spec = _spec(world)
     things: list[tuple[Keys, WorldObject]] = [
         (("obstacles", k), world_object) for k, world_object in enumerate(spec.obstacles)
@@ -80,7 +80,7 @@ def duplicate_shapes(world: LoadedWorld) -> Iterator[CheckProblem]:
 
 @WORLD_FILE.check("SC030")
 def unknown_friction_regions(world: LoadedWorld) -> Iterator[CheckProblem]:
-    """Find friction in regions that do not exist."""
+    """Find entries of `friction` for regions that do not exist."""
     spec = _spec(world)
     for name in spec.friction:
         if name not in spec.regions:
