@@ -80,7 +80,7 @@ def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
 
 
 def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
-    """Return the body with the payload and the motor torque that the scenario sets. Raises InvalidInput (see above)."""
+    """Return the body with the payload and the motor torque of the scenario. Raises InvalidInput if it would tip over."""
     entry = loaded.spec.only_robot
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
@@ -167,6 +167,7 @@ def _criterion_mask_blocks(mask: CriterionMask, tree: MappingNode, with_source_l
 
 
 def _stack_mask_grid(loaded: LoadedScenario, keys: Keys, source: LoadedMap | None) -> OccupancyGrid | None:
+    """Return the grid of a mask of the stack; None if the stack has none."""
     return None if source is None else _mask_grid(source, keys, loaded.tree, loaded.with_source_line)
 
 

@@ -71,6 +71,7 @@ def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]
 
 
 def _goal(name: str, entry: GoalEntry, stack: StackBase) -> Goal:
+    """Return a listed goal; missing tolerances are those of the goal checker of the stack."""
     return Goal(
         name=name,
         pose=entry.pose.pose,

@@ -54,6 +54,7 @@ def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | Non
 def _references_in(
     value: Any, mark: ReferenceTo | None, keys: Keys, includes_robot: RobotFilter | None
 ) -> Iterator[Reference]:
+    """Yield the references in the value of a field whose texts have the given mark."""
     if isinstance(value, BaseModel):
         yield from references(value, keys, includes_robot)
     elif isinstance(value, list):

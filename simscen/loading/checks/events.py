@@ -181,6 +181,7 @@ class PossibleRun:
         return ((*keys, test.kind), reason) if reason else None
 
     def _why_parts_never_true(self, tests: Sequence[AnyCondition], keys: Keys) -> list[Reason | None]:
+        """Return the reason for each of the conditions in the list at `keys`; None for those that can be true."""
         return [self._why_never_true(test, (*keys, k)) for k, test in enumerate(tests)]
 
     def may_do(self, *kinds: str) -> bool:

@@ -39,6 +39,7 @@ _SUFFIXES_BY_KIND = (
     ("robot", (*ROBOT_SUFFIXES, *URDF_SUFFIXES)),
     ("stack", STACK_SUFFIXES),
 )
+"""Kinds of files, each with its suffixes."""
 
 
 def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:

@@ -31,6 +31,7 @@ MIN_DEPTH_M = 0.1
 ESTIMATE_ERROR_M = 0.5
 """Possible error of the initial estimate. A start is only reported if it is at least this deep inside a zone."""
 NO_LIMIT_REASON = "no cell of the mask limits the speed with this `base` and `multiplier`"
+"""Reason in messages why a speed mask has no effect."""
 
 
 def stack_masks(scene: Scene) -> FilterMasks:

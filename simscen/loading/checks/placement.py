@@ -55,12 +55,14 @@ def blocked_robot_poses(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _blocked_start(scene: Scene) -> Iterator[CheckProblem]:
+    """Yield a problem if the start is blocked by the fixed world, or by a body at its initial pose."""
     if not expects_start_failure(scene.loaded.spec):
         solids = (*scene.world.solids, *scene.bodies)
         yield from _pose_problem(scene, START, "the robot's start", scene.start, solids, FREE_SPACE_HINT)
 
 
 def _blocked_goals(scene: Scene) -> Iterator[CheckProblem]:
+    """Yield a problem for each goal in the fixed world, and a warning for each goal in a body that stays there."""
     for keys, goal in scene.targets:
         code = "GOAL_OUTSIDE_MAP" if scene.area.outside(goal.pose) else "GOAL_OCCUPIED"
         hint = f"move it, or {expected_failure_hint(keys, code)}"
@@ -91,6 +93,7 @@ def _fits_nearby(scene: Scene, goal: Goal) -> bool:
 
 
 def _blocked_kidnap_poses(scene: Scene) -> Iterator[CheckProblem]:
+    """Yield a problem for each blocked pose to which an event kidnaps the robot."""
     for keys, _, action in scene.actions:
         if isinstance(action, Kidnap):
             what = "the pose to which the robot is kidnapped"

@@ -65,6 +65,7 @@ class Subject(Protocol):
 
 S = TypeVar("S", bound=Subject)
 Check = Callable[[S], Iterable[CheckProblem]]
+"""Function that yields the problems of a subject."""
 C = TypeVar("C", bound=Callable[..., Any])
 
 

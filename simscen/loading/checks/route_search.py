@@ -84,14 +84,17 @@ class RobotRoutes:
 
     @cached_property
     def _paths_around_fixed(self) -> SimplePaths | None:
+        """The fast search around the fixed solids of the world; None if a solid is too complex for it."""
         return self.scene.cache.simple_paths(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
 
     def _approximate_paths(self, solids: tuple[Solid, ...]) -> SimplePaths | None:
+        """Return the fast search; None if a solid is too complex for it."""
         if solids is self.scene.world.solids:
             return self._paths_around_fixed
         return simple_paths_between(solids, self.scene.size.inscribed, self.z_range)
 
     def _exact_paths(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
+        """Return the exact search."""
         return self.scene.cache.shortest_paths(solids, self.bounds, self.scene.size.inscribed, self.z_range)
 
 

@@ -26,6 +26,7 @@ Model = TypeVar("Model", bound=BaseModel)
 Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
 
 SDF_SUFFIXES = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
+"""Suffixes of the files of Gazebo worlds."""
 XML_STARTS = ("<?xml", "<sdf", "<!--")
 """Beginnings of XML files, for example of SDF files with the suffix of another format."""
 URDF_SUFFIXES = (".urdf", ".xacro")
@@ -53,7 +54,7 @@ class Assets:
 
     def world(self, written: ScalarNode) -> LoadedWorld | None:
         """Load the world in the file with this path."""
-        path = self._find(str(written.value), written.position)
+        path = self._find_file(str(written.value), written.position)
         return None if path is None else self._load_cached(self.world_file, path)
 
     def world_file(self, path: Path) -> LoadedWorld | None:
@@ -66,7 +67,7 @@ class Assets:
             hint = "if it is SDF, rename it to .sdf or .world"
             self.problems.append(Problem(name, 1, 1, "SC004", "this is an XML file, expected a world in YAML", hint))
             return None
-        tree = self._tree(path)
+        tree = self._read_tree(path)
         if is_ros_map(tree):
             loaded = self._ros_map(tree, path)
             return LoadedWorld(path.stem, path, map=loaded) if loaded else None
@@ -82,10 +83,10 @@ class Assets:
         loaded_map = sdf = None
         if spec.map is not None:
             position = value_position(tree, ("map",))
-            found = self._find(spec.map, position)
+            found = self._find_file(spec.map, position)
             loaded_map = self.map_file(found) if found else None
         if spec.sdf is not None:
-            sdf = self._find(spec.sdf, value_position(tree, ("sdf",)))
+            sdf = self._find_file(spec.sdf, value_position(tree, ("sdf",)))
         self.problems += unknown_places(spec, tree, spec.places)
         spec = resolve_places(spec, spec.places)
         name = spec.name or path.name.split(".")[0]
@@ -94,23 +95,23 @@ class Assets:
 
     def map(self, written: ScalarNode) -> LoadedMap | None:
         """Load the ROS map in the YAML file with this path."""
-        path = self._find(str(written.value), written.position)
+        path = self._find_file(str(written.value), written.position)
         return None if path is None else self._load_cached(self.map_file, path)
 
     def map_file(self, path: Path) -> LoadedMap | None:
         """Load the ROS map in a YAML file."""
-        return self._ros_map(self._tree(path), path)
+        return self._ros_map(self._read_tree(path), path)
 
     def robot(self, written: str, position: Position) -> LoadedRobot | None:
         """Load a robot from the file with this path, or a robot with this name that ships with simscen."""
         if "/" in written or written.endswith((*URDF_SUFFIXES, ".yaml", ".yml")):
-            path = self._find(written, position)
+            path = self._find_file(written, position)
             return None if path is None else self._load_cached(self.robot_file, path)
         bundled_files = shipped_robots()
         if written in bundled_files:
             return self._load_cached(partial(self.robot_file, bundled=True), bundled_files[written])
         hint = f"{suggestion(written, bundled_files)} (or the path of a *.robot.yaml or .urdf file)"
-        self._add(position, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
+        self._add_problem(position, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
         return None
 
     def robot_file(self, path: Path, bundled: bool = False) -> LoadedRobot | None:
@@ -122,13 +123,15 @@ class Assets:
                 self.problems.append(text)
                 return None
             return LoadedRobot(name, path, urdf=path)
-        tree = self._tree(path)
+        tree = self._read_tree(path)
         spec = self._checked(RobotSpec, tree)
         if spec is None or tree is None:
             return None
-        urdf = self._find(spec.urdf, value_position(tree, ("urdf",))) if spec.urdf else None
+        urdf = self._find_file(spec.urdf, value_position(tree, ("urdf",))) if spec.urdf else None
         positions = {package: value_position(tree, ("packages", package)) for package in spec.packages}
-        packages = {package: self._folder(spec.packages[package], position) for package, position in positions.items()}
+        packages = {
+            package: self._find_folder(spec.packages[package], position) for package, position in positions.items()
+        }
         if (spec.urdf and urdf is None) or None in packages.values():
             return None
         mapping = tree if isinstance(tree, MappingNode) else None
@@ -148,22 +151,24 @@ class Assets:
         return found
 
     def _ros_map(self, tree: Node | None, path: Path) -> LoadedMap | None:
+        """Return the ROS map with this tree in the file `path`."""
         spec = self._checked(RosMapSpec, tree)
         if spec is None or tree is None:
             return None
-        image = self._find(spec.image, value_position(tree, ("image",)))
+        image = self._find_file(spec.image, value_position(tree, ("image",)))
         return (
             LoadedMap(path, spec, image, tuple(self.library.with_source(_ignored_key_warnings(tree))))
             if image
             else None
         )
 
-    def _tree(self, path: Path) -> Node | None:
+    def _read_tree(self, path: Path) -> Node | None:
         tree, problems = self.library.read(path)
         self.problems += problems
         return tree
 
     def _checked(self, model: type[Model], tree: Node | None) -> Model | None:
+        """Return the specification in a tree; None if the tree is None or invalid."""
         if tree is None:
             return None
         spec = check(model, tree)
@@ -172,28 +177,28 @@ class Assets:
             return None
         return spec
 
-    def _find(self, written: str, position: Position) -> Path | None:
-        found = self._existing(written, position)
+    def _find_file(self, written: str, position: Position) -> Path | None:
+        found = self._find_path(written, position)
         if found is not None and not found.is_file():
-            self._add(position, "SC001", f"not a regular file: {quoted(written)}")
+            self._add_problem(position, "SC001", f"not a regular file: {quoted(written)}")
             return None
         return found
 
-    def _folder(self, written: str, position: Position) -> Path | None:
-        found = self._existing(written, position)
+    def _find_folder(self, written: str, position: Position) -> Path | None:
+        found = self._find_path(written, position)
         if found is not None and not found.is_dir():
-            self._add(position, "SC001", f"not a folder: {quoted(written)}")
+            self._add_problem(position, "SC001", f"not a folder: {quoted(written)}")
             return None
         return found
 
-    def _existing(self, written: str, position: Position) -> Path | None:
+    def _find_path(self, written: str, position: Position) -> Path | None:
         found = self.library.sandbox.find(written, self.library.folder_of(position))
         if isinstance(found, PathProblem):
-            self._add(position, found.code, found.message, found.hint)
+            self._add_problem(position, found.code, found.message, found.hint)
             return None
         return found
 
-    def _add(self, position: Position, code: str, message: str, hint: str = "") -> None:
+    def _add_problem(self, position: Position, code: str, message: str, hint: str = "") -> None:
         self.problems.append(Problem(*position, code=code, message=message, hint=hint))
 
 
@@ -220,6 +225,7 @@ def _ignored_key_warnings(tree: Node) -> list[Problem]:
 
 
 def _ignored_key_hint(key: str) -> str:
+    """Return "did you mean …?" if a key of a ROS map is similar; else that the key is ignored."""
     near = suggestion(key, RosMapSpec.model_fields)
     return near if near.startswith("did you mean") else "it is ignored, as by map_server"
 

@@ -125,6 +125,7 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
 
 
 def _unknown_key(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
+    """Return the problem of the unknown key at the end of `loc`, with a hint what was meant or where it belongs."""
     key = str(loc[-1])
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     where = f" in `{holder}`" if holder else ""
@@ -148,6 +149,7 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
 
 
 def _missing_key(tree: Node, loc: Keys) -> Problem:
+    """Return the problem of the missing key, or the missing item of a list, at the end of `loc`."""
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     if isinstance(loc[-1], int):
         return _problem(key_position(tree, loc[:-1]), "SC017", f"`{holder}` has too few values: [{loc[-1]}] is missing")
@@ -174,6 +176,7 @@ def _empty_values(tree: Node) -> Iterator[Keys]:
 
 
 def _empty_value_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
+    """Return the problem of the empty value at `loc`."""
     *holder, key = loc
     if isinstance(key, int):
         return _problem(

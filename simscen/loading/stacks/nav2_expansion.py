@@ -131,6 +131,7 @@ def _translated_tree(one: Translation, parameters: Nav2Parameters) -> MappingNod
 
 
 def _node(value: Any, position: Position) -> Node:
+    """Return a parameter as a tree; all its nodes have the same position."""
     if isinstance(value, list):
         return SequenceNode(position, tuple(_node(item, position) for item in value))
     return ScalarNode(position, value)

@@ -29,6 +29,7 @@ MPPI_CRITICS = (
     "ConstraintCritic", "CostCritic", "ObstaclesCritic", "GoalCritic", "GoalAngleCritic", "PathAlignCritic",
     "PathFollowCritic", "PathAngleCritic", "PreferForwardCritic", "TwirlingCritic", "VelocityDeadbandCritic",
 )  # fmt: skip
+"""MPPI critics that simscen has, under the same names."""
 RENAMED_PARAMETERS: Mapping[tuple[str, str], str] = {
     ("regulated_pure_pursuit", "max_linear_vel"): "desired_linear_vel",
     **{("dwb", f"{critic}.scale"): weight for critic, weight in DWB_CRITICS.items()},

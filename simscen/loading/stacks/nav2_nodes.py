@@ -176,6 +176,7 @@ def _layer_classes(parameters: Parameters) -> Mapping[str, str]:
 def _translate_costmap_parameter(
     node: str, name: str, value: object, section: str, known: Sequence[str]
 ) -> Iterator[Translation]:
+    """Translate a parameter of the costmap itself."""
     if name == "rolling_window":
         rolls = section == "local_costmap"
         why = "" if bool(value) == rolls else "the local costmap always rolls, the global one with `map: none`"
@@ -186,6 +187,7 @@ def _translate_costmap_parameter(
 def _translate_layer_parameter(
     node: str, name: str, value: Any, layers: Mapping[str, str], section: str, known: KnownParameters
 ) -> Iterator[Translation]:
+    """Translate a parameter `layer.…` of an inflation or denoise layer; `layers` has the class of each layer."""
     kind, last = layers[name.partition(".")[0]], name.rpartition(".")[2]
     if kind == "InflationLayer":
         yield from translate_same_name(node, name, value, (section,), known[section], last)
@@ -303,6 +305,7 @@ def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownPara
 
 
 def _translate_approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Translation]:
+    """Translate the parameters of the polygon that is used."""
     for nav2_name, simscen_name, offset in (
         ("time_before_collision", "time_before_collision", 0),
         ("simulation_time_step", "simulation_time_step", 0),
@@ -360,6 +363,7 @@ def _is_relevant(parameter: str, value: object) -> bool:
 
 
 def _translate_amcl(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
+    """Translate the parameters of the localizer."""
     for name, value in parameters.items():
         if name == "robot_model_type":
             model = MOTION_MODELS.get(class_of(value))
@@ -370,6 +374,7 @@ def _translate_amcl(node: str, parameters: Parameters, known: KnownParameters) -
 
 
 def _translate_behavior_server(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
+    """Translate the parameters of the recovery behaviors."""
     for name, value in parameters.items():
         # A negative minimum has no effect in Nav2.
         no_minimum = name == "min_rotational_vel" and isinstance(value, float | int) and value < 0
@@ -386,3 +391,4 @@ TRANSLATORS = {
     "velocity_smoother": _translate_velocity_smoother,
     "collision_monitor": _translate_collision_monitor,
 }
+"""Function that translates the parameters of a node, by name of the node."""

@@ -179,6 +179,7 @@ class AxisBuilder:
         return target
 
     def _report_duplicates(self, items: SequenceNode) -> None:
+        """Report values that occur more than once in a list."""
         seen: list[object] = []
         for item in items.items:
             if item.plain in seen:

@@ -12,6 +12,7 @@ from simscen.loading.variations.paths import Target, split_path
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 MAX_NAME_CHARS, _MAX_VALUE_CHARS = 100, 40
+"""Largest length of a name, and of a value in it."""
 _VALID_NAME = re.compile(r"[^\W][\w.,=+%-]*")
 _NUMBERED = re.compile(r"variation-([1-9][0-9]{0,8})")
 _UNSAFE_CHARS = re.compile(r"[^\w.+%-]+")

@@ -89,6 +89,7 @@ def split_path(path: str) -> list[str]:
 
 
 def _keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
+    """Return the keys of the value to which the parts of a path lead. Raises PathError if they lead nowhere."""
     node: Node | None = tree
     keys: list[Key] = []
     for number, part in enumerate(parts):

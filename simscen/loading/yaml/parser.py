@@ -127,6 +127,7 @@ class _Composer:
         return node, height
 
     def _content(self, event: ev.NodeEvent, depth: int) -> tuple[Node, int]:
+        """Return the node that begins with `event`, which is not an alias."""
         if isinstance(event, ev.ScalarEvent):
             return ScalarNode(self._position_of(event), self._scalar(event)), 0
         if isinstance(event, ev.SequenceStartEvent):
@@ -134,6 +135,7 @@ class _Composer:
         return self._mapping(event, depth)
 
     def _scalar(self, event: ev.ScalarEvent) -> str | int | float | bool | None:
+        """Return the value of a scalar; reports an integer that is too large, and returns 0 instead."""
         if not event.implicit[0]:
             return str(event.value)
         try:
@@ -187,6 +189,7 @@ class _Composer:
         return str(event.value)
 
     def _alias(self, event: ev.AliasEvent, depth: int) -> tuple[Node, int]:
+        """Return the node of the anchor to which an alias refers. Raises _ParseError if there is none, or a circle."""
         if event.anchor not in self._anchors:
             raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
         anchor = self._anchors[event.anchor]
@@ -230,6 +233,7 @@ class _Composer:
         return Problem(*position, code=code, message=message, hint=hint)
 
     def _syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
+        """Return the problem for a syntax error of PyYAML, in words that name the likely mistake."""
         mark = error.problem_mark or error.context_mark
         if mark is None:
             return self._problem(None, "SC003", error.problem or "cannot be read as YAML")

@@ -23,11 +23,13 @@ _WORDS: dict[str, Scalar] = {
     **dict.fromkeys(("-.inf", "-.Inf", "-.INF"), -math.inf),
     **dict.fromkeys((".nan", ".NaN", ".NAN"), math.nan),
 }
+"""Text → value, for all values that are no numbers."""
 _INTEGERS = (
     (re.compile(r"[-+]?(0|[1-9][0-9]*)"), 10),
     (re.compile(r"0o[0-7]+"), 8),
     (re.compile(r"0x[0-9a-fA-F]+"), 16),
 )
+"""Patterns of integers, each with its base."""
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 
 
@@ -46,6 +48,7 @@ def parse_scalar(text: str) -> Scalar:
 
 
 _TAGS = {str: "str", bool: "bool", int: "int", float: "float", type(None): "null"}
+"""Type of a value → name of its type in YAML."""
 # Characters that `read_text` rejects, and line breaks of YAML 1.1; strings with one of them are written with escapes.
 _NEEDS_ESCAPES = re.compile("[\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
 

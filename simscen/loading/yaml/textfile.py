@@ -58,6 +58,7 @@ def _read_bytes(path: Path) -> bytes | str:
 
 
 def _decode(raw: bytes, display_name: str) -> str | Problem:
+    """Return the text in the bytes of a file, or a problem with its encoding or its characters."""
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
