@@ -80,7 +80,7 @@ def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
 
 
 def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
-    """Return the body with the payload and the motor torque of the scenario. Raises InvalidInput if it would tip over."""
+    """Return the body with the payload and the motor torque of the scenario. Raises InvalidInput if it tips over."""
     entry = loaded.spec.only_robot
     if entry.payload is None and entry.motor_torque == 1.0:
         return body

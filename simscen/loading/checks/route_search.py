@@ -119,16 +119,16 @@ def trigger_areas(scene: Scene) -> list[TriggerArea]:
         ((*step.keys, "when"), step.name, step.when) for step in spec.steps
     ]
     tests += [(("faults", k, "when"), fault.label, fault.when) for k, fault in enumerate(spec.faults)]
-    return [area for keys, name, test in tests if test is not None for area in _areas(scene, test, keys, name)]
+    return [area for keys, name, test in tests if test is not None for area in _required_areas(scene, test, keys, name)]
 
 
-def _areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
+def _required_areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
     """Yield the areas that the robot must enter for the condition `test` of the event or fault `name` to be true."""
     if not scene.loaded.includes_robot(test.robot) or test.any is not None or test.not_ is not None:
         return
     if test.all is not None:
         for k, part in enumerate(test.all):
-            yield from _areas(scene, part, (*keys, "all", k), name)
+            yield from _required_areas(scene, part, (*keys, "all", k), name)
         return
     keys = (*keys, test.kind)
     match test.chosen if test.kind in ("robot_in", "robot_within") else None:

@@ -110,24 +110,25 @@ SHORTCUT_ACTIONS = ("kidnap", "push", "new_goal", "cancel_goal")
 class Drive:
     """Drive of the robot to all goals in order.
 
-    `lengths` are the lengths in m of the shortest paths of the legs: from the start, or the goal before, to each goal.
+    A leg leads to a goal from the goal before, or from the start. `leg_lengths` are the lengths in m of the shortest
+    paths of the legs.
     """
 
     goals: tuple[Goal, ...]
     robot: RobotSpec
-    lengths: list[float]
+    leg_lengths: list[float]
 
     @property
-    def least_lengths(self) -> list[float]:
+    def min_leg_lengths(self) -> list[float]:
         """Lower bound on the driven length of each leg in m, given the tolerances of the goals."""
         slack = [0.0, *(goal.xy_tolerance for goal in self.goals)]
-        pairs = zip(self.lengths, pairwise(slack), strict=True)
+        pairs = zip(self.leg_lengths, pairwise(slack), strict=True)
         return [max(0.0, MIN_PATH_RATIO * length - a - b) for length, (a, b) in pairs]
 
     @property
-    def least_times(self) -> list[float]:
+    def min_leg_times(self) -> list[float]:
         """Lower bound on the time for each leg in s."""
-        return [length / (MAX_AVERAGE_SPEED_RATIO * self.robot.top_speed) for length in self.least_lengths]
+        return [length / (MAX_AVERAGE_SPEED_RATIO * self.robot.top_speed) for length in self.min_leg_lengths]
 
     @property
     def top_speed_text(self) -> str:
@@ -137,7 +138,7 @@ class Drive:
     @property
     def description(self) -> str:
         """Length and time of the whole drive, as part of a message."""
-        total = sum(self.lengths)
+        total = sum(self.leg_lengths)
         return (
             f"the path of {total:.2f} m to all goals takes {total / self.robot.top_speed:.1f} s {self.top_speed_text}"
         )
@@ -165,13 +166,13 @@ def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckProblem]:
     spec = scene.loaded.spec
     for index, goal in enumerate(drive.goals[: len(spec.goals)]):
         is_sent = index == 0 or spec.on_goal_failure == "stop"
-        if goal.timeout is not None and drive.least_times[index] > goal.timeout and is_sent:
-            length = drive.lengths[index]
+        if goal.timeout is not None and drive.min_leg_times[index] > goal.timeout and is_sent:
+            length = drive.leg_lengths[index]
             reason = f"the path of {length:.2f} m takes {length / drive.robot.top_speed:.1f} s {drive.top_speed_text}"
             message = f"goal `{goal.name}` cannot be reached within {goal.timeout:g} s: {reason}"
             yield CheckProblem(("goals", index, "timeout"), message)
     waits = sum(goal.wait for goal in drive.goals)
-    if sum(drive.least_times) + waits > spec.time_limit and any(map(_requires_success, spec.pass_)):
+    if sum(drive.min_leg_times) + waits > spec.time_limit and any(map(_requires_success, spec.pass_)):
         keys = ("time_limit",) if "time_limit" in spec.model_fields_set else ("goals",)
         waiting = f", and the robot waits {waits:g} s at goals" if waits else ""
         message = f"the goals cannot be reached within {spec.time_limit:g} s: {drive.description}{waiting}"
@@ -184,7 +185,7 @@ def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckProblem]:
 def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tuple[str, str]]:
     """Yield the key of each bound of a criterion that the drive violates, and the reason."""
     criterion, names = entry.chosen, [goal.name for goal in drive.goals]
-    times, lengths = drive.least_times, drive.least_lengths
+    times, lengths = drive.min_leg_times, drive.min_leg_lengths
     bound = getattr(criterion, "max", None)
     if entry.kind == "time_to_goal" and isinstance(bound, float):
         goal = getattr(criterion, "goal", None)
@@ -195,8 +196,8 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
     if entry.kind == "path_length":
         ratio = getattr(criterion, "max_ratio", None)
         if isinstance(bound, float) and sum(lengths) > bound:
-            yield "max", f"the shortest path to all goals is {sum(drive.lengths):.2f} m long"
-        if ratio is not None and sum(lengths) > ratio * sum(drive.lengths):
+            yield "max", f"the shortest path to all goals is {sum(drive.leg_lengths):.2f} m long"
+        if ratio is not None and sum(lengths) > ratio * sum(drive.leg_lengths):
             yield "max_ratio", "no path is shorter than the shortest one"
     within = getattr(criterion, "within", None)
     if entry.kind == "goals_reached" and within is not None:
@@ -204,7 +205,7 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
         too_late = [k for k, name in enumerate(names) if times[k] > within and any(is_named(name, c) for c in chosen)]
         if too_late:
             k = too_late[0]
-            yield "within", f"the path of {drive.lengths[k]:.2f} m to `{names[k]}` takes {times[k]:.1f} s"
+            yield "within", f"the path of {drive.leg_lengths[k]:.2f} m to `{names[k]}` takes {times[k]:.1f} s"
 
 
 def _requires_success(entry: AnyCriterion) -> bool:
