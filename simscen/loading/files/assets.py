@@ -237,15 +237,22 @@ def shipped_robots() -> dict[str, Path]:
 
 
 def find_criterion_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, CriterionMask]:
-    """Load the filter masks of the criteria under `pass`; problems are added to `assets`.
+    """Load the filter masks of the criteria under `pass`, by path as written; problems are added to `assets`.
 
-    The keys are the paths as written. A path that several criteria name is loaded for the first of them.
+    Logs distinguish masks by these paths, so it is a problem if one path leads to two files. That is possible with
+    `pass+` in a scenario in another folder than the file that it extends.
     """
     found: dict[str, CriterionMask] = {}
     for reference in references(spec):
         node = node_at(tree, reference.keys)
-        if reference.target == "mask" and reference.keys[0] == "pass" and isinstance(node, ScalarNode):
-            loaded = assets.map(node)
-            if loaded is not None:
-                found.setdefault(reference.name, CriterionMask(reference.keys, loaded))
+        if reference.target != "mask" or reference.keys[0] != "pass" or not isinstance(node, ScalarNode):
+            continue
+        loaded = assets.map(node)
+        if loaded is None:
+            continue
+        first = found.setdefault(reference.name, CriterionMask(reference.keys, loaded))
+        if first.map.path != loaded.path:
+            message = f"{quoted(reference.name)} is also the path of another mask, in a file that this one extends"
+            hint = f"write it in another way, e.g. `./{reference.name}`"
+            assets.problems.append(Problem(*node.position, code="SC016", message=message, hint=hint))
     return found
