@@ -38,7 +38,10 @@ class RobotSize:
 
 
 def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
-    """Return the radius in m of the largest circle around the origin inside a footprint, which is round if `radius`."""
+    """Return the radius in m of the largest circle around the origin inside a footprint.
+
+    `radius` is that of a round footprint, and None for a polygon.
+    """
     if radius is not None:
         return radius
     ends = (*footprint[1:], footprint[0])
@@ -48,7 +51,7 @@ def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
 def robot_size(loaded: LoadedScenario) -> RobotSize:
     """Return the size of a scenario's robot. Raises InvalidInput for an unusable robot.
 
-    The robot is not built, which is slow, if its file has simple shapes as body and a footprint or radius.
+    To build the robot is slow. That is avoided if its file has simple shapes as body, and a footprint or radius.
     """
     spec = loaded.robot.spec
     if (
@@ -99,7 +102,7 @@ def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, 
 def blocking_world(loaded: LoadedScenario, world: World) -> World:
     """Return the world with only the solids that block the scenario's robot. Raises InvalidInput for an unusable robot.
 
-    The robot is not built, which is slow, if the world has no solids that it could drive over.
+    To build the robot is slow. That is avoided if the world has no solids that it could drive over.
     """
     spec = loaded.robot.spec
     radius = None if spec is None else getattr(spec.drive, "wheel_radius", 0.0)

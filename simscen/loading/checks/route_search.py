@@ -147,7 +147,7 @@ def _required_areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> 
 
 
 def _distance_to_region(corners: Polygon, max_distance: float) -> Callable[[Pose2], float]:
-    """Return the function for the distance from the area within `max_distance` m of a region."""
+    """Return the `distance` of the area that consists of a region and everything within `max_distance` m of it."""
     return lambda pose: distance_to_polygon(pose, corners) - max_distance
 
 

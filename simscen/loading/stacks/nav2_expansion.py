@@ -88,7 +88,7 @@ def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree
     library.add({display_name: parameters.text}, {display_name: file})
     profile = MappingNode(position, {"profile": Entry(position, ScalarNode(position, "nav2"))})
     clock = _clock(result.tree)
-    translations = [_with_possible_rate(one, clock) for one in translate(parameters.nodes, _known_parameters())]
+    translations = [_with_possible_frequency(one, clock) for one in translate(parameters.nodes, _known_parameters())]
     below = profile
     for translation in translations:
         if translation.keys:
@@ -108,8 +108,8 @@ def _clock(scenario: MappingNode) -> Clock:
         return Clock()  # validation reports the error
 
 
-def _with_possible_rate(one: Translation, clock: Clock) -> Translation:
-    """Return a translation; a controller frequency whose period is not a whole number of ticks is rounded."""
+def _with_possible_frequency(one: Translation, clock: Clock) -> Translation:
+    """Return the translation, with the nearest possible controller frequency: its period must be whole ticks."""
     if one.keys != ("controller_frequency",) or not isinstance(one.value, int | float) or one.value <= 0:
         return one
     try:

@@ -1,6 +1,7 @@
 """Parse and evaluate the conditions on varied values under `require:`, such as `goals[0].pose.x > robot.pose.x + 1`.
 
-Conditions have the syntax of Python. They are parsed with `ast` and interpreted here, so that they cannot run code.
+Conditions have the syntax of Python. They are parsed with `ast` and interpreted here, so that they cannot run code. The
+function `value` takes a path as text, because `pass.clearance.min` is not valid Python.
 """
 
 import ast
@@ -16,6 +17,7 @@ from simscen.loading.variations.paths import PathError, resolve_path
 from simscen.loading.yaml.tree import MappingNode, Node, child
 from simscen.spec.quantities import si_number
 
+# What conditions can contain, besides `and`, `or`, and `not`.
 _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
     ast.Eq: operator.eq, ast.NotEq: operator.ne,
@@ -24,8 +26,6 @@ _OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
 }  # fmt: skip
 _FUNCTIONS: dict[str, Callable[..., float]] = {"abs": abs, "min": min, "max": max, "hypot": math.hypot, "wrap": wrap}
-VALUE = "value"
-"""Function in conditions that takes a path as text: `pass.clearance.min` is not valid Python, because of `pass`."""
 GRAMMAR = (
     "comparisons such as `goals[0].pose.x > robot.pose.x + 1` with and, or, not, + - * /, abs, min, max, hypot, wrap; "
     "quantities in quotes: '50 cm'; value('pass.clearance.min') for paths with words of Python"
@@ -112,7 +112,10 @@ def _path(node: ast.expr, text: str) -> str:
 
 
 def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
-    """Return the value of an expression: a number in SI units, a text, or a boolean. Raises TypeError, for example."""
+    """Return the value of an expression: a number in SI units, a text, or a boolean.
+
+    Raises TypeError, ZeroDivisionError, or OverflowError if it cannot be evaluated.
+    """
     match node:
         case ast.BoolOp(op=ast.And(), values=parts):
             return all(_truth(part, values) for part in parts)

@@ -24,7 +24,7 @@ MAX_TOTAL_VALUES = 5_000_000
 MAX_REJECTED_DRAWS = 10_000
 """Number of consecutive draws that do not meet `require` after which drawing is given up with an error."""
 _DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
-"""Top-level keys that do not affect a run. Values below them do not appear in names of variations."""
+"""Top-level keys that do not change what happens in a run. Their values do not appear in names of variations."""
 
 
 @dataclass(frozen=True)
