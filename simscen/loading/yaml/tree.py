@@ -1,6 +1,7 @@
 """Tree of a YAML file with the positions of its keys and values.
 
-Trees are immutable. A changed tree shares the nodes that did not change.
+Trees are immutable. A changed tree shares the nodes that did not change. Some functions take a `loc`: keys, or the
+location of an error in pydantic, which also names members of unions between the keys. These names are skipped.
 """
 
 from collections.abc import Iterator, Sequence
@@ -110,10 +111,6 @@ def replace_at(node: Node | None, keys: Keys, value: Node, position: Position) -
     old = mapping.entries.get(str(key))
     entry = Entry(old.key if old else position, replace_at(old.value if old else None, rest, value, position))
     return MappingNode(mapping.position, {**mapping.entries, str(key): entry})
-
-
-# The functions below also take a pydantic `loc`, which names the members of unions between the keys of the file. These
-# names do not exist in the tree and are skipped.
 
 
 def existing_keys(node: Node, loc: Sequence[Key]) -> Keys:
