@@ -12,7 +12,7 @@ from simscen.loading.files.single_files import load_world_file
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_variations
 from simscen.loading.stacks.choice import StackChoice
-from simscen.loading.variations.naming import VariationProblems, merge_problems
+from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.world_cache import WorldCache
 
 CHECKED_VARIATIONS = range(1, 4)

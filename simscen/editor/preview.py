@@ -15,8 +15,8 @@ from simscen.grid_graph import polyline_length
 from simscen.loading.checks.scene import Scene
 from simscen.loading.goals import scenario_goals
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.open_ground import extend_bounds
 from simscen.loading.robot_size import RobotSize, blocking_world, robot_size
-from simscen.loading.world_cache import extend_bounds
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 OUTLINE_STEP_M = 0.05

@@ -1,4 +1,4 @@
-"""Build the world, the maps, the filter masks, and the robot that a loaded scenario names."""
+"""Build the world, the map, the filter masks, and the robot of a loaded scenario from their files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry.shapes import Mesh
 from simscen.loading.loaded import CriterionMask, LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
-from simscen.loading.yaml.tree import Key, MappingNode, key_position, value_position
+from simscen.loading.yaml.tree import Keys, MappingNode, key_position, value_position
 from simscen.model.robot import RobotSpec
 from simscen.model.world import WorldSpec
 from simscen.worlds.world_file import world_from_spec
@@ -29,9 +29,10 @@ def load_world(loaded: LoadedScenario) -> World:
 
 
 def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] = (), lenient: bool = False) -> World:
-    """Build the world of a world file. Files that SDF refers to must lie in `root` or `world_path`.
+    """Build a loaded world. Files that an SDF file refers to must lie in `root` or a folder of `world_path`.
 
-    Raises InvalidInput for an unusable map image or SDF file; with `lenient`, unsupported SDF elements become notes.
+    With `lenient`, unsupported elements of an SDF file become notes of the world instead of errors. Raises InvalidInput
+    for an unusable map image or SDF file.
     """
     base: World | None = None
     if source.sdf is not None:
@@ -44,18 +45,19 @@ def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] 
 
 
 def load_map(source: LoadedMap) -> OccupancyGrid:
-    """Load the grid of a ROS map."""
+    """Load the occupancy grid of a ROS map. Raises InvalidInput for an unusable image."""
     return _map_and_notes(source)[0]
 
 
 def _map_and_notes(source: LoadedMap) -> tuple[OccupancyGrid, tuple[str, ...]]:
+    """Return the grid of a ROS map, and warnings about its image."""
     from simscen.worlds.maps.ros_map import load_map
 
     return load_map(source.spec, source.image)
 
 
 def read_mesh(path: Path) -> Mesh:
-    """Read a mesh for a URDF. Raises ValueError, which the URDF reader reports at the line that names the mesh."""
+    """Read a mesh that a URDF names. Raises ValueError, as the reader of URDFs expects, for an unusable file."""
     from simscen.worlds.sdf.meshes import read_mesh as read
 
     try:
@@ -65,9 +67,10 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
-    """Load the specification of the robot (inferred if it is only a URDF) and its body, including the payload.
+    """Return the specification and the body of a scenario's robot, with the payload and torque that the scenario sets.
 
-    Raises InvalidInput for unusable files and for a payload that would tip the robot over.
+    The specification of a robot that is only a URDF is inferred. Raises InvalidInput for unusable files, and for a
+    payload that would tip the robot over.
     """
     try:
         spec, body = robot_from_file(loaded.robot, (loaded.root, *loaded.world_path))
@@ -77,7 +80,7 @@ def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
 
 
 def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
-    """Return the body with the payload and the motor torque that the scenario sets."""
+    """Return the body with the payload and the motor torque of the scenario. Raises InvalidInput if it tips over."""
     entry = loaded.spec.only_robot
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
@@ -95,44 +98,47 @@ def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBo
 
 
 def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:
-    """Load the specification and body of a robot. Files that it refers to must lie in `roots`."""
+    """Return the specification and the body of a robot. Files that it refers to must lie in `roots`.
+
+    Raises InvalidInput for unusable files.
+    """
     from simscen.sim.body.from_spec import build_robot_body
     from simscen.sim.urdf.xacro.expand import UnknownArgument
     from simscen.sim.urdf.xml_source import RobotFiles
 
-    spec = robot.spec or _infer_spec(robot.path, roots)
+    spec = robot.spec
+    if spec is None:
+        from simscen.sim.urdf.body import infer_robot_spec
+
+        spec = infer_robot_spec(robot.path, roots, read_mesh)
     files = RobotFiles(robot.urdf, robot.packages) if robot.urdf else None
     try:
         return spec, build_robot_body(spec, robot.path, roots, read_mesh, files)
     except UnknownArgument as error:
-        raise InvalidInput([_unknown_argument(robot, error.name, error.declared)]) from error
+        raise InvalidInput([_unknown_argument_problem(robot, error.name, error.declared)]) from error
 
 
-def _unknown_argument(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Problem:
+def _unknown_argument_problem(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Problem:
+    """Return the problem that a robot file sets an argument that its xacro file does not declare."""
     assert robot.tree is not None and robot.urdf is not None  # only robot files with xacro have arguments
     message = f"{quoted(robot.urdf.name)} declares no argument {quoted(argument)}"
     hint = suggestion(argument, declared) or "it has no <xacro:arg>"
     return Problem(*key_position(robot.tree, ("arguments", argument)), "SC403", message, hint)
 
 
-def _infer_spec(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:
-    from simscen.sim.urdf.body import infer_robot_spec
-
-    return infer_robot_spec(urdf, roots, read_mesh)
-
-
-KEEPOUT_KEYS: tuple[Key, ...] = ("stack", "keepout_mask")
-SPEED_KEYS: tuple[Key, ...] = ("stack", "speed_mask", "file")
+KEEPOUT_KEYS: Keys = ("stack", "keepout_mask")
+SPEED_KEYS: Keys = ("stack", "speed_mask", "file")
+"""Keys of the paths of the stack's masks in a scenario."""
 
 MAX_BLOCKS = 100_000
-"""Largest number of rectangles of equal cells in a mask of a criterion. Each log contains them."""
+"""Largest number of rectangles of equal cells in a mask of a criterion, because every log contains the rectangles."""
 
-AddSource = Callable[[Problem], Problem]
-"""Adds the source line to a problem."""
+WithSourceLine = Callable[[Problem], Problem]
+"""Function that returns a problem with the text of its source line."""
 
 
 def load_masks(loaded: LoadedScenario) -> FilterMasks:
-    """Load the masks of the stack. Raises InvalidInput at the line that names an unreadable mask."""
+    """Load the filter masks of the stack. Raises InvalidInput at the line that names an unreadable mask."""
     keepout = _stack_mask_grid(loaded, KEEPOUT_KEYS, loaded.keepout_mask)
     grid, spec = _stack_mask_grid(loaded, SPEED_KEYS, loaded.speed_mask), loaded.spec.stack.speed_mask
     if grid is None or spec is None:
@@ -141,13 +147,17 @@ def load_masks(loaded: LoadedScenario) -> FilterMasks:
 
 
 def load_criterion_masks(
-    masks: Mapping[str, CriterionMask], tree: MappingNode, with_source_line: AddSource
+    masks: Mapping[str, CriterionMask], tree: MappingNode, with_source_line: WithSourceLine
 ) -> dict[str, MaskBlocks]:
-    """Load the masks of criteria. Raises InvalidInput at the line that names an unusable mask."""
+    """Load the filter masks of criteria, by path as written; the criteria in `tree` name them.
+
+    Raises InvalidInput at the line that names an unusable mask.
+    """
     return {name: _criterion_mask_blocks(mask, tree, with_source_line) for name, mask in masks.items()}
 
 
-def _criterion_mask_blocks(mask: CriterionMask, tree: MappingNode, with_source_line: AddSource) -> MaskBlocks:
+def _criterion_mask_blocks(mask: CriterionMask, tree: MappingNode, with_source_line: WithSourceLine) -> MaskBlocks:
+    """Return a mask divided into rectangles of equal cells."""
     cells = mask_blocks(_mask_grid(mask.map, mask.keys, tree, with_source_line))
     if len(cells.blocks) > MAX_BLOCKS:
         message = f"mask image {mask.map.image.name} falls into {len(cells.blocks)} rectangles of equal cells"
@@ -156,13 +166,13 @@ def _criterion_mask_blocks(mask: CriterionMask, tree: MappingNode, with_source_l
     return cells
 
 
-def _stack_mask_grid(loaded: LoadedScenario, keys: tuple[Key, ...], source: LoadedMap | None) -> OccupancyGrid | None:
+def _stack_mask_grid(loaded: LoadedScenario, keys: Keys, source: LoadedMap | None) -> OccupancyGrid | None:
+    """Return the grid of a mask of the stack; None if the stack has none."""
     return None if source is None else _mask_grid(source, keys, loaded.tree, loaded.with_source_line)
 
 
-def _mask_grid(
-    source: LoadedMap, keys: tuple[Key, ...], tree: MappingNode, with_source_line: AddSource
-) -> OccupancyGrid:
+def _mask_grid(source: LoadedMap, keys: Keys, tree: MappingNode, with_source_line: WithSourceLine) -> OccupancyGrid:
+    """Return the grid of the mask that the scenario names at `keys`. Raises InvalidInput at this position."""
     try:
         return load_map(source)
     except InvalidInput as error:

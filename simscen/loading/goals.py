@@ -1,4 +1,4 @@
-"""Goals of a scenario."""
+"""Goals of a scenario: those that it lists, with their tolerances, and those that its events send."""
 
 import math
 from collections.abc import Callable
@@ -6,20 +6,24 @@ from dataclasses import replace
 
 from simscen.actions.robot import NewGoal
 from simscen.core.messages.navigation import Goal, loop_goal_name
+from simscen.loading.yaml.tree import Keys
 from simscen.model.navigation import expected_failure_name
 from simscen.model.scenario import GoalEntry, ScenarioSpec
 from simscen.model.stack_base import StackBase
 
 
 def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
-    """Return all goals in order, with names and tolerances; names in further loops end in `#2`, `#3`, …"""
+    """Return the goals that the scenario lists, in order, repeated for each loop.
+
+    The names of goals in further loops end in `#2`, `#3`, … Missing tolerances are those of the goal checker.
+    """
     goals = [_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True)]
     if spec.navigation.mode == "navigate_through_poses":
-        via = [
+        intermediate = [
             _intermediate_goal(goal, entry, spec.navigation.radius)
             for goal, entry in zip(goals, spec.goals, strict=True)
         ]
-        goals = [*via[:-1], *goals[-1:]]
+        goals = [*intermediate[:-1], *goals[-1:]]
     return tuple(
         replace(goal, name=loop_goal_name(goal.name, loop))
         for loop in range(1, spec.navigation.loops + 1)
@@ -28,7 +32,10 @@ def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
 
 
 def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, str]:
-    """Return the expected failure by goal; navigate_through_poses fails at all goals or none."""
+    """Return the name of the expected failure of each of `goals` that is expected to fail, by name of the goal.
+
+    With navigate_through_poses, all goals fail or none: the expectation of the last goal applies to all.
+    """
     through = spec.navigation.mode == "navigate_through_poses"
     found = {}
     for number, goal in enumerate(goals):
@@ -39,15 +46,18 @@ def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, 
 
 
 def _intermediate_goal(goal: Goal, entry: GoalEntry, radius: float) -> Goal:
-    """Return a goal as navigate_through_poses passes it: within `radius` m, at any heading."""
+    """Return a goal that navigate_through_poses passes without stopping: within `radius` m, at any heading."""
     return replace(goal, via=True, xy_tolerance=entry.xy_tolerance or radius, yaw_tolerance=math.pi)
 
 
-def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]) -> dict[tuple[str | int, ...], Goal]:
-    """Return the goals that events send to robots for which `includes_robot` is true, by path in the scenario file."""
+def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]) -> dict[Keys, Goal]:
+    """Return the goals that events send, by the keys of their actions in the scenario file.
+
+    `includes_robot` selects them by the robot that an action names (None: it names no robot).
+    """
     checker = spec.stack.goal_checker
-    found: dict[tuple[str | int, ...], Goal] = {}
-    for keys, action in (placed for step in spec.steps for placed in step.located_actions()):
+    found: dict[Keys, Goal] = {}
+    for keys, action in (located for step in spec.steps for located in step.located_actions()):
         if isinstance(sent := action.chosen, NewGoal) and includes_robot(action.robot):
             where = (*keys, "new_goal")
             found[where] = Goal(
@@ -61,6 +71,7 @@ def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]
 
 
 def _goal(name: str, entry: GoalEntry, stack: StackBase) -> Goal:
+    """Return a listed goal; missing tolerances are those of the goal checker of the stack."""
     return Goal(
         name=name,
         pose=entry.pose.pose,

@@ -10,8 +10,10 @@ from simscen.model.scenario import ScenarioSpec
 
 _TOKEN = re.compile(r"[()]|[^\s()]+")
 MAX_DEPTH = 50
+"""Largest depth of nested `not` and parentheses."""
 
 Matcher = Callable[[str], bool]
+"""Function that returns whether a title matches an expression."""
 
 
 class Selectable(Protocol):
@@ -41,21 +43,21 @@ def select(scenarios: Iterable[Item], keyword: str = "", tags: Sequence[str] = (
     matches = keyword_matcher(keyword) if keyword.strip() else lambda _: True
     chosen = [s for s in candidates if matches(s.title) and (not tags or not set(tags).isdisjoint(s.spec.tags))]
     if not chosen:
-        raise NothingSelected(_describe_no_match(candidates, keyword, tags))
+        raise NothingSelected(_no_match_message(candidates, keyword, tags))
     return chosen
 
 
 def keyword_matcher(expression: str) -> Matcher:
-    """Return the test for titles that an expression describes. Raises UsageError for an invalid expression."""
-    reader = _Reader(_TOKEN.findall(expression), expression)
-    matcher = reader.parse_or(0)
-    if reader.tokens:
-        raise reader.error(f"unexpected {quoted(reader.tokens[0])}")
+    """Return the matcher for an expression such as `aisle and not slow`. Raises UsageError if it is invalid."""
+    parser = _Parser(_TOKEN.findall(expression), expression)
+    matcher = parser.parse_or(0)
+    if parser.tokens:
+        raise parser.error(f"unexpected {quoted(parser.tokens[0])}")
     return matcher
 
 
-class _Reader:
-    """Recursive descent parser; precedence: or < and < not < parentheses."""
+class _Parser:
+    """Recursive descent parser of expressions. `or` binds weakest, then `and`, then `not`. `tokens` are the rest."""
 
     def __init__(self, tokens: list[str], expression: str) -> None:
         self.tokens, self._expression = tokens, expression
@@ -63,25 +65,25 @@ class _Reader:
     def parse_or(self, depth: int) -> Matcher:
         """Parse terms joined by `or`."""
         options = [self._parse_and(depth)]
-        while self._next_is("or"):
+        while self._take("or"):
             options.append(self._parse_and(depth))
         return lambda text: any(option(text) for option in options)
 
     def _parse_and(self, depth: int) -> Matcher:
         parts = [self._parse_term(depth)]
-        while self._next_is("and"):
+        while self._take("and"):
             parts.append(self._parse_term(depth))
         return lambda text: all(part(text) for part in parts)
 
     def _parse_term(self, depth: int) -> Matcher:
         if depth > MAX_DEPTH:
             raise self.error(f"it is nested deeper than {MAX_DEPTH}")
-        if self._next_is("not"):
+        if self._take("not"):
             inner = self._parse_term(depth + 1)
             return lambda text: not inner(text)
-        if self._next_is("("):
+        if self._take("("):
             inner = self.parse_or(depth + 1)
-            if not self._next_is(")"):
+            if not self._take(")"):
                 raise self.error("a parenthesis is not closed")
             return inner
         if not self.tokens or self.tokens[0] in ("and", "or", ")"):
@@ -89,18 +91,20 @@ class _Reader:
         word = self.tokens.pop(0).casefold()
         return lambda text: word in text.casefold()
 
-    def _next_is(self, token: str) -> bool:
+    def _take(self, token: str) -> bool:
+        """Remove the next token and return True if it is `token`; else return False."""
         if self.tokens and self.tokens[0] == token:
             self.tokens.pop(0)
             return True
         return False
 
     def error(self, why: str) -> UsageError:
-        """Return the error with the whole expression."""
+        """Return the error for the expression, with a reason."""
         return UsageError(f"cannot read -k {quoted(self._expression)}: {why}")
 
 
-def _describe_no_match(candidates: Sequence[Selectable], keyword: str, tags: Sequence[str]) -> str:
+def _no_match_message(candidates: Sequence[Selectable], keyword: str, tags: Sequence[str]) -> str:
+    """Return the message that no scenario is selected, with a hint for an unknown tag."""
     known = sorted({tag for scenario in candidates for tag in scenario.spec.tags})
     unknown = [tag for tag in tags if tag not in known]
     if unknown:

@@ -1,20 +1,12 @@
-"""Names that a scenario can refer to, and the replacement of names of places by their poses."""
+"""List the names that a scenario can refer to: of places, regions, objects, goals, events, faults, and verdicts."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, TypeVar
-
-from pydantic import BaseModel, RootModel
+from collections.abc import Mapping
 
 from simscen.core.environment.world_model import World
-from simscen.core.errors import Problem
 from simscen.core.messages.navigation import loop_goal_name
 from simscen.criteria.registry import verdict_names
-from simscen.loading.loaded import LoadedScenario, LoadedWorld
-from simscen.loading.schema.messages import quoted, suggestion
-from simscen.loading.spec_walk import Reference, references
-from simscen.loading.yaml.tree import Key, Node, value_position
+from simscen.loading.loaded import LoadedScenario
 from simscen.model.world import WorldSpec
-from simscen.spec.places import PlaceAllowed, PoseSpec
 
 NOUNS = {
     "place": "place of the world",
@@ -28,48 +20,54 @@ NOUNS = {
     "disturbance": "event, fault or mark",
     "verdict": "criterion, event or fault",
 }
+"""Kind of reference → words for what it refers to, in messages.
+
+A "movable" thing can be moved by actions. A "mover" is a movable thing or another robot, and can be followed.
+"""
 
 Names = Mapping[str, list[str] | None]
-"""Known names by kind of reference; None: they are known only when an imported world has been built."""
+"""Valid names by kind of reference. None: not known, because the scenario has an imported world that is not built yet,
+or because a scenario of several robots has verdicts of all of them."""
 
 
 def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
-    """Return all names that a scenario can refer to; those of an imported world need the built `world`."""
+    """Return all names that a scenario can refer to. For names in an imported world, the built `world` is needed."""
     world_names = _names_in_files(loaded) if world is None else _names_in_built_world(loaded, world)
     movable = world_names["movable"]
-    happening = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
+    disturbances = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
     return {
         **world_names,
         "mover": None if movable is None else [*movable, *loaded.other_robots],
         "goal": goal_names(loaded),
         "event": _distinct(event_names(loaded), mark_names(loaded)),
-        "disturbance": _distinct(happening, mark_names(loaded)),
-        "verdict": None if loaded.other_robots else _distinct(verdict_names(loaded.spec.pass_), happening),
+        "disturbance": _distinct(disturbances, mark_names(loaded)),
+        "verdict": None if loaded.other_robots else _distinct(verdict_names(loaded.spec.pass_), disturbances),
     }
 
 
 def goal_names(loaded: LoadedScenario) -> list[str]:
-    """Return the goals of the scenario, then those that its events send."""
-    return own_goal_names(loaded) + _defined(loaded, "new_goal")
+    """Return the names of the goals that the scenario lists, then of those that its events send."""
+    return listed_goal_names(loaded) + _defined(loaded, "new_goal")
 
 
-def own_goal_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of the goals in every loop: as written, or after their place, or goal-1, goal-2, …"""
+def listed_goal_names(loaded: LoadedScenario) -> list[str]:
+    """Return the names of the goals under `goals` in every loop: as written, or after their place, or goal-1, …"""
     loops = range(1, loaded.spec.navigation.loops + 1)
     return [loop_goal_name(name, loop) for loop in loops for name in loaded.spec.goal_names]
 
 
 def event_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of events, each followed by the steps of its story."""
+    """Return the names of the events, each followed by the names of the steps of its sequence."""
     return [step.name for step in loaded.spec.steps]
 
 
 def mark_names(loaded: LoadedScenario) -> list[str]:
-    """Return the marks that events set, in order."""
+    """Return the names of the marks that events set, in order."""
     return _distinct(_defined(loaded, "mark"))
 
 
 def _names_in_files(loaded: LoadedScenario) -> Names:
+    """Return the names of things of the world as far as the files contain them."""
     world = loaded.world.spec
     imported = world is None or loaded.world.map is not None or loaded.world.sdf is not None
     spawned = spawned_names(loaded)
@@ -85,6 +83,7 @@ def _names_in_files(loaded: LoadedScenario) -> Names:
 
 
 def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
+    """Return the names of things of the built world."""
     moving, spawned = [body.name for body in world.bodies], spawned_names(loaded)
     return {
         "place": list(world.places),
@@ -96,19 +95,19 @@ def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
 
 
 def world_object_names(loaded: LoadedScenario, world: World | None = None) -> list[str]:
-    """Return the names of objects in the world; without the built `world`, those of its file."""
+    """Return the names of all objects in the built world; without it, of those in the world file."""
     if world is not None:
         return [*(body.name for body in world.bodies), *(solid.name for solid in world.solids)]
     return _object_names(loaded.world.spec) if loaded.world.spec is not None else []
 
 
 def spawned_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of objects and pedestrians, also those of crowds, that events add to the world."""
+    """Return the names of the objects and pedestrians that events add to the world."""
     return _defined(loaded, "spawn") + pedestrian_names(loaded)
 
 
 def pedestrian_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of pedestrians, also those of crowds."""
+    """Return the names of the pedestrians that events add to the world, alone or in crowds."""
     crowds = [
         action.chosen.names
         for step in loaded.spec.steps
@@ -119,7 +118,7 @@ def pedestrian_names(loaded: LoadedScenario) -> list[str]:
 
 
 def _defined(loaded: LoadedScenario, kind: str) -> list[str]:
-    """Return the names that actions of one kind define; goals of other robots are skipped."""
+    """Return the names of what actions of one kind add, without goals of other robots."""
     actions = [action for step in loaded.spec.steps for action in step.actions]
     relevant = [action for action in actions if kind != "new_goal" or loaded.includes_robot(action.robot)]
     return [str(getattr(action.chosen, "name", "")) for action in relevant if action.kind == kind]
@@ -139,78 +138,5 @@ def _object_names(world: WorldSpec) -> list[str]:
 
 
 def _distinct(*names: list[str]) -> list[str]:
+    """Return the names of all lists, each once."""
     return list(dict.fromkeys(name for part in names for name in part))
-
-
-Spec = TypeVar("Spec", bound=BaseModel)
-Places = Mapping[str, PoseSpec]
-PLACEHOLDER_POSE = PoseSpec(x=0.0, y=0.0)
-"""Pose that replaces an unknown place, which is reported as a problem."""
-NO_WORLD_HINT = "name its world with `world:`"
-NO_PLACES_HINT = "the world has no places"
-
-
-def places_of(world: LoadedWorld | None) -> Places:
-    """Return the places of a world, which are all defined in its own file."""
-    return world.spec.places if world is not None and world.spec is not None else {}
-
-
-def resolve_places(spec: Spec, places: Places) -> Spec:
-    """Return the specification with poses and points instead of names of places."""
-    for reference, pose in _poses_of_references(spec, places):
-        spec = _replace_at(spec, reference.keys, pose)
-    return spec
-
-
-def resolve_criteria_places(plain: dict[str, Any], spec: BaseModel, places: Places) -> dict[str, Any]:
-    """Return the data of `spec` with poses and points instead of the names of places in its criteria.
-
-    Logs are judged without a world, so criteria in logs cannot refer to its places.
-    """
-    for reference, pose in _poses_of_references(spec, places):
-        if "pass" in reference.keys[:3:2]:  # of the scenario, or of one of its robots
-            written = pose.model_dump() if isinstance(pose, BaseModel) else pose
-            plain = _replace_at(plain, reference.keys, written)
-    return plain
-
-
-def place_references(spec: BaseModel) -> Iterator[Reference]:
-    """Yield the references to places."""
-    return (reference for reference in references(spec) if isinstance(reference.mark, PlaceAllowed))
-
-
-def unknown_places(
-    spec: BaseModel, tree: Node, known: Iterable[str], nothing: str = NO_PLACES_HINT
-) -> Iterator[Problem]:
-    """Yield a problem for each unknown place; `nothing` is the hint if there are no places at all."""
-    names = tuple(known)
-    for reference in place_references(spec):
-        if reference.name not in names:
-            hint = suggestion(reference.name, (*names, *getattr(reference.mark, "keywords", ()))) or nothing
-            message = f"no place of the world is called {quoted(reference.name)}"
-            yield Problem(*value_position(tree, reference.keys), code="SC030", message=message, hint=hint)
-
-
-def _poses_of_references(spec: BaseModel, places: Places) -> Iterator[tuple[Reference, Any]]:
-    """Yield each reference to a place with the value that replaces it."""
-    for reference in place_references(spec):
-        assert isinstance(reference.mark, PlaceAllowed)
-        yield (
-            reference,
-            reference.mark.value_at(places.get(reference.name, PLACEHOLDER_POSE).with_place(reference.name)),
-        )
-
-
-def _replace_at(holder: Any, keys: tuple[Key, ...], value: Any) -> Any:
-    """Return a copy of `holder` (model, list or dict) with `value` at `keys`."""
-    if isinstance(holder, RootModel):
-        return holder.model_copy(update={"root": _replace_at(holder.root, keys, value)})
-    if not keys:
-        return value
-    key, *below = keys
-    if isinstance(holder, BaseModel):
-        name = next(name for name, field in type(holder).model_fields.items() if key == (field.alias or name))
-        return holder.model_copy(update={name: _replace_at(getattr(holder, name), tuple(below), value)})
-    changed = holder.copy()
-    changed[key] = _replace_at(holder[key], tuple(below), value)
-    return changed

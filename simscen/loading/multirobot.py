@@ -1,4 +1,4 @@
-"""Split a scenario of several robots into one scenario per robot."""
+"""Handle `robots:`: split a scenario of several robots into one scenario per robot, and report missing keys."""
 
 from collections.abc import Iterator
 
@@ -9,15 +9,16 @@ from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, Sequ
 from simscen.model.scenario import RobotEntry
 
 ROBOT, ROBOTS, PASS, EXPECTED, STACK = "robot", "robots", "pass", "expected", "stack"
+"""Keys of a scenario."""
 ROBOT_KEYS = ("goals", "faults")
-"""Keys that are at top level for one robot, and under each robot if there are several."""
+"""Keys that are at top level for a single robot, and under each robot if there are several."""
 
 
 def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
-    """Return the scenario of each robot by name, sorted; empty for a scenario of one robot.
+    """Return the tree of a scenario for each robot alone, by name and sorted; empty for a scenario of one robot.
 
-    All nodes keep their positions in the file. The key `expected` is not copied, because it applies to the scenario as
-    a whole.
+    All nodes keep their positions in the file. The key `expected` is left out, because it applies to all robots
+    together.
     """
     robots = child(tree, ROBOTS)
     entries = robots.entries if isinstance(robots, MappingNode) else {}
@@ -25,7 +26,7 @@ def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
 
 
 def has_multiple_robots(tree: MappingNode) -> bool:
-    """Return whether `robots` is a valid mapping of robots."""
+    """Return whether a scenario has a key `robots` with a mapping of mappings."""
     robots = child(tree, ROBOTS)
     return isinstance(robots, MappingNode) and all(
         isinstance(entry.value, MappingNode) for entry in robots.entries.values()
@@ -33,23 +34,27 @@ def has_multiple_robots(tree: MappingNode) -> bool:
 
 
 def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
+    """Return the tree of a scenario for one robot, whose entry under `robots` is `entry`.
+
+    Its keys have priority over those at top level. Its criteria are added to those at top level.
+    """
     own_tree, position = entry.value, entry.value.position
     assert isinstance(own_tree, MappingNode)
     robot = {key: value for key, value in own_tree.entries.items() if key in RobotEntry.model_fields}
     own = {key: value for key, value in own_tree.entries.items() if key not in robot and key != PASS}
-    whole = merge_mappings(MappingNode(tree.position, own), _without(tree, ROBOTS, EXPECTED))
+    merged = merge_mappings(MappingNode(tree.position, own), tree.without_keys(ROBOTS, EXPECTED))
     criteria = SequenceNode(tree.position, (*_items(child(tree, PASS)), *_items(child(own_tree, PASS))))
     return MappingNode(
         tree.position,
-        {**whole.entries, ROBOT: Entry(entry.key, MappingNode(position, robot)), PASS: Entry(entry.key, criteria)},
+        {**merged.entries, ROBOT: Entry(entry.key, MappingNode(position, robot)), PASS: Entry(entry.key, criteria)},
     )
 
 
 def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
-    """Return a scenario with the selected stack in place of its own stack, or of the stacks of all its robots.
+    """Return a scenario with the selected stack instead of its own stack, or instead of the stacks of all its robots.
 
-    If the choice is a command for an external stack that a robot of the scenario already names, the tree is returned
-    unchanged.
+    If the choice is the command of an external stack that a robot of the scenario names, the tree is returned
+    unchanged, because the command is for this robot alone.
     """
     robots = child(tree, ROBOTS)
     if robots is None:
@@ -66,16 +71,16 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
         name: Entry(entry.key, _with_complete_stack(entry.value, chosen[name]))
         for name, entry in robots.entries.items()
     }
-    rest = _without(tree, STACK)
+    rest = tree.without_keys(STACK)
     return MappingNode(
         tree.position, {**rest.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.position, own))}
     )
 
 
 def _with_complete_stack(robot: Node, robot_scenario: MappingNode) -> MappingNode:
-    """Return the tree of a robot with the complete stack of `robot_scenario`.
+    """Return the entry of a robot with the complete `stack` section of `robot_scenario`.
 
-    The robot needs the complete stack because the common key `stack` is removed.
+    It must be complete, because the common `stack` section at top level is removed.
     """
     assert isinstance(robot, MappingNode)
     return MappingNode(
@@ -84,27 +89,24 @@ def _with_complete_stack(robot: Node, robot_scenario: MappingNode) -> MappingNod
 
 
 def external_stack_name(tree: MappingNode) -> str | None:
-    """Return the name of the external stack of a scenario of one robot."""
+    """Return the name of the external stack of a scenario of one robot; None if it has another stack."""
     stack = child(tree, STACK)
     name = None if stack is None else child(stack, EXTERNAL)
     return str(name.value) if isinstance(name, ScalarNode) else None
 
 
 def _items(node: Node | None) -> tuple[Node, ...]:
+    """Return the items of a list; () for anything else."""
     return node.items if isinstance(node, SequenceNode) else ()
 
 
-def _without(tree: MappingNode, *keys: str) -> MappingNode:
-    return MappingNode(tree.position, {key: entry for key, entry in tree.entries.items() if key not in keys})
-
-
 def scenario_robot_problems(tree: MappingNode) -> list[Problem]:
-    """Return problems with missing or contradictory `robot`, `robots` and `pass` in a scenario."""
+    """Return problems with the keys of robots and with `pass` in a scenario that are missing or exclude each other."""
     return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _single_robot_problems(tree))]
 
 
 def criteria_robot_problems(tree: MappingNode) -> list[Problem]:
-    """Return problems with missing or contradictory `robots` and `pass` in a file of criteria."""
+    """Return problems with `robots` and `pass` in a file of criteria, as `scenario_robot_problems` for scenarios."""
     return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _missing_criteria(tree))]
 
 

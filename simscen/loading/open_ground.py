@@ -1,4 +1,4 @@
-"""Start and goals on open ground: the map of a world with a ground plane covers them."""
+"""Extend the bounds of a world with open ground, so that its map covers the starts and goals of all robots."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,13 +9,13 @@ from simscen.core.geometry import Pose2
 from simscen.loading.checks.scene import expects_failure
 from simscen.loading.goals import event_goals, scenario_goals
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.world_cache import extend_bounds
+from simscen.loading.world_cache import Bounds
 
 
-def with_stops(world: World, loaded: LoadedScenario) -> World:
-    """Return the world with bounds that contain the stops of all robots if it has open ground; else the same object.
+def with_stops_in_bounds(world: World, loaded: LoadedScenario) -> World:
+    """Return a world with open ground with bounds that contain the stops of all robots; another world unchanged.
 
-    Stops are start poses, goals, and poses to which events kidnap a robot, without goals that are expected to fail.
+    Stops are start poses, goals that are not expected to fail, and poses to which events kidnap a robot.
     """
     if not world.has_open_ground or world.grid is not None or loaded.map is not None:
         return world
@@ -26,11 +26,19 @@ def with_stops(world: World, loaded: LoadedScenario) -> World:
 
 
 def _stops(loaded: LoadedScenario) -> Iterator[Pose2]:
+    """Yield the stops of the robot of a scenario."""
     spec = loaded.spec
     yield spec.only_robot.pose.pose
     for goal in (*scenario_goals(spec), *event_goals(spec, loaded.includes_robot).values()):
         if not expects_failure(spec, goal.name):
             yield goal.pose
-    for _, action in (placed for step in spec.steps for placed in step.located_actions()):
+    for _, action in (located for step in spec.steps for located in step.located_actions()):
         if isinstance(action.chosen, Kidnap) and loaded.includes_robot(action.robot):
             yield action.chosen.pose.pose
+
+
+def extend_bounds(bounds: Bounds, poses: list[Pose2]) -> Bounds:
+    """Return the bounds, enlarged to contain the poses."""
+    left, bottom, right, top = bounds
+    xs, ys = [pose.x for pose in poses], [pose.y for pose in poses]
+    return min([left, *xs]), min([bottom, *ys]), max([right, *xs]), max([top, *ys])

@@ -8,11 +8,13 @@ from typing import Any
 
 from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.spec_walk import Keys, walk
+from simscen.loading.spec_walk import walk
+from simscen.loading.yaml.tree import Keys
 from simscen.spec.choice import Choice
 from simscen.spec.registry import Entry, find, origin_of
 
 _HEADER_PREFIX = "plugin."
+"""Beginning of the keys of plugins in the header of a log."""
 
 
 def plugins_of(loaded: LoadedScenario) -> tuple[Entry, ...]:
@@ -27,27 +29,28 @@ def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[Entry, ...]:
 
 
 def used_by(*specs: Any) -> tuple[Entry, ...]:
-    """Return the plugins that validated specifications use, sorted."""
+    """Return the plugins that specifications use, sorted."""
     found = {entry for spec in specs for keys, part in walk(spec) for entry in _used(keys, part)}
     return _sorted(found)
 
 
 def log_header_key(entry: Entry) -> str:
-    """Return the key of a plugin in the header of a log, e.g. `plugin.criterion.dwell`."""
+    """Return the key under which the header of a log records the version of a plugin: `plugin.criterion.dwell`."""
     return f"{_HEADER_PREFIX}{entry.group}.{entry.name}"
 
 
 def requirement_of(entry: Entry) -> str:
-    """Return `package==version` of a plugin."""
+    """Return the requirement by which pip installs the package of a plugin in its version: `package==version`."""
     return f"{entry.distribution}=={entry.version}"
 
 
 def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[Problem]:
-    """Return a problem for each plugin that a log used and that is not installed in the same version.
+    """Return a problem for each plugin that a log used, but that is not installed in the same version.
 
-    `header` is the header of the log. Only plugins of the given `groups`, e.g. "criterion", are checked.
+    `header` is the header of the log. Only plugins of these `groups`, e.g. "criterion", are checked. The problems have
+    no path; the caller adds it.
     """
-    missing = []
+    missing: list[Problem] = []
     for key, recorded in sorted(header.items()):
         group, _, name = key.removeprefix(_HEADER_PREFIX).partition(".")
         if not key.startswith(_HEADER_PREFIX) or group not in groups:
@@ -57,8 +60,9 @@ def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[P
         if installed != recorded:
             difference = f"{installed} is installed" if installed else "it is not installed"
             message = f"the run was judged with {group} `{name}` of {recorded}, but {difference}"
-            missing.append((message, f"`pip install {recorded}`, or judge with another file: --scenario"))
-    return [Problem("", 0, 0, "SC805", message, hint) for message, hint in missing]
+            hint = f"`pip install {recorded}`, or judge with another file: --scenario"
+            missing.append(Problem("", 0, 0, "SC805", message, hint))
+    return missing
 
 
 def _sorted(entries: Iterable[Entry]) -> tuple[Entry, ...]:
@@ -66,6 +70,7 @@ def _sorted(entries: Iterable[Entry]) -> tuple[Entry, ...]:
 
 
 def _used(keys: Keys, part: Any) -> Iterator[Entry]:
+    """Yield the plugin that defines a part of a specification, if one does; `keys` are those of the part."""
     if isinstance(part, Choice):
         entry = find(part.group, part.kind) if part.original_class is not None else None
         if entry is not None and not entry.shipped:

@@ -1,4 +1,4 @@
-"""Size of a robot, and the parts of a world that block it."""
+"""Determine the size of a robot, and which solids of a world block it."""
 
 import math
 from dataclasses import dataclass, replace
@@ -8,7 +8,6 @@ from simscen.core.geometry.polygons import distance_to_segment
 from simscen.core.geometry.shapes import Solid
 from simscen.loading.builders import load_robot
 from simscen.loading.loaded import LoadedScenario
-from simscen.model.robot import RobotSpec
 from simscen.sim.body.robot_body import RobotBody, check_ground_clearance
 from simscen.worlds.geometry.prisms import has_no_drivable_solids
 
@@ -18,25 +17,31 @@ CIRCLE_CORNERS = 24
 
 @dataclass(frozen=True)
 class RobotSize:
-    """Size of a robot: `footprint` (base frame, m), `radius` of a round one (m), and `height` of the hull (m).
-
-    `underside` is the height (m) of the lowest point of the hull of an omnidirectional or mecanum base, which stays at
-    z = 0. It is None for other bases, whose wheels climb low obstacles.
-    """
+    """Size of a robot in m."""
 
     footprint: Polygon
+    """Corners of the footprint in the base frame."""
     radius: float | None
+    """Radius of a round footprint; None for a polygon."""
     height: float
+    """Height of the top of the hull above the floor."""
     underside: float | None = None
+    """Height of the lowest point of the hull of an omnidirectional or mecanum base, which stays at z = 0.
+
+    None for other bases, whose wheels climb low obstacles.
+    """
 
     @property
     def inscribed(self) -> float:
-        """The inscribed radius in m."""
+        """Radius in m of the largest circle around the base frame's origin inside the footprint."""
         return inscribed_radius(self.radius, self.footprint)
 
 
 def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
-    """Return the radius in m of the largest circle around the base's origin inside the footprint."""
+    """Return the radius in m of the largest circle around the origin inside a footprint.
+
+    `radius` is that of a round footprint, and None for a polygon.
+    """
     if radius is not None:
         return radius
     ends = (*footprint[1:], footprint[0])
@@ -46,7 +51,7 @@ def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
 def robot_size(loaded: LoadedScenario) -> RobotSize:
     """Return the size of a scenario's robot. Raises InvalidInput for an unusable robot.
 
-    A robot of simple shapes with a footprint or radius in its file need not be built for this.
+    To build the robot is slow. That is avoided if its file has simple shapes as body, and a footprint or radius.
     """
     spec = loaded.robot.spec
     if (
@@ -56,23 +61,23 @@ def robot_size(loaded: LoadedScenario) -> RobotSize:
         and spec.drive.type != "mecanum"
     ):
         check_ground_clearance(spec, loaded.robot.path)
-        corners = tuple((x, y) for x, y in spec.footprint) if spec.footprint is not None else _round(spec.radius or 0.0)
+        corners = (
+            tuple((x, y) for x, y in spec.footprint) if spec.footprint is not None else _circle(spec.radius or 0.0)
+        )
         is_planar = spec.drive.type == "omnidirectional"
         underside = min(part.z for part in spec.body) if is_planar else None
-        return RobotSize(corners, spec.radius, _height_of_shapes(spec), underside)
+        height = max(part.z + part.total_height for part in spec.body)
+        return RobotSize(corners, spec.radius, height, underside)
     body = load_robot(loaded)[1]
     low, high = _hull_heights(body)
     is_planar = body.drive.type in ("omnidirectional", "mecanum")
     return RobotSize(body.footprint, body.radius, high, low if is_planar else None)
 
 
-def _round(radius: float) -> Polygon:
+def _circle(radius: float) -> Polygon:
+    """Return a polygon that approximates a circle around the origin."""
     angles = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
     return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
-
-
-def _height_of_shapes(spec: RobotSpec) -> float:
-    return max(part.z + part.total_height for part in spec.body or ())
 
 
 def _hull_heights(body: RobotBody) -> tuple[float, float]:
@@ -84,7 +89,7 @@ def _hull_heights(body: RobotBody) -> tuple[float, float]:
 
 
 def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:
-    """Return the solids that block a robot: all except the ramps that it can climb."""
+    """Return the solids that block a robot: all except those that it can drive over or climb, such as ramps."""
     reach = max((wheel.radius for wheel in body.wheels), default=0.0)
     if has_no_drivable_solids(solids, reach):
         return solids
@@ -95,9 +100,9 @@ def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, 
 
 
 def blocking_world(loaded: LoadedScenario, world: World) -> World:
-    """Return the world with only the solids that block the scenario's robot.
+    """Return the world with only the solids that block the scenario's robot. Raises InvalidInput for an unusable robot.
 
-    The robot is built only if the world is not flat. Raises InvalidInput for an unusable robot.
+    To build the robot is slow. That is avoided if the world has no solids that it could drive over.
     """
     spec = loaded.robot.spec
     radius = None if spec is None else getattr(spec.drive, "wheel_radius", 0.0)

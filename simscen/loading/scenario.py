@@ -1,4 +1,4 @@
-"""Load a scenario with all files that it refers to, or report all its problems."""
+"""Load a scenario, its variations, and all files that it refers to; or report all problems."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -11,21 +11,22 @@ from simscen.loading.checks.runner import check_robot_names, check_scenario
 from simscen.loading.codes import STACK_CANNOT
 from simscen.loading.files.assets import Assets, find_criterion_masks
 from simscen.loading.files.paths import PathSandbox
-from simscen.loading.known_names import places_of, resolve_places, unknown_places
-from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
+from simscen.loading.loaded import LoadedMap, LoadedScenario
+from simscen.loading.named_places import places_of, resolve_places, unknown_places
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import StackChoice, not_a_scenario, recognize_stack_file
-from simscen.loading.stacks.nav2_parameters import with_nav2_parameters
+from simscen.loading.stacks.nav2_expansion import with_nav2_parameters
 from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
-from simscen.loading.variations.naming import VariationProblems, merge_problems, number_of
+from simscen.loading.variations.naming import number_of
 from simscen.loading.variations.options import Change
+from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.yaml.library import Library
-from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, child, node_at, value_position
+from simscen.loading.yaml.tree import Keys, MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec
-from simscen.model.world import WorldSpec
 
 SUFFIXES = (".scenario.yaml", ".scenario.yml", ".yaml", ".yml")
+"""Suffixes that are not part of the id of a scenario."""
 
 
 def load_scenario(
@@ -35,12 +36,12 @@ def load_scenario(
     choice: StackChoice | None = None,
     variation: str = "",
 ) -> LoadedScenario:
-    """Load the scenario in the file `path`; paths in it must lead into `root` or a folder of `world_path`.
+    """Load the scenario in the file `path`, or one of its variations.
 
-    `world_path` are the folders in which worlds are searched. `choice` is the stack selected with `--stack`, which
-    replaces the scenario's own. `variation` is the name of one of its variations; "" for a file without variations.
-    Raises InvalidInput with all problems of the scenario and of the files it names, and UsageError if the variation is
-    unknown or missing.
+    All files that it refers to must lie in `root` or in a folder of `world_path`, in which worlds are searched.
+    `choice` is the stack selected with `--stack`, which replaces the stack of the scenario. `variation` is the name of
+    the variation; "" for a file without variations. Raises InvalidInput with all problems of the scenario and its
+    files, and UsageError if there is no such variation, or if a file with variations is loaded without naming one.
     """
     number = number_of(variation)
     loaded = try_variations(path, root, world_path, choice, None if number is None else [number])
@@ -58,7 +59,7 @@ def load_scenario(
 def try_scenario(
     path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
 ) -> LoadedScenario | list[Problem]:
-    """Return the scenario in a file (the first variation if it has several), or all problems of the file."""
+    """Return the scenario in a file (its first variation if it has any), or all problems of the file."""
     loaded = try_variations(path, root, world_path, choice)
     return loaded if isinstance(loaded, list) else loaded[0]
 
@@ -71,11 +72,12 @@ def try_variations(
     numbers: Sequence[int] | None = None,
     unsaved: Mapping[Path, str] | None = None,
 ) -> tuple[LoadedScenario, ...] | list[Problem]:
-    """Return all variations of the scenario in a file in order, or all problems of any of them.
+    """Return all variations of the scenario in a file, in order; or all problems if any of them has errors.
 
-    A file without variations yields one scenario whose variation has no name. `numbers` selects variations, counted
-    from 1. Numbers that do not exist, and variations that do not meet the conditions in `require`, are skipped.
-    `unsaved` contains the texts of files that are changed in an editor, but not saved.
+    A file without variations yields one scenario with `variation` "". `numbers` selects variations, counted from 1.
+    Numbers that do not exist, and variations that do not meet the conditions in `require`, are skipped. `unsaved`
+    contains the texts of files that are changed in an editor, but not saved. The other parameters are those of
+    `load_scenario`.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     read = _read(path, library, choice)
@@ -97,7 +99,7 @@ def try_variations(
 def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()) -> VariationSpace | None:
     """Return the variations of the scenario in a file without loading them; None if it has none.
 
-    Raises InvalidInput.
+    Raises InvalidInput if the file or its `variations` cannot be read.
     """
     library = Library(PathSandbox.around(root, world_path))
     read = _read(path, library, None)
@@ -108,11 +110,11 @@ def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()
 
 
 class ChangedScenario:
-    """A scenario file whose content is changed in memory, for example to find a smaller scenario.
+    """Loads changed versions of a scenario file without writing them, for example to find a smaller scenario.
 
-    `merged_tree` is the content of the file merged with what it extends and with `defaults.yaml`. `base_tree` is
-    `merged_tree` without the key `variations`. `tree` is `base_tree` with the values of the selected variation, which
-    `changes` lists.
+    `merged_tree` is the content of the file merged with the files that it extends and with `defaults.yaml`. `base_tree`
+    is `merged_tree` without the key `variations`. `tree` is `base_tree` with the values of the selected variation,
+    which `changes` lists.
     """
 
     def __init__(
@@ -123,11 +125,10 @@ class ChangedScenario:
         choice: StackChoice | None = None,
         variation: str | None = "",
     ) -> None:
-        """Read the file.
+        """Read the file and check the selected variation.
 
-        `variation` is the name of a variation, "" for a file without variations, or None to ignore its variations.
-
-        Raises InvalidInput, and UsageError for an unknown variation.
+        `variation` is the name of a variation, "" for a file without variations, or None to ignore its variations and
+        check nothing. Raises InvalidInput, and UsageError for an unknown variation.
         """
         self._library, self._choice = Library(PathSandbox.around(root, world_path)), choice
         if variation is not None:
@@ -138,8 +139,7 @@ class ChangedScenario:
         self.file, self.merged_tree = read
         self.path = self._library.sandbox.display_name(self.file)
         self.text = self._library.texts[self.path]
-        entries = {key: one for key, one in self.merged_tree.entries.items() if key != VARIATIONS}
-        self.base_tree = self.tree = replace(self.merged_tree, entries=entries)
+        self.base_tree = self.tree = self.merged_tree.without_keys(VARIATIONS)
         self.changes: tuple[Change, ...] = ()
         if variation:
             number = number_of(variation)
@@ -148,17 +148,16 @@ class ChangedScenario:
             self.tree, self.changes = varied.tree, varied.changes
 
     def load(self, tree: MappingNode) -> LoadedScenario | list[Problem]:
-        """Load the scenario with this content instead of the content of the file; or return all its problems."""
+        """Load the scenario with the content `tree`, without its variations; or return all its problems."""
         merged, problems = self._library.with_defaults(self.file, tree, [])
         if problems or not isinstance(merged, MappingNode):
             return problems
-        entries = {key: entry for key, entry in merged.entries.items() if key != VARIATIONS}
-        merged = MappingNode(merged.position, entries)
-        return _load_variation(Variation("", merged), self._library, self.file, self._choice)
+        varied = Variation("", merged.without_keys(VARIATIONS))
+        return _load_variation(varied, self._library, self.file, self._choice)
 
 
 def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Path, MappingNode] | list[Problem]:
-    """Read a scenario file and the files that it extends, or return all problems."""
+    """Return the absolute path of a scenario file and its tree, merged with what it extends; or all problems."""
     sandbox = library.sandbox
     file = sandbox.resolve_argument(path)
     if isinstance(file, Problem):
@@ -184,7 +183,7 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
 def _load_variation(
     variation: Variation, library: Library, file: Path, choice: StackChoice | None
 ) -> LoadedScenario | list[Problem]:
-    """Load one variation with the selected stack, or with its own if `choice` is None; or return all its problems."""
+    """Load one variation with the stack `choice`, or with its own stack if it is None; or return all its problems."""
     tree = variation.tree if choice is None else multirobot.apply_stack_choice(variation.tree, choice)
     if choice is not None and (ineffective := list(_ineffective_variation_problems(variation, tree, choice))):
         return library.with_source(ineffective)
@@ -209,7 +208,7 @@ def _load_variation(
 
 
 def _ineffective_variation_problems(variation: Variation, tree: MappingNode, choice: StackChoice) -> Iterator[Problem]:
-    """Yield problems with varied values of a stack that `--stack` replaces."""
+    """Yield a problem for each varied value that has no effect, because `--stack` replaces the stack that it is for."""
     each = [tree, *multirobot.split_by_robot(tree).values()] if multirobot.has_multiple_robots(tree) else [tree]
     for change in variation.changes:
         if all(node_at(part, change.target.keys) is not change.value for part in each):
@@ -219,7 +218,7 @@ def _ineffective_variation_problems(variation: Variation, tree: MappingNode, cho
 
 
 def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
-    """Return the problems of the world file of an invalid scenario, to report all problems at once."""
+    """Return the problems of the world file that an invalid scenario names, to report all problems at once."""
     assets, node = Assets(library), child(tree, "world")
     if isinstance(node, ScalarNode) and isinstance(node.value, str):
         assets.world(node)
@@ -229,7 +228,7 @@ def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
 def _load_multi_robot(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path
 ) -> LoadedScenario | list[Problem]:
-    """Load a scenario of several robots; a problem that several robots share is returned once."""
+    """Load a scenario of several robots, or return its problems; a problem that several robots share occurs once."""
     views: dict[str, LoadedScenario] = {}
     problems: list[Problem] = []
     for name, own in multirobot.split_by_robot(tree).items():
@@ -257,14 +256,14 @@ def _load_multi_robot(
 def _load_single_robot(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path, name: str = "", others: tuple[str, ...] = ()
 ) -> LoadedScenario | list[Problem]:
-    """Load a scenario of one robot, or as one of several robots sees it."""
+    """Load a scenario of one robot, or the view of the robot `name` among the robots `others`; or return problems."""
     assets = Assets(library)
-    world = _world(spec, tree, assets, file)
-    robot_map = _map(spec, tree, assets)
+    world = assets.world_of(spec.world, tree, file)
+    robot_map = _robot_map(spec, tree, assets)
     keepout_mask = _mask(spec.stack.keepout_mask, tree, ("stack", "keepout_mask"), assets)
     limits = spec.stack.speed_mask
     speed_mask = _mask(limits.file if limits else None, tree, ("stack", "speed_mask", "file"), assets)
-    judged = find_criterion_masks(spec, tree, assets)
+    criterion_masks = find_criterion_masks(spec, tree, assets)
     robot = assets.robot(spec.only_robot.model, value_position(tree, ("robot", "model")))
     if world is None or robot is None or assets.problems:
         return library.with_source(sorted(assets.problems))
@@ -289,11 +288,11 @@ def _load_single_robot(
             robot_map if robot_map != "none" else None,
             keepout_mask,
             speed_mask,
-            *(mask.map for mask in judged.values()),
+            *(mask.map for mask in criterion_masks.values()),
         ),
         keepout_mask=keepout_mask,
         speed_mask=speed_mask,
-        criterion_masks=judged,
+        criterion_masks=criterion_masks,
         robot_name=name,
         other_robots=others,
     )
@@ -303,22 +302,16 @@ def _load_single_robot(
     return replace(loaded, notes=(*loaded.notes, *problems))
 
 
-def _world(spec: ScenarioSpec, tree: MappingNode, assets: Assets, file: Path) -> LoadedWorld | None:
-    node = node_at(tree, ("world",))
-    if isinstance(spec.world, WorldSpec):
-        return assets.complete_world(spec.world, node, file)
-    return assets.world(node) if isinstance(node, ScalarNode) else None
-
-
-def _map(spec: ScenarioSpec, tree: MappingNode, assets: Assets) -> LoadedMap | Literal["none"] | None:
+def _robot_map(spec: ScenarioSpec, tree: MappingNode, assets: Assets) -> LoadedMap | Literal["none"] | None:
+    """Load the map that the robot gets; "none" for no map, None for the map of the world."""
     node = node_at(tree, ("map",))
     if spec.map is None or spec.map == "none" or not isinstance(node, ScalarNode):
         return "none" if spec.map == "none" else None
     return assets.map(node)
 
 
-def _mask(mask_path: str | None, tree: MappingNode, keys: tuple[Key, ...], assets: Assets) -> LoadedMap | None:
-    """Load the filter mask that the stack names at `keys`."""
+def _mask(mask_path: str | None, tree: MappingNode, keys: Keys, assets: Assets) -> LoadedMap | None:
+    """Load the filter mask that the stack names at `keys`; None if `mask_path` is None."""
     node = node_at(tree, keys)
     return assets.map(node) if mask_path is not None and isinstance(node, ScalarNode) else None
 
@@ -329,12 +322,12 @@ def _map_notes(*maps: LoadedMap | None) -> tuple[Problem, ...]:
 
 
 def is_unusable_name(name: str) -> bool:
-    """Return whether a name cannot be the name of an output folder."""
+    """Return whether no output folder can have this name."""
     return name in ("", ".", "..")
 
 
 def scenario_id(file: Path, root: Path) -> str:
-    """Return the id of a scenario: its path relative to the root, without suffix."""
+    """Return the id of a scenario: its path relative to the root (its name if it is outside), without suffix."""
     display_name = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
     return next(
         (display_name.removesuffix(suffix) for suffix in SUFFIXES if display_name.endswith(suffix)),

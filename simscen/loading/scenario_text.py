@@ -1,4 +1,4 @@
-"""A scenario as one self-contained text, for logs and output folders, and its events and faults in a log."""
+"""What a log records of a scenario: a self-contained text, which can be read again, and its events and faults."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -8,9 +8,9 @@ import yaml
 from simscen.core.errors import InvalidInput
 from simscen.core.records.events import Disturbance
 from simscen.loading.files.paths import PathSandbox
-from simscen.loading.known_names import places_of, resolve_criteria_places
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.multirobot import split_by_robot
+from simscen.loading.named_places import places_of, resolve_criteria_places
 from simscen.loading.plugins import missing_plugins
 from simscen.loading.schema.validate import Model, check
 from simscen.loading.yaml.library import Library
@@ -22,12 +22,14 @@ from simscen.model.scenario import CriteriaSpec, ScenarioSpec
 JUDGING_PLUGINS = frozenset({"criterion", "metric"})
 """Kinds of plugins that are needed to judge a log."""
 _JUDGING_KEYS = frozenset({"simscen", "pass", "metrics", "expected"})
+"""Top-level keys of a scenario that are needed to judge a log."""
 
 
 def resolved_text(loaded: LoadedScenario) -> str:
-    """Return the file as written, or merged with what it `extends` and `defaults.yaml`.
+    """Return the scenario (or its variation) as one text, without `extends` and without places in criteria.
 
-    Names of places in criteria are replaced by poses, because logs are judged without the world.
+    The text is the file as written if nothing had to be merged or replaced. Names of places in criteria are replaced by
+    poses, because logs are judged without the world.
     """
     own, _ = parse_yaml(loaded.text, loaded.path)
     plain = resolve_criteria_places(loaded.tree.plain, _validated(ScenarioSpec, loaded.tree), places_of(loaded.world))
@@ -37,7 +39,7 @@ def resolved_text(loaded: LoadedScenario) -> str:
 
 
 def unexpanded_text(loaded: LoadedScenario) -> str:
-    """Return the same text, but with `variations` instead of the values of one variation."""
+    """Return the scenario as one text without `extends`, with `variations` instead of the values of this variation."""
     if not loaded.variation:
         return resolved_text(loaded)
     own, _ = parse_yaml(loaded.text, loaded.path)
@@ -46,14 +48,14 @@ def unexpanded_text(loaded: LoadedScenario) -> str:
 
 
 def spec_of_text(text: str, name: str) -> ScenarioSpec:
-    """Return the specification in a resolved text; `name` is its name in problems. Raises InvalidInput."""
+    """Return the specification in a text of `resolved_text`; `name` is its name in problems. Raises InvalidInput."""
     return _validated(ScenarioSpec, _read(text, name))
 
 
 def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, MappingNode]:
-    """Return the criteria in a resolved text, of one of several robots if given, and the tree with their positions.
+    """Return the criteria in a text of `resolved_text`, or of a file with criteria only, and the tree of the text.
 
-    The text may be a file with criteria only. Raises InvalidInput.
+    `robot` selects one of several robots. `name` is the name of the text in problems. Raises InvalidInput.
     """
     tree = _read(text, name)
     if isinstance(tree, MappingNode) and robot:
@@ -64,11 +66,11 @@ def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, 
 
 
 def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str = "") -> CriteriaSpec:
-    """Return the criteria in the resolved text of a log, for `robot` if there are several.
+    """Return the criteria in the scenario text of a log; `robot` selects one of several robots.
 
-    `name` is the name of the text in problems, `facts` are the entries in the header of the log. Other parts of the
-    scenario are ignored, so plugins other than criteria and metrics need not be installed. Raises InvalidInput, also if
-    a criterion is not installed in the version of the log.
+    `name` is the name of the text in problems, and `facts` are the entries in the header of the log. The rest of the
+    scenario is ignored, so plugins that it uses for other things than criteria and metrics need not be installed.
+    Raises InvalidInput, also if a criterion or metric is not installed in the version of the log.
     """
     if missing := missing_plugins(facts, JUDGING_PLUGINS):
         raise InvalidInput([replace(problem, path=name) for problem in missing])
@@ -80,6 +82,7 @@ def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str 
 
 
 def _read(text: str, name: str) -> Node:
+    """Return the tree of a text. Raises InvalidInput."""
     tree, problems = parse_yaml(text, name)
     if tree is None or problems:
         raise InvalidInput(problems)
@@ -87,6 +90,7 @@ def _read(text: str, name: str) -> Node:
 
 
 def _validated(model: type[Model], tree: Node) -> Model:
+    """Return the specification in a tree. Raises InvalidInput."""
     spec = check(model, tree)
     if isinstance(spec, list):
         raise InvalidInput(spec)
@@ -94,7 +98,7 @@ def _validated(model: type[Model], tree: Node) -> Model:
 
 
 def disturbances_of(loaded: LoadedScenario) -> tuple[Disturbance, ...]:
-    """Return the events, each followed by the steps of its story, then the faults, in the order of the scenario."""
+    """Return the events, each followed by the steps of its sequence, then the faults, in the order of the scenario."""
     return (*_events(loaded), *_faults(loaded))
 
 
@@ -112,7 +116,7 @@ def _faults(loaded: LoadedScenario) -> Iterator[Disturbance]:
 
 
 def _one_line_yaml(loaded: LoadedScenario, *keys: Key) -> str:
-    """Return a mapping on one line of YAML, without its braces."""
+    """Return the mapping at `keys` as one line of YAML without braces."""
     text = yaml.safe_dump(
         node_at(loaded.tree, keys).plain, default_flow_style=True, sort_keys=False, allow_unicode=True, width=10**9
     )
@@ -120,6 +124,6 @@ def _one_line_yaml(loaded: LoadedScenario, *keys: Key) -> str:
 
 
 def _line(loaded: LoadedScenario, *keys: Key) -> int:
-    """Return the line in the scenario file; 0 if the keys are in a file that it extends."""
+    """Return the line of the value at `keys` in the scenario file; 0 if it is in a file that the scenario extends."""
     position = loaded.position_of(*keys)
     return position.line if position.path == loaded.path else 0

@@ -1,4 +1,4 @@
-"""Walk through a specification: its parts with their keys, references by name, quantities."""
+"""Search a specification for its parts, for names that refer to things, and for quantities; each with its keys."""
 
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -6,15 +6,15 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from pydantic import BaseModel, RootModel
 
-from simscen.loading.yaml.tree import Key
+from simscen.loading.yaml.tree import Keys
 from simscen.spec.places import PlaceAllowed, ReferenceTo
 from simscen.spec.quantities import Quantity
 
 
 class Reference(NamedTuple):
-    """Name at `keys` of a scenario that refers to something; `mark` defines the kind of thing."""
+    """Name at `keys` of a specification that refers to something; `mark` in the type of the field says to what."""
 
-    keys: tuple[Key, ...]
+    keys: Keys
     mark: ReferenceTo
     name: str
 
@@ -24,25 +24,26 @@ class Reference(NamedTuple):
         return self.mark.target
 
 
-RobotFilter = Callable[[str | None], bool]
-"""Predicate that selects the parts to walk through, by the robot that they name (None: no robot)."""
+RobotFilter = Callable[[str], bool]
+"""Function that returns whether parts that name this robot are searched."""
 
 
-def references(
-    spec: BaseModel, keys: tuple[Key, ...] = (), includes_robot: RobotFilter | None = None
-) -> Iterator[Reference]:
-    """Yield every reference below `spec`, in the order of its fields, without parts that `includes_robot` rejects."""
+def references(spec: BaseModel, keys: Keys = (), includes_robot: RobotFilter | None = None) -> Iterator[Reference]:
+    """Yield every reference in `spec`, whose own keys are `keys`, in the order of its fields.
+
+    Parts that name a robot for which `includes_robot` is false are left out; None includes all.
+    """
     robot = getattr(spec, "robot", None)
     if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
         return
     for name, key, mark in _fields_of(type(spec)):
         below = keys if isinstance(spec, RootModel) else (*keys, key)
-        yield from _in_value(getattr(spec, name), mark, below, includes_robot)
+        yield from _references_in(getattr(spec, name), mark, below, includes_robot)
 
 
 @cache
 def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | None]]:
-    """Return name and key of each field, and what a text in the field refers to."""
+    """Return the name and the YAML key of each field, and the mark that says to what a text in it refers."""
     found = []
     for name, field in model.model_fields.items():
         marks = [mark for mark in field.metadata if isinstance(mark, ReferenceTo)]
@@ -50,17 +51,18 @@ def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo | Non
     return found
 
 
-def _in_value(
-    value: Any, mark: ReferenceTo | None, keys: tuple[Key, ...], includes_robot: RobotFilter | None
+def _references_in(
+    value: Any, mark: ReferenceTo | None, keys: Keys, includes_robot: RobotFilter | None
 ) -> Iterator[Reference]:
+    """Yield the references in the value of a field whose texts have the given mark."""
     if isinstance(value, BaseModel):
         yield from references(value, keys, includes_robot)
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            yield from _in_value(item, mark, (*keys, index), includes_robot)
+            yield from _references_in(item, mark, (*keys, index), includes_robot)
     elif isinstance(value, dict):
         for key, item in value.items():
-            yield from _in_value(item, mark, (*keys, key), includes_robot)
+            yield from _references_in(item, mark, (*keys, key), includes_robot)
     elif (
         isinstance(value, str) and mark is not None and not (isinstance(mark, PlaceAllowed) and value in mark.keywords)
     ):
@@ -68,7 +70,7 @@ def _in_value(
 
 
 def _mark(kind: Any) -> ReferenceTo | None:
-    """Return what text of this type refers to; unions and lists are searched."""
+    """Return the mark of a type, or of its members or items; None if its texts refer to nothing."""
     if get_origin(kind) is Annotated:
         marks = [mark for mark in get_args(kind)[1:] if isinstance(mark, ReferenceTo)]
         if marks:
@@ -77,13 +79,11 @@ def _mark(kind: Any) -> ReferenceTo | None:
     return next((found for member in get_args(kind) if (found := _mark(member))), None)
 
 
-Keys = tuple[Key, ...]
+def walk(spec: Any, keys: Keys = (), includes_robot: RobotFilter | None = None) -> Iterator[tuple[Keys, BaseModel]]:
+    """Yield a specification and every specification in it, each with its keys; `keys` are those of `spec` itself.
 
-
-def walk(
-    spec: Any, keys: Keys = (), includes_robot: Callable[[str], bool] | None = None
-) -> Iterator[tuple[Keys, BaseModel]]:
-    """Yield a specification and every mapping in it, with their keys, without parts that `includes_robot` rejects."""
+    Parts that name a robot for which `includes_robot` is false are left out; None includes all.
+    """
     robot = getattr(spec, "robot", None)
     if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
         return
@@ -102,7 +102,7 @@ def walk(
 
 
 def quantities_of(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float]]:
-    """Yield the numbers of one dimension in a specification, with their keys."""
+    """Yield the quantities of one dimension, such as "angle", in SI units, each with its keys."""
     for keys, part in walk(spec):
         for name, key in _quantity_fields(type(part), dimension):
             if isinstance(value := getattr(part, name), int | float):
@@ -111,7 +111,7 @@ def quantities_of(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float
 
 @cache
 def _quantity_fields(model: type[BaseModel], dimension: str) -> list[tuple[str, str]]:
-    """Return name and key of the fields with quantities of the dimension."""
+    """Return the name and the YAML key of each field with a quantity of the dimension."""
     return [
         (name, field.alias or name)
         for name, field in model.model_fields.items()

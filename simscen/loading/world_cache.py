@@ -1,4 +1,4 @@
-"""Cache of the worlds that one command uses."""
+"""Cache of built worlds, and of shortest paths in them, for the scenarios of one command."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from simscen.core.environment.world_model import World
 from simscen.core.files import collect_read_files, record_read_file
-from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Solid
 from simscen.loading.builders import load_world
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
@@ -18,17 +17,21 @@ if TYPE_CHECKING:
     from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 Bounds = tuple[float, float, float, float]
+"""(min x, min y, max x, max y) in m."""
 
 
 @dataclass
 class WorldCache:
-    """Caches built worlds, and the shortest paths of discs in them.
+    """Caches built worlds, and the shortest paths of discs between their solids.
 
-    `max_worlds` limits the number of worlds; the oldest ones are discarded.
+    `max_worlds` is the largest number of worlds that are kept; the oldest ones are discarded. In all methods, `solids`
+    are compared by identity, `radius` is that of the disc in m, and `z_range` are the heights in m between which a
+    solid blocks the disc.
     """
 
     max_worlds: int = 100_000
     _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
+    """Worlds, and the files from which they were built."""
     _simple_paths: list[tuple[tuple[Solid, ...], float, tuple[float, float], SimplePaths | None]] = field(
         default_factory=list
     )
@@ -37,7 +40,7 @@ class WorldCache:
     )
 
     def world(self, loaded: LoadedScenario) -> World:
-        """Return the world of a scenario and record its files as read. Raises InvalidInput."""
+        """Return the built world of a scenario, and record its files as read. Raises InvalidInput."""
         known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
         if known is None:
             with collect_read_files() as read:
@@ -51,7 +54,7 @@ class WorldCache:
     def simple_paths(
         self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]
     ) -> SimplePaths | None:
-        """Return the paths of a disc of radius m between simple solids; None if a solid is not simple."""
+        """Return a fast search of paths, which may miss paths; None if a solid is too complex for it."""
         for known in self._simple_paths:
             if known[0] is solids and known[1:3] == (radius, z_range):
                 return known[3]
@@ -62,7 +65,7 @@ class WorldCache:
     def shortest_paths(
         self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]
     ) -> ShortestPaths:
-        """Return the shortest paths of a disc between solids."""
+        """Return the slower search of shortest paths in `bounds`, which finds a path if there is one."""
         for known in self._shortest_paths:
             if known[0] is solids and known[1:4] == (bounds, radius, z_range):
                 return known[4]
@@ -75,10 +78,3 @@ class WorldCache:
             (solids, bounds, radius, z_range, paths),
         ]  # large objects: keep only the last four
         return paths
-
-
-def extend_bounds(bounds: Bounds, places: list[Pose2]) -> Bounds:
-    """Return the bounds, enlarged to contain the places."""
-    left, bottom, right, top = bounds
-    xs, ys = [place.x for place in places], [place.y for place in places]
-    return min([left, *xs]), min([bottom, *ys]), max([right, *xs]), max([top, *ys])

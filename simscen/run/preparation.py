@@ -25,10 +25,10 @@ from simscen.loading.builders import (
     robot_from_file,
     world_from_file,
 )
-from simscen.loading.files.single_files import LoadedCriteria
+from simscen.loading.files.criteria_file import LoadedCriteria
 from simscen.loading.goals import event_goals, expected_failures, scenario_goals
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.open_ground import with_stops
+from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.loading.plugins import plugins_of
 from simscen.loading.robot_size import blocking_solids, inscribed_radius
 from simscen.loading.scenario_text import disturbances_of
@@ -97,7 +97,7 @@ FindLegs = Callable[[BuiltWorld, Sequence[tuple[Pose2, Goal]], float], list[Leg]
 
 def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
     """Build the world of a scenario without a cache."""
-    world = with_stops(load_world(loaded), loaded)
+    world = with_stops_in_bounds(load_world(loaded), loaded)
     return build_world_and_map(world, height, map_resolution(loaded, world))
 
 

@@ -27,7 +27,7 @@ from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Goal
 from simscen.loading.builders import load_world
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.open_ground import with_stops
+from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.run.preparation import PreparedScenario, map_resolution, prepare
 from simscen.run.reproducibility import arithmetic_fingerprints, software_versions, source_digest
 from simscen.worlds.built_world import build_world_and_map
@@ -279,7 +279,7 @@ class ScenarioCache:
         digest = hashlib.sha256(pickle.dumps(replace(loaded.world, tree=None))).hexdigest()
         if digest not in self._worlds:
             self._worlds[digest] = load_world(loaded)
-        world = with_stops(self._worlds[digest], loaded)
+        world = with_stops_in_bounds(self._worlds[digest], loaded)
         key = digest, height, map_resolution(loaded, world)
         if world is not self._worlds[digest]:  # the map belongs to the stops of this scenario
             return self._builder.build(world, *key[1:])

@@ -15,8 +15,9 @@ from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import MAX_SEED
+from simscen.loading.files.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
-from simscen.loading.files.single_files import LoadedCriteria, load_criteria, load_robot_file, load_world_file
+from simscen.loading.files.single_files import load_robot_file, load_world_file
 from simscen.loading.yaml.tree import value_position
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.read import LocalizationLog, read_localization_log

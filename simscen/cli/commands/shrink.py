@@ -31,9 +31,10 @@ from simscen.cli.shared_options import (
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import RunKey, RunResult
 from simscen.loading.files.discovery import default_root, sibling
-from simscen.loading.reduction import Keys, changed_text, changed_values, removed_parts
+from simscen.loading.reduction import changed_values, removed_parts
 from simscen.loading.scenario import ChangedScenario
-from simscen.loading.yaml.tree import MappingNode, Node, child
+from simscen.loading.yaml.rewriting import changed_text
+from simscen.loading.yaml.tree import Keys, MappingNode, Node, child
 from simscen.report.journal_reader import JOURNAL_FILE, PlannedRun, read_journal
 from simscen.run.sessions.output_folder import RUNS_FOLDER, write_atomically
 from simscen.run.sessions.results import display_path

@@ -24,11 +24,12 @@ from simscen.judge.statistical_tests import clopper_pearson_limits, is_counted
 from simscen.judge.study import StudyPlan, evaluate_study, value_text
 from simscen.loading.files.discovery import default_root, sibling
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.reduction import changed_text, with_seed
+from simscen.loading.reduction import with_seed
 from simscen.loading.scenario import ChangedScenario
 from simscen.loading.variations.conditions import ConditionError
 from simscen.loading.variations.expand import Variation
 from simscen.loading.variations.search_space import SearchSpace, search_space
+from simscen.loading.yaml.rewriting import changed_text
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
 from simscen.run.process.jobs import Backend, Job
@@ -106,7 +107,7 @@ class Falsification:
             raise InvalidInput(space)
         self._space = space
         self._checks = Checks(root_folder, request.world_path, request.lenient, stacks=stacks)
-        self._search: Search = make_search(request.method, space.choices, request.search_seed)
+        self._search: Search = make_search(request.method, space.choice_counts, request.search_seed)
         self._variations: dict[str, Variation] = {}
         self._planned: list[PlannedRun] = []
         self._signatures: set[Signature] = set()

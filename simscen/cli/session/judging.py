@@ -16,8 +16,8 @@ from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Evidence, LogCoverage
 from simscen.judge.run_result import combine_robots, judge_run
+from simscen.loading.files.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
-from simscen.loading.files.single_files import LoadedCriteria, load_criteria
 from simscen.loading.scenario_text import criteria_of_text
 from simscen.model.scenario import expected_failure
 from simscen.record.foreign.options import ForeignLogOptions

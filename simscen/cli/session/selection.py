@@ -25,7 +25,8 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.stacks.choice import StackChoice
-from simscen.loading.variations.naming import VariationProblems, merge_problems, number_of
+from simscen.loading.variations.naming import number_of
+from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.world_cache import WorldCache
 
 

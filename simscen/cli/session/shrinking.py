@@ -17,18 +17,17 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.reduction import (
     MAX_DIGITS,
     UNNEEDED_KEYS,
-    Keys,
     Rounding,
     max_depth,
     removable_parts,
-    rounded_tree,
     roundings,
+    with_roundings,
     with_seed,
     with_values,
     without_parts,
 )
 from simscen.loading.scenario import ChangedScenario
-from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child
+from simscen.loading.yaml.tree import Entry, Keys, MappingNode, Node, ScalarNode, SequenceNode, child
 from simscen.run.process.jobs import Backend, Job
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
@@ -231,7 +230,7 @@ class Shrinking:
             def build(
                 exact: Sequence[Keys], changes: Sequence[Rounding] = tuple(changes), tree: MappingNode = before
             ) -> MappingNode:
-                return rounded_tree(tree, [change for change in changes if change.keys not in exact])
+                return with_roundings(tree, [change for change in changes if change.keys not in exact])
 
             self.tree = build(self._minimize([change.keys for change in changes], build))
 

@@ -160,7 +160,7 @@ def _command(text: str, value: str, may_be_command: bool, stacks: Stacks) -> Ext
         reason = f"{quoted(value)} is neither a stack type nor a name in {stacks.config.file}"
         hint = suggestion(value, dict.fromkeys(names))
         raise UsageError(f"cannot read --stack {escaped(text)}: expected NAME=VALUE; {reason}; {hint}")
-    from simscen.loading.stacks.userconfig import parse_command
+    from simscen.loading.stacks.external_commands import parse_command
 
     try:
         return parse_command(value, caller_environment(), Path.cwd())

@@ -1,1 +1,1 @@
-"""Semantic checks of scenarios and other files: as written, and in the built world."""
+"""Check what valid files mean: whether names exist, events can happen, criteria can fail, and goals can be reached."""

@@ -1,27 +1,28 @@
-"""Checks of actions that are impossible or have no effect."""
+"""Checks that find actions of events that are impossible or have no effect."""
 
 from collections.abc import Iterator
 from typing import Any
 
-from simscen.loading.checks.registry import MEANING, CheckFinding, Keys
+from simscen.loading.checks.registry import MEANING, CheckProblem
 from simscen.loading.known_names import pedestrian_names
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.yaml.tree import Keys
 
 
 @MEANING.check("SC050")
-def timed_stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find stops of pedestrians with a duration: pedestrians have no script that could continue."""
+def timed_stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find stops of pedestrians with a duration: pedestrians do not walk on after a stop."""
     pedestrians = pedestrian_names(loaded)
     for step in loaded.spec.steps:
         for keys, action in step.located_actions():
             stop: Any = action.chosen
             if action.kind == "stop" and stop.for_ is not None and stop.name in pedestrians:
                 message = f"`{step.name}` can never happen: pedestrian `{stop.name}` does not walk on after a stop"
-                yield CheckFinding((*keys, "stop", "for"), message, "remove `for`")
+                yield CheckProblem((*keys, "stop", "for"), message, "remove `for`")
 
 
 def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
-    """Return name of the event, keys and specification of each action that switches a zone."""
+    """Return the name of the event, the keys, and the specification of each action that switches a zone on or off."""
     return [
         (step.name, (*keys, action.kind), action.chosen)
         for step in loaded.spec.steps
@@ -31,36 +32,37 @@ def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
 
 
 @MEANING.check("SC050")
-def impossible_zone_actions(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find speed zones without a limit."""
+def speed_zones_without_limit(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find actions that switch on a speed zone for which no speed limit is given anywhere."""
     actions = _zone_actions(loaded)
     limited = [zone.region for zone in loaded.spec.stack.speed_zones]
     limited += [action.region for _, _, action in actions if getattr(action, "speed_limit", None)]
     for name, keys, action in actions:
         if _limits_speed(keys, action) and action.region not in limited:
             message = f"`{name}` can never happen: region `{action.region}` has no speed limit"
-            yield CheckFinding((*keys, "region"), message, "add a limit: `speed_limit: 0.3 m/s`")
+            yield CheckProblem((*keys, "region"), message, "add a limit: `speed_limit: 0.3 m/s`")
 
 
 @MEANING.check("SC055", severity="warning")
-def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find speed zones whose limit is not below the top speed of the robot."""
+def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find actions that set a speed limit that is not below the top speed of the robot."""
     robot = loaded.robot.spec
     for _, keys, action in _zone_actions(loaded):
         if robot is None or not _limits_speed(keys, action):
             continue
         if action.speed_limit is not None and action.speed_limit >= robot.top_speed:
             message = f"the limit has no effect: the robot's top speed is {robot.top_speed:g} m/s"
-            yield CheckFinding((*keys, "speed_limit"), message)
+            yield CheckProblem((*keys, "speed_limit"), message)
 
 
 def _limits_speed(keys: Keys, action: Any) -> bool:
+    """Return whether an action at `keys` that switches a zone switches on a speed zone."""
     return keys[-1] == "speed_zone" and action.enabled and action.region is not None
 
 
 @MEANING.check("SC055", severity="warning")
-def pushes_without_effect(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find pushes of zero, and pushes of objects without mass."""
+def pushes_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find pushes of zero, and pushes of objects without mass or of pedestrians."""
     world = loaded.world.spec
     spawned = [action.chosen for step in loaded.spec.steps for action in step.actions if action.kind == "spawn"]
     things = [*(world.objects if world else []), *spawned]
@@ -72,20 +74,20 @@ def pushes_without_effect(loaded: LoadedScenario) -> Iterator[CheckFinding]:
             push: Any = action.chosen
             if not any(push.impulse or push.force):
                 key = "impulse" if push.force is None else "force"
-                yield CheckFinding((*keys, "push", key), "a push of zero changes nothing")
+                yield CheckProblem((*keys, "push", key), "a push of zero changes nothing")
             named: list[Any] = [thing for thing in things if getattr(thing, "name", "") == push.name]
             if push.name in doors or (named and not any(thing.mass for thing in named)):
                 message = f"a push cannot move `{push.name}`, which has no mass"
-                yield CheckFinding((*keys, "push", "name"), message, "give it a `mass`, or `move` it")
+                yield CheckProblem((*keys, "push", "name"), message, "give it a `mass`, or `move` it")
             elif push.name in pedestrian_names(loaded):
                 message = f"a push cannot move pedestrian `{push.name}`"
-                yield CheckFinding((*keys, "push", "name"), message, "use `stop`, `teleport` or `move`")
+                yield CheckProblem((*keys, "push", "name"), message, "use `stop`, `teleport` or `move`")
 
 
 @MEANING.check("SC055", severity="warning")
-def doors_already_in_state(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find doors that are opened although they are open, or closed although they are closed."""
-    located_actions = [placed for step in loaded.spec.steps for placed in step.located_actions()]
+def doors_already_in_state(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find actions that open a door that is always open, or close a door that is always closed."""
+    located_actions = [located for step in loaded.spec.steps for located in step.located_actions()]
     if loaded.world.spec is None or any(action.may_do() for _, action in located_actions):
         return
     kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, action in located_actions}
@@ -96,4 +98,4 @@ def doors_already_in_state(loaded: LoadedScenario) -> Iterator[CheckFinding]:
             if action.kind == kind and is_full and closed.get(name) is state and (opposite, name) not in kinds:
                 initial = "closed" if state else "open"
                 message = f"door `{name}` is {initial} from the start, and no event {opposite}s it"
-                yield CheckFinding((*keys, kind, "name"), message)
+                yield CheckProblem((*keys, kind, "name"), message)

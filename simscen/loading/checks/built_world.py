@@ -1,4 +1,4 @@
-"""Checks of a world file in the built world: places, regions, and motions."""
+"""Checks of the places, regions, and motions in a world file against the geometry of the built world."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
 from simscen.loading.checks.placement import motion_stops
-from simscen.loading.checks.registry import CheckFinding, CheckStage
+from simscen.loading.checks.registry import CheckProblem, CheckStage
 from simscen.loading.checks.scene import TOUCH_M
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted
@@ -15,20 +15,20 @@ from simscen.loading.yaml.tree import MappingNode
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 BLOCKING_HEIGHTS_M = 0.02, 0.4
-"""Heights between which an obstacle blocks most robots."""
+"""Lowest and highest z between which an obstacle blocks most robots. World files are checked without a robot."""
 RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_SLOPE_RAD, RAMP_ROBOT_STEP_M = 0.1, 0.35, 0.03
-"""Wheel radius, maximum slope and maximum step of a robot that climbs typical ramps."""
+"""Wheel radius, maximum slope, and maximum step of an assumed robot that climbs typical ramps."""
 
 
 class BuiltWorld(NamedTuple):
-    """A world and the file that it was built from."""
+    """A world, and the loaded file that it was built from."""
 
     world: World
     source: LoadedWorld
 
     @property
     def tree(self) -> MappingNode | None:
-        """The tree of the world file; None for worlds in other formats."""
+        """The tree of the world file; None for a world in another format."""
         return self.source.tree
 
 
@@ -36,12 +36,12 @@ BUILT_WORLD: CheckStage[BuiltWorld] = CheckStage("built world")
 
 
 def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
-    """Return the problems of a world file in its built world, without the text of their lines; all are warnings."""
+    """Return warnings about a world file, without the texts of their source lines; [] for other formats."""
     return [] if source.spec is None else BUILT_WORLD.problems(BuiltWorld(world, source))
 
 
 @BUILT_WORLD.check("SC314", severity="warning")
-def places_in_obstacles(built: BuiltWorld) -> Iterator[CheckFinding]:
+def places_in_obstacles(built: BuiltWorld) -> Iterator[CheckProblem]:
     """Find places inside obstacles."""
     assert built.source.spec is not None
     world = _without_platforms(built.world) if built.source.spec.ramps else built.world
@@ -49,22 +49,22 @@ def places_in_obstacles(built: BuiltWorld) -> Iterator[CheckFinding]:
         solid = first_solid_in_disc(world.solids, (place.x, place.y), TOUCH_M, BLOCKING_HEIGHTS_M)
         if solid is not None:
             message = f'place {quoted(name)} is inside obstacle "{solid}"'
-            yield CheckFinding(("places", name), message, at_key=True)
+            yield CheckProblem(("places", name), message, at_key=True)
 
 
 @BUILT_WORLD.check("SC304", severity="warning")
-def motions_into_obstacles(built: BuiltWorld) -> Iterator[CheckFinding]:
-    """Find keyframes and waypoints of objects inside obstacles."""
+def motions_into_obstacles(built: BuiltWorld) -> Iterator[CheckProblem]:
+    """Find keyframes and waypoints of moving objects inside obstacles."""
     assert built.source.spec is not None
     for index, thing in enumerate(built.source.spec.objects):
         for keys, what, (x, y) in motion_stops(thing.move) if thing.move is not None else ():
             if solid := first_solid_in_disc(built.world.solids, (x, y), TOUCH_M, BLOCKING_HEIGHTS_M):
                 message = f'{what} of {quoted(thing.name)} ({x:g}, {y:g}) is inside obstacle "{solid}"'
-                yield CheckFinding(("objects", index, "move", *keys), message)
+                yield CheckProblem(("objects", index, "move", *keys), message)
 
 
 @BUILT_WORLD.check("SC315", severity="warning")
-def regions_outside_the_world(built: BuiltWorld) -> Iterator[CheckFinding]:
+def regions_outside_the_world(built: BuiltWorld) -> Iterator[CheckProblem]:
     """Find regions outside the bounds of the world."""
     assert built.source.spec is not None
     left, bottom, right, top = built.world.bounds
@@ -72,7 +72,7 @@ def regions_outside_the_world(built: BuiltWorld) -> Iterator[CheckFinding]:
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
         if max(xs) < left or min(xs) > right or max(ys) < bottom or min(ys) > top:
             message = f"region {quoted(name)} is outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
-            yield CheckFinding(("regions", name), message, at_key=True)
+            yield CheckProblem(("regions", name), message, at_key=True)
 
 
 def _without_platforms(world: World) -> World:

@@ -1,62 +1,68 @@
-"""Checks of criteria: criteria that no run can pass, and bounds that hardly any run can exceed."""
+"""Checks that find criteria that no run can pass, and criteria that hardly any run can fail."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
 
 from simscen.loading.checks.events import why_no_recovery
-from simscen.loading.checks.registry import MEANING, CheckFinding, Keys
+from simscen.loading.checks.registry import MEANING, CheckProblem
 from simscen.loading.known_names import goal_names
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.yaml.tree import Keys
 from simscen.model.navigation import expected_failure_name
 
 GOAL_CRITERIA = frozenset({"goals_reached", "time_to_goal", "no_false_success", "stuck", "result", "error_code"})
 """Criteria that have nothing to judge if the robot gets no goal."""
 NO_ERROR = 0
-LOOSE_SPEED_FACTOR = 1.2
-"""A bound on the speed above this multiple of the top speed is loose; below, it still limits an overshoot."""
+"""Nav2's error code for success."""
+LOOSE_SPEED_RATIO = 1.2
+"""Bounds on the speed above this multiple of the top speed are loose. Lower bounds can still limit an overshoot."""
 LOOSE_PATH_RATIO = 10.0
+"""Bounds on the path length above this multiple of the shortest path are loose."""
 LOOSE_COLLISION_COUNT = 1000
+"""Bounds on the number of collisions from this number on are loose."""
 
 LooseBounds = Iterator[tuple[str, str]]
-"""Key and reason for each bound of a criterion that hardly any run can exceed."""
+"""Loose bounds of a criterion, which hardly any run can exceed: the key of each, and the reason."""
 
 
 @MEANING.check("SC036")
-def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find criteria that need more time than the run has."""
+def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find criteria that need more time to be judged than the run has."""
     limit = loaded.spec.time_limit
     for index, entry in enumerate(loaded.spec.pass_):
         horizon = getattr(entry.chosen, "horizon", 0.0)
         if horizon > limit:
             message = f"`{entry.kind}` can never hold: it needs {horizon:g} s, but the time limit is {limit:g} s"
-            yield CheckFinding(("pass", index, entry.kind), message, at_key=True)
+            yield CheckProblem(("pass", index, entry.kind), message, at_key=True)
 
 
 @MEANING.check("SC036")
-def runs_without_motion(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find a time limit that ends the run before the second sample of the ground truth."""
+def runs_without_motion(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find a time limit that ends the run before the second sample of the truth, so that no motion can be judged."""
     period = 1.0 / loaded.spec.physics.truth_rate
     if loaded.spec.time_limit < period:
         message = f"nothing can be judged: the second sample of the ground truth is at t = {period:g} s"
-        yield CheckFinding(("time_limit",), message)
+        yield CheckProblem(("time_limit",), message)
 
 
 @MEANING.check("SC051")
-def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find criteria that no run can pass."""
     for index, entry in enumerate(loaded.spec.pass_):
-        check = _IMPOSSIBLE.get(entry.kind)
+        check = _WHY_IMPOSSIBLE.get(entry.kind)
         reason = _why_no_goals(loaded, entry.kind, entry.chosen) or (check(loaded, entry.chosen) if check else None)
         if reason:
-            yield CheckFinding(("pass", index, entry.kind), f"{entry.kind} can never hold: {reason}", at_key=True)
+            yield CheckProblem(("pass", index, entry.kind), f"{entry.kind} can never hold: {reason}", at_key=True)
 
 
 def _why_no_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
+    """Return the reason if a criterion needs a goal and there is none; else None."""
     needs_goal = kind in GOAL_CRITERIA or (kind == "path_length" and criterion.max_ratio is not None)
     return "the robot gets no goal" if needs_goal and not goal_names(loaded) else None
 
 
-def _result(loaded: LoadedScenario, result: Any) -> str | None:
+def _why_impossible_result(loaded: LoadedScenario, result: Any) -> str | None:
+    """Return why no run can have the result that a criterion requires; None if a run can."""
     cancels = any(action.may_do("cancel_goal") for step in loaded.spec.steps for action in step.actions)
     if result.status == "CANCELED" and not cancels:
         return "no event cancels a goal"
@@ -67,16 +73,18 @@ def _result(loaded: LoadedScenario, result: Any) -> str | None:
     return None
 
 
-def _recoveries(loaded: LoadedScenario, recoveries: Any) -> str | None:
+def _why_no_recoveries(loaded: LoadedScenario, recoveries: Any) -> str | None:
+    """Return why no run can have the recoveries that a criterion requires; None if a run can."""
     return why_no_recovery(loaded, recoveries.name) if recoveries.min else None
 
 
-_IMPOSSIBLE = {"result": _result, "recoveries": _recoveries}
+_WHY_IMPOSSIBLE = {"result": _why_impossible_result, "recoveries": _why_no_recoveries}
+"""Function that returns why a criterion of this kind is impossible; None if it is possible."""
 
 
 @MEANING.check("SC051")
-def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find pairs of criteria that require different results."""
+def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find pairs of criteria that require different results of the navigation."""
     failing = any(expected_failure_name(goal.expect) for goal in loaded.spec.goals)
     required_results: dict[str, tuple[str, Keys]] = {}
     for index, entry in enumerate(loaded.spec.pass_):
@@ -91,13 +99,13 @@ def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckFinding]:
         if before:
             first = loaded.key_position_of(*before[1])
             message = f"{entry.kind} contradicts {before[0]} at {first.line}:{first.col}: no run can pass both"
-            yield CheckFinding(keys, message, at_key=True)
+            yield CheckProblem(keys, message, at_key=True)
         required_results.setdefault(status, (entry.kind, keys))
 
 
 @MEANING.check("SC051")
-def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find goals after one that is expected to fail, in scenarios that stop at the first failure."""
+def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find goals that are never sent: the goal before is expected to fail, and the scenario stops at a failure."""
     spec = loaded.spec
     new_goals = any(action.may_do("new_goal") for step in spec.steps for action in step.actions)
     if spec.on_goal_failure == "continue" or new_goals:
@@ -106,26 +114,26 @@ def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckFinding]:
         if expected_failure_name(goal.expect) and (spec.navigation.loops > 1 or index + 1 < len(spec.goals)):
             following = spec.goal_names[(index + 1) % len(spec.goals)]
             message = f"the robot never gets goal `{following}`: it stops after this goal, which is expected to fail"
-            yield CheckFinding(("goals", index, "expect"), message, "set `on_goal_failure: continue`")
+            yield CheckProblem(("goals", index, "expect"), message, "set `on_goal_failure: continue`")
             return
 
 
 @MEANING.check("SC052", severity="warning")
-def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find bounds that physics or the time limit already guarantee."""
+def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find bounds that physics or the time limit guarantee, so that the criterion can hardly fail."""
     for index, entry in enumerate(loaded.spec.pass_):
-        check = _LOOSE.get(entry.kind)
+        check = _LOOSE_BOUNDS.get(entry.kind)
         for key, reason in check(loaded, entry.chosen) if check else ():
-            yield CheckFinding(("pass", index, entry.kind, key), f"{entry.kind} can hardly fail: {reason}")
+            yield CheckProblem(("pass", index, entry.kind, key), f"{entry.kind} can hardly fail: {reason}")
 
 
 def _loose_speed(loaded: LoadedScenario, speed: Any) -> LooseBounds:
     robot = loaded.robot.spec
     if robot is None:
         return
-    if speed.max is not None and speed.max > LOOSE_SPEED_FACTOR * robot.top_speed:
+    if speed.max is not None and speed.max > LOOSE_SPEED_RATIO * robot.top_speed:
         yield "max", f"the robot's top speed is {robot.top_speed:g} m/s"
-    if speed.max_turn_rate is not None and speed.max_turn_rate > LOOSE_SPEED_FACTOR * robot.limits.angular:
+    if speed.max_turn_rate is not None and speed.max_turn_rate > LOOSE_SPEED_RATIO * robot.limits.angular:
         yield "max_turn_rate", f"the robot's maximum turn rate is {robot.limits.angular:g} rad/s"
 
 
@@ -151,29 +159,32 @@ def _loose_goals_reached(loaded: LoadedScenario, reached: Any) -> LooseBounds:
 
 
 def _beyond_limit(loaded: LoadedScenario, criterion: Any, key: str) -> LooseBounds:
+    """Yield the bound `key` if it is a time that is not below the time limit of the run."""
     value, limit = getattr(criterion, key), loaded.spec.time_limit
     if value is not None and value >= limit:
         yield key, f"the time limit ends the run after {limit:g} s"
 
 
-def _within_limit(key: str) -> Callable[[LoadedScenario, Any], LooseBounds]:
+def _time_bound(key: str) -> Callable[[LoadedScenario, Any], LooseBounds]:
+    """Return a check of the bound `key`, which is a time."""
     return lambda loaded, criterion: _beyond_limit(loaded, criterion, key)
 
 
-_LOOSE: dict[str, Callable[[LoadedScenario, Any], LooseBounds]] = {
+_LOOSE_BOUNDS: dict[str, Callable[[LoadedScenario, Any], LooseBounds]] = {
     "speed": _loose_speed,
     "path_length": _loose_path_length,
     "collisions": _loose_collisions,
     "goals_reached": _loose_goals_reached,
-    "time_to_goal": _within_limit("max"),
-    "stuck": _within_limit("max"),
-    "stopped_within": _within_limit("time"),
-    "relocalized_within": _within_limit("time"),
+    "time_to_goal": _time_bound("max"),
+    "stuck": _time_bound("max"),
+    "stopped_within": _time_bound("time"),
+    "relocalized_within": _time_bound("time"),
 }
+"""Function that yields the loose bounds of a criterion of this kind."""
 
 
 @MEANING.check("SC052", severity="warning")
-def only_warnings(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find scenarios in which no criterion can fail the run."""
+def only_warnings(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find scenarios whose criteria all have `severity: warn`, so that no run can fail."""
     if all(entry.severity == "warn" for entry in loaded.spec.pass_):
-        yield CheckFinding(("pass",), "no criterion can fail the run: all are `severity: warn`", at_key=True)
+        yield CheckProblem(("pass",), "no criterion can fail the run: all are `severity: warn`", at_key=True)

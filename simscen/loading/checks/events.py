@@ -1,4 +1,7 @@
-"""Checks of triggers: events and faults that can never happen, or happen less often than specified."""
+"""Checks that find events and faults whose triggers never fire, or fire less often than specified.
+
+An event can wait for another one, so the events that can happen are determined step by step (see possible_run).
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -7,70 +10,71 @@ from types import SimpleNamespace
 from typing import Any
 
 from simscen.core.messages.navigation import matches_goal_name
-from simscen.loading.checks.registry import MEANING, CheckFinding, Keys
-from simscen.loading.known_names import own_goal_names
+from simscen.loading.checks.registry import MEANING, CheckProblem
+from simscen.loading.known_names import listed_goal_names
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.yaml.tree import Keys
 from simscen.model.disturbances import SequenceStep
 from simscen.model.stack import StackSpec
 from simscen.triggers.base import AnyCondition, Trigger
 
 Reason = tuple[Keys, str]
-"""Keys of the part that prevents a trigger from firing, and the reason as words after "can never happen: "."""
+"""Keys of the part that prevents a trigger from firing, and the reason as words that follow "can never happen:"."""
 
 LATCHING_CONDITIONS = frozenset(
     {"time", "travelled", "goal", "waypoint", "replan", "recovery", "collision", "pedestrian", "event"}
 )
 """Conditions that stay true once they have become true."""
 MAX_SPEED_RATIO = 1.1
-"""Largest speed of a robot, relative to its top speed, at any moment."""
+"""Largest speed of a robot at any time, relative to its top speed, which it can overshoot a little."""
 MAX_TRUTH_ERROR_M = 0.5
 """Upper bound on the localization error of a stack that gets the true pose."""
 
 
 @MEANING.check("SC050")
-def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find events and faults that can never happen, whatever the robot does."""
+def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find events and faults that can never happen, whatever the robot does. It is an error if they are required."""
     run = possible_run(loaded)
     for keys, trigger, name, required in run.triggers:
         if trigger is not None and (reason := run.why_never(trigger, keys)):
-            yield CheckFinding(reason[0], f"`{name}` can never happen: {reason[1]}", warning=not required)
+            yield CheckProblem(reason[0], f"`{name}` can never happen: {reason[1]}", warning=not required)
 
 
 @MEANING.check("SC052", severity="warning")
-def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find events and faults with `times` that can happen only once."""
+def triggers_that_fire_once(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find events and faults that should happen several times (`times`), but can happen only once."""
     run = possible_run(loaded)
     for keys, trigger, name, _ in run.triggers:
         if trigger is None or trigger.times == 1 or trigger.edge != "rising" or not _stays_true(trigger):
             continue
         if run.why_never(trigger, keys) is None:
             message = f"`{name}` happens once, not {trigger.times} times: its condition stays true"
-            yield CheckFinding((*keys, "times"), message)
+            yield CheckProblem((*keys, "times"), message)
     for index, fault in enumerate(loaded.spec.faults):
         if fault.when is not None and fault.when.times > 1 and fault.for_ is None:
             message = f"`{fault.label}` happens once, not {fault.when.times} times: without `for` it lasts to the end"
-            yield CheckFinding(("faults", index, "when", "times"), message, "add `for`: how long it lasts")
+            yield CheckProblem(("faults", index, "when", "times"), message, "add `for`: how long it lasts")
 
 
 @MEANING.check("SC050")
-def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find steps of a story that need more time than the run has, or wait for an earlier step."""
+def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find steps of a sequence that happen after the time limit at the earliest, or wait for an earlier step."""
     run = possible_run(loaded)
-    limit, needed = loaded.spec.time_limit, dict[int, float]()
+    limit, earliest = loaded.spec.time_limit, dict[int, float]()
     for number, step in enumerate(run.steps):
         own = 0.0 if step.when is None or step.when.edge == "falling" else step.when.delay + _earliest_true_s(step.when)
-        needed[number] = own + (0.0 if step.after is None else needed[step.after])
+        earliest[number] = own + (0.0 if step.after is None else earliest[step.after])
         if step.after is None or not run.is_reached(step) or step.when is None:
             continue
         keys = (*step.keys, "when")
-        if needed[number] >= limit > own and needed[step.after] < limit:
-            reason = f"its story takes at least {needed[number]:g} s, but the time limit is {limit:g} s"
-            yield CheckFinding(keys, f"`{step.name}` can never happen: {reason}", warning=not step.required)
+        if earliest[number] >= limit > own and earliest[step.after] < limit:
+            reason = f"its sequence takes at least {earliest[number]:g} s, but the time limit is {limit:g} s"
+            yield CheckProblem(keys, f"`{step.name}` can never happen: {reason}", warning=not step.required)
         for part in step.when.parts():
             name = getattr(part.event, "name", None)
             if name in run.earlier_steps(step):
                 message = f"`{step.name}` waits for `{name}`, which has already happened; a step waits for new events"
-                yield CheckFinding(keys, message)
+                yield CheckProblem(keys, message)
 
 
 def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
@@ -86,7 +90,11 @@ def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
 
 
 def possible_run(loaded: LoadedScenario) -> "PossibleRun":
-    """Return everything that can happen in a run: the fixed point of events that make other events possible."""
+    """Return what can happen in a run of the scenario.
+
+    At first, nothing counts as possible. Then the events that are possible without others are added, then those that
+    wait for them, and so on, until no more are added.
+    """
     run = PossibleRun(loaded, frozenset())
     while (possible := run.next_possible) != run.possible:
         run = replace(run, possible=possible)
@@ -95,19 +103,22 @@ def possible_run(loaded: LoadedScenario) -> "PossibleRun":
 
 @dataclass(frozen=True)
 class PossibleRun:
-    """Everything that can happen in a run if the events, faults and marks with the names `possible` can happen."""
+    """What can happen in a run if the events, faults, and marks with the names `possible` can happen.
+
+    Methods called like a condition take its specification. They return why it can never be true; None if it can.
+    """
 
     loaded: LoadedScenario
     possible: frozenset[str]
 
     @cached_property
     def steps(self) -> list[SequenceStep]:
-        """Return the events and the steps of their stories."""
+        """The events, each followed by the steps of its sequence."""
         return self.loaded.spec.steps
 
     @property
     def triggers(self) -> Iterator[tuple[Keys, Trigger | None, str, bool]]:
-        """Return keys, trigger, name and `required` of all events, steps that are reached, and faults."""
+        """Yield the keys, the trigger, the name, and `required` of each reachable event or step, then of each fault."""
         for step in self.steps:
             if self.is_reached(step):
                 yield (*step.keys, "when"), step.when, step.name, step.required
@@ -115,29 +126,29 @@ class PossibleRun:
             yield ("faults", index, "when"), fault.when, fault.label, fault.required
 
     def is_reached(self, step: SequenceStep) -> bool:
-        """Return whether the step before it in its story can happen."""
+        """Return whether the step before `step` in its sequence can happen; True for an event."""
         return step.after is None or self.steps[step.after].name in self.possible
 
     def earlier_steps(self, step: SequenceStep) -> frozenset[str]:
-        """Return the names of the steps before it in its story."""
+        """Return the names of the event and the steps before `step` in its sequence."""
         if step.after is None:
             return frozenset()
         return self.earlier_steps(self.steps[step.after]) | {self.steps[step.after].name}
 
     @property
     def next_possible(self) -> frozenset[str]:
-        """Return the names of the events, faults and marks that can happen if those in `possible` can."""
+        """The names of the events, faults, and marks that can happen if those in `possible` can."""
         triggers = [
             *((step.when, step.name) for step in self.steps if self.is_reached(step)),
             *((fault.when, fault.label) for fault in self.loaded.spec.faults),
         ]
-        reachable = {name for when, name in triggers if when is None or self.why_never(when, ()) is None}
-        actions = [action for step in self.steps if step.name in reachable for action in step.actions]
+        happening = {name for when, name in triggers if when is None or self.why_never(when, ()) is None}
+        actions = [action for step in self.steps if step.name in happening for action in step.actions]
         marks = {getattr(action.chosen, "name", "") for action in actions if action.kind == "mark"}
-        return frozenset(reachable | marks)
+        return frozenset(happening | marks)
 
     def why_never(self, trigger: Trigger, keys: Keys) -> Reason | None:
-        """Return why a trigger never fires; None if it can."""
+        """Return why the trigger at `keys` never fires; None if it can."""
         limit = self.loaded.spec.time_limit
         if trigger.probability == 0:
             return (*keys, "probability"), "its probability is 0"
@@ -147,19 +158,20 @@ class PossibleRun:
         if trigger.edge == "rising" and earliest >= limit:
             key = "delay" if trigger.delay else "for" if trigger.for_ else trigger.kind
             return (*keys, key), f"{earliest:g} s is not before the time limit of {limit:g} s"
-        return self._reason(trigger, keys)
+        return self._why_never_true(trigger, keys)
 
-    def _reason(self, test: AnyCondition, keys: Keys) -> Reason | None:
+    def _why_never_true(self, test: AnyCondition, keys: Keys) -> Reason | None:
+        """Return why the condition at `keys` is never true; None if it can be."""
         if not self.loaded.includes_robot(test.robot):
             return None
         limit = self.loaded.spec.time_limit
         if test.for_ is not None and test.for_ >= limit:
             return (*keys, "for"), f"{test.for_:g} s is not less than the time limit of {limit:g} s"
         if test.all is not None:
-            reasons = self._reasons(test.all, (*keys, "all"))
+            reasons = self._why_parts_never_true(test.all, (*keys, "all"))
             return next((reason for reason in reasons if reason), None)
         if test.any is not None:
-            reasons = self._reasons(test.any, (*keys, "any"))
+            reasons = self._why_parts_never_true(test.any, (*keys, "any"))
             return reasons[0] if all(reasons) else None
         if test.not_ is not None:
             always = test.not_.time is not None and _earliest_true_s(test.not_) == 0
@@ -168,19 +180,20 @@ class PossibleRun:
         reason = check(self, test.chosen) if check else None
         return ((*keys, test.kind), reason) if reason else None
 
-    def _reasons(self, tests: Sequence[AnyCondition], keys: Keys) -> list[Reason | None]:
-        return [self._reason(test, (*keys, k)) for k, test in enumerate(tests)]
+    def _why_parts_never_true(self, tests: Sequence[AnyCondition], keys: Keys) -> list[Reason | None]:
+        """Return the reason for each of the conditions in the list at `keys`; None for those that can be true."""
+        return [self._why_never_true(test, (*keys, k)) for k, test in enumerate(tests)]
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether a possible event has, or may have, one of these actions."""
+        """Return whether a possible event can do what actions of these kinds do."""
         return any(
             action.may_do(*kinds) for step in self.steps if step.name in self.possible for action in step.actions
         )
 
     def goal_count(self, goal: str | None) -> int:
-        """Return how many goals of this name (None: any name) the robot can get."""
-        own = [name for name in own_goal_names(self.loaded) if matches_goal_name(name, goal)]
-        more = sum(
+        """Return how many goals with this name (None: any name) the robot can get."""
+        listed = [name for name in listed_goal_names(self.loaded) if matches_goal_name(name, goal)]
+        sent = sum(
             1 if step.when is None else step.when.times
             for step in self.steps
             for action in step.actions
@@ -189,7 +202,7 @@ class PossibleRun:
             and self.loaded.includes_robot(action.robot)
             and goal in (None, getattr(action.chosen, "name", ""))
         )
-        return len(own) + more
+        return len(listed) + sent
 
     def _time(self, time: Any) -> str | None:
         limit = self.loaded.spec.time_limit
@@ -264,13 +277,13 @@ class PossibleRun:
 
     @property
     def _top_speed(self) -> float | None:
-        """Return the top speed in m/s; None if it is not known or something can make the robot faster."""
+        """The top speed in m/s; None if it is not known, or if an action can make the robot faster."""
         spec = self.loaded.robot.spec
         return None if spec is None or self.may_do("push", "kidnap") else spec.top_speed
 
     @property
     def _may_be_pushed(self) -> bool:
-        """Return whether something that moves could push the robot."""
+        """Whether something that moves could push the robot."""
         world = self.loaded.world
         if world.spec is None or world.sdf is not None or self.loaded.other_robots:
             return True
@@ -294,6 +307,7 @@ _CONDITIONS = {
     "pedestrian": PossibleRun._pedestrian,
     "event": PossibleRun._event,
 }
+"""Method that returns why a condition of this kind can never be true; None if it can."""
 
 
 def _stays_true(test: AnyCondition) -> bool:
@@ -303,11 +317,12 @@ def _stays_true(test: AnyCondition) -> bool:
 
 
 def _earliest_true_s(test: AnyCondition) -> float:
-    """Return a lower bound on the time in s at which a condition counts as true."""
+    """Return a lower bound on the time in s at which a condition counts as true, that is, after its `for`."""
     return (test.for_ or 0.0) + _earliest_condition_s(test)
 
 
 def _earliest_condition_s(test: AnyCondition) -> float:
+    """Return a lower bound on the time in s at which a condition becomes true, without its `for`."""
     if test.all is not None:
         return max(map(_earliest_true_s, test.all))
     if test.any is not None:

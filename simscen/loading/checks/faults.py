@@ -1,4 +1,4 @@
-"""Checks of faults: can they affect their sensor, can they happen, do they have an effect?"""
+"""Checks of faults: whether they can affect their sensor, whether they can happen, and whether they have an effect."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from simscen.core.records.events import BELIEF, COMMAND, KIND_BY_INSTANCE, MAP, WHEELS
 from simscen.faults.base import Instance
-from simscen.loading.checks.registry import MEANING, NAMES, CheckFinding, NameScope
+from simscen.loading.checks.registry import MEANING, NAMES, CheckProblem, NameScope
 from simscen.loading.codes import STACK_CANNOT
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.schema.messages import quoted, suggestion
@@ -16,20 +16,21 @@ from simscen.model.stack import StackSpec
 from simscen.triggers.base import Trigger
 
 NOUNS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
+"""Kind of a target of faults that is no sensor → words in messages."""
 RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
-"""Faults that measure again, which is only possible at the moment of the scan."""
+"""Faults that compute the measurement anew, which is only possible at the time of the measurement."""
 
 
 class ListedFault(NamedTuple):
-    """A fault, its position in the list of faults, and the instance that it affects (None if there is none)."""
+    """A fault, its number in the list from 0, and the instance that it affects (None if the robot does not have it)."""
 
-    position: int
+    number: int
     entry: FaultEntry
     instance: Instance | None
 
 
 def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance]:
-    """Return all targets of faults by name: the robot's sensors, then commands, wheels, localizer and map."""
+    """Return all things that faults can affect, by name: sensors of the robot, `cmd_vel`, `wheels`, and so on."""
     frequency = loaded.spec.stack.controller_frequency
     others = {
         name: Instance(kind, frequency if kind == COMMAND else 0.0, robot.drive if kind == WHEELS else None)
@@ -43,7 +44,7 @@ def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance
 
 
 def _listed_faults(loaded: LoadedScenario) -> Iterator[ListedFault]:
-    """Yield the faults; none if the sensors of the robot are not known yet."""
+    """Yield all faults; nothing for a robot that is only a URDF and not built yet, whose sensors are not known."""
     if loaded.robot.spec is not None:
         known = instances(loaded, loaded.robot.spec)
         for index, entry in enumerate(loaded.spec.faults):
@@ -51,20 +52,20 @@ def _listed_faults(loaded: LoadedScenario) -> Iterator[ListedFault]:
 
 
 @NAMES.check("SC031")
-def unknown_sensors(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find faults on a sensor that the robot does not have."""
+def unknown_sensors(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find faults of a sensor that the robot does not have."""
     loaded = scope.loaded
     for index, entry, instance in _listed_faults(loaded):
         if instance is None:
             assert loaded.robot.spec is not None
             hint = suggestion(entry.sensor, instances(loaded, loaded.robot.spec))
             message = f"robot `{loaded.robot.name}` has no sensor called {quoted(entry.sensor)}"
-            yield CheckFinding(("faults", index, "sensor"), message, hint)
+            yield CheckProblem(("faults", index, "sensor"), message, hint)
 
 
 @NAMES.check("SC032")
-def unsuitable_faults(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find faults that cannot affect their sensor, or whose values do not suit it."""
+def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find faults of a kind that cannot affect their sensor, or whose values do not fit the sensor."""
     loaded = scope.loaded
     for index, entry, instance in _listed_faults(loaded):
         if instance is None:
@@ -77,51 +78,51 @@ def unsuitable_faults(scope: NameScope) -> Iterator[CheckFinding]:
             hint = f"it can affect: {', '.join(suitable)}" if suitable else "it can affect nothing on this robot"
             what = NOUNS.get(instance.kind) or _with_article(loaded.robot.spec.sensors[entry.sensor].kind)
             message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
-            yield CheckFinding(keys, message, hint, at_key=True)
+            yield CheckProblem(keys, message, hint, at_key=True)
         elif unsuitable := entry.fault.unsuitable_key(instance):
             below = (unsuitable[0],) if unsuitable[0] else ()
             message = f"fault `{entry.kind}` does not fit `{entry.sensor}`: {unsuitable[1]}"
-            yield CheckFinding((*keys, *below), message, at_key=True)
+            yield CheckProblem((*keys, *below), message, at_key=True)
 
 
 @NAMES.check("SC032")
-def impossible_map_faults(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find faults on a map that is not used, or during part of a run."""
+def impossible_map_faults(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find faults of the map in scenarios without a map, and faults of the map with a time."""
     loaded = scope.loaded
     for index, entry, instance in _suitable_faults(loaded):
         if instance.kind != MAP:
             continue
         if loaded.spec.map == "none":
             message = "the map cannot have faults: the scenario has `map: none`"
-            yield CheckFinding(("faults", index, "sensor"), message)
+            yield CheckProblem(("faults", index, "sensor"), message)
         for key, given in (("when", entry.when), ("for", entry.for_)):
             if given is not None:
                 message = f"a fault on the map cannot have `{key}`: the stack gets the map once, before it starts"
-                yield CheckFinding(("faults", index, key), message, at_key=True)
+                yield CheckProblem(("faults", index, key), message, at_key=True)
 
 
 @NAMES.check(STACK_CANNOT)
-def faults_of_other_localizers(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find faults on the localizer of a stack that is not one of simscen's own."""
+def faults_of_foreign_localizers(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find faults of the localizer of a stack that is not one of simscen's own, and so cannot be disturbed."""
     if isinstance(scope.loaded.spec.stack, StackSpec):
         return
     for index, _, instance in _suitable_faults(scope.loaded):
         if instance.kind == BELIEF:
             message = "only the localizer of simscen's own stacks can have faults"
             hint = "disturb the inputs of the localizer instead: odometry, lidar, imu, or the map"
-            yield CheckFinding(("faults", index, "sensor"), message, hint)
+            yield CheckProblem(("faults", index, "sensor"), message, hint)
 
 
 def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, Instance]]:
-    """Yield position, fault, and instance of each fault that can affect its instance."""
+    """Yield the index, the fault, and the instance of each fault that can affect its instance."""
     for index, entry, instance in _listed_faults(loaded):
         if instance is not None and instance.kind in entry.fault.affects and not entry.fault.unsuitable_key(instance):
             yield index, entry, instance
 
 
 @NAMES.check("SC032")
-def resampling_after_delay(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find faults that measure again but are listed after a fault that delays the scans."""
+def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find faults that compute the measurement anew, but are listed after a fault that delays the messages."""
     loaded = scope.loaded
     faults = loaded.spec.faults
     for index, entry, instance in _listed_faults(loaded):
@@ -132,12 +133,12 @@ def resampling_after_delay(scope: NameScope) -> Iterator[CheckFinding]:
         if resamples and before:
             message = f"`{entry.label}` has no effect: `{before[0]}` before it holds the measurements back"
             hint = f"list it before `{before[0]}`; faults apply in the order of the list"
-            yield CheckFinding(("faults", index, entry.kind), message, hint, at_key=True)
+            yield CheckProblem(("faults", index, entry.kind), message, hint, at_key=True)
 
 
 @MEANING.check("SC050")
-def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find faults that are shorter than the time between two messages of their sensor."""
+def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find faults that are so short that they can begin and end between two messages of their sensor."""
     if loaded.robot.spec is None:
         return
     rates = {name: getattr(sensor.chosen, "rate", None) for name, sensor in loaded.robot.spec.sensors.items()}
@@ -146,30 +147,30 @@ def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckFinding]:
         rate = rates.get(entry.sensor)
         if entry.for_ is None or rate is None or entry.for_ * rate >= 1 - 1e-9:
             continue
-        begin = _start_time(entry.when)
+        begin = _start_time_s(entry.when)
         between = begin is not None and math.ceil(begin * rate - 1e-6) > (begin + entry.for_) * rate + 1e-6
         if begin is None or between:
             when = "begins and ends" if between else "may begin and end"
             message = f"`{entry.label}` {when} between two messages: `{entry.sensor}` sends {rate:g} per second"
             hint = f"make it last at least {1 / rate:g} s"
-            yield CheckFinding(("faults", index, "for"), message, hint, warning=not (between and entry.required))
+            yield CheckProblem(("faults", index, "for"), message, hint, warning=not (between and entry.required))
 
 
-def _start_time(when: Trigger | None) -> float | None:
-    """Return when a fault begins, in s, if that depends on the time alone."""
+def _start_time_s(when: Trigger | None) -> float | None:
+    """Return the time in s at which a fault begins; None if it depends on something else than the time."""
     if when is None:
         return 0.0
     return float(when.chosen.root) + when.delay if when.time is not None else None  # type: ignore[attr-defined]
 
 
 @MEANING.check("SC055", severity="warning")
-def faults_without_effect(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def faults_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find faults whose values have no effect."""
     for index, entry in enumerate(loaded.spec.faults):
         neutral = entry.fault.neutral_values
         if neutral and all(getattr(entry.chosen, key) == value for key, value in neutral.items()):
             message = f"fault `{entry.label}` changes nothing with these values"
-            yield CheckFinding(("faults", index, entry.kind), message, at_key=True)
+            yield CheckProblem(("faults", index, entry.kind), message, at_key=True)
 
 
 def _with_article(noun: str) -> str:

@@ -1,4 +1,4 @@
-"""Recognize the kind of a file, and check files of any kind."""
+"""Recognize the kind of a file (scenario, world, robot, …), and check a file of any kind."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,19 +18,20 @@ from simscen.loading.files.paths import PathSandbox
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.validate import check_partial
 from simscen.loading.stacks.choice import NAV2_FILE_KIND, STACK_FILE_KIND, recognize_stack_file
-from simscen.loading.variations.naming import VariationProblems, merge_problems
+from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec
 
 CHECKED_DRAWS = range(1, 21)
-"""Numbers of the variations of a study that are checked; the others are checked before they run."""
+"""Numbers of the variations of a study that are checked. The others are checked before they run."""
 STACK_KINDS = ("stack", NAV2_FILE_KIND)
 """Kinds of files with the parameters of a stack."""
-_ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
-_ONLY_WORLDS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
-_ONLY_SCENARIOS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
-_SUFFIXES = (
+_ROBOT_KEYS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
+_WORLD_KEYS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
+_SCENARIO_KEYS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
+"""Top-level keys that only files of this kind have."""
+_SUFFIXES_BY_KIND = (
     ("scenario", SCENARIO_SUFFIXES),
     ("study", STUDY_SUFFIXES),
     ("base", BASE_SUFFIXES),
@@ -38,12 +39,13 @@ _SUFFIXES = (
     ("robot", (*ROBOT_SUFFIXES, *URDF_SUFFIXES)),
     ("stack", STACK_SUFFIXES),
 )
+"""Kinds of files, each with its suffixes."""
 
 
 def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
-    """Return the problems of a file, and of the files it names; `kind` is what file_kind returns.
+    """Return the errors and warnings of a file and of the files that it names; `kind` is what `file_kind` returns.
 
-    Some problems are warnings.
+    The other files must lie in `root` or a folder of `world_path`.
     """
     if kind in ("scenario", "study"):
         loaded = try_variations(file, root, world_path, numbers=CHECKED_DRAWS if kind == "study" else None)
@@ -74,13 +76,14 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
 
 
 def file_kind(file: Path, root: Path) -> str:
-    """Return the kind of a file by its suffix, else by keys that only one kind has.
+    """Return the kind of a file, by its suffix, or else by keys that only files of one kind have.
 
-    The kinds are "scenario", "study", "world", "robot", "stack", "base", "map" and NAV2_FILE_KIND.
+    The kinds are "scenario", "study", "world", "robot", "stack", "base", "map" (a ROS map), and NAV2_FILE_KIND. A file
+    without a known suffix or key counts as a scenario.
     """
     if file.name == DEFAULTS_FILE:
         return "base"
-    for kind, suffixes in _SUFFIXES:
+    for kind, suffixes in _SUFFIXES_BY_KIND:
         if file.name.endswith(suffixes):
             return kind
     library = Library(PathSandbox.around(root))
@@ -92,27 +95,27 @@ def file_kind(file: Path, root: Path) -> str:
     ):
         return "stack" if kind == STACK_FILE_KIND else kind
     keys = set(tree.entries) if isinstance(tree, MappingNode) else set()
-    if keys & _ONLY_SCENARIOS:
+    if keys & _SCENARIO_KEYS:
         return "scenario"
-    return "robot" if keys & _ONLY_ROBOTS else "world" if keys & _ONLY_WORLDS else "scenario"
+    return "robot" if keys & _ROBOT_KEYS else "world" if keys & _WORLD_KEYS else "scenario"
 
 
 def check_base_file(file: Path, library: Library) -> list[Problem]:
-    """Return the problems of a base file (`*.base.yaml`, `defaults.yaml`) and of the files it names.
+    """Return the problems of a base file (`*.base.yaml`, `defaults.yaml`) and of the world and robot that it names.
 
-    Missing keys are not problems: the scenarios that extend it may have them.
+    Missing keys are no problems, because scenarios that extend the file may have them.
     """
     tree, problems = library.read(file)
     if problems or tree is None:
         return library.with_source(problems)
-    problems = check_partial(ScenarioSpec, _with_lists(tree))
+    problems = check_partial(ScenarioSpec, _with_plain_keys(tree))
     return library.with_source(
         sorted([*problems, *(_named_file_problems(tree, library) if isinstance(tree, MappingNode) else [])])
     )
 
 
-def _with_lists(tree: Node) -> Node:
-    """Return the tree with `pass+` as `pass`, so that the items to be added are checked."""
+def _with_plain_keys(tree: Node) -> Node:
+    """Return the tree with keys such as `pass+` renamed to `pass`, so that their items are checked as well."""
     if not isinstance(tree, MappingNode):
         return tree
     entries = {
@@ -124,6 +127,7 @@ def _with_lists(tree: Node) -> Node:
 
 
 def _named_file_problems(tree: MappingNode, library: Library) -> list[Problem]:
+    """Return the problems of the world and the robot that a base file names."""
     assets = Assets(library)
     world, model = child(tree, "world"), node_at(tree, ("robot", "model"))
     if isinstance(world, ScalarNode) and isinstance(world.value, str):

@@ -1,4 +1,4 @@
-"""Checks that find keepout zones and filter masks that forbid the start or a goal, or that have no effect."""
+"""Checks that find keepout zones and filter masks that forbid the start or a goal, or have no effect."""
 
 from collections.abc import Callable, Iterator, Mapping
 
@@ -12,7 +12,7 @@ from simscen.core.geometry.polygons import depth_inside_polygon, separation_from
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.speed import Speed
 from simscen.loading.builders import KEEPOUT_KEYS, SPEED_KEYS, load_criterion_masks, load_masks
-from simscen.loading.checks.registry import CheckFinding, Keys
+from simscen.loading.checks.registry import CheckProblem
 from simscen.loading.checks.scene import (
     WORLD,
     Scene,
@@ -21,33 +21,35 @@ from simscen.loading.checks.scene import (
     required_failure_hint,
 )
 from simscen.loading.schema.messages import quoted
+from simscen.loading.yaml.tree import Keys
 
 ZoneTest = Callable[[Pose2, float], bool]
-"""Function of a pose and a distance in m: whether a zone contains all positions within the distance of the pose."""
+"""Function that takes a pose and a distance in m. Returns whether a zone contains all positions within the distance."""
 
 MIN_DEPTH_M = 0.1
-"""Depth in m inside a zone from which a goal is forbidden, however the costmap rounds the zone to cells."""
+"""Depth inside a zone from which a goal is certainly forbidden. A costmap can round the edge of the zone to cells."""
 ESTIMATE_ERROR_M = 0.5
-"""Possible error of the initial estimate in m. A start is reported only if it is at least this deep inside a zone."""
+"""Possible error of the initial estimate. A start is only reported if it is at least this deep inside a zone."""
 NO_LIMIT_REASON = "no cell of the mask limits the speed with this `base` and `multiplier`"
+"""Reason in messages why a speed mask has no effect."""
 
 
 def stack_masks(scene: Scene) -> FilterMasks:
-    """Return the filter masks of the stack. Raises InvalidInput for a mask that cannot be read."""
+    """Load the filter masks of the stack. Raises InvalidInput for a mask that cannot be read."""
     return load_masks(scene.loaded)
 
 
 def criterion_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
-    """Return the masks of criteria, by file. Raises InvalidInput for a mask that cannot be read."""
+    """Load the filter masks of criteria, by path as written. Raises InvalidInput for a mask that cannot be read."""
     return load_criterion_masks(scene.loaded.criterion_masks, scene.loaded.tree, scene.loaded.with_source_line)
 
 
 @WORLD.check("SC302")
-def check_stack_zones(scene: Scene) -> Iterator[CheckFinding]:
-    """Find goals, and starts (a warning), in zones that the stack keeps out of."""
+def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
+    """Find goals in zones that the stack keeps out of, and starts in them (a warning)."""
     regions = scene.world.regions
     zones: list[tuple[Keys, str, ZoneTest]] = [
-        (("stack", "keepout", index), f"in `{region}`", _inside_region(regions[region]))
+        (("stack", "keepout", index), f"in `{region}`", _region_test(regions[region]))
         for index, region in enumerate(scene.loaded.spec.stack.keepout)
     ]
     keepout = scene.cached(stack_masks).keepout
@@ -58,19 +60,20 @@ def check_stack_zones(scene: Scene) -> Iterator[CheckFinding]:
             if forbids(goal.pose, MIN_DEPTH_M):
                 message = f"goal `{goal.name}` cannot be reached: it is {where}, which the stack keeps out of"
                 hint = f"move one of them, or {expected_failure_hint(goal_keys, 'GOAL_OCCUPIED')}"
-                yield CheckFinding(keys, message, hint)
+                yield CheckProblem(keys, message, hint)
         if forbids(scene.start, ESTIMATE_ERROR_M) and not expects_start_failure(scene.loaded.spec):
             message = f"the robot starts {where}, which the stack keeps out of"
             hint = f"move one of them, or {required_failure_hint('START_OCCUPIED')}"
-            yield CheckFinding(keys, message, hint, warning=True)
+            yield CheckProblem(keys, message, hint, warning=True)
 
 
-def _inside_region(corners: Polygon) -> ZoneTest:
+def _region_test(corners: Polygon) -> ZoneTest:
+    """Return the test for a region."""
     return lambda pose, within: depth_inside_polygon(pose, corners) > within
 
 
 def forbidden_test(mask: OccupancyGrid) -> ZoneTest:
-    """Return a test whether the keepout mask forbids all positions within a distance of a pose."""
+    """Return the test for the area that a keepout mask forbids. It samples the positions as densely as the cells."""
 
     def forbids(pose: Pose2, within: float) -> bool:
         steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, MIN_DEPTH_M))) + 1)
@@ -81,37 +84,37 @@ def forbidden_test(mask: OccupancyGrid) -> ZoneTest:
 
 
 @WORLD.check("SC055", severity="warning")
-def masks_without_effect(scene: Scene) -> Iterator[CheckFinding]:
+def masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
     """Find masks of the stack that forbid or limit nothing."""
     masks = scene.cached(stack_masks)
     if masks.keepout is not None and not (masks.keepout.cells == OCCUPIED).any():
-        yield CheckFinding(KEEPOUT_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
+        yield CheckProblem(KEEPOUT_KEYS, "the keepout mask forbids nothing: none of its cells is occupied")
     if masks.speed is not None and not masks.speed.has_limits:
-        yield CheckFinding(SPEED_KEYS, f"the speed mask has no effect: {NO_LIMIT_REASON}")
+        yield CheckProblem(SPEED_KEYS, f"the speed mask has no effect: {NO_LIMIT_REASON}")
 
 
 @WORLD.check("SC311", severity="warning")
-def shades_in_keepout_mask(scene: Scene) -> Iterator[CheckFinding]:
-    """Find keepout masks with cells that are neither free nor occupied."""
+def partly_occupied_mask_cells(scene: Scene) -> Iterator[CheckProblem]:
+    """Find keepout masks with cells that are neither free nor occupied, and so have no effect."""
     keepout = scene.cached(stack_masks).keepout
     if keepout is not None and (keepout.cells == OCCUPIED).any():
         count = np.count_nonzero((keepout.cells > FREE) & (keepout.cells < OCCUPIED))
         if count:
             message = f"{count} cells of the keepout mask are neither free nor occupied: they forbid nothing"
-            yield CheckFinding(KEEPOUT_KEYS, message)
+            yield CheckProblem(KEEPOUT_KEYS, message)
 
 
 @WORLD.check("SC055", severity="warning")
-def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckFinding]:
+def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
     """Find masks of criteria that forbid or limit nothing."""
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         match entry.chosen:
             case Keepout(mask=str(name)) if not len(masks[name].forbidden):
                 message = "the criterion judges nothing: no cell of the mask is occupied"
-                yield CheckFinding(("pass", index, "keepout", "mask"), message)
+                yield CheckProblem(("pass", index, "keepout", "mask"), message)
             case Speed(mask=spec) if spec is not None and not spec.over(masks[spec.file].grid).has_limits:
-                yield CheckFinding(
+                yield CheckProblem(
                     ("pass", index, "speed", "mask", "file"), f"the criterion judges nothing: {NO_LIMIT_REASON}"
                 )
             case _:
@@ -119,7 +122,7 @@ def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckFinding]:
 
 
 @WORLD.check("SC051")
-def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckFinding]:
+def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckProblem]:
     """Find keepout criteria whose mask forbids the start or a goal."""
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
@@ -131,10 +134,10 @@ def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckFinding]:
             continue
         start = mask.to_mask_frame(np.array([scene.start]))
         if separation_from_boxes(start, scene.outline, mask.forbidden)[0] < 0:
-            yield CheckFinding(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
+            yield CheckProblem(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
             continue
         forbids = forbidden_test(mask.grid)
         inside = [goal.name for _, goal in scene.targets if forbids(goal.pose, goal.xy_tolerance)]
         if inside:
             message = f"keepout cannot hold if goal `{inside[0]}` is reached: {quoted(name)} forbids its position"
-            yield CheckFinding(keys, message)
+            yield CheckProblem(keys, message)

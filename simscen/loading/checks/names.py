@@ -1,4 +1,4 @@
-"""Checks of names, also of robots: do they exist, are they unique, are they allowed in their place?"""
+"""Checks of names: whether they exist, whether they are unique, and whether they are allowed where they are written."""
 
 from collections.abc import Container, Iterator
 from dataclasses import replace
@@ -6,18 +6,19 @@ from dataclasses import replace
 from simscen.actions.base import Action, AnyAction
 from simscen.core.messages.navigation import LOOP_NAME
 from simscen.criteria.registry import verdict_names
-from simscen.loading.checks.registry import NAMES, ROBOT_NAMES, CheckFinding, Keys, NameScope, WrittenScenario
-from simscen.loading.known_names import NOUNS, event_names, known_names, own_goal_names, world_object_names
+from simscen.loading.checks.registry import NAMES, ROBOT_NAMES, CheckProblem, NameScope, WrittenScenario
+from simscen.loading.known_names import NOUNS, event_names, known_names, listed_goal_names, world_object_names
 from simscen.loading.multirobot import ROBOTS
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references, walk
+from simscen.loading.yaml.tree import Keys
 from simscen.triggers.base import AnyCondition, Condition
 
 RENAME_HINT = "rename one of them"
 
 
 @NAMES.check("SC030")
-def unknown_names(scope: NameScope) -> Iterator[CheckFinding]:
+def unknown_names(scope: NameScope) -> Iterator[CheckProblem]:
     """Find names that refer to nothing."""
     loaded = scope.loaded
     known = known_names(loaded, scope.world)
@@ -26,12 +27,12 @@ def unknown_names(scope: NameScope) -> Iterator[CheckFinding]:
         if names is not None and reference.name not in names and not _is_immovable(scope, reference):
             hint = suggestion(reference.name, dict.fromkeys(names)) or "there is none"
             message = f"no {NOUNS[reference.target]} is called {quoted(reference.name)}"
-            yield CheckFinding(reference.keys, message, hint)
+            yield CheckProblem(reference.keys, message, hint)
 
 
 @NAMES.check("SC035")
-def immovable_names(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find names of fixed parts of the world, or of robots, where the name of a movable object is expected."""
+def names_of_immovable_things(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find names of fixed parts of the world, or of robots, where only movable objects can be named."""
     loaded = scope.loaded
     known = known_names(loaded, scope.world)
     for reference in references(loaded.spec, includes_robot=loaded.includes_robot):
@@ -44,10 +45,11 @@ def immovable_names(scope: NameScope) -> Iterator[CheckFinding]:
             else "a fixed part of the world"
         )
         message = f"{quoted(reference.name)} is {what}, which cannot be moved or followed"
-        yield CheckFinding(reference.keys, message, "name an object, a door or something that an event spawns")
+        yield CheckProblem(reference.keys, message, "name an object, a door or something that an event spawns")
 
 
 def _is_immovable(scope: NameScope, reference: Reference) -> bool:
+    """Return whether a reference to a movable object names something that exists, but cannot be moved."""
     if reference.target not in ("movable", "mover"):
         return False
     objects = known_names(scope.loaded, scope.world)["object"] or ()
@@ -55,14 +57,14 @@ def _is_immovable(scope: NameScope, reference: Reference) -> bool:
 
 
 def _robots_not_allowed(scope: NameScope, reference: Reference) -> tuple[str, ...]:
-    """Return the robots to which a reference must not refer."""
+    """Return the robots to which a reference to a movable object must not refer."""
     own = (scope.loaded.robot_name,) if reference.target == "movable" else ()
     return (*own, *scope.loaded.other_robots)
 
 
 @NAMES.check("SC031")
-def unknown_lidars(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find triggers on the scans of a lidar that the robot does not have."""
+def unknown_lidars(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find triggers by the age of the scans of a lidar that the robot does not have."""
     loaded = scope.loaded
     if loaded.robot.spec is None:
         return
@@ -71,12 +73,12 @@ def unknown_lidars(scope: NameScope) -> Iterator[CheckFinding]:
         named = getattr(part.scan_age, "sensor", None) if isinstance(part, AnyCondition) else None
         if named is not None and named not in lidars:
             message = f"robot `{loaded.robot.name}` has no lidar called {quoted(named)}"
-            yield CheckFinding((*keys, "scan_age", "sensor"), message, suggestion(named, lidars) or "it has no lidar")
+            yield CheckProblem((*keys, "scan_age", "sensor"), message, suggestion(named, lidars) or "it has no lidar")
 
 
 @NAMES.check("SC033")
-def duplicate_names(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find two goals, two events, or two faults with the same name, and an event and a fault with the same name."""
+def duplicate_names(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find goals, events, or faults with the same name, and events with the name of a fault."""
     loaded = scope.loaded
     lists: dict[str, list[tuple[Keys, str | None]]] = {
         "goal": [(("goals", k), goal.name) for k, goal in enumerate(loaded.spec.goals)],
@@ -89,44 +91,44 @@ def duplicate_names(scope: NameScope) -> Iterator[CheckFinding]:
             if name is not None and name in seen:
                 first = loaded.position_of(*seen[name], "name")
                 message = f"{what} {quoted(name)} is already defined at {first.line}:{first.col}"
-                yield CheckFinding((*keys, "name"), message, "choose another name")
+                yield CheckProblem((*keys, "name"), message, "choose another name")
             seen.setdefault(name or "", keys)
     for index, fault in enumerate(loaded.spec.faults):
         if fault.name is not None and fault.name in event_names(loaded):
             message = f"an event is also called {quoted(fault.name)}; criteria cannot distinguish them"
-            yield CheckFinding(("faults", index, "name"), message, RENAME_HINT)
+            yield CheckProblem(("faults", index, "name"), message, RENAME_HINT)
 
 
 @NAMES.check("SC033")
-def duplicate_names_of_actions(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find marks and new goals with the name of an event, a fault or a goal."""
+def duplicate_marks_and_new_goals(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find marks with the name of an event or fault, and goals of events with the name of another goal."""
     loaded = scope.loaded
     disturbances = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
-    goals = own_goal_names(loaded)
-    for keys, action in (placed for step in loaded.spec.steps for placed in step.located_actions()):
+    goals = listed_goal_names(loaded)
+    for keys, action in (located for step in loaded.spec.steps for located in step.located_actions()):
         name = getattr(action.chosen, "name", "")
         if action.kind == "mark" and name in disturbances:
             message = f"an event or a fault is also called {quoted(name)}; criteria cannot distinguish them"
-            yield CheckFinding((*keys, "mark", "name"), message, RENAME_HINT)
+            yield CheckProblem((*keys, "mark", "name"), message, RENAME_HINT)
         if action.kind != "new_goal" or not name or not loaded.includes_robot(action.robot):
             continue
         if name in goals:
             message = f"another goal is also called {quoted(name)}; criteria cannot distinguish them"
-            yield CheckFinding((*keys, "new_goal", "name"), message, "choose another name")
+            yield CheckProblem((*keys, "new_goal", "name"), message, "choose another name")
         goals.append(name)
 
 
 @NAMES.check("SC033")
-def reserved_goal_names(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find goals with names such as `shelf#2`, which are reserved for the second and later loops."""
+def reserved_goal_names(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find goals with names such as `shelf#2`, which goals get in the second and later loops."""
     for index, goal in enumerate(scope.loaded.spec.goals):
         if goal.name is not None and LOOP_NAME.fullmatch(goal.name):
             message = f"{quoted(goal.name)} is reserved for the goals of the second and later loops"
-            yield CheckFinding(("goals", index, "name"), message, "choose a name that does not end in # and a number")
+            yield CheckProblem(("goals", index, "name"), message, "choose a name that does not end in # and a number")
 
 
 @NAMES.check("SC033")
-def duplicate_pedestrians(scope: NameScope) -> Iterator[CheckFinding]:
+def duplicate_pedestrians(scope: NameScope) -> Iterator[CheckProblem]:
     """Find pedestrians with the name of an object of the world or of another pedestrian."""
     loaded = scope.loaded
     used_names = dict.fromkeys(world_object_names(loaded, scope.world), "an object of the world")
@@ -138,22 +140,22 @@ def duplicate_pedestrians(scope: NameScope) -> Iterator[CheckFinding]:
             repeated = [name for name in names if name in used_names]
             if repeated and (action.kind != "spawn" or used_names[repeated[0]] == "a pedestrian"):
                 message = f"{used_names[repeated[0]]} is also called {quoted(repeated[0])}"
-                yield CheckFinding((*keys, action.kind, "name"), message, RENAME_HINT)
+                yield CheckProblem((*keys, action.kind, "name"), message, RENAME_HINT)
             used_names.update(dict.fromkeys(names, "a spawned object" if action.kind == "spawn" else "a pedestrian"))
 
 
 @NAMES.check("SC033")
-def robots_named_like_objects(scope: NameScope) -> Iterator[CheckFinding]:
+def robots_named_like_objects(scope: NameScope) -> Iterator[CheckProblem]:
     """Find robots with the name of an object of the world."""
     loaded = scope.loaded
     objects = known_names(replace(loaded, other_robots=()), scope.world)["object"] or ()
     if loaded.robot_name in objects:
         message = f"an object of the world is also called {quoted(loaded.robot_name)}"
-        yield CheckFinding(("robot",), message, "rename the robot", at_key=True)
+        yield CheckProblem(("robot",), message, "rename the robot", at_key=True)
 
 
 @ROBOT_NAMES.check("SC030")
-def unknown_robots(scenario: WrittenScenario) -> Iterator[CheckFinding]:
+def unknown_robots(scenario: WrittenScenario) -> Iterator[CheckProblem]:
     """Find triggers and actions with the name of a robot that does not exist."""
     spec = scenario.spec
     robots = spec.robots or {}
@@ -163,12 +165,12 @@ def unknown_robots(scenario: WrittenScenario) -> Iterator[CheckFinding]:
         message, hint = f"no robot is called {quoted(part.robot)}", suggestion(part.robot, robots)
         if not robots:
             message, hint = f"{message}: the only robot has no name", "remove `robot`"
-        yield CheckFinding((*keys, "robot"), message, hint)
+        yield CheckProblem((*keys, "robot"), message, hint)
 
 
 @ROBOT_NAMES.check("SC043")
-def missing_robots(scenario: WrittenScenario) -> Iterator[CheckFinding]:
-    """Find triggers and actions that must name a robot, because there are several, and do not."""
+def missing_robot_names(scenario: WrittenScenario) -> Iterator[CheckProblem]:
+    """Find triggers and actions that do not name a robot, although they apply to one of several robots."""
     spec = scenario.spec
     if not spec.robots:
         return
@@ -182,11 +184,14 @@ def missing_robots(scenario: WrittenScenario) -> Iterator[CheckFinding]:
             if action.robot is None and action.chosen.is_robot_specific:
                 unnamed.append((keys, action.kind))
         for keys, kind in unnamed:
-            yield CheckFinding((*keys, kind), f"`{kind}` must name one of the robots", hint, at_key=True)
+            yield CheckProblem((*keys, kind), f"`{kind}` must name one of the robots", hint, at_key=True)
 
 
 def _conditions_without_robot(test: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, str]]:
-    """Yield keys and kind of each condition that applies to one robot, or to its fault, but names no robot."""
+    """Yield the keys and the kind of each condition that applies to one robot, or to its fault, but names no robot.
+
+    `faults` are the names of the faults of all robots.
+    """
     if test.robot is not None:
         return
     for key, inner in (("all", test.all), ("any", test.any)):
@@ -202,18 +207,18 @@ def _conditions_without_robot(test: AnyCondition, keys: Keys, faults: Container[
 
 
 @ROBOT_NAMES.check("SC030")
-def unknown_expected_verdicts(scenario: WrittenScenario) -> Iterator[CheckFinding]:
-    """Find names under `expected.criteria` that no verdict has; a robot's verdicts begin with `<robot>/`."""
+def unknown_expected_verdicts(scenario: WrittenScenario) -> Iterator[CheckProblem]:
+    """Find names under `expected.criteria` that no verdict has. Those of a robot's verdicts begin with `<robot>/`."""
     spec = scenario.spec
     if not spec.robots:
         return
     known = [step.name for step in spec.steps]
     for name, robot in sorted(spec.robots.items()):
-        own = [*verdict_names([*spec.pass_, *robot.pass_]), *(fault.label for fault in robot.faults)]
-        known += [f"{name}/{one}" for one in own]
+        verdicts = [*verdict_names([*spec.pass_, *robot.pass_]), *(fault.label for fault in robot.faults)]
+        known += [f"{name}/{verdict}" for verdict in verdicts]
     for number, expected in enumerate(spec.expected.criteria if spec.expected else ()):
         if expected not in known:
             matches = [one for one in known if one.partition("/")[2] == expected]
             hint = f"write {' or '.join(f'`{match}`' for match in matches)}" if matches else suggestion(expected, known)
             message = f"no criterion, event or fault is called {quoted(expected)}"
-            yield CheckFinding(("expected", "criteria", number), message, hint)
+            yield CheckProblem(("expected", "criteria", number), message, hint)

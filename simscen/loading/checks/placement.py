@@ -1,4 +1,4 @@
-"""Checks that find poses of the robot, goals, and objects of events inside an obstacle or outside the map."""
+"""Checks that find poses of the robot, of goals, and of objects of events inside an obstacle or outside the map."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -13,7 +13,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast_message
 from simscen.core.geometry.shapes import MotionPath, Solid
 from simscen.core.messages.navigation import Goal
-from simscen.loading.checks.registry import CheckFinding, Keys
+from simscen.loading.checks.registry import CheckProblem
 from simscen.loading.checks.scene import (
     SILL_M,
     START,
@@ -23,7 +23,7 @@ from simscen.loading.checks.scene import (
     expected_failure_hint,
     expects_start_failure,
 )
-from simscen.loading.yaml.tree import MappingNode
+from simscen.loading.yaml.tree import Keys, MappingNode
 from simscen.sim.body.outline import radius_and_height
 from simscen.spec.moving_objects import Motion
 from simscen.triggers.base import Trigger
@@ -32,35 +32,37 @@ from simscen.worlds.extent import top_height
 from simscen.worlds.geometry.overlaps import first_solid_in_disc, place_polygon, polygons_overlap
 from simscen.worlds.geometry.prisms import upright_prism
 
-START_HINT = "move it to free space"
+FREE_SPACE_HINT = "move it to free space"
 MAX_PLATFORM_HEIGHT_M = 0.3
-"""Height up to which an obstacle in a Gazebo world may be meant as the floor."""
-TOLERANCE_SHARES = (-0.9, 0.0, 0.9)
-"""Offsets that are tried around the exact pose of a goal, as fractions of its tolerances: just inside of them."""
+"""Largest height of an obstacle in a Gazebo world that may be meant as the floor."""
+TOLERANCE_FRACTIONS = (-0.9, 0.0, 0.9)
+"""Offsets that are tried around the exact pose of a goal, as fractions of its tolerances."""
 
 MotionStop = tuple[Keys, str, tuple[float, float]]
-"""Keys below those of the motion, description, and position (x, y) of a keyframe or waypoint."""
+"""Keyframe, waypoint, or other position of a motion: its keys below the motion, a description, and (x, y) in m."""
 
 
-def blocked_poses(scene: Scene) -> dict[Keys, CheckFinding]:
-    """Return the findings for start, goals and kidnap poses at which the robot cannot be, by their keys in the file."""
-    found = [*_start(scene), *_goals(scene), *_kidnaps(scene)]
-    return {finding.keys: finding for finding in found}
+def blocked_poses(scene: Scene) -> dict[Keys, CheckProblem]:
+    """Return the problems of starts, goals, and kidnap poses at which the robot cannot be, by the keys of the pose."""
+    found = [*_blocked_start(scene), *_blocked_goals(scene), *_blocked_kidnap_poses(scene)]
+    return {problem.keys: problem for problem in found}
 
 
 @WORLD.check("SC301")
-def check_robot_poses(scene: Scene) -> Iterator[CheckFinding]:
-    """Find start, goal and kidnap poses inside an obstacle or outside the map."""
+def blocked_robot_poses(scene: Scene) -> Iterator[CheckProblem]:
+    """Find starts, goals, and kidnap poses inside an obstacle or outside the map."""
     yield from scene.cached(blocked_poses).values()
 
 
-def _start(scene: Scene) -> Iterator[CheckFinding]:
+def _blocked_start(scene: Scene) -> Iterator[CheckProblem]:
+    """Yield a problem if the start is blocked by the fixed world, or by a body at its initial pose."""
     if not expects_start_failure(scene.loaded.spec):
         solids = (*scene.world.solids, *scene.bodies)
-        yield from _pose_problem(scene, START, "the robot's start", scene.start, solids, START_HINT)
+        yield from _pose_problem(scene, START, "the robot's start", scene.start, solids, FREE_SPACE_HINT)
 
 
-def _goals(scene: Scene) -> Iterator[CheckFinding]:
+def _blocked_goals(scene: Scene) -> Iterator[CheckProblem]:
+    """Yield a problem for each goal in the fixed world, and a warning for each goal in a body that stays there."""
     for keys, goal in scene.targets:
         code = "GOAL_OUTSIDE_MAP" if scene.area.outside(goal.pose) else "GOAL_OCCUPIED"
         hint = f"move it, or {expected_failure_hint(keys, code)}"
@@ -70,13 +72,13 @@ def _goals(scene: Scene) -> Iterator[CheckFinding]:
         position = goal.pose.x, goal.pose.y
         if not found and (thing := first_solid_in_disc(scene.unmoved_bodies, position, TOUCH_M, scene.z_range)):
             message = f"goal `{goal.name}` is inside `{thing}`, and no event moves or removes `{thing}`"
-            yield CheckFinding(keys, message, hint, warning=True)
+            yield CheckProblem(keys, message, hint, warning=True)
 
 
 def _fits_nearby(scene: Scene, goal: Goal) -> bool:
-    """Return whether the robot fits at another pose within the goal's tolerances, although the exact pose is blocked.
+    """Return whether a pose within the tolerances of a goal is free, although the exact pose is blocked.
 
-    Only footprints that are not round are tried, and only if no obstacle overlaps the robot's inscribed circle.
+    Poses are only tried for a footprint that is not round, and if no obstacle overlaps its inscribed circle.
     """
     outside = scene.area.outside(goal.pose)
     if outside or scene.size.radius is not None or scene.circle_conflict(goal.pose, scene.world.solids):
@@ -84,31 +86,38 @@ def _fits_nearby(scene: Scene, goal: Goal) -> bool:
     x, y, yaw = goal.pose
     near = (
         Pose2(x + a * goal.xy_tolerance, y + b * goal.xy_tolerance, yaw + c * goal.yaw_tolerance)
-        for a, b, c in product(TOLERANCE_SHARES, repeat=3)
+        for a, b, c in product(TOLERANCE_FRACTIONS, repeat=3)
         if math.hypot(a, b) <= 1
     )
     return any(scene.footprint_conflict(pose, scene.world.solids) is None for pose in near)
 
 
-def _kidnaps(scene: Scene) -> Iterator[CheckFinding]:
+def _blocked_kidnap_poses(scene: Scene) -> Iterator[CheckProblem]:
+    """Yield a problem for each blocked pose to which an event kidnaps the robot."""
     for keys, _, action in scene.actions:
         if isinstance(action, Kidnap):
             what = "the pose to which the robot is kidnapped"
-            yield from _pose_problem(scene, (*keys, "pose"), what, action.pose.pose, scene.world.solids, START_HINT)
+            yield from _pose_problem(
+                scene, (*keys, "pose"), what, action.pose.pose, scene.world.solids, FREE_SPACE_HINT
+            )
 
 
 def _pose_problem(
     scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
-) -> Iterator[CheckFinding]:
+) -> Iterator[CheckProblem]:
+    """Yield a problem if the robot cannot be at a pose among `solids`; `what` describes the pose in the message."""
     conflict = scene.area.outside(pose) or scene.footprint_conflict(pose, solids)
     if conflict:
         if scene.loaded.world.sdf is not None:
             hint = _hint_in_gazebo_world(scene, pose, solids, hint)
-        yield CheckFinding(keys, f"{what} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
+        yield CheckProblem(keys, f"{what} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
 
 
 def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], hint: str) -> str:
-    """Return the hint for a pose beside the world, or on a low slab that may be meant as the floor."""
+    """Return the hint for a blocked pose: outside of the world, or on a low slab that may be meant as the floor.
+
+    In other cases, `hint` itself is returned.
+    """
     if scene.area.outside(pose):
         return f"{hint}; or drive with `map: none`"
     position = pose.x, pose.y
@@ -119,19 +128,19 @@ def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], 
 
 
 @WORLD.check("SC304")
-def check_spawns(scene: Scene) -> Iterator[CheckFinding]:
-    """Find objects that are spawned inside an obstacle or on the robot."""
+def blocked_spawns(scene: Scene) -> Iterator[CheckProblem]:
+    """Find objects that would be spawned inside an obstacle or on the robot."""
     for keys, _, action in scene.actions:
         if isinstance(action, Spawn):
             is_event = keys[2] == "do"  # the time of a later step counts from the step before it
             when = scene.loaded.spec.events[int(keys[1])].when if is_event else None
             where = _inside_obstacle(scene, action) or _on_robot(scene, action, when)
             if where:
-                yield CheckFinding((*keys, "name"), f"`{action.name}` would appear {where}", "choose another pose")
+                yield CheckProblem((*keys, "name"), f"`{action.name}` would appear {where}", "choose another pose")
 
 
 def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
-    """Return the obstacle that contains the whole outline of a spawned object, so that nothing can touch the object."""
+    """Return "inside obstacle …" if an obstacle contains all of a spawned object, so that nothing can touch it."""
     if spawn.pose is None:
         return None
     corners = place_polygon(_outline(spawn), spawn.pose.pose)
@@ -145,7 +154,10 @@ def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
 
 
 def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
-    """Return "on the robot" if an object overlaps the robot when it appears: relative to the robot, or at t = 0."""
+    """Return "on the robot" if a spawned object certainly overlaps the robot; else None.
+
+    That is certain for an object that appears relative to the robot, or at t = 0. `when` is its trigger, if known.
+    """
     if spawn.z >= scene.size.height:
         return None
     if spawn.ahead is not None:
@@ -158,15 +170,15 @@ def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
 
 
 def _outline(spawn: Spawn) -> Polygon:
-    """Return the outline of an object in its own frame."""
+    """Return the outline of an object on the floor in its own frame."""
     solid = spawn.solid(spawn.name)
     prism = upright_prism(Solid(solid.shape, Pose3(z=solid.pose.z), spawn.name))
     return prism.base if prism is not None else tuple((x, y) for x, y in spawn.polygon or ())
 
 
 @WORLD.check("SC304")
-def check_pedestrians(scene: Scene) -> Iterator[CheckFinding]:
-    """Find pedestrians whose start or goals are too close to obstacles."""
+def blocked_pedestrians(scene: Scene) -> Iterator[CheckProblem]:
+    """Find pedestrians whose start or goals are closer to an obstacle than their radius."""
     solids = (*scene.world.solids, *scene.immovable_bodies)
     for keys, _, action in scene.actions:
         if not isinstance(action, Pedestrian):
@@ -176,12 +188,12 @@ def check_pedestrians(scene: Scene) -> Iterator[CheckFinding]:
         for below, what, (x, y) in stops:
             if solid := first_solid_in_disc(solids, (x, y), action.radius, (SILL_M, action.height)):
                 message = f'{what} ({x:g}, {y:g}) is closer to obstacle "{solid}" than {action.radius:g} m'
-                yield CheckFinding((*keys, *below), message, "choose a position with enough room")
+                yield CheckProblem((*keys, *below), message, "choose a position with enough room")
 
 
 @WORLD.check("SC304", severity="warning")
-def check_motions(scene: Scene) -> Iterator[CheckFinding]:
-    """Find keyframes, waypoints and teleport targets inside the fixed world."""
+def motions_into_walls(scene: Scene) -> Iterator[CheckProblem]:
+    """Find keyframes and waypoints of motions, and targets of `teleport`, inside fixed obstacles."""
     for keys, _, action in scene.actions:
         stops: list[MotionStop] = []
         if isinstance(action, Move):
@@ -191,24 +203,27 @@ def check_motions(scene: Scene) -> Iterator[CheckFinding]:
         for below, what, (x, y) in stops:
             if solid := first_solid_in_disc(scene.world.solids, (x, y), TOUCH_M, scene.z_range):
                 message = f'{what} ({x:g}, {y:g}) is inside obstacle "{solid}"'
-                yield CheckFinding(
+                yield CheckProblem(
                     (*keys, *below), message, "move it to free space: walls do not stop scripted motions"
                 )
 
 
 @WORLD.check("SC305")
-def check_motion_speeds(scene: Scene) -> Iterator[CheckFinding]:
+def too_fast_motions(scene: Scene) -> Iterator[CheckProblem]:
     """Find scripted motions so fast that contact with the robot could be missed between two ticks."""
     tick = 1 / scene.loaded.spec.physics.tick_rate
     for keys, tree, name, path, solids in _motions(scene):
         step = largest_step(path, tick, radius_and_height(solids)[0] if solids else 0.0)
         if step > MAX_STEP_M:
             hint = f"make it {math.ceil(10 * step / MAX_STEP_M) / 10:g} times slower, or raise `physics.tick_rate`"
-            yield CheckFinding(keys, too_fast_message(name, step), hint, tree=tree)
+            yield CheckProblem(keys, too_fast_message(name, step), hint, tree=tree)
 
 
 def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, MotionPath, Sequence[Solid]]]:
-    """Yield keys, their tree, name, path and solids of all scripted motions, as far as they are known before a run."""
+    """Yield keys, their tree (None: the scenario), name, path, and solids of each scripted motion of a body.
+
+    Motions that depend on the run, for example on the position of the robot, are left out.
+    """
     bodies = {body.name: body for body in scene.world.bodies}
     file = scene.loaded.world
     own = [thing.name for thing in file.spec.objects] if file.spec is not None else []
@@ -238,7 +253,10 @@ def motion_stops(motion: Motion) -> list[MotionStop]:
 
 
 def check_robots_apart(scenes: Sequence[Scene]) -> Iterator[Problem]:
-    """Find robots whose footprints overlap at their starts (SC044); `scenes` are the views of one scenario."""
+    """Yield a problem for each pair of robots whose footprints overlap at their starts (SC044).
+
+    `scenes` has a scene for each robot of a scenario. This check is not in a stage, because it needs all scenes.
+    """
     for one, other in combinations(scenes, 2):
         if polygons_overlap(place_polygon(one.outline, one.start), place_polygon(other.outline, other.start)):
             first, second = one.loaded.robot_name, other.loaded.robot_name

@@ -1,12 +1,13 @@
 """Interface of semantic checks, and the stages in which checks run.
 
-A check is a generator function that yields one CheckFinding per problem. It is registered for a stage together with the
-error code that it reports:
+A check is a generator function that yields a CheckProblem for each problem, and is named after what it finds. It is
+registered for a stage together with the error code that it reports:
 
     @MEANING.check("SC050")
-    def impossible_events(loaded: LoadedScenario) -> Iterator[CheckFinding]: ...
+    def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]: ...
 
-Stages, in the order in which they run. After errors, later stages are not run:
+These are the stages in the order in which they run. If a stage finds errors, later stages do not run, except that NAMES
+always runs with WORLD_FILE.
 
 | stage | subject | finds, for example | needs |
 |---|---|---|---|
@@ -19,53 +20,52 @@ Stages, in the order in which they run. After errors, later stages are not run:
 | TIMING (`scene.py`) | one robot's view of the scenario | time limits that are too short | the same |
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
-from simscen.loading.yaml.tree import Key, MappingNode, key_position, value_position
+from simscen.loading.yaml.tree import Keys, MappingNode, key_position, value_position
 from simscen.model.scenario import ScenarioSpec
 
-Keys = tuple[Key, ...]
-"""Keys and indices that lead from the top of a file to a value, e.g. ("goals", 0, "pose")."""
 
-
-class CheckFinding(NamedTuple):
-    """A problem found by a check: where it is, what is wrong, and what to do.
-
-    `keys` lead to the value to mark; with `at_key`, its key is marked instead. They are keys in the checked file, or in
-    the file of `tree` if that is given, such as the world file of a scenario. A finding with `warning` is a warning
-    even if the check reports errors.
-    """
+class CheckProblem(NamedTuple):
+    """Problem that a check found, by keys instead of a position in a file."""
 
     keys: Keys
+    """Keys of the value to mark."""
     message: str
+    """What is wrong."""
     hint: str = ""
+    """What to do."""
     at_key: bool = False
+    """Whether to mark the key itself instead of its value."""
     warning: bool = False
+    """Whether this is a warning even if the check is registered for errors."""
     tree: MappingNode | None = None
+    """Tree that `keys` refer to, such as that of the robot file; None for the tree of the subject of the check."""
 
     def problem(self, code: str, tree: MappingNode, severity: str = "error") -> Problem:
-        """Return the finding as a problem at its position in `tree`; the text of the source line is added later."""
+        """Return the problem with its position in `tree`, the tree of the subject, but without its source line."""
         position_of = key_position if self.at_key else value_position
         position = position_of(self.tree or tree, self.keys)
         return Problem(*position, code, self.message, self.hint, "warning" if self.warning else severity)
 
 
 class Subject(Protocol):
-    """Object that checks examine: anything with the tree of the file in which problems are reported."""
+    """Object that the checks of a stage examine. It has the tree of the file in which problems are reported."""
 
     @property
     def tree(self) -> MappingNode | None:
-        """The tree of the file; None if the file is not in YAML."""
+        """The tree of the file; None for a file that is not in simscen's language, which is not checked."""
         ...
 
 
 S = TypeVar("S", bound=Subject)
-Check = Callable[[S], Iterable[CheckFinding]]
+Check = Callable[[S], Iterable[CheckProblem]]
+"""Function that yields the problems of a subject."""
 C = TypeVar("C", bound=Callable[..., Any])
 
 
@@ -87,26 +87,26 @@ class CheckStage(Generic[S]):
         return register
 
     def problems(self, subject: S) -> list[Problem]:
-        """Return the problems that all checks of this stage find; the text of the source lines is added later."""
+        """Return the problems that all checks of this stage find, without their source lines."""
         tree = subject.tree
         if tree is None:
             return []
         return [
-            finding.problem(code, tree, severity)
+            found.problem(code, tree, severity)
             for code, severity, function in self.checks
-            for finding in function(subject)
+            for found in function(subject)
         ]
 
 
 class WrittenScenario(NamedTuple):
-    """A scenario as written, with all its robots."""
+    """Scenario as written, with all its robots, before it is split into views."""
 
     spec: ScenarioSpec
     tree: MappingNode
 
 
 class NameScope(NamedTuple):
-    """Scenario and world in which names are looked up; `world` is None until the world has been built."""
+    """View of a scenario, and its built world, in which names are looked up. `world` is None before it is built."""
 
     loaded: LoadedScenario
     world: World | None = None
@@ -121,8 +121,3 @@ ROBOT_NAMES: CheckStage[WrittenScenario] = CheckStage("robot names")
 WORLD_FILE: CheckStage[LoadedWorld] = CheckStage("world file")
 NAMES: CheckStage[NameScope] = CheckStage("names")
 MEANING: CheckStage[LoadedScenario] = CheckStage("meaning")
-
-
-def warnings(findings: Iterable[CheckFinding]) -> Iterator[CheckFinding]:
-    """Return the findings as warnings."""
-    return (finding._replace(warning=True) for finding in findings)

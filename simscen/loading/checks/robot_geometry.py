@@ -1,4 +1,4 @@
-"""Check the geometry of a robot's file against its URDF."""
+"""Check the geometry of a robot: its file against its URDF, and whether its wheels are on the ground."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +19,10 @@ DIMENSION_TOLERANCE = 0.01
 
 
 def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, roots: tuple[Path, ...]) -> list[Problem]:
-    """Return warnings about a robot with a URDF: different dimensions, or wheels and casters off the ground."""
+    """Return warnings about a robot with a URDF: wrong dimensions in its file, or wheels and casters off the ground.
+
+    `spec` and `body` are those of the robot. Files that it refers to must lie in `roots`.
+    """
     if robot.urdf is None:
         return []
     from simscen.sim.urdf.body import read_spec_tree
@@ -31,7 +34,7 @@ def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, root
 
 
 def dimension_warnings(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]:
-    """Yield warnings about dimensions of the drive that differ from the URDF."""
+    """Yield a warning for each dimension of the drive in the robot file that differs from the URDF."""
     if robot.tree is None or robot.urdf is None:
         return
     urdf_dimensions = _urdf_dimensions(body.wheels)
@@ -46,7 +49,7 @@ def dimension_warnings(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]
 
 
 def _urdf_dimensions(wheels: tuple[Wheel, ...]) -> dict[str, float]:
-    """Return the dimensions of the drive according to the wheels of the body."""
+    """Return the dimensions of the drive in m according to its wheels, by key of the drive in a robot file."""
     driven = [wheel for wheel in wheels if wheel.driven]
     if not driven:
         return {}
@@ -61,7 +64,7 @@ def _urdf_dimensions(wheels: tuple[Wheel, ...]) -> dict[str, float]:
 
 
 def robot_problems(file: RobotFile) -> list[Problem]:
-    """Return errors and warnings about a robot that only building it reveals."""
+    """Return the errors and warnings about a robot that only building it reveals."""
     robot = file.robot
     try:
         if robot.urdf is not None:

@@ -1,4 +1,4 @@
-"""Checks of routes: goals that no route leads to, and bounds that no drive can meet."""
+"""Checks that find goals to which no route leads, and bounds on time or path length that no drive can meet."""
 
 import math
 from collections.abc import Iterator
@@ -12,28 +12,28 @@ from simscen.core.messages.navigation import Goal
 from simscen.core.messages.navigation import matches_goal_name as is_named
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.placement import blocked_poses
-from simscen.loading.checks.regions import robot_routes
-from simscen.loading.checks.registry import CheckFinding
+from simscen.loading.checks.registry import CheckProblem
+from simscen.loading.checks.route_search import robot_routes
 from simscen.loading.checks.scene import START, TIMING, WORLD, Scene, expected_failure_hint, expects_failure
 from simscen.loading.goals import scenario_goals
 from simscen.model.robot import RobotSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 GAP_EDGE_M = 0.03
-"""Distance from the edge of a gap within which the solid that forms the edge is searched."""
+"""Distance from the edge of a gap within which the solid at the edge is searched, to name it."""
 
 
 class Gap(NamedTuple):
-    """The widest gap on the way to a goal: in words, and its position in m."""
+    """Narrowest place of the widest way to a goal: a description for messages, and its position (x, y) in m."""
 
     description: str
     position: tuple[float, float]
 
 
-def unreachable_goals(scene: Scene) -> list[tuple[CheckFinding, Gap]]:
-    """Return a finding for each goal without a route, and the gap that is too narrow.
+def unreachable_goals(scene: Scene) -> list[tuple[CheckProblem, Gap]]:
+    """Return a problem for each goal without a route, and the gap that is too narrow.
 
-    It is an error if fixed walls block the goal, and a warning if the robot might pass or push what blocks it.
+    The problem is an error if fixed walls block the way, and a warning if the robot might get through after all.
     """
     blocked = scene.cached(blocked_poses)
     if START in blocked:
@@ -47,27 +47,27 @@ def unreachable_goals(scene: Scene) -> list[tuple[CheckFinding, Gap]]:
         gap = _widest_gap(scene, goal.pose, solids)
         message = f"goal `{goal.name}` cannot be reached from the start: {gap.description}"
         if solids is not world and routes.is_reachable(starts, goal.pose, world):
-            finding = CheckFinding(keys, message, "no event opens, moves or removes it", warning=True)
+            problem = CheckProblem(keys, message, "no event opens, moves or removes it", warning=True)
         elif scene.may_do():
-            finding = CheckFinding(
+            problem = CheckProblem(
                 keys, message, "unless an action of an installed package opens a route", warning=True
             )
         elif len(scene.certain_walls) < len(world) and routes.is_reachable(starts, goal.pose, scene.certain_walls):
-            finding = CheckFinding(keys, message, _ramp_hint(scene), warning=True)
+            problem = CheckProblem(keys, message, _ramp_hint(scene), warning=True)
         else:
-            finding = CheckFinding(keys, message, f"widen the gap, or {expected_failure_hint(keys, 'NO_VALID_PATH')}")
-        found.append((finding, gap))
+            problem = CheckProblem(keys, message, f"widen the gap, or {expected_failure_hint(keys, 'NO_VALID_PATH')}")
+        found.append((problem, gap))
     return found
 
 
 @WORLD.check("SC302")
-def check_reachability(scene: Scene) -> Iterator[CheckFinding]:
-    """Find goals that no route leads to."""
-    return (finding for finding, _ in scene.cached(unreachable_goals))
+def goals_without_route(scene: Scene) -> Iterator[CheckProblem]:
+    """Find goals to which no route leads."""
+    return (problem for problem, _ in scene.cached(unreachable_goals))
 
 
 def _ramp_hint(scene: Scene) -> str:
-    """Return when a goal may be reachable after all: a solid that is not upright may be a ramp."""
+    """Return the hint that a goal is reachable if a tilted solid is a ramp that the robot can climb."""
     from simscen.loading.builders import load_robot
     from simscen.sim.body.robot_body import compute_climb_limits
 
@@ -77,6 +77,7 @@ def _ramp_hint(scene: Scene) -> str:
 
 
 def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
+    """Return the gap between `solids` that is too narrow, on the way to the goal with the widest gaps."""
     from simscen.worlds.geometry.triangulation import merge_solids
     from simscen.worlds.routes.narrow_gaps import narrowest_gap
 
@@ -93,39 +94,41 @@ def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
     return Gap(f"the widest gap is {gap.width:.2f} m wide at {position}{between}, but {robot_width}", (gap.x, gap.y))
 
 
-MIN_PATH_SHARE = 0.97
-"""Every drive is at least this share of the computed shortest path.
+MIN_PATH_RATIO = 0.97
+"""Lower bound on the length of a drive, relative to the computed shortest path.
 
-Computed lengths are exact to 1 %, and a robot can cut corners a little more than they assume.
+It is less than 1, because computed lengths are exact to 1 %, and a robot can cut corners a little more than they
+assume.
 """
 MAX_AVERAGE_SPEED_RATIO = 1.02
-"""Largest average speed of a drive, relative to the top speed of the robot."""
+"""Upper bound on the average speed of a drive, relative to the top speed of the robot."""
 SHORTCUT_ACTIONS = ("kidnap", "push", "new_goal", "cancel_goal")
-"""Actions after which a robot may be somewhere else, faster, or done earlier."""
+"""Actions by which a robot may arrive earlier than by driving to its goals."""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """A drive of `robot` to all `goals`.
+    """Drive of the robot to all goals in order.
 
-    `lengths` are the lengths in m of the shortest path of each leg, from one goal (or the start) to the next goal.
+    A leg leads to a goal from the goal before, or from the start. `leg_lengths` are the lengths in m of the shortest
+    paths of the legs.
     """
 
     goals: tuple[Goal, ...]
     robot: RobotSpec
-    lengths: list[float]
+    leg_lengths: list[float]
 
     @property
-    def least_lengths(self) -> list[float]:
-        """Lower bounds of the lengths, given the tolerances of the goals."""
+    def min_leg_lengths(self) -> list[float]:
+        """Lower bound on the driven length of each leg in m, given the tolerances of the goals."""
         slack = [0.0, *(goal.xy_tolerance for goal in self.goals)]
-        pairs = zip(self.lengths, pairwise(slack), strict=True)
-        return [max(0.0, MIN_PATH_SHARE * length - a - b) for length, (a, b) in pairs]
+        pairs = zip(self.leg_lengths, pairwise(slack), strict=True)
+        return [max(0.0, MIN_PATH_RATIO * length - a - b) for length, (a, b) in pairs]
 
     @property
-    def least_times(self) -> list[float]:
-        """Lower bound of the time for each leg in s."""
-        return [length / (MAX_AVERAGE_SPEED_RATIO * self.robot.top_speed) for length in self.least_lengths]
+    def min_leg_times(self) -> list[float]:
+        """Lower bound on the time for each leg in s."""
+        return [length / (MAX_AVERAGE_SPEED_RATIO * self.robot.top_speed) for length in self.min_leg_lengths]
 
     @property
     def top_speed_text(self) -> str:
@@ -134,22 +137,22 @@ class Drive:
 
     @property
     def description(self) -> str:
-        """Length and time of the whole drive, in words."""
-        total = sum(self.lengths)
+        """Length and time of the whole drive, as part of a message."""
+        total = sum(self.leg_lengths)
         return (
             f"the path of {total:.2f} m to all goals takes {total / self.robot.top_speed:.1f} s {self.top_speed_text}"
         )
 
 
 @TIMING.check("SC303")
-def impossible_time_bounds(scene: Scene) -> Iterator[CheckFinding]:
+def impossible_time_bounds(scene: Scene) -> Iterator[CheckProblem]:
     """Find timeouts, time limits and bounds of criteria that no drive can meet."""
     goals, robot = scenario_goals(scene.loaded.spec), scene.loaded.robot.spec
     failing = any(expects_failure(scene.loaded.spec, goal.name) for goal in goals)
     if not goals or robot is None or failing or scene.may_do(*SHORTCUT_ACTIONS):
         return
     routes, stops = scene.cached(robot_routes), (scene.start, *(goal.pose for goal in goals))
-    # The upper bounds are cheap: if the drive meets all bounds with them, it does with the exact lengths.
+    # Upper bounds on the lengths are cheap. If a drive of these lengths meets all bounds, so does the shortest drive.
     upper = [routes.length_upper_bound(a, b) for a, b in pairwise(stops)]
     if all(map(math.isfinite, upper)) and not list(_violated_bounds(scene, Drive(goals, robot, upper))):
         return
@@ -158,30 +161,31 @@ def impossible_time_bounds(scene: Scene) -> Iterator[CheckFinding]:
         yield from _violated_bounds(scene, Drive(goals, robot, exact))
 
 
-def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckFinding]:
+def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckProblem]:
+    """Yield a problem for each bound of the scenario that the drive violates."""
     spec = scene.loaded.spec
     for index, goal in enumerate(drive.goals[: len(spec.goals)]):
         is_sent = index == 0 or spec.on_goal_failure == "stop"
-        if goal.timeout is not None and drive.least_times[index] > goal.timeout and is_sent:
-            length = drive.lengths[index]
+        if goal.timeout is not None and drive.min_leg_times[index] > goal.timeout and is_sent:
+            length = drive.leg_lengths[index]
             reason = f"the path of {length:.2f} m takes {length / drive.robot.top_speed:.1f} s {drive.top_speed_text}"
             message = f"goal `{goal.name}` cannot be reached within {goal.timeout:g} s: {reason}"
-            yield CheckFinding(("goals", index, "timeout"), message)
+            yield CheckProblem(("goals", index, "timeout"), message)
     waits = sum(goal.wait for goal in drive.goals)
-    if sum(drive.least_times) + waits > spec.time_limit and any(map(_requires_success, spec.pass_)):
+    if sum(drive.min_leg_times) + waits > spec.time_limit and any(map(_requires_success, spec.pass_)):
         keys = ("time_limit",) if "time_limit" in spec.model_fields_set else ("goals",)
         waiting = f", and the robot waits {waits:g} s at goals" if waits else ""
         message = f"the goals cannot be reached within {spec.time_limit:g} s: {drive.description}{waiting}"
-        yield CheckFinding(keys, message)
+        yield CheckProblem(keys, message)
     for index, entry in enumerate(spec.pass_):
         for key, reason in _violated_criterion_bounds(entry, drive):
-            yield CheckFinding(("pass", index, entry.kind, key), f"{entry.kind} can never hold: {reason}")
+            yield CheckProblem(("pass", index, entry.kind, key), f"{entry.kind} can never hold: {reason}")
 
 
 def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tuple[str, str]]:
-    """Yield the key of each bound that cannot be met, and the reason."""
+    """Yield the key of each bound of a criterion that the drive violates, and the reason."""
     criterion, names = entry.chosen, [goal.name for goal in drive.goals]
-    times, lengths = drive.least_times, drive.least_lengths
+    times, lengths = drive.min_leg_times, drive.min_leg_lengths
     bound = getattr(criterion, "max", None)
     if entry.kind == "time_to_goal" and isinstance(bound, float):
         goal = getattr(criterion, "goal", None)
@@ -192,8 +196,8 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
     if entry.kind == "path_length":
         ratio = getattr(criterion, "max_ratio", None)
         if isinstance(bound, float) and sum(lengths) > bound:
-            yield "max", f"the shortest path to all goals is {sum(drive.lengths):.2f} m long"
-        if ratio is not None and sum(lengths) > ratio * sum(drive.lengths):
+            yield "max", f"the shortest path to all goals is {sum(drive.leg_lengths):.2f} m long"
+        if ratio is not None and sum(lengths) > ratio * sum(drive.leg_lengths):
             yield "max_ratio", "no path is shorter than the shortest one"
     within = getattr(criterion, "within", None)
     if entry.kind == "goals_reached" and within is not None:
@@ -201,11 +205,11 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
         too_late = [k for k, name in enumerate(names) if times[k] > within and any(is_named(name, c) for c in chosen)]
         if too_late:
             k = too_late[0]
-            yield "within", f"the path of {drive.lengths[k]:.2f} m to `{names[k]}` takes {times[k]:.1f} s"
+            yield "within", f"the path of {drive.leg_lengths[k]:.2f} m to `{names[k]}` takes {times[k]:.1f} s"
 
 
 def _requires_success(entry: AnyCriterion) -> bool:
-    """Return whether the run fails unless every goal is reached."""
+    """Return whether a criterion fails the run unless every goal is reached."""
     if entry.kind == "result":
         requires = getattr(entry.chosen, "status", "") == "SUCCEEDED"
     else:

@@ -1,4 +1,4 @@
-"""Run the checks of names, settings, and meaning, which do not look at the geometry of the built world."""
+"""Run the checks that do not need the built world: stages ROBOT_NAMES, WORLD_FILE, NAMES, and MEANING."""
 
 from collections.abc import Iterable
 
@@ -17,12 +17,11 @@ MODULES = (actions, criteria, events, faults, names, settings, world_file)
 def check_scenario(
     loaded: LoadedScenario, world: World | None = None, unknown_places: Iterable[Problem] = ()
 ) -> list[Problem]:
-    """Return the errors and warnings of a scenario with one robot.
+    """Return the errors and warnings of a scenario of one robot, or of a robot's view of a scenario of several.
 
-    A scenario with several robots is checked once per robot: `loaded` is then the part that concerns one of them.
-    `world` is the built world; it is needed only for the names in an imported world, e.g. from Gazebo. `unknown_places`
-    are problems with names of places, which were found while the scenario was loaded. The meaning of the scenario is
-    checked only if there are no errors in the names and in the world file.
+    `world` is the built world. It is only needed for names in an imported world, such as one from Gazebo.
+    `unknown_places` are problems with names of places that were found while the scenario was loaded; they are returned
+    first. The meaning of the scenario is checked only if there are no errors before.
     """
     problems = [*unknown_places, *NAMES.problems(NameScope(loaded, world)), *check_world_file(loaded.world)]
     if all(problem.severity == "warning" for problem in problems):
@@ -31,10 +30,10 @@ def check_scenario(
 
 
 def check_world_file(world: LoadedWorld) -> list[Problem]:
-    """Return the errors and warnings of a world file. They do not contain the text of the source line yet."""
+    """Return the errors and warnings of a world file, without their source lines; [] for a ROS map or an SDF file."""
     return [] if world.spec is None else WORLD_FILE.problems(world)
 
 
 def check_robot_names(spec: ScenarioSpec, tree: MappingNode) -> list[Problem]:
-    """Return the problems with the names of robots. They do not contain the text of the source line yet."""
+    """Return the problems with names of robots in a scenario, without their source lines."""
     return ROBOT_NAMES.problems(WrittenScenario(spec, tree))

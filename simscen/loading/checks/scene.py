@@ -1,4 +1,4 @@
-"""Scenario in its built world: the subject of the checks of the stages WORLD and TIMING."""
+"""Scene: a scenario of one robot in its built world. It is the subject of the checks of the stages WORLD and TIMING."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -16,24 +16,25 @@ from simscen.core.geometry.shapes import Body, Solid
 from simscen.core.messages.navigation import ErrorCode, Goal, matches_goal_name
 from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.loading.builders import load_map
-from simscen.loading.checks.registry import CheckStage, Keys
+from simscen.loading.checks.registry import CheckStage
 from simscen.loading.goals import event_goals, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.robot_size import RobotSize
 from simscen.loading.world_cache import WorldCache
-from simscen.loading.yaml.tree import MappingNode
+from simscen.loading.yaml.tree import Keys, MappingNode
 from simscen.model.navigation import expected_failure_name
 from simscen.model.scenario import ScenarioSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc, first_solid_in_footprint
 from simscen.worlds.geometry.prisms import upright_prism
 
 SILL_M = 0.02
-"""Height below which an obstacle does not block a robot."""
-TOUCHING_M = 0.002
-"""Height above the underside of a hull that an obstacle must have to touch the hull for certain."""
+"""Height below which an obstacle does not block the start or a goal of a robot on wheels."""
+MIN_HULL_OVERLAP_M = 0.002
+"""Height by which an obstacle must exceed the underside of a hull to touch it certainly."""
 TOUCH_M = 1e-6
 """Distance below which a point counts as inside a solid."""
 START = ("robot", "pose")
+"""Keys of the start pose in a scenario."""
 MOVING_ACTIONS = frozenset({"open", "close", "move", "remove", "teleport", "push"})
 """Actions that can move or remove a body."""
 
@@ -42,13 +43,16 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class DrivableArea:
-    """The area that the robot can be in: its map, or else the bounds of the world; unlimited without either."""
+    """Area in which the robot can be: its map `grid`, or else `bounds`; unlimited without either.
+
+    `bounds` is (min x, min y, max x, max y) in m.
+    """
 
     bounds: tuple[float, float, float, float] | None = None
     grid: OccupancyGrid | None = None
 
     def outside(self, pose: Pose2) -> str | None:
-        """Return why a pose is not in the area, as words after "is"; None for a pose in the area."""
+        """Return that a pose is not in the area, as words that follow "is"; None for a pose in the area."""
         if self.grid is not None and not self.grid.inside(self.grid.cell_of(np.array([[pose.x, pose.y]])))[0]:
             rows, columns = self.grid.shape
             size = f"{columns * self.grid.resolution:g} m x {rows * self.grid.resolution:g} m"
@@ -62,9 +66,10 @@ class DrivableArea:
 
 
 def drivable_area(loaded: LoadedScenario, world: World) -> DrivableArea:
-    """Return the area of the map that the robot gets; for a world without a map, the bounds of the world.
+    """Return the area in which the robot of a scenario can be.
 
-    With `map: none` it is unlimited: goals may lie beyond all obstacles.
+    It is the area of the map that the robot gets. For a world without a map, it is the bounds of the world. With
+    `map: none`, it is unlimited, because goals may lie beyond all obstacles.
     """
     if loaded.map == "none":
         return DrivableArea()
@@ -74,7 +79,10 @@ def drivable_area(loaded: LoadedScenario, world: World) -> DrivableArea:
 
 @dataclass(frozen=True)
 class Scene:
-    """A scenario of one robot, its world, and the size of the robot."""
+    """Scenario of one robot, or one robot's view of a scenario, with its world and the size of the robot.
+
+    For the checks, `world` has only the solids that block the robot. Positions are in m in the frame of the world.
+    """
 
     loaded: LoadedScenario
     world: World
@@ -83,7 +91,7 @@ class Scene:
     _results: dict[Callable[..., Any], Any] = field(default_factory=dict, repr=False, compare=False)
 
     def cached(self, compute: "Callable[[Scene], T]") -> T:
-        """Return `compute(self)`, computed once: checks share results this way."""
+        """Return `compute(self)`, which is computed once, so that checks can share the result."""
         if compute not in self._results:
             self._results[compute] = compute(self)
         result: T = self._results[compute]
@@ -96,13 +104,16 @@ class Scene:
 
     @property
     def z_range(self) -> tuple[float, float]:
-        """Heights in m between which something blocks the robot."""
+        """Lowest and highest z in m between which an obstacle blocks the robot."""
         return self.heights_above(SILL_M)
 
     def heights_above(self, sill: float) -> tuple[float, float]:
-        """Return the heights in m between which something blocks the robot, if a base on wheels climbs `sill` m."""
+        """Return the lowest and highest z in m between which an obstacle blocks the robot.
+
+        A base on wheels is assumed to climb obstacles of up to `sill` m.
+        """
         underside = self.size.underside
-        lowest = sill if underside is None else underside + TOUCHING_M
+        lowest = sill if underside is None else underside + MIN_HULL_OVERLAP_M
         return lowest, max(lowest + sill, self.size.height)
 
     @cached_property
@@ -117,22 +128,22 @@ class Scene:
 
     @cached_property
     def area(self) -> DrivableArea:
-        """The area that the robot can be in."""
+        """The area in which the robot can be."""
         return drivable_area(self.loaded, self.world)
 
     @cached_property
     def bodies(self) -> tuple[Solid, ...]:
-        """All bodies that can move, at their initial poses."""
+        """The solids of all bodies that can move, at their initial poses."""
         return tuple(_at_initial_pose(self.world.bodies))
 
     @cached_property
     def unmoved_bodies(self) -> tuple[Solid, ...]:
-        """Bodies that have no motion of their own, and that no event opens, moves or removes."""
+        """The solids of bodies that have no motion of their own, and that no event moves or removes."""
         return tuple(_at_initial_pose(b for b in self.world.bodies if b.path is None and b.name not in self._moved))
 
     @cached_property
     def immovable_bodies(self) -> tuple[Solid, ...]:
-        """Unmoved bodies that the robot cannot push either."""
+        """The solids of unmoved bodies that the robot cannot push either, because they have no mass."""
         return tuple(
             _at_initial_pose(
                 b for b in self.world.bodies if b.mass == 0 and b.path is None and b.name not in self._moved
@@ -141,22 +152,23 @@ class Scene:
 
     @cached_property
     def _moved(self) -> set[str]:
+        """The names of the bodies that an event may move or remove."""
         if self.may_do():
             return {body.name for body in self.world.bodies}
         return {getattr(action, "name", "") for _, kind, action in self.actions if kind in MOVING_ACTIONS}
 
     @cached_property
     def certain_walls(self) -> tuple[Solid, ...]:
-        """The fixed solids that certainly block a robot: upright ones, and the walls made from a map.
+        """The fixed solids that certainly block a robot: upright ones, and walls that were made from a map.
 
-        A mesh or a tilted box may be a ramp.
+        Other solids, such as a mesh or a tilted box, may be ramps.
         """
         mapped = self.world.grid is not None
         return tuple(s for s in self.world.solids if upright_prism(s) is not None or (mapped and s.name == "map"))
 
     @cached_property
     def targets(self) -> list[tuple[Keys, Goal]]:
-        """The goals that the robot is expected to reach, also those sent by events, with the keys of their poses."""
+        """The goals that the robot is expected to reach, also those of events; each with the keys of its pose."""
         spec = self.loaded.spec
         first = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses
         own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
@@ -165,17 +177,20 @@ class Scene:
 
     @cached_property
     def actions(self) -> list[tuple[Keys, str, BaseModel]]:
-        """Keys, kind and specification of every action of every event."""
+        """The keys, the kind, and the specification of each action of an event that applies to this robot."""
         located = [found for step in self.loaded.spec.steps for found in step.located_actions()]
         relevant = [(keys, action) for keys, action in located if self.loaded.includes_robot(action.robot)]
         return [((*keys, action.kind), action.kind, action.chosen) for keys, action in relevant]
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether an event has, or may have, one of these actions; without kinds: may do anything."""
+        """Return whether an event can do what actions of these kinds do.
+
+        An action of an installed package may do anything. Without kinds, return whether there is such an action.
+        """
         return any(action.may_do(*kinds) for step in self.loaded.spec.steps for action in step.actions)
 
     def footprint_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
-        """Return how the footprint of the robot conflicts with a solid, as words after "is"; None if it is free."""
+        """Return how the robot at a pose conflicts with a solid, as words that follow "is"; None if it does not."""
         if solid := first_solid_in_disc(solids, (pose.x, pose.y), TOUCH_M, self.z_range):
             return f'inside obstacle "{solid}"'
         if solid := self.circle_conflict(pose, solids):
@@ -186,7 +201,7 @@ class Scene:
         return None
 
     def circle_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
-        """Return the solid that the inscribed circle of the robot overlaps, at any heading."""
+        """Return the name of a solid that the robot's inscribed circle overlaps at a pose; None if there is none."""
         return first_solid_in_disc(solids, (pose.x, pose.y), self.size.inscribed, self.z_range)
 
     @property
@@ -196,6 +211,7 @@ class Scene:
 
 
 def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:
+    """Yield the solids of bodies in the frame of the world, with the names of the bodies."""
     for body in bodies:
         for solid in body.solids:
             yield Solid(solid.shape, body.pose.compose(solid.pose), body.name)
@@ -203,17 +219,17 @@ def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:
 
 WORLD: CheckStage[Scene] = CheckStage("world")
 TIMING: CheckStage[Scene] = CheckStage("timing")
-"""Checks of time bounds, which need routes to all goals: they run only if all other checks pass."""
-
+"""Checks of time bounds. They need routes to all goals, so they run only if all other checks find no errors."""
 
 START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
+"""Error codes of a navigation that fails because of the start pose."""
 
 
 def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
-    """Return whether the scenario passes if the robot fails at this goal.
+    """Return whether a scenario expects that the robot fails at the goal with this name.
 
-    The scenario states this with `expect` at the goal, with the result or the error code of the whole navigation, or
-    with the error code of this goal.
+    A scenario states this with `expect` at the goal, or with a criterion: `result` or `error_code` of the whole
+    navigation, or `error_code` of this goal.
     """
     through = spec.navigation.mode == "navigate_through_poses"
     entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
@@ -225,24 +241,24 @@ def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
 
 
 def expected_failure_hint(keys: Keys, code: str) -> str:
-    """Return how a scenario can expect that the goal at `keys` fails with the error code `code`."""
+    """Return the hint how a scenario can expect that the goal at `keys` fails with the error code `code`."""
     if keys[0] == "goals":
         return f"expect the failure with `expect: {{error_code: {code}}}` at the goal"
     return required_failure_hint(code)
 
 
 def required_failure_hint(code: str) -> str:
-    """Return how a scenario can require that navigation fails with the error code `code`."""
+    """Return the hint how a scenario can require that the whole navigation fails with the error code `code`."""
     return f"replace `goals_reached` in `pass` by `result: {{status: FAILED, error_code: {code}}}`"
 
 
 def expects_start_failure(spec: ScenarioSpec) -> bool:
-    """Return whether the scenario passes if the robot cannot start."""
+    """Return whether a scenario requires that navigation fails because of the start pose."""
     return any(code in START_FAILURES for code, _ in _required_codes(spec))
 
 
 def _required_codes(spec: ScenarioSpec) -> Iterator[tuple[ErrorCode, str | None]]:
-    """Yield each error code that a criterion requires, and its goal; None: the whole navigation."""
+    """Yield each error code that a criterion requires, and the name of its goal; None for the whole navigation."""
     for entry in spec.pass_:
         if entry.severity != "fail":
             continue

@@ -1,6 +1,6 @@
-"""Run the checks that need the built world: is the start free, can every goal be reached in time?
+"""Run the checks that need the built world, such as whether the start is free and every goal can be reached in time.
 
-They need no physics engine.
+These are the stages BUILT_WORLD, WORLD, and TIMING. They need no physics engine.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,7 +16,7 @@ from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.checks.scene import TIMING, WORLD, Scene
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
-from simscen.loading.open_ground import with_stops
+from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.loading.robot_size import blocking_world, robot_size
 from simscen.loading.world_cache import WorldCache
 from simscen.worlds.extent import oversize_hint
@@ -30,13 +30,14 @@ MODULES = (masks, placement, routes, regions)
 def check_in_world(
     loaded: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
 ) -> list[Problem]:
-    """Return the problems of a scenario in its world; some are warnings.
+    """Return the errors and warnings of a scenario in its built world.
 
-    `cache` keeps worlds for further scenarios. With `pictures`, a picture of each scenario with problems is written
-    to that folder. Raises InvalidInput for unusable files, and UsageError for a picture that cannot be written.
+    `cache` keeps built worlds for further scenarios. If a folder `pictures` is given, a picture of the world is written
+    to it for a scenario with problems. Raises InvalidInput for unusable files, and UsageError for a picture that cannot
+    be written.
     """
     cache = cache or WorldCache()
-    world = with_stops(cache.world(loaded), loaded)
+    world = with_stops_in_bounds(cache.world(loaded), loaded)
     if not loaded.robots:
         return _check_robot(loaded, world, cache, pictures)
     found = [problem for view in loaded.robots.values() for problem in _check_robot(view, world, cache, pictures)]
@@ -48,7 +49,7 @@ def check_in_world(
 
 
 def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictures: Path | None) -> list[Problem]:
-    """Return the problems of a scenario of one robot, or as one of several robots sees it."""
+    """Return the problems of a scenario of one robot, or of one robot's view of a scenario."""
     loaded = _with_robot_spec(loaded)
     blocking = blocking_world(loaded, world)
     problems = [*_check_names_again(loaded, world), *_oversized_map(loaded, world)]
@@ -60,6 +61,7 @@ def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictur
 
 
 def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
+    """Return the problems that the stages WORLD and TIMING find; hints name the picture, if one is drawn."""
     problems = WORLD.problems(scene)
     if not _has_errors(problems):
         problems += TIMING.problems(scene)
@@ -72,9 +74,10 @@ def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
 
 
 def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path) -> Path:
-    """Draw the world, the robot at its start and its goals, and gaps that are too narrow; return the image file.
+    """Draw the world, the robot at its start and its goals, and gaps that are too narrow.
 
-    Raises UsageError if it cannot be written.
+    `gaps` are the positions (x, y) of the gaps in m. Returns the image file, which is written to `folder`. Raises
+    UsageError if it cannot be written.
     """
     from simscen.worlds.built_world import build_world_and_map
     from simscen.worlds.maps.world_picture import draw_world
@@ -96,7 +99,7 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
 
 
 def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Problem]:
-    """Return the notes of the reader of a world, as warnings about its file."""
+    """Return the notes that were made while a world was built, as warnings about its file."""
     display_name = source.path.relative_to(root).as_posix() if source.path.is_relative_to(root) else str(source.path)
     return [
         Problem(display_name, 0, 0, "SC311", note.removeprefix(f"{display_name}: "), severity="warning")
@@ -105,7 +108,10 @@ def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Pr
 
 
 def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
-    """Check names that are only known now: those of an imported world, and sensors of a robot that is only a URDF."""
+    """Return the problems of names that can only be checked now; [] if all could be checked before.
+
+    These are the names in an imported world, and the sensors of a robot that is only a URDF.
+    """
     is_urdf = loaded.robot.path == loaded.robot.urdf
     if is_urdf or loaded.world.map is not None or loaded.world.sdf is not None:
         return sorted(check_scenario(loaded, world))
@@ -113,12 +119,13 @@ def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
 
 
 def _oversized_map(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
+    """Yield a problem if the map that would be made of the world is too large."""
     if world.grid is None and loaded.map is None and (message := map_size_error(world.bounds)):
         yield loaded.problem(("world",), "SC330", message, f"{oversize_hint(world)}, or drive with `map: none`")
 
 
 def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:
-    """Yield contradictions between a robot file and its URDF."""
+    """Yield a warning for each dimension in the robot file that differs from its URDF."""
     if loaded.robot.urdf is None:
         return
     from simscen.loading.checks.robot_geometry import dimension_warnings
@@ -127,7 +134,7 @@ def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:
 
 
 def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:
-    """Return the scenario with the specification inferred from the URDF if the robot has no robot file."""
+    """Return the scenario with a specification of its robot, which is inferred if the robot is only a URDF."""
     if loaded.robot.spec is not None:
         return loaded
     return replace(loaded, robot=replace(loaded.robot, spec=load_robot(loaded)[0]))

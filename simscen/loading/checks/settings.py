@@ -1,4 +1,4 @@
-"""Checks of settings: uneven rates, too many goals, values without effect, duplicates, and angles in degrees."""
+"""Checks of settings: rates that do not divide the tick rate, too many goals, duplicates, angles in degrees, …"""
 
 import math
 from collections.abc import Iterator
@@ -7,21 +7,21 @@ from typing import Any
 from pydantic import BaseModel
 
 from simscen.core.clock import Clock
-from simscen.loading.checks.registry import MEANING, NAMES, CheckFinding, Keys, NameScope
+from simscen.loading.checks.registry import MEANING, NAMES, CheckProblem, NameScope
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.spec_walk import quantities_of
-from simscen.loading.yaml.tree import MappingNode, ScalarNode, existing_keys, node_at
+from simscen.loading.yaml.tree import Keys, MappingNode, ScalarNode, existing_keys, node_at
 from simscen.model.localizers import Amcl
 from simscen.model.navigation import expected_failure_name
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import MAX_GOALS
 
-TICK_RATE = ("physics", "tick_rate")
+TICK_RATE_KEYS = ("physics", "tick_rate")
 
 
 @NAMES.check("SC034")
-def uneven_rates(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find rates that do not divide the physics rate."""
+def uneven_rates(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find rates that do not divide the tick rate."""
     loaded = scope.loaded
     rates: list[tuple[MappingNode, Keys, float]] = [
         (loaded.tree, ("stack", "controller_frequency"), loaded.spec.stack.controller_frequency),
@@ -40,22 +40,25 @@ def uneven_rates(scope: NameScope) -> Iterator[CheckFinding]:
             yield _uneven_rate(loaded, tree, keys, str(error))
 
 
-def _uneven_rate(loaded: LoadedScenario, tree: MappingNode, keys: Keys, error: str) -> CheckFinding:
-    """Return the finding at the tick rate if that is written, else at the rate or where the rate would be."""
+def _uneven_rate(loaded: LoadedScenario, tree: MappingNode, keys: Keys, error: str) -> CheckProblem:
+    """Return the problem of the rate at `keys` in `tree`, the tree of the scenario or of the robot file.
+
+    It is marked at the tick rate if the scenario sets it, else at the rate, or where the rate would be written.
+    """
     owner = "" if tree is loaded.tree else f" of robot `{loaded.robot.name}`"
     message = f"{'.'.join(str(key) for key in keys)}{owner}: {error}"
-    if existing_keys(loaded.tree, TICK_RATE) == TICK_RATE:
-        return CheckFinding(TICK_RATE, message)
-    return CheckFinding(keys, message, at_key=existing_keys(tree, keys) != keys, tree=tree)
+    if existing_keys(loaded.tree, TICK_RATE_KEYS) == TICK_RATE_KEYS:
+        return CheckProblem(TICK_RATE_KEYS, message)
+    return CheckProblem(keys, message, at_key=existing_keys(tree, keys) != keys, tree=tree)
 
 
 @NAMES.check("SC016")
-def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckFinding]:
-    """Find more goals than a run may have, and keys that only the last goal of a drive through poses can have."""
+def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find more goals than a run may have, and keys that only the last goal of navigate_through_poses can have."""
     spec = scope.loaded.spec
     if len(spec.goals) * spec.navigation.loops > MAX_GOALS:
         message = f"{len(spec.goals)} goals in {spec.navigation.loops} loops exceed the limit of {MAX_GOALS} goals"
-        yield CheckFinding(("navigation", "loops"), message)
+        yield CheckProblem(("navigation", "loops"), message)
     if spec.navigation.mode != "navigate_through_poses":
         return
     for index, goal in enumerate(spec.goals[:-1]):
@@ -65,27 +68,27 @@ def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckFinding]:
         ):
             if used and key in goal.model_fields_set:
                 message = f"only the last goal of navigate_through_poses can have `{key}`: elsewhere the robot {why}"
-                yield CheckFinding(("goals", index, key), message)
+                yield CheckProblem(("goals", index, key), message)
 
 
 FULL_TURN_RAD = 2 * math.pi
 SPEED_PARAMETERS = ("desired_linear_vel", "max_vel_x", "vx_max")
-"""Speeds of Nav2's controllers."""
+"""Parameters of Nav2's controllers for their forward speed."""
 
 
 @MEANING.check("SC052", severity="warning")
-def late_timeouts(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find timeouts of goals after the end of the run."""
+def late_timeouts(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find timeouts of goals that are longer than the time limit of the run."""
     limit = loaded.spec.time_limit
     for index, (goal, name) in enumerate(zip(loaded.spec.goals, loaded.spec.goal_names, strict=True)):
         if goal.timeout is not None and goal.timeout > limit:
             message = f"goal `{name}` never times out: the time limit ends the run after {limit:g} s"
-            yield CheckFinding(("goals", index, "timeout"), message)
+            yield CheckProblem(("goals", index, "timeout"), message)
 
 
 @MEANING.check("SC053", severity="warning")
-def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find angles of more than one turn without a unit, in the scenario, its world, and its own robot file."""
+def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find angles of more than one turn without a unit in the scenario, its world, and its own robot file."""
     files: list[tuple[BaseModel | None, MappingNode | None]] = [
         (loaded.spec, loaded.tree),
         (loaded.world.spec, loaded.world.tree),
@@ -99,11 +102,11 @@ def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckFinding]:
             if without_unit and abs(value) > FULL_TURN_RAD + 1e-3:
                 turns = value / FULL_TURN_RAD
                 message = f"`{keys[-1]}: {value:g}` is {turns:.1f} turns: angles without a unit are in radians"
-                yield CheckFinding(keys, message, f"did you mean `{value:g} deg`?", tree=tree)
+                yield CheckProblem(keys, message, f"did you mean `{value:g} deg`?", tree=tree)
 
 
 @MEANING.check("SC054", severity="warning")
-def duplicate_entries(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def duplicate_entries(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find the same entry twice in one list."""
     spec = loaded.spec
     lists: list[tuple[Keys, list[Any]]] = [
@@ -119,24 +122,24 @@ def duplicate_entries(loaded: LoadedScenario) -> Iterator[CheckFinding]:
             if entry in entries[:index]:
                 first = loaded.position_of(*keys, entries.index(entry))
                 message = f"the same entry is already in `{keys[-1]}` at {first.line}:{first.col}"
-                yield CheckFinding((*keys, index), message)
+                yield CheckProblem((*keys, index), message)
 
 
 @MEANING.check("SC055", severity="warning")
-def deprecated_parameters(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find parameters that earlier versions had and that no longer have an effect."""
+def deprecated_parameters(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find parameters and values of earlier versions."""
     if getattr(loaded.spec.stack, "profile", None) == "simscen":
-        yield CheckFinding(("stack", "profile"), "`simscen` is a deprecated name of this profile", "write `advanced`")
+        yield CheckProblem(("stack", "profile"), "`simscen` is a deprecated name of this profile", "write `advanced`")
     localizer = getattr(loaded.spec.stack, "localizer", None)
     if isinstance(localizer, Amcl) and localizer.parameters is not None:
         message = "`parameters` is deprecated; `profile: nav2` has the default values of nav2_amcl"
         hint = "replace it by `laser_model_type: likelihood_field`"
-        yield CheckFinding(("stack", "localizer", "parameters"), message, hint)
+        yield CheckProblem(("stack", "localizer", "parameters"), message, hint)
 
 
 @MEANING.check("SC055", severity="warning")
-def ignored_recovery_parameters(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find parameters of AMCL's recovery that a localizer with `relocalization: scan_matching` does not use."""
+def ignored_recovery_parameters(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find parameters of AMCL's recovery in a localizer with `relocalization: scan_matching`, which ignores them."""
     localizer = getattr(loaded.spec.stack, "localizer", None)
     if getattr(localizer, "relocalization", None) != "scan_matching":
         return
@@ -144,34 +147,34 @@ def ignored_recovery_parameters(loaded: LoadedScenario) -> Iterator[CheckFinding
         keys = ("stack", "localizer", key)
         if getattr(localizer, key, 0.0) > 0.0 and existing_keys(loaded.tree, keys) == keys:
             hint = "use `relocalization: random` to find a lost robot as nav2_amcl does"
-            yield CheckFinding(keys, f"`{key}` has no effect with `relocalization: scan_matching`", hint)
+            yield CheckProblem(keys, f"`{key}` has no effect with `relocalization: scan_matching`", hint)
 
 
 @MEANING.check("SC055", severity="warning")
-def latency_without_values(loaded: LoadedScenario) -> Iterator[CheckFinding]:
+def latency_without_values(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find `latency: robot` for a robot whose file gives no latency."""
     robot = loaded.robot.spec
     if getattr(loaded.spec.stack, "latency", None) != "robot":
         return
     if robot is None or "latency" not in robot.model_fields_set:
         message = f"the file of robot `{loaded.robot.name}` has no `latency`: computing takes no time"
-        yield CheckFinding(
+        yield CheckProblem(
             ("stack", "latency"), message, "add `latency` to a *.robot.yaml, or write the durations here"
         )
 
 
 @MEANING.check("SC055", severity="warning")
-def speeds_above_the_top_speed(loaded: LoadedScenario) -> Iterator[CheckFinding]:
-    """Find speed limits of zones and speeds of controllers that the robot cannot reach."""
+def speeds_above_the_top_speed(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find speed limits of zones, and speeds of controllers, that are above the top speed of the robot."""
     robot, stack = loaded.robot.spec, loaded.spec.stack
     if robot is None:
         return
     for index, zone in enumerate(stack.speed_zones):
         if zone.speed_limit >= robot.top_speed:
             message = f"the limit has no effect: the robot's top speed is {robot.top_speed:g} m/s"
-            yield CheckFinding(("stack", "speed_zones", index, "speed_limit"), message)
+            yield CheckProblem(("stack", "speed_zones", index, "speed_limit"), message)
     for key in SPEED_PARAMETERS:
         speed = getattr(getattr(stack, "controller", None), key, None)
         if isinstance(speed, int | float) and speed > robot.limits.linear:
             message = f"the robot never drives {speed:g} m/s: its top speed is {robot.limits.linear:g} m/s"
-            yield CheckFinding(("stack", "controller", key), message)
+            yield CheckProblem(("stack", "controller", key), message)

@@ -1,10 +1,11 @@
-"""Checks of world files: unique names, objects without extent, duplicates, unknown regions."""
+"""Checks of world files: names that are not unique, things of zero size, duplicates, and unknown regions."""
 
 from collections.abc import Iterator
 
-from simscen.loading.checks.registry import WORLD_FILE, CheckFinding, Keys
+from simscen.loading.checks.registry import WORLD_FILE, CheckProblem
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.yaml.tree import Keys
 from simscen.model.world import WorldObject, WorldSpec
 
 
@@ -14,8 +15,8 @@ def _spec(world: LoadedWorld) -> WorldSpec:
 
 
 @WORLD_FILE.check("SC033")
-def shared_names(world: LoadedWorld) -> Iterator[CheckFinding]:
-    """Find obstacles and walls with the name of an object or a door, or obstacles that share a name (a warning)."""
+def duplicate_names_in_world(world: LoadedWorld) -> Iterator[CheckProblem]:
+    """Find obstacles and walls with the name of an object or a door, and obstacles with the same name (a warning)."""
     spec = _spec(world)
     moving = {world_object.name for world_object in spec.objects} | {door.name for door in spec.doors}
     seen: set[str] = set()
@@ -23,39 +24,39 @@ def shared_names(world: LoadedWorld) -> Iterator[CheckFinding]:
         keys: Keys = ("obstacles", index, "name")
         if obstacle.name in moving:
             message = f"an object or a door is also called {quoted(obstacle.name)}"
-            yield CheckFinding(keys, message, "rename one of them")
+            yield CheckProblem(keys, message, "rename one of them")
         elif obstacle.name in seen:
             message = f"another obstacle is also called {quoted(obstacle.name)}; reports cannot distinguish them"
-            yield CheckFinding(keys, message, warning=True)
+            yield CheckProblem(keys, message, warning=True)
         seen.add(obstacle.name)
     for number, wall in enumerate(spec.walls, start=1):
         if wall.label(number) in moving:
             message = f"an object or a door is also called {quoted(wall.label(number))}"
-            yield CheckFinding(("walls", number - 1, "name"), message, "rename one of them")
+            yield CheckProblem(("walls", number - 1, "name"), message, "rename one of them")
 
 
 @WORLD_FILE.check("SC313")
-def zero_extents(world: LoadedWorld) -> Iterator[CheckFinding]:
-    """Find walls, ramps and doors of zero size, and motions that end where they start (a warning)."""
+def zero_extents(world: LoadedWorld) -> Iterator[CheckProblem]:
+    """Find walls, ramps, and doors of zero size, and motions that stay at one pose (a warning)."""
     spec = _spec(world)
     for index, wall in enumerate(spec.walls):
         if all(point == wall.points[0] for point in wall.points):
-            yield CheckFinding(("walls", index, "points"), "the wall has no length: all its points are the same")
+            yield CheckProblem(("walls", index, "points"), "the wall has no length: all its points are the same")
     for index, ramp in enumerate(spec.ramps):
         if ramp.start == ramp.end:
-            yield CheckFinding(("ramps", index, "end"), "the ramp has no length: `start` and `end` are the same")
+            yield CheckProblem(("ramps", index, "end"), "the ramp has no length: `start` and `end` are the same")
     for index, door in enumerate(spec.doors):
         if door.points[0] == door.points[1]:
-            yield CheckFinding(("doors", index, "points"), "the door has no width: both points are the same")
+            yield CheckProblem(("doors", index, "points"), "the door has no width: both points are the same")
     for index, world_object in enumerate(spec.objects):
         if world_object.move is not None and len(set(world_object.move.path(world_object.pose.pose).poses)) == 1:
             key = "through" if world_object.move.keyframes is None else "keyframes"
-            yield CheckFinding(("objects", index, "move", key), "the motion leads nowhere", warning=True)
+            yield CheckProblem(("objects", index, "move", key), "the motion leads nowhere", warning=True)
 
 
 @WORLD_FILE.check("SC054", severity="warning")
-def duplicate_shapes(world: LoadedWorld) -> Iterator[CheckFinding]:
-    """Find the same shape at the same pose under another name."""
+def duplicate_shapes(world: LoadedWorld) -> Iterator[CheckProblem]:
+    """Find obstacles and objects with the same shape and pose as another one."""
     spec = _spec(world)
     things: list[tuple[Keys, WorldObject]] = [
         (("obstacles", k), world_object) for k, world_object in enumerate(spec.obstacles)
@@ -73,15 +74,15 @@ def duplicate_shapes(world: LoadedWorld) -> Iterator[CheckFinding]:
         )
         same = next((name for other, name in seen if other == shape), None)
         if same is not None:
-            yield CheckFinding(keys, f"{quoted(same)} has the same shape and pose", at_key=True)
+            yield CheckProblem(keys, f"{quoted(same)} has the same shape and pose", at_key=True)
         seen.append((shape, world_object.name))
 
 
 @WORLD_FILE.check("SC030")
-def unknown_friction_regions(world: LoadedWorld) -> Iterator[CheckFinding]:
-    """Find friction in regions that do not exist."""
+def unknown_friction_regions(world: LoadedWorld) -> Iterator[CheckProblem]:
+    """Find entries of `friction` for regions that do not exist."""
     spec = _spec(world)
     for name in spec.friction:
         if name not in spec.regions:
             message, hint = f"no region is called {quoted(name)}", suggestion(name, spec.regions)
-            yield CheckFinding(("friction", name), message, hint, at_key=True)
+            yield CheckProblem(("friction", name), message, hint, at_key=True)

@@ -1,1 +1,1 @@
-"""Files that scenarios and commands name: paths, kinds, worlds, maps, robots."""
+"""Find and load the files that commands and scenarios name: scenarios, worlds, maps, robots, and criteria."""

@@ -1,4 +1,4 @@
-"""Load the files that a scenario names: worlds, maps, robots, filter masks."""
+"""Load the files that a scenario names: worlds, maps, robots, and filter masks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -11,8 +11,8 @@ from pydantic import BaseModel
 from simscen.core.errors import Problem
 from simscen.core.version import PACKAGE
 from simscen.loading.files.paths import PathProblem
-from simscen.loading.known_names import resolve_places, unknown_places
 from simscen.loading.loaded import CriterionMask, LoadedMap, LoadedRobot, LoadedWorld
+from simscen.loading.named_places import resolve_places, unknown_places
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.spec_walk import references
@@ -26,25 +26,39 @@ Model = TypeVar("Model", bound=BaseModel)
 Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
 
 SDF_SUFFIXES = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
+"""Suffixes of the files of Gazebo worlds."""
 XML_STARTS = ("<?xml", "<sdf", "<!--")
+"""Beginnings of XML files, for example of SDF files with the suffix of another format."""
 URDF_SUFFIXES = (".urdf", ".xacro")
 ROBOT_SUFFIX = ".robot.yaml"
+"""Suffix of the files of the robots that ship with simscen."""
 
 
 @dataclass
 class Assets:
-    """Loader of the files that a scenario names; collects their problems."""
+    """Loader of the files that a scenario names. Its methods add all problems to `problems`.
+
+    Methods return None if the file cannot be used, or if nothing is to be loaded. `written` is a name or a path as
+    written in the scenario, relative to the file that contains it; `position` is where it is written.
+    """
 
     library: Library
     problems: list[Problem] = field(default_factory=list)
 
+    def world_of(self, world: WorldSpec | str | None, tree: MappingNode, file: Path) -> LoadedWorld | None:
+        """Load the world under the key `world` of the scenario `file`: the inline world, or the file that it names."""
+        node = node_at(tree, ("world",))
+        if isinstance(world, WorldSpec):
+            return self.complete_world(world, node, file)
+        return self.world(node) if isinstance(node, ScalarNode) else None
+
     def world(self, written: ScalarNode) -> LoadedWorld | None:
-        """Load the world in the file that a scenario names."""
-        path = self._find(str(written.value), written.position)
+        """Load the world in the file with this path."""
+        path = self._find_file(str(written.value), written.position)
         return None if path is None else self._load_cached(self.world_file, path)
 
     def world_file(self, path: Path) -> LoadedWorld | None:
-        """Load the world in a file: SDF by suffix, a ROS map by its keys, else a world file of simscen."""
+        """Load a world: an SDF file (recognized by its suffix), a ROS map (by its keys), or a world file of simscen."""
         if path.name.endswith(SDF_SUFFIXES):
             return LoadedWorld(path.name.split(".")[0], path, sdf=path)
         name = self.library.sandbox.display_name(path)
@@ -53,52 +67,55 @@ class Assets:
             hint = "if it is SDF, rename it to .sdf or .world"
             self.problems.append(Problem(name, 1, 1, "SC004", "this is an XML file, expected a world in YAML", hint))
             return None
-        tree = self._tree(path)
+        tree = self._read_tree(path)
         if is_ros_map(tree):
             loaded = self._ros_map(tree, path)
             return LoadedWorld(path.stem, path, map=loaded) if loaded else None
-        spec = self._model(WorldSpec, tree)
+        spec = self._checked(WorldSpec, tree)
         return self.complete_world(spec, tree, path) if spec and tree else None
 
     def complete_world(self, spec: WorldSpec, tree: Node, path: Path) -> LoadedWorld | None:
-        """Return a simscen world with the map or SDF that it extends, and with poses instead of names of places."""
+        """Load the map or SDF file that a simscen world extends, and replace names of places by poses.
+
+        `tree` is the tree of `spec`, and `path` is the file that contains it: a world file, or a scenario.
+        """
         before = len(self.problems)
         loaded_map = sdf = None
         if spec.map is not None:
             position = value_position(tree, ("map",))
-            found = self._find(spec.map, position)
+            found = self._find_file(spec.map, position)
             loaded_map = self.map_file(found) if found else None
         if spec.sdf is not None:
-            sdf = self._find(spec.sdf, value_position(tree, ("sdf",)))
+            sdf = self._find_file(spec.sdf, value_position(tree, ("sdf",)))
         self.problems += unknown_places(spec, tree, spec.places)
         spec = resolve_places(spec, spec.places)
         name = spec.name or path.name.split(".")[0]
-        whole = tree if isinstance(tree, MappingNode) else None
-        return LoadedWorld(name, path, spec, loaded_map, sdf, whole) if len(self.problems) == before else None
+        mapping = tree if isinstance(tree, MappingNode) else None
+        return LoadedWorld(name, path, spec, loaded_map, sdf, mapping) if len(self.problems) == before else None
 
     def map(self, written: ScalarNode) -> LoadedMap | None:
-        """Load the ROS map in the file that a scenario names."""
-        path = self._find(str(written.value), written.position)
+        """Load the ROS map in the YAML file with this path."""
+        path = self._find_file(str(written.value), written.position)
         return None if path is None else self._load_cached(self.map_file, path)
 
     def map_file(self, path: Path) -> LoadedMap | None:
-        """Load the ROS map in a file."""
-        return self._ros_map(self._tree(path), path)
+        """Load the ROS map in a YAML file."""
+        return self._ros_map(self._read_tree(path), path)
 
     def robot(self, written: str, position: Position) -> LoadedRobot | None:
-        """Load a robot by the path of its file, or by the name of a robot that ships with simscen."""
+        """Load a robot from the file with this path, or a robot with this name that ships with simscen."""
         if "/" in written or written.endswith((*URDF_SUFFIXES, ".yaml", ".yml")):
-            path = self._find(written, position)
+            path = self._find_file(written, position)
             return None if path is None else self._load_cached(self.robot_file, path)
         bundled_files = shipped_robots()
         if written in bundled_files:
             return self._load_cached(partial(self.robot_file, bundled=True), bundled_files[written])
         hint = f"{suggestion(written, bundled_files)} (or the path of a *.robot.yaml or .urdf file)"
-        self._add(position, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
+        self._add_problem(position, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
         return None
 
     def robot_file(self, path: Path, bundled: bool = False) -> LoadedRobot | None:
-        """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file."""
+        """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file; `bundled` means that it ships with simscen."""
         name = path.name.split(".")[0]
         if path.suffix in URDF_SUFFIXES:
             text = read_text(path, self.library.sandbox.display_name(path))
@@ -106,48 +123,52 @@ class Assets:
                 self.problems.append(text)
                 return None
             return LoadedRobot(name, path, urdf=path)
-        tree = self._tree(path)
-        spec = self._model(RobotSpec, tree)
+        tree = self._read_tree(path)
+        spec = self._checked(RobotSpec, tree)
         if spec is None or tree is None:
             return None
-        urdf = self._find(spec.urdf, value_position(tree, ("urdf",))) if spec.urdf else None
-        places = {package: value_position(tree, ("packages", package)) for package in spec.packages}
-        packages = {package: self._folder(spec.packages[package], position) for package, position in places.items()}
+        urdf = self._find_file(spec.urdf, value_position(tree, ("urdf",))) if spec.urdf else None
+        positions = {package: value_position(tree, ("packages", package)) for package in spec.packages}
+        packages = {
+            package: self._find_folder(spec.packages[package], position) for package, position in positions.items()
+        }
         if (spec.urdf and urdf is None) or None in packages.values():
             return None
-        body = tree if isinstance(tree, MappingNode) else None
+        mapping = tree if isinstance(tree, MappingNode) else None
         found = {package: folder for package, folder in packages.items() if folder is not None}
-        return LoadedRobot(name, path, spec, urdf, bundled, body, found)
+        return LoadedRobot(name, path, spec, urdf, bundled, mapping, found)
 
     def _load_cached(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
-        """Load a file; a file without problems is cached for all variations of a scenario."""
-        name = getattr(load, "func", load).__name__, path
-        if name in self.library.loaded:
-            known: Loaded = self.library.loaded[name]
+        """Return `load(path)`. A file without problems is loaded once for all variations of a scenario."""
+        key = getattr(load, "func", load).__name__, path
+        if key in self.library.loaded:
+            known: Loaded = self.library.loaded[key]
             return known
         before = len(self.problems)
         found = load(path)
         if found is not None and len(self.problems) == before:
-            self.library.loaded[name] = found
+            self.library.loaded[key] = found
         return found
 
     def _ros_map(self, tree: Node | None, path: Path) -> LoadedMap | None:
-        spec = self._model(RosMapSpec, tree)
+        """Return the ROS map with this tree in the file `path`."""
+        spec = self._checked(RosMapSpec, tree)
         if spec is None or tree is None:
             return None
-        image = self._find(spec.image, value_position(tree, ("image",)))
+        image = self._find_file(spec.image, value_position(tree, ("image",)))
         return (
             LoadedMap(path, spec, image, tuple(self.library.with_source(_ignored_key_warnings(tree))))
             if image
             else None
         )
 
-    def _tree(self, path: Path) -> Node | None:
+    def _read_tree(self, path: Path) -> Node | None:
         tree, problems = self.library.read(path)
         self.problems += problems
         return tree
 
-    def _model(self, model: type[Model], tree: Node | None) -> Model | None:
+    def _checked(self, model: type[Model], tree: Node | None) -> Model | None:
+        """Return the specification in a tree; None if the tree is None or invalid."""
         if tree is None:
             return None
         spec = check(model, tree)
@@ -156,38 +177,38 @@ class Assets:
             return None
         return spec
 
-    def _find(self, written: str, position: Position) -> Path | None:
-        found = self._existing(written, position)
+    def _find_file(self, written: str, position: Position) -> Path | None:
+        found = self._find_path(written, position)
         if found is not None and not found.is_file():
-            self._add(position, "SC001", f"not a regular file: {quoted(written)}")
+            self._add_problem(position, "SC001", f"not a regular file: {quoted(written)}")
             return None
         return found
 
-    def _folder(self, written: str, position: Position) -> Path | None:
-        found = self._existing(written, position)
+    def _find_folder(self, written: str, position: Position) -> Path | None:
+        found = self._find_path(written, position)
         if found is not None and not found.is_dir():
-            self._add(position, "SC001", f"not a folder: {quoted(written)}")
+            self._add_problem(position, "SC001", f"not a folder: {quoted(written)}")
             return None
         return found
 
-    def _existing(self, written: str, position: Position) -> Path | None:
+    def _find_path(self, written: str, position: Position) -> Path | None:
         found = self.library.sandbox.find(written, self.library.folder_of(position))
         if isinstance(found, PathProblem):
-            self._add(position, found.code, found.message, found.hint)
+            self._add_problem(position, found.code, found.message, found.hint)
             return None
         return found
 
-    def _add(self, position: Position, code: str, message: str, hint: str = "") -> None:
+    def _add_problem(self, position: Position, code: str, message: str, hint: str = "") -> None:
         self.problems.append(Problem(*position, code=code, message=message, hint=hint))
 
 
 def is_ros_map(tree: Node | None) -> bool:
-    """Return whether a YAML file is a map of map_server and not a world file of simscen."""
+    """Return whether a YAML file is a ROS map (a file of map_server), and not a world file of simscen."""
     return isinstance(tree, MappingNode) and "image" in tree.entries and "resolution" in tree.entries
 
 
 def _ignored_key_warnings(tree: Node) -> list[Problem]:
-    """Return warnings about keys that map_server ignores."""
+    """Return warnings about keys of a ROS map that map_server ignores."""
     if not isinstance(tree, MappingNode):
         return []
     ignored = [key for key in tree.entries if key not in RosMapSpec.model_fields]
@@ -204,6 +225,7 @@ def _ignored_key_warnings(tree: Node) -> list[Problem]:
 
 
 def _ignored_key_hint(key: str) -> str:
+    """Return "did you mean …?" if a key of a ROS map is similar; else that the key is ignored."""
     near = suggestion(key, RosMapSpec.model_fields)
     return near if near.startswith("did you mean") else "it is ignored, as by map_server"
 
@@ -215,15 +237,22 @@ def shipped_robots() -> dict[str, Path]:
 
 
 def find_criterion_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, CriterionMask]:
-    """Load the filter masks of the criteria under `pass`, by file name as written; problems are added to `assets`.
+    """Load the filter masks of the criteria under `pass`, by path as written; problems are added to `assets`.
 
-    Lists are never merged, so all masks are named in one file, and equal paths refer to the same mask.
+    Logs distinguish masks by these paths, so it is a problem if one path leads to two files. That is possible with
+    `pass+` in a scenario in another folder than the file that it extends.
     """
     found: dict[str, CriterionMask] = {}
     for reference in references(spec):
         node = node_at(tree, reference.keys)
-        if reference.target == "mask" and reference.keys[0] == "pass" and isinstance(node, ScalarNode):
-            loaded = assets.map(node)
-            if loaded is not None:
-                found.setdefault(reference.name, CriterionMask(reference.keys, loaded))
+        if reference.target != "mask" or reference.keys[0] != "pass" or not isinstance(node, ScalarNode):
+            continue
+        loaded = assets.map(node)
+        if loaded is None:
+            continue
+        first = found.setdefault(reference.name, CriterionMask(reference.keys, loaded))
+        if first.map.path != loaded.path:
+            message = f"{quoted(reference.name)} is also the path of another mask, in a file that this one extends"
+            hint = f"write it in another way, e.g. `./{reference.name}`"
+            assets.problems.append(Problem(*node.position, code="SC016", message=message, hint=hint))
     return found

@@ -1,4 +1,4 @@
-"""Copy a scenario with the files that it needs."""
+"""Copy a scenario, and the files that it names, to another folder."""
 
 import shutil
 from collections.abc import Iterator
@@ -9,23 +9,27 @@ from simscen.core.errors import UsageError
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario_text import unexpanded_text
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
+from simscen.loading.yaml.tree import Node, ScalarNode, nodes_with_keys
 
 _MODELINE = "# yaml-language-server:"
+"""Start of the comment that tells editors the path of the schema, which would be wrong in another folder."""
 _SEARCHED_SUFFIXES = (".yaml", ".yml")
+"""Files in which names of further files are searched."""
 _UNSEARCHED_SUFFIXES = (".sdf", ".world", ".urdf", ".xacro")
-"""Formats that can refer to further files, but are not searched for them."""
+"""Files that can name further files, but are not searched, so they cannot be copied."""
 
 
 def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path]:
-    """Copy a scenario to `target`, and the files it needs to a folder of the same name next to it; return the copies.
+    """Copy a scenario to the file `target` and return the paths of all copies.
 
-    If `target` is in the root of the scenario, the other files stay and only their paths are adapted. The text keeps
-    its comments, except that a scenario that extends other files is merged with them. Raises UsageError if a file
-    cannot be copied.
+    The files that it names are copied to a folder next to `target`, called as `target` without suffixes. If `root`, the
+    root of `target`, is also the root of the scenario, they are not copied. The paths in the copied scenario are
+    adapted. The copy keeps the comments of the scenario, unless files that it extends are merged into it. Raises
+    UsageError if a file cannot be copied, or a copy exists already.
     """
     text, tree = _text_of(loaded)
-    named = {leaf: _file_of(leaf, loaded) for leaf in _leaves(tree)}
+    folders = {file.parent for file in loaded.files.values()}
+    named = {leaf: _existing_file(leaf, folders) for leaf in _scalars(tree)}
     files = {leaf: file for leaf, file in named.items() if file is not None}
     needed = sorted({dependency for file in files.values() for dependency in _with_dependencies(file)})
     same_root = root == loaded.root
@@ -44,7 +48,7 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
 
 
 def _text_of(loaded: LoadedScenario) -> tuple[str, Node]:
-    """Return the text to copy, without the schema line for editors, and its tree."""
+    """Return the text to copy, without the line that names the schema for editors, and its tree."""
     lines = unexpanded_text(loaded).split("\n")
     text = "\n".join(line for line in lines if not line.startswith(_MODELINE))
     tree, _ = parse_yaml(text, loaded.path)
@@ -52,30 +56,22 @@ def _text_of(loaded: LoadedScenario) -> tuple[str, Node]:
     return text, tree
 
 
-def _leaves(node: Node | None) -> Iterator[ScalarNode]:
-    if isinstance(node, MappingNode):
-        for entry in node.entries.values():
-            yield from _leaves(entry.value)
-    elif isinstance(node, SequenceNode):
-        for item in node.items:
-            yield from _leaves(item)
-    elif isinstance(node, ScalarNode):
-        yield node
-
-
-def _file_of(leaf: ScalarNode, loaded: LoadedScenario) -> Path | None:
-    """Return the file that a text names, relative to one of the files of the scenario."""
-    return _existing_file(leaf, {file.parent for file in loaded.files.values()})
+def _scalars(tree: Node) -> Iterator[ScalarNode]:
+    return (node for _, node in nodes_with_keys(tree) if isinstance(node, ScalarNode))
 
 
 def _existing_file(leaf: ScalarNode, folders: set[Path]) -> Path | None:
+    """Return the file whose path relative to one of the folders is the value of the leaf; None if there is none."""
     if not isinstance(leaf.value, str) or "." not in leaf.value or "\n" in leaf.value or len(leaf.value) > 4096:
         return None
     return next((file for folder in sorted(folders) if (file := (folder / leaf.value).resolve()).is_file()), None)
 
 
 def _with_dependencies(file: Path, known: frozenset[Path] = frozenset()) -> Iterator[Path]:
-    """Yield a file and the files that it names, recursively."""
+    """Yield a file and the files that it names, recursively, except files in `known`.
+
+    Raises UsageError for a file that may name further files, but is not searched.
+    """
     if file in known:
         return
     if file.name.endswith(_UNSEARCHED_SUFFIXES):
@@ -83,14 +79,14 @@ def _with_dependencies(file: Path, known: frozenset[Path] = frozenset()) -> Iter
     yield file
     if file.name.endswith(_SEARCHED_SUFFIXES):
         tree, _ = parse_yaml(file.read_text(encoding="utf-8"), file.name)
-        for leaf in _leaves(tree):
+        for leaf in () if tree is None else _scalars(tree):
             other = _existing_file(leaf, {file.parent})
             if other is not None:
                 yield from _with_dependencies(other, known | {file})
 
 
 def _with_path(text: str, leaf: ScalarNode, path: str) -> str:
-    """Return the text with another path at the position of the leaf."""
+    """Return the text with `path` instead of the value of the leaf."""
     lines = text.split("\n")
     line, start = lines[leaf.position.line - 1], leaf.position.col - 1
     quote = line[start] if line[start] in "'\"" else ""

@@ -17,18 +17,22 @@ STUDY_SUFFIXES = (".study.yaml", ".study.yml")
 STACK_SUFFIXES = (".stack.yaml", ".stack.yml")
 BASE_SUFFIXES = (".base.yaml", ".base.yml")
 SUFFIXES = SCENARIO_SUFFIXES + STUDY_SUFFIXES + WORLD_SUFFIXES + ROBOT_SUFFIXES + STACK_SUFFIXES + BASE_SUFFIXES
+"""Suffixes of all kinds of files in simscen's own language."""
 
 REPOSITORY_FOLDERS = (".git", ".hg", ".jj", ".svn")
+"""Folders at the top of a repository."""
 PROJECT_FILES = ("pyproject.toml", "package.xml", "setup.py")
-"""Files at the top of a Python project or a ROS package, for copies without a repository."""
+"""Files at the top of a Python project or a ROS package. They mark the root of a copy without a repository."""
 SCENARIOS_FOLDER = "scenarios"
+"""Usual name of the folder with the scenarios of a project."""
 
 
 def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCENARIO_SUFFIXES) -> list[Path]:
-    """Return the files that `paths` select, sorted: files as given, and files with one of `suffixes` in folders.
+    """Return the files that `paths` select, absolute and sorted.
 
-    Raises InvalidInput if a path is missing or two scenarios have the same id up to case, and NothingSelected if there
-    are no scenarios.
+    A file selects itself. A folder selects the files with one of `suffixes` in and below it. Raises InvalidInput for
+    missing paths, and for scenarios that would write to the same output folder. Raises NothingSelected if no file is
+    selected.
     """
     problems = [problem for path in paths if (problem := _missing_path_problem(path))]
     found = dict.fromkeys(file.absolute() for path in paths for file in _selected_files(path, suffixes, problems))
@@ -45,18 +49,18 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
 
 
 def sibling(file: Path, label: str) -> Path:
-    """Return a scenario file beside another, such as `goal.minimal.scenario.yaml` beside `goal.scenario.yaml`."""
+    """Return the path of a scenario file next to `file`: `goal.minimal.scenario.yaml` for the label `minimal`."""
     suffixes = (*SCENARIO_SUFFIXES, *STUDY_SUFFIXES)
     name = next((file.name.removesuffix(end) for end in suffixes if file.name.endswith(end)), file.stem)
     return file.with_name(f"{name}.{label}{SCENARIO_SUFFIXES[0]}")
 
 
 def default_root(paths: Iterable[Path]) -> Path:
-    """Return the folder of the project that contains all `paths`, without reading the files.
+    """Return the folder of the project that contains all `paths`. Only names of files are considered.
 
-    This is the nearest parent with a repository; else with a project file; else the parent of the nearest folder called
-    `scenarios`; else the working folder if it contains the paths; else their common folder. The root of the file system
-    and the home folder are only projects if they have a repository or a project file.
+    This is the first that exists of: the nearest parent with a repository; the nearest parent with a project file; the
+    parent of the nearest folder called `scenarios`; the working folder if it contains the paths; their common folder.
+    The root of the file system and the home folder only count if they have a repository or a project file.
     """
     folders = [Path(os.path.realpath(path if is_folder(path) else path.parent)) for path in paths]
     common = Path(os.path.commonpath(folders)) if folders else Path.cwd()
@@ -80,6 +84,7 @@ def _is_too_wide(folder: Path) -> bool:
 
 
 def _missing_path_problem(path: Path) -> Problem | None:
+    """Return a problem if a path does not exist or cannot be accessed; else None."""
     try:
         path.lstat()
     except (OSError, ValueError) as error:
@@ -108,7 +113,10 @@ def _selected_files(path: Path, suffixes: tuple[str, ...], problems: list[Proble
 
 
 def _output_folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]:
-    """Yield problems with ids whose output folder would be the folder of a run (seed-…) of another scenario."""
+    """Yield a problem for each scenario whose output folder would lie in the folder of a run of another scenario.
+
+    For example, the scenario `a/seed-1/b` would be written into the run with seed 1 of the scenario `a`.
+    """
     ids = {scenario_id(file, root).casefold() for file in files}
     for file in files:
         name = scenario_id(file, root).casefold()
@@ -124,7 +132,10 @@ def _display_name(file: Path, root: Path) -> str:
 
 
 def _duplicate_ids(files: list[Path], root: Path) -> Iterator[Problem]:
-    """Yield problems with ids that differ only in case: some file systems cannot distinguish their output folders."""
+    """Yield a problem for each scenario with the same id as another one.
+
+    Ids that differ only in case count as the same: some file systems cannot distinguish their output folders.
+    """
     seen: dict[str, Path] = {}
     for file in files:
         other = seen.setdefault(scenario_id(file, root).casefold(), file)

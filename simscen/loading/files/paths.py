@@ -12,14 +12,18 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.textfile import os_error_reason
 
 MODEL_SCHEME = "model://"
+"""Scheme of the URIs with which Gazebo names models."""
 
 _INVALID_IN_NAMES = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
-"""Control and bidirectional characters, and surrogates for bytes that are not UTF-8 (PEP 383)."""
+"""Characters that the id of a scenario cannot contain, because it appears in names of folders and in XML.
+
+These are control and bidirectional characters, and the surrogates that stand for bytes that are not UTF-8 (PEP 383).
+"""
 
 
 @dataclass(frozen=True)
 class PathSandbox:
-    """Folders that a scenario may read from: `root`, and those of `--world-path`, which are searched in order."""
+    """Folders from which a scenario may read files: `root`, and those of `--world-path`, searched in order."""
 
     root: Path
     world_path: tuple[Path, ...] = ()
@@ -30,44 +34,49 @@ class PathSandbox:
         return cls(_resolved(root), tuple(_resolved(folder) for folder in world_path))
 
     def find(self, written: str, folder: Path) -> "Path | PathProblem":
-        """Return the existing file or folder for a path written in a file in `folder`.
+        """Return the existing file or folder that the path `written` in a file in `folder` leads to, or a problem.
 
-        The path is resolved relative to `folder` first, and must stay inside the root. `model://name/…` and relative
-        paths are then searched in the folders of `--world-path`. Problems do not reveal which files exist outside.
+        A relative path is resolved from `folder` first. If it leads out of the sandbox or does not exist there, it is
+        searched in the folders of `--world-path`. `model://name/…` is searched only there. Problems do not reveal which
+        files exist outside of the sandbox.
         """
         if problem := _invalid_form(written):
             return problem
         if written.startswith(MODEL_SCHEME):
             message = f"{quoted(written)} was not found in any folder of --world-path"
-            missing = PathProblem("SC023", message, _world_path_hint(self))
+            missing = PathProblem("SC023", message, "" if self.world_path else "allow its folder with --world-path")
             return self._in_world_path(written.removeprefix(MODEL_SCHEME)) or missing
-        inside = _resolved(folder / written)
-        if self.contains(inside):
+        path = _resolved(folder / written)
+        if self.contains(path):
             try:
-                inside.stat()
+                path.stat()
             except OSError as error:
-                problem = _unusable(error, written, inside)
+                problem = _stat_problem(error, written, path)
             else:
-                return inside
-        return self._in_world_path(written) or problem or _outside(written)
+                return path
+        return self._in_world_path(written) or problem or _outside_problem(written)
 
     def resolve_argument(self, path: Path) -> Path | Problem:
-        """Return the absolute path of a file named on the command line; a problem if it is outside the sandbox."""
+        """Return the absolute path of a file named on the command line.
+
+        Returns a problem if it is outside the sandbox, or if its name has invalid characters. It need not exist.
+        """
         file = _resolved(path.parent) / path.name
         if self.contains(file):
             return _name_problem(path, self.display_name(file)) or file
         return Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose the root with --root")
 
     def contains(self, path: Path) -> bool:
-        """Return whether a file, with symbolic links resolved, is inside the root or an allowed folder."""
+        """Return whether a path, with symbolic links resolved, is inside one of the folders."""
         real = _resolved(path)
         return any(real.is_relative_to(allowed) for allowed in (self.root, *self.world_path))
 
     def display_name(self, path: Path) -> str:
-        """Return the name of a file in messages: relative to the root if it is inside."""
+        """Return the name of a file in problems: its path relative to the root if it is inside, else the full path."""
         return path.relative_to(self.root).as_posix() if path.is_relative_to(self.root) else str(path)
 
     def _in_world_path(self, written: str) -> Path | None:
+        """Return the first existing file or folder with this path in the folders of `--world-path`, or None."""
         if ".." in PurePosixPath(written).parts:
             return None
         candidates = ((folder, _resolved(folder / written)) for folder in self.world_path)
@@ -75,18 +84,18 @@ class PathSandbox:
 
 
 def exists(path: Path) -> bool:
-    """Return whether a path exists; False for invalid names, for which Path.exists raises."""
+    """Return whether a path exists; False for an invalid name, for which Path.exists raises an error."""
     return os.path.exists(path)  # noqa: PTH110
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a path is a folder; False for invalid names, for which Path.is_dir raises."""
+    """Return whether a path is a folder; False for an invalid name, for which Path.is_dir raises an error."""
     return os.path.isdir(path)  # noqa: PTH112
 
 
 @dataclass(frozen=True)
 class PathProblem:
-    """Reason why a path in a file cannot be used."""
+    """Reason why a path in a file cannot be used. The caller knows the position, and makes it a Problem."""
 
     code: str
     message: str
@@ -94,6 +103,7 @@ class PathProblem:
 
 
 def _invalid_form(written: str) -> PathProblem | None:
+    """Return a problem with a path that is not relative or has control characters; else None."""
     if any(not c.isprintable() for c in written):
         return PathProblem("SC017", f"control character in the path {quoted(written)}")
     if written.startswith(("/", "~")) or (len(written) > 1 and written[1] == ":"):
@@ -104,7 +114,7 @@ def _invalid_form(written: str) -> PathProblem | None:
 
 
 def _name_problem(path: Path, name: str) -> Problem | None:
-    """Return a problem if the name of a file cannot be a scenario id, which appears in folder names and XML."""
+    """Return a problem if the displayed `name` of the file `path` has invalid characters; else None."""
     character = _INVALID_IN_NAMES.search(name)
     if character is None:
         return None
@@ -115,25 +125,23 @@ def _name_problem(path: Path, name: str) -> Problem | None:
 
 
 def _resolved(path: Path) -> Path:
-    """Return the path with symbolic links resolved; Path.resolve raises RuntimeError on a loop."""
+    """Return the absolute path with symbolic links resolved; unlike Path.resolve, without an error for a loop."""
     return Path(os.path.realpath(path))
 
 
-def _outside(written: str) -> PathProblem:
+def _outside_problem(written: str) -> PathProblem:
     hint = "choose the root with --root, or allow a folder with --world-path"
     return PathProblem("SC020", f"{quoted(written)} is outside the scenario root", hint)
 
 
-def _unusable(error: OSError, written: str, path: Path) -> PathProblem:
+def _stat_problem(error: OSError, written: str, path: Path) -> PathProblem:
+    """Return the problem for the error of `path.stat()`; `written` is the path as written."""
     code = "SC022" if error.errno == errno.ELOOP else "SC023"
-    return PathProblem(code, f"{os_error_reason(error)}: {quoted(written)}", _sibling(path))
+    return PathProblem(code, f"{os_error_reason(error)}: {quoted(written)}", _similar_name_hint(path))
 
 
-def _world_path_hint(sandbox: PathSandbox) -> str:
-    return "" if sandbox.world_path else "allow its folder with --world-path"
-
-
-def _sibling(missing: Path) -> str:
+def _similar_name_hint(missing: Path) -> str:
+    """Return "did you mean …?" if the folder of a missing file has a file with a similar name; else ""."""
     try:
         names = sorted(entry.name for entry in os.scandir(missing.parent))
     except OSError:

@@ -1,6 +1,7 @@
-"""Hints for common YAML mistakes.
+"""Hints for common mistakes in YAML files.
 
-A choice is a mapping with one key that selects its kind, such as the criterion `collisions: {max: 0}`.
+A choice is a mapping whose key selects its kind, such as the criterion `collisions: {max: 0}`. A `loc` is the location
+of an error in pydantic: keys and indices of the file, and between them names of the members of unions.
 """
 
 from collections.abc import Iterable, Sequence
@@ -9,20 +10,23 @@ from pydantic import BaseModel, ValidationError
 
 from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at
 from simscen.loading.schema.messages import suggestion
-from simscen.loading.yaml.tree import Key, MappingNode, Node, ScalarNode, SequenceNode, dotted_path, existing_keys
+from simscen.loading.yaml.tree import Key, Keys, MappingNode, Node, ScalarNode, SequenceNode, dotted_path, existing_keys
 from simscen.spec.choice import Choice
 from simscen.spec.places import PoseSpec
 
-HINTS_FOR_BOUNDS: dict[tuple[Key, ...], str] = {
+HINTS_FOR_BOUNDS: dict[Keys, str] = {
     ("physics", "truth_rate"): "criteria are judged at these samples; lower rates miss short violations",
 }
-"""Reasons for bounds that may surprise users, by the path of the value."""
+"""Reasons for bounds that may surprise users, by the keys of the value."""
 MAX_SEARCH_DEPTH = 3
 """Levels below a mapping in which a misplaced key is searched."""
 
 
 def hint_for_wrong_type(kind: str, model: type[BaseModel], loc: Sequence[Key], node: Node) -> str:
-    """Return how to write a value where a mapping or a list is expected at `loc` below `model`."""
+    """Return how to correct the value `node` at `loc` in `model`, where a mapping or a list is expected; "" if unknown.
+
+    `kind` is pydantic's type of the error, such as "list_type".
+    """
     models = models_at(model, loc)
     in_list = isinstance(next((part for part in reversed(loc) if not _is_tag(part)), ""), int)
     if kind == "list_type":
@@ -30,15 +34,15 @@ def hint_for_wrong_type(kind: str, model: type[BaseModel], loc: Sequence[Key], n
     if isinstance(node, SequenceNode):
         return _sequence_for_mapping_hint(models, node)
     if isinstance(node, ScalarNode):
-        word = _missing_colon_hint(models, node.value, in_list) if isinstance(node.value, str) else ""
-        return word or _scalar_for_mapping_hint(models, node) or _explain_hint(model, loc)
+        colon_hint = _missing_colon_hint(models, node.value, in_list) if isinstance(node.value, str) else ""
+        return colon_hint or _scalar_for_mapping_hint(models, node) or _explain_hint(model, loc)
     return ""
 
 
 def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key], key: str) -> str:
-    """Return where a key on the wrong level belongs; "" if it is valid on no level.
+    """Return where to move the unknown key `key` of the mapping at `loc`; "" if no suitable place is found.
 
-    Keys in an item of a list are not searched outside of this item.
+    For a key in an item of a list, only levels inside of this item are considered.
     """
     item = next((index + 1 for index, part in enumerate(loc) if isinstance(part, int)), 0)
     for length in range(len(loc) - 1, item - 1, -1):
@@ -53,7 +57,7 @@ def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key
 
 
 def hint_for_reserved_key(loc: Sequence[Key], key: str) -> str:
-    """Return a hint for `robot` in faults and criteria, and for `then` in a step."""
+    """Return a hint for the key `robot` in faults and criteria, and `then` in a step of a sequence; else ""."""
     if key == "robot" and loc and loc[0] in ("faults", "pass", "robots"):
         return "write it under the name of the robot: `robots: {NAME: {faults: …, pass: …}}`"
     if key == "then" and "then" in loc:
@@ -62,6 +66,7 @@ def hint_for_reserved_key(loc: Sequence[Key], key: str) -> str:
 
 
 def _list_hint(node: Node, in_list: bool) -> str:
+    """Return how to write a list instead of `node`; `in_list` means that `node` is an item of a list itself."""
     if in_list and isinstance(node, ScalarNode) and isinstance(node.value, int | float):
         return "write each point as a list: `[[1, 2], [3, 4]]`"
     if isinstance(node, MappingNode):
@@ -70,6 +75,7 @@ def _list_hint(node: Node, in_list: bool) -> str:
 
 
 def _sequence_for_mapping_hint(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
+    """Return how to write a list as a mapping: without `-`, or two or three numbers as a pose; else ""."""
     if all(isinstance(item, MappingNode) for item in node.items):
         return "remove the `-`: a mapping is expected, not a list"
     values = [str(item.value) for item in node.items if isinstance(item, ScalarNode)]
@@ -102,13 +108,13 @@ def _is_valid(model: type[BaseModel], value: dict[str, object]) -> bool:
 
 
 def _explain_hint(model: type[BaseModel], loc: Sequence[Key]) -> str:
-    """Return a hint that refers to `simscen explain` if the value belongs to a key of a choice."""
+    """Return a hint that refers to `simscen explain` if the last key of `loc` is a key of a choice; else ""."""
     chosen = any(issubclass(one, Choice) and loc[-1] in one.choices() for one in models_at(model, loc[:-1]) if loc)
     return f"`simscen explain {loc[-1]}` shows its keys" if chosen else ""
 
 
 def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: bool) -> str:
-    """Return a hint if the key of a choice was written without a colon."""
+    """Return how to write the text `word` as a key of a choice, with a colon and a value; "" if no choice has it."""
     for choice in (model for model in models if issubclass(model, Choice)):
         keys = [*choice.choices()]
         if word not in keys:
@@ -122,7 +128,7 @@ def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: b
 
 
 def _find_key_below(models: Iterable[type[BaseModel]], key: str, depth: int = 1) -> list[Key] | None:
-    """Return the keys of the nearest mapping below in which `key` is valid."""
+    """Return the keys that lead from `models` to the nearest mapping in which `key` is valid; None if there is none."""
     holders = [(name, models_at(model, [name])) for model in models if not issubclass(model, Choice)
                for name in keys_of([model])]  # fmt: skip
     for name, below in holders:

@@ -1,7 +1,7 @@
-"""Find the models and keys that are valid at a position, including those of installed packages.
+"""Find the pydantic models, and their keys, that are possible at a location in a file.
 
-A pydantic `loc` mixes keys of the file with tags of unions. Both are resolved against the types, and every model that
-fits is kept.
+A `loc` is the location of an error in pydantic: keys and indices of the file, and between them the names (tags) of the
+members of unions. Models of installed packages are included.
 """
 
 from collections.abc import Iterable, Sequence
@@ -13,12 +13,12 @@ from pydantic.fields import FieldInfo
 
 from simscen.loading.yaml.tree import Key
 from simscen.spec.base import LazySpec, annotation_of
-from simscen.spec.choice import Choice
+from simscen.spec.choice import Choice, with_installed_choices
 from simscen.spec.extensible_union import ExtensibleUnion, installed_specs
 
 
 def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel]]:
-    """Return the models that a mapping at `loc` below `model` may be an instance of."""
+    """Return the possible models of a mapping at `loc` in a file whose top level is `model`."""
     candidates: list[Any] = [model]
     for part in loc:
         options = [option for candidate in candidates for option in _union_members(candidate)]
@@ -30,12 +30,12 @@ def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel
 
 
 def type_values_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
-    """Return the valid values of `type` in a mapping at `loc`."""
+    """Return the valid values of the key `type` in a mapping at `loc`."""
     return [str(value) for kind in models_at(model, loc) for value in _literal_types(kind)]
 
 
 def type_values_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -> list[str]:
-    """Return the other values of `type` with which the mapping at `loc` could have this key."""
+    """Return the other values of `type` that would make `key` valid in the mapping at `loc`."""
     own = type_values_at(model, loc)
     if not loc or loc[-1] not in own:
         return []
@@ -50,12 +50,12 @@ def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
 
 
 def has_no_required_keys(model: type[BaseModel]) -> bool:
-    """Return whether `{}` is a complete specification."""
+    """Return whether `{}` is valid for a model."""
     return not issubclass(model, RootModel | Choice) and not any(f.is_required() for f in model.model_fields.values())
 
 
 def field_type(model: type[BaseModel], key: str) -> Any:
-    """Return the declared type of the field with this key; None if there is none, or its package is broken."""
+    """Return the type of the field with this key; None if there is no such field, or its package cannot be imported."""
     for name, field in model.model_fields.items():
         if key in (field.alias, name):
             return _type_of(field)
@@ -63,6 +63,7 @@ def field_type(model: type[BaseModel], key: str) -> Any:
 
 
 def _type_of(field: FieldInfo) -> Any:
+    """Return the type of a field; None if its package cannot be imported."""
     from simscen.spec.registry import BrokenPlugin
 
     if mark := next((mark for mark in field.metadata if isinstance(mark, ExtensibleUnion)), None):
@@ -84,18 +85,14 @@ def _union_members(kind: Any) -> list[Any]:
     if get_origin(unwrapped) in (Union, UnionType):
         return [option for member in get_args(unwrapped) if member is not NoneType for option in _union_members(member)]
     if _is_model(unwrapped) and issubclass(unwrapped, RootModel):
-        inner = _root_type(unwrapped)
+        inner = _unwrapped(unwrapped.model_fields["root"].annotation)
         holds_models = _is_model(inner) or get_origin(inner) in (Union, UnionType)
         return _union_members(unwrapped.model_fields["root"].annotation) if holds_models else [kind]
     return [kind]
 
 
-def _root_type(model: Any) -> Any:
-    return _unwrapped(model.model_fields["root"].annotation)
-
-
 def _types_below(kind: Any, part: Key) -> list[Any]:
-    """Return the Python types that an item may have, for a key or index `part` of a container of type `kind`."""
+    """Return the possible types of the value under a key or index `part` of a value of type `kind`."""
     unwrapped = _unwrapped(kind)
     if _is_model(unwrapped) and isinstance(part, str):
         matches = field_type(unwrapped, part)
@@ -108,7 +105,7 @@ def _types_below(kind: Any, part: Key) -> list[Any]:
 
 
 def _tags(option: Any) -> set[str]:
-    """Return the names that pydantic may use for this member of a union in a `loc`."""
+    """Return the names that a `loc` may contain for this member of a union."""
     tags = {meta.tag for meta in _metadata(option) if isinstance(meta, Tag)}
     unwrapped = _unwrapped(option)
     if _is_model(unwrapped):
@@ -117,31 +114,26 @@ def _tags(option: Any) -> set[str]:
 
 
 def _literal_types(model: type[BaseModel]) -> tuple[Any, ...]:
+    """Return the values that a model allows for its key `type`; () if it has no such key."""
     field = model.model_fields.get("type")
     return get_args(field.annotation) if field is not None and get_origin(field.annotation) is Literal else ()
 
 
 def _metadata(kind: Any) -> tuple[Any, ...]:
+    """Return the metadata of an `Annotated` type; () for other types."""
     return tuple(get_args(kind)[1:]) if get_origin(kind) is Annotated else ()
 
 
 def _extensible_union(kind: Any) -> ExtensibleUnion | None:
+    """Return the mark of a union to which installed packages can add members; None for other types."""
     return next((mark for mark in _metadata(kind) if isinstance(mark, ExtensibleUnion)), None)
 
 
 def _unwrapped(kind: Any) -> Any:
-    """Return a type without `Annotated`, with lazy specifications loaded and choices of installed packages added."""
+    """Return the type inside of `Annotated`; lazy specifications are imported, and choices have installed kinds."""
     while get_origin(kind) is Annotated:
         kind = next((mark.load() for mark in _metadata(kind) if isinstance(mark, LazySpec)), get_args(kind)[0])
-    return _with_installed(kind) if _is_model(kind) and issubclass(kind, Choice) else kind
-
-
-def _with_installed(choice: type[Choice]) -> type[Choice]:
-    from simscen.spec.choice import (
-        with_installed_choices,  # searches installed packages, so only used to explain problems
-    )
-
-    return with_installed_choices(choice)
+    return with_installed_choices(kind) if _is_model(kind) and issubclass(kind, Choice) else kind
 
 
 def _is_model(kind: Any) -> bool:

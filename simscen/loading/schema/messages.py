@@ -1,4 +1,4 @@
-"""Translate errors of pydantic to messages for authors of YAML files."""
+"""Translate errors of pydantic to messages for authors of YAML files; format values and suggestions for messages."""
 
 import difflib
 import re
@@ -20,13 +20,16 @@ _KINDS = {
     "float_type": "a number",
     "bool_type": "true or false",
 }
+"""Error type of pydantic → what is expected."""
 _BOUNDS = {
     "greater_than": ("greater than", "gt"),
     "greater_than_equal": ("at least", "ge"),
     "less_than": ("less than", "lt"),
     "less_than_equal": ("at most", "le"),
 }
+"""Error type of pydantic → words for the bound, and the key of the bound in the context of the error."""
 MAX_LISTED_CHOICES = 40
+"""Largest number of choices in a message."""
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?")
 _LEADING_ZERO = re.compile(r"[-+]?0[0-9]")
 _TEXTS = {
@@ -37,10 +40,11 @@ _TEXTS = {
     "path_name": ("SC017", "a name must not be a path"),
     "string_too_long": ("SC017", "longer than {max_length} characters"),
 }
+"""Error type of pydantic → error code, and message with placeholders for values of the context."""
 
 
 class Message(NamedTuple):
-    """Error code, message and hint."""
+    """Error code of simscen (SC…), text, and hint of a problem, without its position."""
 
     code: str
     text: str
@@ -70,7 +74,7 @@ def quoted(text: str, max_chars: int = 60) -> str:
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """Return "did you mean …?" if a known word is similar, else a list of the known words."""
+    """Return "did you mean …?" if a known word is similar, else "expected one of: …"; "" if no word is known."""
     choices = list(known)
     lowered = {choice.lower(): choice for choice in reversed(choices)}
     matches = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
@@ -80,13 +84,16 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 def _listed(choices: list[str]) -> str:
-    """Return the first choices; an imported world may have hundreds of names."""
+    """Return the choices separated by commas, without those beyond the limit: a world may have hundreds of names."""
     more = len(choices) - MAX_LISTED_CHOICES
     return f"{', '.join(choices[:MAX_LISTED_CHOICES])}, and {more} more" if more > 1 else ", ".join(choices)
 
 
 def translate_error(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Message:
-    """Return the message for pydantic's error type `kind` at `node`; `text` is pydantic's own message."""
+    """Return the message for an error of pydantic at `node`.
+
+    `kind` is pydantic's type of the error, `context` are its values, such as the bound, and `text` is its own message.
+    """
     if kind in _KINDS:
         return Message("SC011", f"expected {_KINDS[kind]}, got {describe_node(node)}", _type_hint(kind, node))
     if kind in _BOUNDS:
@@ -120,6 +127,7 @@ def translate_error(kind: str, context: Mapping[str, Any], node: Node, text: str
 
 
 def _type_hint(kind: str, node: Node) -> str:
+    """Return how to correct a value of the wrong type; "" if unknown."""
     if kind == "string_type" and isinstance(node, ScalarNode) and node.value is not None:
         return "put it in quotes"
     if not isinstance(node, ScalarNode) or not isinstance(node.value, str):
@@ -136,14 +144,14 @@ def _type_hint(kind: str, node: Node) -> str:
 
 
 def _quoted_number_hint(node: Node) -> str:
-    """Return how to correct text that is a number with quotes or leading zeros."""
+    """Return how to correct text that is a number with quotes or leading zeros; "" for other values."""
     if not isinstance(node, ScalarNode) or not isinstance(node.value, str) or not _NUMBER.fullmatch(node.value):
         return ""
     return "remove the leading zero" if _LEADING_ZERO.match(node.value) else "remove the quotes"
 
 
 def short_value(node: Node) -> str:
-    """Return the value of a node, shortened."""
+    """Return the value of a node in backquotes, shortened; words such as "a list" for collections."""
     if isinstance(node, ScalarNode) and node.value is not None:
         return quoted(str(node.value).lower() if isinstance(node.value, bool) else str(node.value))
     return describe_node(node)
@@ -154,11 +162,12 @@ def _number(value: Any) -> str:
 
 
 def _choices(expected: str) -> list[str]:
-    """Return the choices in pydantic's text "'a', 'b' or 'c'"."""
+    """Return the choices that pydantic lists as "'a', 'b' or 'c'"."""
     return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
 
 
 def _invalid_name(node: Node, pattern: str) -> Message:
+    """Return the message for a name that does not match `pattern`."""
     value = node.value if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
     control = next((c for c in value if not c.isprintable()), None)
     if control is not None:

@@ -1,7 +1,7 @@
-"""Validate a tree against a pydantic model."""
+"""Validate a tree against a pydantic model, and translate pydantic's errors to problems with positions and hints."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import Any, TypeVar
 
@@ -12,17 +12,17 @@ from simscen.loading.schema import common_mistakes, messages
 from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at, type_values_at, type_values_with_key
 from simscen.loading.yaml import textfile
 from simscen.loading.yaml.tree import (
-    Key,
+    Keys,
     MappingNode,
     Node,
     Position,
     ScalarNode,
-    SequenceNode,
     child,
     dotted_path,
     existing_keys,
     key_position,
     node_at,
+    nodes_with_keys,
     value_position,
 )
 from simscen.spec.choice import Choice
@@ -30,58 +30,64 @@ from simscen.triggers.base import AnyCondition, Trigger
 
 Model = TypeVar("Model", bound=BaseModel)
 LANGUAGE_VERSION = 1
-
+"""Version of the scenario language, which files state under the key `simscen`."""
 
 MissingKeys = Callable[[MappingNode], list[Problem]]
-"""Finds problems that depend on several keys, which a model cannot express."""
+"""Function that returns the problems of a file with missing keys that are required only if other keys are absent."""
 
 
 def check(model: type[Model], tree: Node, find_missing_keys: MissingKeys | None = None) -> Model | list[Problem]:
-    """Return the specification in `tree`, or all its problems, including those that `find_missing_keys` finds."""
-    if not isinstance(tree, MappingNode):
-        return [
-            _problem(tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
-        ]
-    if problem := _wrong_version(tree):
-        return [problem]
-    empty = [_empty_value_problem(model, tree, loc) for loc in _empty_values(tree)]
-    missing = find_missing_keys(tree) if find_missing_keys is not None else []
-    try:
-        spec = model.model_validate(tree.plain, by_alias=True, by_name=False)
-    except ValidationError as error:
-        errors = error.errors(include_input=False, include_url=False)
-        found = [_translate(model, tree, dict(e)) for e in errors if not _is_caused_by_empty_value(tree, dict(e))]
-        return _without_duplicates([*empty, *missing, *found])
-    return [*empty, *missing] or spec
+    """Return the specification in `tree`, or all its problems, including those that `find_missing_keys` returns."""
+    mapping = _supported_mapping(tree)
+    if isinstance(mapping, Problem):
+        return [mapping]
+    missing = find_missing_keys(mapping) if find_missing_keys is not None else []
+    spec, errors = _validate(model, mapping)
+    problems = _problems(model, mapping, errors, missing)
+    return problems if problems or spec is None else spec
 
 
 def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
-    """Return the problems of a file that other files extend; missing keys are allowed, except inside of lists."""
-    if not isinstance(tree, MappingNode):
-        return [
-            _problem(tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
-        ]
-    if problem := _wrong_version(tree):
-        return [problem]
-    empty = [_empty_value_problem(model, tree, loc) for loc in _empty_values(tree)]
+    """Return the problems of a file that other files extend. Missing keys are allowed, except in items of lists."""
+    mapping = _supported_mapping(tree)
+    if isinstance(mapping, Problem):
+        return [mapping]
+    _, errors = _validate(model, mapping)
+    return _problems(model, mapping, [error for error in errors if not _is_missing_key(error)])
+
+
+def _supported_mapping(tree: Node) -> MappingNode | Problem:
+    """Return the tree, or a problem if it is no mapping or needs another version of the language."""
+    if isinstance(tree, MappingNode):
+        return _wrong_version(tree) or tree
+    return _problem(tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
+
+
+def _validate(model: type[Model], tree: MappingNode) -> tuple[Model | None, list[dict[str, Any]]]:
+    """Return the specification (None if it is invalid) and pydantic's errors, except those that empty values cause."""
     try:
-        model.model_validate(tree.plain, by_alias=True, by_name=False)
+        return model.model_validate(tree.plain, by_alias=True, by_name=False), []
     except ValidationError as error:
-        errors = [dict(found) for found in error.errors(include_input=False, include_url=False)]
-        relevant = [
-            found for found in errors if not _is_missing_key(found) and not _is_caused_by_empty_value(tree, found)
-        ]
-        return _without_duplicates([*empty, *(_translate(model, tree, found) for found in relevant)])
-    return empty
+        errors = [dict(one) for one in error.errors(include_input=False, include_url=False)]
+        return None, [one for one in errors if not _is_caused_by_empty_value(tree, one)]
+
+
+def _problems(
+    model: type[BaseModel], tree: MappingNode, errors: list[dict[str, Any]], missing: Sequence[Problem] = ()
+) -> list[Problem]:
+    """Return the problems of empty values, then `missing`, then the problems for pydantic's errors."""
+    empty = [_empty_value_problem(model, tree, keys) for keys in _empty_values(tree)]
+    return _without_duplicates([*empty, *missing, *(_translate(model, tree, error) for error in errors)])
 
 
 def _is_missing_key(error: dict[str, Any]) -> bool:
-    """Return whether an error is a missing key outside of lists."""
+    """Return whether an error of pydantic reports a missing key outside of lists."""
     in_a_list = any(isinstance(part, int) for part in error["loc"])
     return error["type"] in ("missing", "union_tag_not_found") and not in_a_list
 
 
 def _wrong_version(tree: MappingNode) -> Problem | None:
+    """Return a problem if the file is written for another version; None if its version is right, missing or invalid."""
     version = child(tree, "simscen")
     if not isinstance(version, ScalarNode) or version.value == LANGUAGE_VERSION or isinstance(version.value, bool):
         return None
@@ -92,7 +98,8 @@ def _wrong_version(tree: MappingNode) -> Problem | None:
 
 
 def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Problem:
-    loc: tuple[Key, ...] = error["loc"]
+    """Return the problem for an error of pydantic."""
+    loc: Keys = error["loc"]
     kind: str = error["type"]
     if kind == "extra_forbidden":
         return _unknown_key(model, tree, loc)
@@ -117,7 +124,8 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
     return _problem(value_position(tree, loc), *message)
 
 
-def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
+def _unknown_key(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
+    """Return the problem of the unknown key at the end of `loc`, with a hint what was meant or where it belongs."""
     key = str(loc[-1])
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     where = f" in `{holder}`" if holder else ""
@@ -132,15 +140,16 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
     elif reserved_key_hint := common_mistakes.hint_for_reserved_key(loc[:-1], key):
         hint = reserved_key_hint
     elif not hint.startswith("did") and (
-        correct_place := common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key)
+        move_hint := common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key)
     ):
-        hint = correct_place
+        hint = move_hint
     elif not hint.startswith("did") and any(issubclass(one, Choice) and one.group for one in models):
         hint = "; ".join(filter(None, (hint, "`simscen plugins` lists what installed packages add")))
     return _problem(key_position(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
 
 
-def _missing_key(tree: Node, loc: tuple[Key, ...]) -> Problem:
+def _missing_key(tree: Node, loc: Keys) -> Problem:
+    """Return the problem of the missing key, or the missing item of a list, at the end of `loc`."""
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     if isinstance(loc[-1], int):
         return _problem(key_position(tree, loc[:-1]), "SC017", f"`{holder}` has too few values: [{loc[-1]}] is missing")
@@ -148,7 +157,7 @@ def _missing_key(tree: Node, loc: tuple[Key, ...]) -> Problem:
     return _problem(key_position(tree, loc[:-1]), "SC010", f"missing key `{loc[-1]}`{where}")
 
 
-def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error: dict[str, Any]) -> Problem:
+def _wrong_type(model: type[BaseModel], tree: Node, loc: Keys, error: dict[str, Any]) -> Problem:
     """Return the problem of a mapping whose `type` is missing or unknown."""
     node, types = node_at(tree, loc), type_values_at(model, loc)
     if not isinstance(node, MappingNode):
@@ -161,19 +170,13 @@ def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error:
     return _problem(value_position(tree, (*loc, "type")), "SC014", message, messages.suggestion(written, types))
 
 
-def _empty_values(node: Node, loc: tuple[Key, ...] = ()) -> Iterator[tuple[Key, ...]]:
+def _empty_values(tree: Node) -> Iterator[Keys]:
     """Yield the keys of empty values: `off:` instead of `off: {}`, or a forgotten value."""
-    if isinstance(node, MappingNode):
-        for key, entry in node.entries.items():
-            yield from _empty_values(entry.value, (*loc, key))
-    elif isinstance(node, SequenceNode):
-        for index, item in enumerate(node.items):
-            yield from _empty_values(item, (*loc, index))
-    elif node.value is None:
-        yield loc
+    return (keys for keys, node in nodes_with_keys(tree) if isinstance(node, ScalarNode) and node.value is None)
 
 
-def _empty_value_problem(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
+def _empty_value_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
+    """Return the problem of the empty value at `loc`."""
     *holder, key = loc
     if isinstance(key, int):
         return _problem(
@@ -195,16 +198,24 @@ def _is_caused_by_empty_value(tree: Node, error: dict[str, Any]) -> bool:
 
 
 def _without_duplicates(problems: list[Problem]) -> list[Problem]:
-    """Return one problem per mistake: members of a union repeat problems, and a misspelled key is also missing."""
-    places: dict[tuple[str, int, int, str], Problem] = {}
+    """Return one problem per mistake.
+
+    Pydantic reports a mistake once for each member of a union, and a misspelled key also as a missing key.
+    """
+    first_at: dict[tuple[str, int, int, str], Problem] = {}
     for problem in problems:
-        key = problem.code if problem.code == "SC010" else ""
-        places.setdefault((problem.path, problem.line, problem.col, key and problem.message), problem)
+        missing_key = problem.message if problem.code == "SC010" else ""
+        first_at.setdefault((problem.path, problem.line, problem.col, missing_key), problem)
     misspelled = {problem.hint for problem in problems if problem.code == "SC012"}
-    return [p for p in places.values() if not (p.code == "SC010" and p.hint == "" and _spelling_hint(p) in misspelled)]
+    return [
+        problem
+        for problem in first_at.values()
+        if not (problem.code == "SC010" and problem.hint == "" and _spelling_hint(problem) in misspelled)
+    ]
 
 
 def _spelling_hint(missing: Problem) -> str:
+    """Return the hint that a misspelled key has if the missing key was meant."""
     return f"did you mean {missing.message.split()[2]}?"
 
 

@@ -1,1 +1,1 @@
-"""Stacks: stack files, Nav2 parameter files, stacks chosen on the command line, and commands of external stacks."""
+"""Load stacks: stack files, Nav2 parameter files, stacks given with `--stack`, and commands of external stacks."""

@@ -1,4 +1,4 @@
-"""Stack that the command line selects for all scenarios with `--stack`, and stack files (`*.stack.yaml`)."""
+"""The stack that `--stack` selects for all scenarios on the command line, and the stack files that it can name."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,37 +8,43 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.core.external_command import ExternalCommand
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.schema.validate import check
-from simscen.loading.stacks.nav2_parameters import NAV2_PARAMS, is_nav2_parameter_file, with_nav2_parameters
+from simscen.loading.stacks.nav2_expansion import NAV2_PARAMS, with_nav2_parameters
+from simscen.loading.stacks.nav2_parameters import is_nav2_parameter_file
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.textfile import read_text
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child, key_position
 from simscen.model.stack_files import StackFileSpec
 
 SCENARIO_KEYS = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
-"""Keys of a `stack:` section that describe the world; they are kept whichever stack is selected."""
+"""Keys of a `stack:` section that describe the world of the scenario. They are kept when another stack is selected."""
 COMMON_STACK_KEYS = ("controller_frequency",)
 """Keys that all types of stacks have."""
 GOAL_CHECKER, TOLERANCES = "goal_checker", ("xy_goal_tolerance", "yaw_goal_tolerance")
+"""Key of a `stack:` section, and keys below it."""
 REFERENCE, EXTERNAL = "reference", "external"
+"""Default type of a stack, and the key with the name of an external stack."""
 
 
 @dataclass(frozen=True)
 class StackChoice:
-    """Stack given as `--stack NAME=VALUE`: a stack file, a type of stack, or the command of an external stack.
-
-    `section` is the `stack:` section of the stack file `file`. `texts` and `files` are those of the stack file and the
-    files it extends (see Library); `notes` are warnings about them. `external_command` starts an external stack.
-    """
+    """Stack given as `--stack NAME=VALUE`: a stack file, a type of stack, or the command of an external stack."""
 
     name: str
     value: str
     type: str = ""
+    """Type of the stack, such as "reference"; "" for a stack file or a command."""
     file: Path | None = None
+    """Stack file."""
     section: MappingNode | None = field(default=None, repr=False)
+    """Section `stack:` of the stack file."""
     texts: Mapping[str, str] = field(default_factory=dict, repr=False)
+    """Texts of the stack file and of the files that it extends, by their names in problems."""
     files: Mapping[str, Path] = field(default_factory=dict, repr=False)
+    """Absolute paths of these files, by their names in problems."""
     external_command: ExternalCommand | None = field(default=None, repr=False)
+    """Command that starts an external stack."""
     notes: tuple[Problem, ...] = field(default=(), repr=False)
+    """Warnings about the stack file."""
 
     @property
     def written(self) -> str:
@@ -46,7 +52,7 @@ class StackChoice:
         return f"{self.name}={self.value}"
 
     def relative_to_folder(self, folder: Path) -> str:
-        """Return NAME=VALUE for a command called in `folder`; a file outside of it is absolute."""
+        """Return NAME=VALUE with the path of the stack file relative to `folder`; absolute if it is outside."""
         if self.file is None:
             return self.written
         file = self.file.relative_to(folder).as_posix() if self.file.is_relative_to(folder) else str(self.file)
@@ -54,11 +60,11 @@ class StackChoice:
 
 
 def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
-    """Return a scenario with the selected stack instead of its own.
+    """Return a scenario of one robot with the selected stack instead of its own.
 
-    Zones, masks and goal tolerances of the scenario are kept. A stack file replaces all other parameters. A command or
-    a type of stack has no parameters: those of the scenario are kept if its own stack is of the same kind, else only
-    those that all stacks have.
+    Zones, masks, and goal tolerances of the scenario are kept. If the choice is a stack file, its parameters replace
+    all others. A command or a type of stack has no parameters. Then the parameters of the scenario are kept if its own
+    stack is of the same type. If not, only those are kept that all types of stacks have.
     """
     own = child(tree, "stack")
     if own is not None and not isinstance(own, MappingNode):
@@ -67,10 +73,11 @@ def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
     if choice.section is None and stack_type(own) == choice.type:
         return tree
     key = tree.entries["stack"].key if "stack" in tree.entries else tree.position
-    return MappingNode(tree.position, {**tree.entries, "stack": Entry(key, _section(own, choice))})
+    return MappingNode(tree.position, {**tree.entries, "stack": Entry(key, _replaced_section(own, choice))})
 
 
-def _section(own: MappingNode, choice: StackChoice) -> MappingNode:
+def _replaced_section(own: MappingNode, choice: StackChoice) -> MappingNode:
+    """Return the `stack:` section of the choice, with what is kept of the section `own` of the scenario."""
     scenario_entries = {name: own.entries[name] for name in SCENARIO_KEYS if name in own.entries}
     if choice.section is not None:
         return _with_goal_tolerances(
@@ -88,15 +95,17 @@ def _section(own: MappingNode, choice: StackChoice) -> MappingNode:
 
 
 def _with_goal_tolerances(section: MappingNode, own: MappingNode) -> MappingNode:
-    """Return the section with the goal tolerances of the scenario, so that all stacks are judged by the same ones."""
-    checker, below = child(own, GOAL_CHECKER), child(section, GOAL_CHECKER)
-    if not isinstance(checker, MappingNode) or not isinstance(below, MappingNode | None):
+    """Return the section with the goal tolerances of the section `own`, so that all stacks have the same goals."""
+    checker, replaced = child(own, GOAL_CHECKER), child(section, GOAL_CHECKER)
+    if not isinstance(checker, MappingNode) or not isinstance(replaced, MappingNode | None):
         return section
     tolerances = {name: checker.entries[name] for name in TOLERANCES if name in checker.entries}
     if not tolerances:
         return section
-    whole = MappingNode(checker.position, {**(below.entries if below else {}), **tolerances})
-    return MappingNode(section.position, {**section.entries, GOAL_CHECKER: Entry(own.entries[GOAL_CHECKER].key, whole)})
+    merged = MappingNode(checker.position, {**(replaced.entries if replaced else {}), **tolerances})
+    return MappingNode(
+        section.position, {**section.entries, GOAL_CHECKER: Entry(own.entries[GOAL_CHECKER].key, merged)}
+    )
 
 
 def stack_type(section: Node) -> str | None:
@@ -108,9 +117,9 @@ def stack_type(section: Node) -> str | None:
 
 
 def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: Sequence[Path] = ()) -> StackChoice:
-    """Return the stack in `path`, which may be outside `root` because the command line names it.
+    """Return the choice `--stack name=value` of the stack file `path`. Raises InvalidInput with all its problems.
 
-    Raises InvalidInput with all problems of the file.
+    The file may be outside of `root`, because the command line names it.
     """
     library = Library(PathSandbox.around(root, [*world_path, path.parent]))
     found = read_stack_file(path, library)
@@ -123,15 +132,15 @@ def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: S
 
 
 def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:
-    """Return the `stack:` section of a stack file and warnings about it, or all problems of the file.
+    """Return the `stack:` section of a stack file and warnings about it; or all problems of the file.
 
-    A Nav2 parameter file counts as a stack file with `nav2_params`. The section contains the Nav2 parameters
-    instead of the path of their file, which may be outside the root of the scenarios.
+    A Nav2 parameter file is read like a stack file whose `nav2_params` names it. The section contains the Nav2
+    parameters instead of the path of their file, which may be outside the root of the scenarios.
     """
     file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):
         return [file]
-    tree, problems = _read(file, library)
+    tree, problems = _read_tree(file, library)
     if problems or tree is None:
         return library.with_source(problems)
     notes: list[Problem] = []
@@ -143,31 +152,27 @@ def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Pro
         tree = expanded.tree
     spec = check(StackFileSpec, tree)
     section = child(tree, "stack")
-    misplaced = _misplaced(section) if isinstance(section, MappingNode) else []
+    misplaced = _misplaced_key_problems(section) if isinstance(section, MappingNode) else []
     if isinstance(spec, list) or misplaced or not isinstance(section, MappingNode):
         return library.with_source(sorted([*misplaced, *(spec if isinstance(spec, list) else [])]))
-    entries = {key: entry for key, entry in section.entries.items() if key != NAV2_PARAMS}
-    return MappingNode(section.position, entries), notes
+    return section.without_keys(NAV2_PARAMS), notes
 
 
-def _read(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
-    """Return the tree of a stack file; for a Nav2 parameter file, of a stack file with `nav2_params`."""
+def _read_tree(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
+    """Return the tree and the problems of a stack file; for a Nav2 parameter file, a stack file that names it."""
     display_name = library.sandbox.display_name(file)
     text = read_text(file, display_name)
     if isinstance(text, Problem) or not is_nav2_parameter_file(text, display_name):
         return library.read(file)
     library.add({display_name: text}, {display_name: file})
-    here = Position(display_name, 1, 1)
-
-    def fields(key: str, value: Node) -> dict[str, Entry]:
-        return {key: Entry(here, value)}
-
-    stack = MappingNode(here, fields(NAV2_PARAMS, ScalarNode(here, file.name)))
-    return MappingNode(here, {**fields("simscen", ScalarNode(here, 1)), **fields("stack", stack)}), []
+    start = Position(display_name, 1, 1)
+    stack = MappingNode(start, {NAV2_PARAMS: Entry(start, ScalarNode(start, file.name))})
+    entries = {"simscen": Entry(start, ScalarNode(start, 1)), "stack": Entry(start, stack)}
+    return MappingNode(start, entries), []
 
 
-def _misplaced(section: MappingNode) -> list[Problem]:
-    """Return problems with zones and masks, which belong to a scenario because they describe a world."""
+def _misplaced_key_problems(section: MappingNode) -> list[Problem]:
+    """Return a problem for each zone or mask in a stack file: it describes a world, so it belongs to a scenario."""
     hint = "write it under `stack:` of the scenario, where it applies to every stack"
     return [
         Problem(*key_position(section, (name,)), "SC016", f"`{name}` belongs to a scenario, not to a stack file", hint)
@@ -177,11 +182,16 @@ def _misplaced(section: MappingNode) -> list[Problem]:
 
 
 STACK_FILE_KIND, NAV2_FILE_KIND = "stack file", "parameter file of Nav2"
+"""Kinds of files with the parameters of a stack, as messages name them."""
 _STACK_FILE_KEYS = frozenset({"simscen", "name", "description", "stack"})
+"""Top-level keys that a stack file can have."""
 
 
 def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str:
-    """Return STACK_FILE_KIND or NAV2_FILE_KIND if the file is one of them, else ""."""
+    """Return STACK_FILE_KIND or NAV2_FILE_KIND if the content of a file shows that it is one of them; else "".
+
+    `display_name` is the name of the file in problems.
+    """
     if is_nav2_parameter_file(text, display_name):
         return NAV2_FILE_KIND
     keys = set(tree.entries) if isinstance(tree, MappingNode) else set()
@@ -189,7 +199,7 @@ def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str
 
 
 def not_a_scenario(kind: str, display_name: str) -> Problem:
-    """Return the problem that a file of this kind is not a scenario, with a hint how to use it."""
+    """Return the problem of a stack file that is used as a scenario; `kind` is what recognize_stack_file returns."""
     alternative = f", or name it in a scenario: `stack: {{nav2_params: {display_name.rpartition('/')[2]}}}`"
     hint = f"run scenarios with `--stack NAME={display_name}`{alternative if kind == NAV2_FILE_KIND else ''}"
     return Problem(display_name, 0, 0, "SC025", f"this is a {kind}, not a scenario", hint)

@@ -1,4 +1,4 @@
-"""Tables and types of the translation from Nav2 parameters to parameters of the reference stack."""
+"""Tables and types for the translation of Nav2 parameters to parameters of the reference stack (see nav2_nodes.py)."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,24 +9,27 @@ CONTROLLERS = {
     "DWBLocalPlanner": "dwb",
     "MPPIController": "mppi",
 }
+"""Class of a controller plugin → type in simscen."""
 PLANNERS = {"NavfnPlanner": "navfn", "SmacPlanner2D": "smac_2d"}
+"""Class of a planner plugin → type in simscen."""
 MOTION_MODELS = {
     "DifferentialMotionModel": "differential", "OmniMotionModel": "omni",
     "differential": "differential", "omnidirectional": "omni",
 }  # fmt: skip
-"""Motion models of AMCL; the last two names are from before Humble."""
+"""Motion model of AMCL → name in simscen; the last two are names from before Humble."""
 DWB_CRITICS = {
     "BaseObstacle": "base_obstacle_scale", "PathAlign": "path_align_scale", "PathDist": "path_dist_scale",
     "GoalAlign": "goal_align_scale", "GoalDist": "goal_dist_scale", "RotateToGoal": "rotate_to_goal_scale",
     "Twirling": "twirling_scale",
 }  # fmt: skip
-"""DWB critics, and the parameters for their weights."""
+"""DWB critic → parameter for its weight in simscen."""
 DWB_CRITICS_WITHOUT_WEIGHT = ("Oscillation", "ObstacleFootprint")
-"""DWB critics that reject trajectories instead of weighting them; they are always active."""
+"""DWB critics that reject trajectories instead of rating them. They are always active in simscen."""
 MPPI_CRITICS = (
     "ConstraintCritic", "CostCritic", "ObstaclesCritic", "GoalCritic", "GoalAngleCritic", "PathAlignCritic",
     "PathFollowCritic", "PathAngleCritic", "PreferForwardCritic", "TwirlingCritic", "VelocityDeadbandCritic",
 )  # fmt: skip
+"""MPPI critics that simscen has, under the same names."""
 RENAMED_PARAMETERS: Mapping[tuple[str, str], str] = {
     ("regulated_pure_pursuit", "max_linear_vel"): "desired_linear_vel",
     **{("dwb", f"{critic}.scale"): weight for critic, weight in DWB_CRITICS.items()},
@@ -36,7 +39,7 @@ RENAMED_PARAMETERS: Mapping[tuple[str, str], str] = {
     ("dwb", "Oscillation.oscillation_reset_angle"): "oscillation_reset_angle",
     ("dwb", "Oscillation.x_only_threshold"): "x_only_threshold",
 }
-"""Parameters with different names: (type in simscen, name in Nav2) → name in simscen."""
+"""Parameters with other names in simscen: (type in simscen, name in Nav2) → name in simscen."""
 IGNORED_PARAMETERS = frozenset(
     {
         "tf_broadcast", "save_pose_rate", "random_seed", "map_subscribe_transient_local",
@@ -46,25 +49,25 @@ IGNORED_PARAMETERS = frozenset(
         "always_reset_initial_pose", "polygons", "controller_plugin_types",
     }
 )  # fmt: skip
-"""Parameters that have no effect in simulation: transport, visualization, lists of plugins."""
+"""Parameters that need no translation, because they have no effect in simulation or are read with other ones."""
 IGNORED_NAME_PARTS = (
     "frame", "topic", "plugin", "use_sim_time", "transform_t", "introspection_mode", "publish", "visualize", "bond",
     "qos", "realtime_priority", "stamp", "transport",
 )  # fmt: skip
-"""Parameters whose names contain one of these have no effect in simulation either."""
+"""Parameters whose names contain one of these texts have no effect in simulation either."""
 EQUIVALENT_VALUES: Mapping[str, tuple[object, ...]] = {
     "enabled": (True,), "marking": (True,), "clearing": (True,), "use_astar": (False,), "scale_velocities": (False,),
     "feedback": ("OPEN_LOOP",), "base_shift_correction": (True,), "deadband_velocity": ([0.0, 0.0, 0.0],),
     "combination_method": (1,), "footprint_clearing_enabled": (True,),
 }  # fmt: skip
-"""Parameters that simscen does not have, with the values that match its behavior."""
+"""Parameter that simscen does not have → values for which Nav2 behaves like simscen."""
 SCENARIO_PARAMETERS: Mapping[str, str] = {
     **dict.fromkeys(("footprint", "robot_radius"), "the robot file defines the size of the robot"),
     **dict.fromkeys(("initial_pose", "set_initial_pose"), "the scenario defines the initial pose"),
 }
-"""Parameters that the scenario or the robot file defines, and the reason given to users."""
+"""Parameter that is ignored because the scenario or the robot file defines it → message for users."""
 OLD_NODE_NAMES = {"recoveries_server": "behavior_server"}
-"""Names of nodes before Humble."""
+"""Name of a node before Humble → its present name."""
 IGNORED_NODES = frozenset(
     {
         "map_server", "map_saver", "lifecycle_manager", "lifecycle_manager_navigation",
@@ -73,55 +76,66 @@ IGNORED_NODES = frozenset(
         "speed_costmap_filter_info_server", "loopback_simulator", "rviz2", "robot_state_publisher",
     }
 )  # fmt: skip
-"""Nodes that the scenario, its map and its zones replace."""
+"""Nodes that simscen replaces by the scenario, its map, and its zones."""
 
 
 def class_of(plugin: object) -> str:
-    """Return the class in a plugin name such as `nav2_navfn_planner::NavfnPlanner` (or with `/`)."""
+    """Return the class of a plugin, without the package: "NavfnPlanner" for `nav2_navfn_planner::NavfnPlanner`.
+
+    Older files have `/` instead of `::`.
+    """
     return str(plugin).replace("/", "::").rpartition("::")[2]
 
 
-Path = tuple[str, ...]
-"""Keys below `stack:`."""
+StackKeys = tuple[str, ...]
+"""Keys that lead to a value below `stack:`."""
 Parameters = Mapping[str, Any]
 """Parameters of one node by dotted name, e.g. `obstacle_layer.scan.topic`."""
-Known = Mapping[str, Sequence[str]]
-"""Parameters of simscen by section, or by the type in a section; `a.b` is `b` in the mapping `a`."""
+KnownParameters = Mapping[str, Sequence[str]]
+"""Names of simscen's parameters, by the section of `stack:` or by the type of the thing that a section describes.
+
+`a.b` is the parameter `b` in the mapping `a`.
+"""
 
 
 @dataclass(frozen=True)
 class Translation:
-    """Nav2 parameter, and the keys and value below `stack:` that it becomes.
-
-    `note` and `hint` are for the user. A parameter with neither path nor note already matches the behavior of simscen.
-    Parameters whose names begin with `covers` are treated the same way, without notes of their own.
-    """
+    """What a parameter of a Nav2 node becomes: a value in simscen, a note that it is ignored, or nothing."""
 
     node: str
     parameter: str
-    path: Path
+    """Dotted name."""
+    keys: StackKeys
+    """Keys of the value below `stack:`; () if the parameter is ignored."""
     value: Any
+    """Value in simscen, or the ignored value."""
     note: str = ""
+    """Message for the user; "" for none."""
     covers: str | None = None
+    """Beginning of the names of further parameters that this translation is for, so that they need none; or None."""
     hint: str = "it is ignored"
+    """Hint for the user, which is shown with the note."""
 
 
 def translate_same_name(
-    node: str, name: str, value: Any, section: Path, known: Sequence[str], simscen_name: str = ""
+    node: str, name: str, value: Any, section: StackKeys, known: Sequence[str], simscen_name: str = ""
 ) -> Iterator[Translation]:
-    """Yield the translation of a parameter that exists in simscen under the same name, or under `simscen_name`."""
+    """Yield the translation of a parameter if `known`, the parameters of a section, contains its name.
+
+    `simscen_name` is its name in simscen; "" for the same name as in Nav2.
+    """
     target = simscen_name or name
     if target in known:
         yield Translation(node, name, (*section, *target.split(".")), value)
 
 
 def strings(value: Any) -> list[str]:
-    """Return the items of a list as text; an empty list for anything else."""
+    """Return the items of a list as texts; an empty list for anything else."""
     return [str(one) for one in value] if isinstance(value, list) else []
 
 
 def parameters_below(parameters: Parameters, name: str) -> Iterator[tuple[str, Any]]:
-    """Yield the parameters below a name, with names relative to it."""
+    """Yield the name (relative to `name`) and the value of each parameter below `name`; nothing if `name` is ""."""
     for key, value in parameters.items():
         if name and key.startswith(f"{name}."):
             yield key.removeprefix(f"{name}."), value

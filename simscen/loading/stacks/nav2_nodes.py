@@ -1,4 +1,8 @@
-"""Translate the parameters of Nav2's nodes: servers with their first plugin, costmaps, smoother, collision monitor."""
+"""Translate the parameters of Nav2's nodes to parameters of the reference stack.
+
+There is one function for each kind of node. In all of them, `node` is the name of the node, `parameters` are its
+parameters, and `known` are the parameters of simscen. `section` is a key below `stack:`, such as "controller".
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -17,7 +21,7 @@ from simscen.loading.stacks.nav2_mapping import (
     PLANNERS,
     RENAMED_PARAMETERS,
     SCENARIO_PARAMETERS,
-    Known,
+    KnownParameters,
     Parameters,
     Translation,
     class_of,
@@ -27,44 +31,51 @@ from simscen.loading.stacks.nav2_mapping import (
 )
 
 
-def controller_server(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
-    """Translate the parameters of checkers and of the controller."""
+def _translate_controller_server(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
+    """Translate the parameters of the first progress checker, goal checker, and controller."""
     for name in ("controller_frequency", "failure_tolerance"):
         if name in parameters:
             yield Translation(node, name, (name,), parameters[name])
     for kind, model in (("progress_checker", "progress_checker"), ("goal_checker", "simple")):
         chosen = _first_plugin(parameters, kind, kind)
-        yield from _unused_plugins(node, parameters, kind, chosen)
+        yield from _note_unused_plugins(node, parameters, kind, chosen)
         for key, value in parameters_below(parameters, chosen):
             yield from translate_same_name(node, f"{chosen}.{key}", value, (kind,), known[model], key)
     controller = _first_plugin(parameters, "controller", "FollowPath")
-    yield from _unused_plugins(node, parameters, "controller", controller)
-    yield from _plugin(node, parameters, controller, "controller", CONTROLLERS, known)
+    yield from _note_unused_plugins(node, parameters, "controller", controller)
+    yield from _translate_plugin(node, parameters, controller, "controller", CONTROLLERS, known)
 
 
-def planner_server(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
-    """Translate the parameters of the planner."""
+def _translate_planner_server(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
+    """Translate the parameters of the first planner."""
     planner = _first_plugin(parameters, "planner", "GridBased")
-    yield from _unused_plugins(node, parameters, "planner", planner)
-    yield from _plugin(node, parameters, planner, "planner", PLANNERS, known)
+    yield from _note_unused_plugins(node, parameters, "planner", planner)
+    yield from _translate_plugin(node, parameters, planner, "planner", PLANNERS, known)
 
 
 def _first_plugin(parameters: Parameters, kind: str, default: str) -> str:
-    """Return the name of the first plugin of a kind; before Iron the progress checker is not a list."""
+    """Return the name of the first plugin of a kind such as "planner"; `default` if none is listed.
+
+    Before Iron, the progress checker is a single name instead of a list.
+    """
     named = parameters.get(f"{kind}_plugins", parameters.get(f"{kind}_plugin", default))
     return next(iter(strings(named)), "") if isinstance(named, list) else str(named)
 
 
-def _unused_plugins(node: str, parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
+def _note_unused_plugins(node: str, parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
+    """Yield a note for each further plugin of a kind, of which only the plugin `chosen` is used."""
     listed = f"{kind}_plugins"
     for other in strings(parameters.get(listed))[1:]:
         yield Translation(node, listed, (), None, f"only the first {kind} is used: {chosen}, not {other}", f"{other}.")
 
 
-def _plugin(
-    node: str, parameters: Parameters, name: str, section: str, types: Mapping[str, str], known: Known
+def _translate_plugin(
+    node: str, parameters: Parameters, name: str, section: str, types: Mapping[str, str], known: KnownParameters
 ) -> Iterator[Translation]:
-    """Translate type and parameters of a plugin; the primary controller of a rotation shim is used without the shim."""
+    """Translate the type and the parameters of the plugin `name`; `types` has the type in simscen of each class.
+
+    Of a rotation shim controller, only its primary controller is translated.
+    """
     inner = f"{name}.primary_controller"
     shimmed = f"{inner}.plugin" in parameters
     plugin_key = f"{inner}.plugin" if shimmed else inner if inner in parameters else f"{name}.plugin"
@@ -91,19 +102,23 @@ def _plugin(
         elif key.rpartition(".")[2] == "min_turning_r":
             own = key if model != "Ackermann" else "min_turning_r"
         elif key == "critics" and kind in ("mppi", "dwb"):
-            yield from _critics(node, f"{prefix}.{key}", written, kind)
+            yield from _translate_critics(node, f"{prefix}.{key}", written, kind)
             continue
         yield from translate_same_name(node, f"{prefix}.{key}", value, (section,), known[kind], own)
 
 
 def _motion_model(parameters: Parameters, prefix: str) -> str:
-    """Return the motion model of MPPI; newer files refer to a plugin by name."""
+    """Return the motion model of MPPI, such as "DiffDrive"; in newer files, it is the class of a plugin."""
     written = parameters.get(f"{prefix}.motion_model", "DiffDrive")
     return class_of(parameters.get(f"{prefix}.{written}.plugin", written)).removesuffix("MotionModel")
 
 
-def _critics(node: str, name: str, written: Any, kind: str) -> Iterator[Translation]:
-    """Translate the list of critics: a list for MPPI, and a weight of 0 for each DWB critic that is not listed."""
+def _translate_critics(node: str, name: str, written: Any, kind: str) -> Iterator[Translation]:
+    """Translate a list of critics of a controller of the type `kind`.
+
+    MPPI gets the list, and DWB the weight 0 for each critic that is not listed. Critics that simscen does not have are
+    noted.
+    """
     listed = strings(written)
     supported = MPPI_CRITICS if kind == "mppi" else (*DWB_CRITICS, *DWB_CRITICS_WITHOUT_WEIGHT)
     names = {
@@ -125,32 +140,34 @@ DEFAULT_LAYERS = {
     "obstacle_layer": "ObstacleLayer",
     "inflation_layer": "InflationLayer",
 }
-"""Layers of a costmap without `plugins`."""
+"""Name → class of the layers of a costmap without `plugins`."""
 OBSERVATION_LAYERS = ("ObstacleLayer", "VoxelLayer")
+"""Classes of layers that mark and clear obstacles by sensor data."""
 
 
-def costmap(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
+def _translate_costmap(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
     """Translate the parameters of the global or the local costmap."""
     section = "local_costmap" if node == "local_costmap" else "costmap"
-    layers = _layers(parameters)
+    layers = _layer_classes(parameters)
     handled = {*layers, *strings(parameters.get("filters"))}
     for name, value in parameters.items():
         layer, _, rest = name.partition(".")
         if not rest:
             yield from _translate_costmap_parameter(node, name, value, section, known[section])
         elif layers.get(layer) in OBSERVATION_LAYERS:
-            continue  # _observation_layers translates all of them together
+            continue  # _translate_observation_sources translates all of them together
         elif layer in layers:
             yield from _translate_layer_parameter(node, name, value, layers, section, known)
         elif layer not in handled:
             handled.add(layer)
             yield Translation(node, name, (), value, f"`plugins` does not list {layer}", covers=f"{layer}.")
-    yield from _observation_layers(node, parameters, layers, section, known[section])
+    yield from _translate_observation_sources(node, parameters, layers, section, known[section])
     for zones in strings(parameters.get("filters")):
-        yield Translation(node, "filters", (), None, covers=f"{zones}.")  # zones are part of the scenario
+        yield Translation(node, "filters", (), None, covers=f"{zones}.")  # the scenario defines zones
 
 
-def _layers(parameters: Parameters) -> Mapping[str, str]:
+def _layer_classes(parameters: Parameters) -> Mapping[str, str]:
+    """Return the class of each layer of a costmap by name."""
     if not isinstance(parameters.get("plugins"), list):
         return DEFAULT_LAYERS
     return {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(parameters["plugins"])}
@@ -159,6 +176,7 @@ def _layers(parameters: Parameters) -> Mapping[str, str]:
 def _translate_costmap_parameter(
     node: str, name: str, value: object, section: str, known: Sequence[str]
 ) -> Iterator[Translation]:
+    """Translate a parameter of the costmap itself."""
     if name == "rolling_window":
         rolls = section == "local_costmap"
         why = "" if bool(value) == rolls else "the local costmap always rolls, the global one with `map: none`"
@@ -167,8 +185,9 @@ def _translate_costmap_parameter(
 
 
 def _translate_layer_parameter(
-    node: str, name: str, value: Any, layers: Mapping[str, str], section: str, known: Known
+    node: str, name: str, value: Any, layers: Mapping[str, str], section: str, known: KnownParameters
 ) -> Iterator[Translation]:
+    """Translate a parameter `layer.…` of an inflation or denoise layer; `layers` has the class of each layer."""
     kind, last = layers[name.partition(".")[0]], name.rpartition(".")[2]
     if kind == "InflationLayer":
         yield from translate_same_name(node, name, value, (section,), known[section], last)
@@ -177,17 +196,18 @@ def _translate_layer_parameter(
 
 
 LASER_SCAN = "LaserScan"
-"""Data type of an observation source without `data_type`."""
+"""Data type of laser scans, and of an observation source without `data_type`."""
 HEIGHTS = ("min_obstacle_height", "max_obstacle_height")
-"""Parameters of observation sources that simscen applies to camera data only."""
+"""Parameters of observation sources that simscen applies only to camera data; the others are ranges of the lidar."""
 
 
-def _observation_layers(
+def _translate_observation_sources(
     node: str, parameters: Parameters, layers: Mapping[str, str], section: str, known: Sequence[str]
 ) -> Iterator[Translation]:
-    """Translate the parameters of observation sources, of which simscen has one set for all sensors.
+    """Translate the parameters of all observation sources to those of simscen, which apply to all sensors.
 
-    The first source of laser scans sets the ranges. The first source sets the heights, with point clouds before scans.
+    The ranges are those of the first source of laser scans. The heights are those of the first source of point clouds;
+    if there is none, of the first source of laser scans.
     """
     types = {
         source: parameters.get(f"{source}.data_type", LASER_SCAN) for source in _observation_sources(parameters, layers)
@@ -212,7 +232,7 @@ def _observation_layers(
 
 
 def _observation_sources(parameters: Parameters, layers: Mapping[str, str]) -> Iterator[str]:
-    """Yield the observation sources of all layers as `layer.source`."""
+    """Yield the names of the observation sources of all layers, as `layer.source`."""
     for layer, kind in layers.items():
         if kind in OBSERVATION_LAYERS:
             found = [name.partition(".")[0] for name, _ in parameters_below(parameters, layer) if "." in name]
@@ -220,8 +240,11 @@ def _observation_sources(parameters: Parameters, layers: Mapping[str, str]) -> I
             yield from (f"{layer}.{source}" for source in listed)
 
 
-def velocity_smoother(node: str, parameters: Parameters, _: Known) -> Iterator[Translation]:
-    """Translate velocity and acceleration limits; lateral and backward motion have the limits of forward motion."""
+def _translate_velocity_smoother(node: str, parameters: Parameters, _: KnownParameters) -> Iterator[Translation]:
+    """Translate the limits of velocity and acceleration.
+
+    In simscen, lateral and backward motion have the limits of forward motion. Other limits are noted.
+    """
     for name, turning in (
         ("max_velocity", "max_angular_velocity"),
         ("max_accel", "max_angular_accel"),
@@ -253,8 +276,8 @@ def velocity_smoother(node: str, parameters: Parameters, _: Known) -> Iterator[T
         yield Translation(node, "max_decel", (), slower, why)
 
 
-def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[Translation]:
-    """Translate the first enabled polygon with the action `approach`; other actions are not supported."""
+def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownParameters) -> Iterator[Translation]:
+    """Translate the first enabled polygon with the action `approach`. Other actions are not supported and noted."""
     if "source_timeout" in parameters:
         yield Translation(node, "source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
     on = parameters.get("enabled", True)
@@ -266,7 +289,7 @@ def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[T
     for polygon, action in actions.items():
         if polygon == used:
             yield from (Translation(node, f"{polygon}.{setting}", (), None) for setting in ("action_type", "enabled"))
-            yield from _approach(node, parameters, polygon)
+            yield from _translate_approach(node, parameters, polygon)
         elif approaching.get(polygon, True):
             why = f"action_type {action} of {polygon} is not supported"
             if polygon in approaching:
@@ -281,7 +304,8 @@ def collision_monitor(node: str, parameters: Parameters, _: Known) -> Iterator[T
             break
 
 
-def _approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Translation]:
+def _translate_approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Translation]:
+    """Translate the parameters of the polygon that is used."""
     for nav2_name, simscen_name, offset in (
         ("time_before_collision", "time_before_collision", 0),
         ("simulation_time_step", "simulation_time_step", 0),
@@ -295,68 +319,76 @@ def _approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Trans
 
 
 def _xy_and_rotation(value: Any) -> list[float]:
-    """Return the values for x, y and rotation; an empty list if the value is not a list of three numbers."""
+    """Return the values for x, y, and rotation; an empty list if `value` is not a list of three numbers."""
     fits = isinstance(value, list) and len(value) == 3 and all(isinstance(one, int | float) for one in value)
     return value if fits else []
 
 
-def translate(nodes: Mapping[str, Parameters], known: Known) -> Iterator[Translation]:
-    """Yield the translation of each parameter of all nodes. `known` are the parameters of simscen."""
+def translate(nodes: Mapping[str, Parameters], known: KnownParameters) -> Iterator[Translation]:
+    """Yield the translations of the parameters of all nodes.
+
+    Parameters that need no translation are left out, and so are nodes that simscen does not have. A translation with
+    neither keys nor a note is for a parameter that simscen does not have.
+    """
     for node, parameters in nodes.items():
-        translator = NODES.get(OLD_NODE_NAMES.get(node, node))
+        translator = TRANSLATORS.get(OLD_NODE_NAMES.get(node, node))
         if translator is None:
             continue
         translations = list(translator(node, parameters, known))
-        yield from (translation for translation in translations if translation.path or translation.note)
+        yield from (translation for translation in translations if translation.keys or translation.note)
         translated = {translation.parameter for translation in translations}
         covered = tuple(translation.covers for translation in translations if translation.covers)
         for name, value in parameters.items():
-            if name not in translated and not name.startswith(covered) and _matters(name, value):
+            if name not in translated and not name.startswith(covered) and _is_relevant(name, value):
                 yield Translation(node, name, (), value, SCENARIO_PARAMETERS.get(name.partition(".")[0], ""))
 
 
 def unknown_nodes(nodes: Mapping[str, Parameters]) -> list[str]:
-    """Return the nodes with relevant parameters that have no counterpart in simscen."""
+    """Return the names of the nodes that have relevant parameters, but no counterpart in simscen."""
     return [
         node
         for node, parameters in nodes.items()
-        if OLD_NODE_NAMES.get(node, node) not in NODES
+        if OLD_NODE_NAMES.get(node, node) not in TRANSLATORS
         and node not in IGNORED_NODES
-        and any(_matters(name, value) for name, value in parameters.items())
+        and any(_is_relevant(name, value) for name, value in parameters.items())
     ]
 
 
-def _matters(parameter: str, value: object) -> bool:
+def _is_relevant(parameter: str, value: object) -> bool:
+    """Return whether a parameter with this value could change the behavior of the stack in simulation."""
     last = parameter.rpartition(".")[2]
     if last in IGNORED_PARAMETERS or any(part in last for part in IGNORED_NAME_PARTS):
         return False
     return last not in EQUIVALENT_VALUES or value not in EQUIVALENT_VALUES[last]
 
 
-def _amcl(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
+def _translate_amcl(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
+    """Translate the parameters of the localizer."""
     for name, value in parameters.items():
         if name == "robot_model_type":
             model = MOTION_MODELS.get(class_of(value))
-            path = ("localizer", "robot_model") if model else ()
-            yield Translation(node, name, path, model, "" if model else f"{value} is not supported")
+            keys = ("localizer", "robot_model") if model else ()
+            yield Translation(node, name, keys, model, "" if model else f"{value} is not supported")
         else:
             yield from translate_same_name(node, name, value, ("localizer",), known["amcl"])
 
 
-def _behavior_server(node: str, parameters: Parameters, known: Known) -> Iterator[Translation]:
+def _translate_behavior_server(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
+    """Translate the parameters of the recovery behaviors."""
     for name, value in parameters.items():
         # A negative minimum has no effect in Nav2.
         no_minimum = name == "min_rotational_vel" and isinstance(value, float | int) and value < 0
         yield from translate_same_name(node, name, 0.0 if no_minimum else value, ("recovery",), known["recovery"])
 
 
-NODES = {
-    "amcl": _amcl,
-    "controller_server": controller_server,
-    "planner_server": planner_server,
-    "local_costmap": costmap,
-    "global_costmap": costmap,
-    "behavior_server": _behavior_server,
-    "velocity_smoother": velocity_smoother,
-    "collision_monitor": collision_monitor,
+TRANSLATORS = {
+    "amcl": _translate_amcl,
+    "controller_server": _translate_controller_server,
+    "planner_server": _translate_planner_server,
+    "local_costmap": _translate_costmap,
+    "global_costmap": _translate_costmap,
+    "behavior_server": _translate_behavior_server,
+    "velocity_smoother": _translate_velocity_smoother,
+    "collision_monitor": _translate_collision_monitor,
 }
+"""Function that translates the parameters of a node, by name of the node."""

@@ -1,33 +1,27 @@
-"""Commands of external stacks: the user configuration that defines them, their programs, and their digests."""
+"""Read the user configuration, which defines the commands of external stacks, and report stacks without a command."""
 
-import hashlib
-import itertools
-import json
 import os
-import shutil
-import stat
-import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput, Problem
-from simscen.core.external_command import ANSWER_TIMEOUT_S, START_TIMEOUT_S, ExternalCommand, split_command
+from simscen.core.external_command import ExternalCommand
 from simscen.loading.files.paths import PathSandbox, exists
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.multirobot import external_stack_name
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import EXTERNAL
+from simscen.loading.stacks.external_commands import parse_command
 from simscen.loading.yaml.library import Library
-from simscen.loading.yaml.textfile import os_error_reason
 from simscen.loading.yaml.tree import MappingNode, value_position
 from simscen.model.stack_files import ExternalStackSpec, UserConfigSpec
 
 
 @dataclass(frozen=True)
 class UserConfig:
-    """User configuration and the file that it was read from."""
+    """User configuration, and the file that it was read from. `tree` and `library` are None if the file is missing."""
 
     file: Path
     spec: UserConfigSpec
@@ -35,9 +29,10 @@ class UserConfig:
     library: Library | None = field(repr=False, default=None)
 
     def command(self, name: str, environment: Mapping[str, str], folder: Path) -> ExternalCommand | None:
-        """Return the command of an external stack for a call from `folder`; None if the configuration has none.
+        """Return the command of the external stack `name`; None if the configuration does not define it.
 
-        Raises InvalidInput if it cannot be run.
+        `environment` are the variables of the caller, and `folder` is the caller's working folder. Raises InvalidInput
+        if the command cannot be run.
         """
         if name not in self.spec.stacks:
             return None
@@ -54,6 +49,7 @@ class UserConfig:
             raise self._invalid((name, "command"), str(error), hint) from error
 
     def _invalid(self, keys: tuple[str, str], message: str, hint: str) -> InvalidInput:
+        """Return the error for a value of a stack, given by its keys below `stacks`."""
         assert self.tree is not None and self.library is not None, "only stacks from a file can be invalid"
         position = value_position(self.tree, ("stacks", *keys))
         problem = Problem(*position, code="SC061", message=message, hint=hint)
@@ -61,10 +57,10 @@ class UserConfig:
 
 
 def load_config(file: Path) -> UserConfig:
-    """Return the configuration in `file`; an empty one if it does not exist. Raises InvalidInput with all problems."""
+    """Return the configuration in `file`; an empty one if it does not exist. Raises InvalidInput if it is invalid."""
     if not exists(file):
         return UserConfig(file, UserConfigSpec())
-    # With this root, problems show the absolute path of the file, which is not part of a project.
+    # No file is inside of this root, so problems show the absolute path of the file.
     library = Library(PathSandbox.around(Path(os.devnull), [file.parent]))
     tree, problems = library.read(file)
     spec = check(UserConfigSpec, tree) if tree is not None else []
@@ -74,9 +70,10 @@ def load_config(file: Path) -> UserConfig:
 
 
 def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: Path | None = None) -> Problem | None:
-    """Return the problem that the external stack of a scenario has no command; None if it has one.
+    """Return a problem if the scenario has an external stack without a command; else None.
 
-    `known` are the names of stacks with a command; `config` is the user configuration.
+    `known` are the names of external stacks with a command, and `config` is the user configuration; they are used in
+    the hint.
     """
     stack = loaded.spec.stack
     if not isinstance(stack, ExternalStackSpec) or loaded.external_command is not None:
@@ -90,9 +87,9 @@ def undefined_stack(loaded: LoadedScenario, known: Iterable[str] = (), config: P
 
 
 def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config: Path) -> list[Problem]:
-    """Return a problem if several --stack define external stacks of the same run, which can have only one --stack.
+    """Return a problem if several `--stack` give commands to robots of the same scenario; else an empty list.
 
-    `given` are the names of external stacks with a command on the command line.
+    A run can use only one `--stack`. `given` are the names of the external stacks to which `--stack` gives commands.
     """
     own = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
     conflicting = [name for name in given if name in own]
@@ -100,115 +97,3 @@ def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config: Pat
     message = f"robots of this scenario have the stacks {stacks}, but a run can have only one --stack"
     hint = f"define the commands of all but one under `stacks:` in {config}"
     return [own[conflicting[1]].problem(("stack", EXTERNAL), "SC042", message, hint)] if len(conflicting) > 1 else []
-
-
-CHUNK_BYTES = 1 << 20
-EXCLUDED_FOLDERS = frozenset({"__pycache__", "venv", "node_modules", "site-packages"})
-"""Folders whose Python files are not part of a stack."""
-MAX_FOLDERS, MAX_SOURCES = 500, 1000
-"""Folders searched and Python files read for the digest of a stack."""
-SIMSCEN_PROGRAM = "simscen"
-"""If PATH has no simscen (virtual environment not activated), the simscen that is running is used instead."""
-
-
-def parse_command(
-    text: str,
-    environment: Mapping[str, str],
-    folder: Path,
-    own: Mapping[str, str] | None = None,
-    limits: tuple[float, float] = (START_TIMEOUT_S, ANSWER_TIMEOUT_S),
-) -> ExternalCommand:
-    """Return a command line as a command that starts in `folder`; `own` variables override `environment`.
-
-    Raises ValueError if it cannot be parsed or its program cannot be run.
-    """
-    program, *arguments = split_command(text)
-    program = str(Path(program).expanduser()) if program.startswith("~") else program
-    env = {**environment, **(own or {})}
-    if program == SIMSCEN_PROGRAM and why_not_executable(program, env, folder):
-        program = str(Path(sys.executable).parent / SIMSCEN_PROGRAM)
-    if reason := why_not_executable(program, env, folder):
-        raise ValueError(reason)
-    argv = (program, *arguments)
-    digest = _digest(argv, own or {}, env, folder)
-    return ExternalCommand(argv, env, str(folder), *limits, digest=digest)
-
-
-def why_not_executable(program: str, env: Mapping[str, str], folder: Path) -> str:
-    """Return why a program cannot be run from `folder`; "" if it can."""
-    if "/" not in program:
-        found = shutil.which(program, path=_path(env, folder))
-        return "" if found else f"no program {quoted(program)} in the PATH"
-    file = folder / program
-    try:
-        mode = file.stat().st_mode
-    except OSError as error:
-        return f"{os_error_reason(error)}: {quoted(program)}"
-    if not stat.S_ISREG(mode):
-        return f"{quoted(program)} is {'a folder' if stat.S_ISDIR(mode) else 'not a regular file'}, not a program"
-    if not os.access(file, os.X_OK):
-        return f"permission denied: {quoted(program)} is not executable"
-    return _why_no_interpreter(program, file)
-
-
-def _why_no_interpreter(program: str, file: Path) -> str:
-    """Return why the interpreter of a script is missing; the kernel would report the script itself as missing."""
-    try:
-        with file.open("rb") as stream:
-            first = stream.read(256).partition(b"\n")[0]
-    except OSError:  # executable but not readable
-        return ""
-    if not first.startswith(b"#!"):
-        return ""
-    words = first[2:].decode(errors="replace").split()
-    if first.endswith(b"\r"):
-        return f"the first line of {quoted(program)} has a Windows line end; save the file with Unix line ends"
-    if not words:
-        return f"the first line of {quoted(program)} names no interpreter"
-    written = quoted("#!" + words[0])
-    return "" if exists(Path(words[0])) else f"{quoted(program)} starts with {written}, which does not exist"
-
-
-def _path(env: Mapping[str, str], folder: Path) -> str:
-    """Return the PATH with relative folders resolved from the folder in which the program starts."""
-    return os.pathsep.join(str(folder / part) for part in env.get("PATH", os.defpath).split(os.pathsep))
-
-
-def _digest(argv: Sequence[str], own: Mapping[str, str], env: Mapping[str, str], folder: Path) -> str:
-    """Return the SHA-256 of the arguments, own variables, program, files named by arguments, and their source files."""
-    sha = hashlib.sha256(json.dumps([list(argv), sorted(own.items())]).encode())
-    found = shutil.which(argv[0], path=_path(env, folder)) if "/" not in argv[0] else None
-    for word in (found or argv[0], *argv[1:]):
-        file = folder / word
-        if len(word) < 4096 and "\0" not in word and file.is_file() and os.access(file, os.R_OK):
-            with file.open("rb") as stream:
-                while data := stream.read(CHUNK_BYTES):
-                    sha.update(data)
-        sha.update(b"\0")
-    for working_folder in _source_folders(argv, folder):
-        for file in itertools.islice(_python_files(working_folder), MAX_SOURCES):
-            sha.update(f"{file.relative_to(working_folder).as_posix()}\0".encode() + file.read_bytes() + b"\0")
-    return sha.hexdigest()
-
-
-def _source_folders(argv: Sequence[str], folder: Path) -> list[Path]:
-    """Return the folders of the scripts and modules that a command names: their imports come from there."""
-    homes: set[Path] = set()
-    for before, word in itertools.pairwise(("", *argv)):
-        if len(word) >= 4096 or "\0" in word:
-            continue
-        module = folder / word.replace(".", "/")
-        if before == "-m" and (module.is_dir() or module.with_suffix(".py").is_file()):
-            homes.add(module if module.is_dir() else module.parent)
-        elif word.endswith(".py") and (folder / word).is_file():
-            homes.add((folder / word).parent)
-    return sorted(homes)
-
-
-def _python_files(working_folder: Path) -> Iterator[Path]:
-    """Yield the readable Python files in and below a folder, without those of hidden folders and environments."""
-    for folder, below, names in itertools.islice(os.walk(working_folder), MAX_FOLDERS):
-        below[:] = sorted(name for name in below if not name.startswith(".") and name not in EXCLUDED_FOLDERS)
-        for file in (Path(folder) / name for name in sorted(names) if name.endswith(".py")):
-            if file.is_file() and os.access(file, os.R_OK):
-                yield file

@@ -1,1 +1,1 @@
-"""From `variations:` to scenarios: paths, values, names."""
+"""Expand the section `variations:` of a scenario to one scenario for each combination of values."""

@@ -1,4 +1,8 @@
-"""Axes of a block of variations: options that are combined with those of the other axes."""
+"""Build the axes of a block of variations.
+
+An axis is a list of options. Each variation of a block combines one option of each axis. An option is one value of one
+path, or several values that belong together.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -27,17 +31,26 @@ if TYPE_CHECKING:  # most scenarios have no variations
 
 @dataclass
 class AxisBuilder:
-    """Builds the axes of blocks for `tree`; collects problems and the targets of all paths."""
+    """Builds the axes of all blocks of the scenario `tree`, which has no `variations` itself.
+
+    `problems` are the problems found so far. `targets` are the targets of all paths that are varied, by path.
+    """
 
     tree: MappingNode
     problems: list[Problem] = field(default_factory=list)
     targets: dict[str, Target] = field(default_factory=dict)
     _names: dict[str, Position] = field(default_factory=dict)
+    """Names of variations that the author gave, in lower case, and their positions."""
 
-    def axes(self, block: "VariationBlock", node: Node, conditions: Sequence[Condition]) -> list[Sequence[Option]]:
-        """Return the axes whose options are combined: each path of a grid, and each other kind as a whole."""
+    def build_axes(
+        self, block: "VariationBlock", node: Node, conditions: Sequence[Condition]
+    ) -> list[Sequence[Option]]:
+        """Return the axes of a block, whose tree is `node`: one for each path of `grid`, and one for each other kind.
+
+        `conditions` are those of the block; `pairwise` considers them.
+        """
         found: list[Sequence[Option]] = [
-            [Option((change,)) for change in changes] for changes in self._columns(child(node, "grid"), True)
+            [Option((change,)) for change in column] for column in self._columns(child(node, "grid"), True)
         ]
         if block.pairwise is not None:
             found.append(self._pairwise(child(node, "pairwise"), conditions))
@@ -51,7 +64,7 @@ class AxisBuilder:
         return found
 
     def _columns(self, node: Node | None, distinct: bool) -> list[list[Change]]:
-        """Return the changes of each path."""
+        """Return the changes to the listed values for each path; reports equal values of a path if `distinct`."""
         if not isinstance(node, MappingNode):
             return []
         found = []
@@ -64,6 +77,7 @@ class AxisBuilder:
         return found
 
     def _pairwise(self, node: Node | None, conditions: Sequence[Condition]) -> list[Option]:
+        """Return options in which each allowed pair of values occurs. Conditions on other paths are not considered."""
         from simscen.loading.variations.sampling import Row, covering_array
 
         columns = self._columns(node, True)
@@ -74,14 +88,15 @@ class AxisBuilder:
             return Option(tuple(column[value] for column, value in zip(columns, row, strict=True)))
 
         paths = {column[0].target.path for column in columns}
-        relevant = [condition for condition in conditions if paths.issuperset(set(condition.paths) & set(self.targets))]
+        decidable = [one for one in conditions if paths.issuperset(set(one.paths) & set(self.targets))]
 
         def is_allowed(row: Row) -> bool:
-            return all_hold(relevant, plain_values(self.tree, relevant, option(row).changes))
+            return all_hold(decidable, plain_values(self.tree, decidable, option(row).changes))
 
         return [option(row) for row in covering_array([len(column) for column in columns], is_allowed)]
 
     def _pairs(self, node: Node | None) -> list[Option]:
+        """Return options that take the first values of all paths, then the second values, and so on."""
         assert isinstance(node, MappingNode)
         lengths = {
             path: len(entry.value.items)
@@ -93,11 +108,12 @@ class AxisBuilder:
             if lengths[path] != lengths[first]:
                 message = f"{quoted(path)} has {lengths[path]} values, {quoted(first)} has {lengths[first]}"
                 hint = "the lists of `pairs` must have the same length"
-                self.add(node.entries[path].value.position, "SC016", message, hint)
+                self.add_problem(node.entries[path].value.position, "SC016", message, hint)
                 return []
         return [Option(changes) for changes in zip(*self._columns(node, False), strict=True)]
 
     def _list(self, node: Node | None) -> list[Option]:
+        """Return an option for each item of `list`, which the author may have given a name."""
         assert isinstance(node, SequenceNode)
         found = []
         for number, item in enumerate(node.items, start=1):
@@ -105,7 +121,7 @@ class AxisBuilder:
             name = self._given_name(item)
             entries = [(path, entry) for path, entry in item.entries.items() if path != "name"]
             if not entries:
-                self.add(item.position, "SC010", "this variation changes nothing", "add a path and its value")
+                self.add_problem(item.position, "SC010", "this variation changes nothing", "add a path and its value")
             targets = [(self._target(path, entry), entry) for path, entry in entries]
             changes = [Change(target, entry.value, number) for target, entry in targets if target is not None]
             self._report_overlaps([[Option((change,))] for change in changes])
@@ -113,19 +129,21 @@ class AxisBuilder:
         return found
 
     def _given_name(self, item: MappingNode) -> str:
+        """Return the name that the author gave an item, "" for none; reports invalid and repeated names."""
         entry = item.entries.get("name")
         if entry is None:
             return ""
         position, value = entry.value.position, entry.value.plain
         name = value if isinstance(value, str) else str(value) if isinstance(value, int | float) else ""
         if (error := name_error(name)) is not None:
-            self.add(position, "SC017", error, NAME_HINT)
+            self.add_problem(position, "SC017", error, NAME_HINT)
         first = self._names.setdefault(name.casefold(), position)
         if first != position:
-            self.add(position, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
+            self.add_problem(position, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
         return name
 
     def _sampled(self, sampled: "Sampled", node: Node | None) -> Sequence[Option]:
+        """Return options with drawn values; reports distributions that are invalid. `node` is the tree of `values`."""
         from simscen.loading.variations.sampling import draw_value, draw_values
 
         assert isinstance(node, MappingNode)
@@ -135,7 +153,7 @@ class AxisBuilder:
             try:
                 draw_value(sampled, path, 0)
             except ValueError as error:
-                self.add(entry.value.position, "SC016", str(error))
+                self.add_problem(entry.value.position, "SC016", str(error))
                 continue
             if target is not None:
                 targets.append(target)
@@ -151,48 +169,53 @@ class AxisBuilder:
         return [Option(changes) for changes in zip(*columns, strict=True)]
 
     def _target(self, path: str, entry: Entry) -> Target | None:
+        """Return the target of a path, and remember it; reports a path that leads nowhere, and returns None."""
         try:
             target = resolve_path(path, entry.key, self.tree)
         except PathError as error:
-            self.add(entry.key, "SC030", str(error), error.hint)
+            self.add_problem(entry.key, "SC030", str(error), error.hint)
             return None
         self.targets.setdefault(path, target)
         return target
 
     def _report_duplicates(self, items: SequenceNode) -> None:
+        """Report values that occur more than once in a list."""
         seen: list[object] = []
         for item in items.items:
             if item.plain in seen:
-                self.add(item.position, "SC054", "this value is listed twice", "remove one of them")
+                self.add_problem(item.position, "SC054", "this value is listed twice", "remove one of them")
             seen.append(item.plain)
 
     def _report_overlaps(self, axes: Sequence[Sequence[Option]]) -> None:
-        """Report axes that change the same value, or a part of each other's values."""
+        """Report paths of different axes if they lead to the same value, or one to a part of the other's value."""
         targets = [
             {change.target.path: change.target for option in typical_options(axis) for change in option.changes}
             for axis in axes
         ]
-        for above, below in combinations(targets, 2):
-            for one, other in product(above.values(), below.values()):
+        for first, second in combinations(targets, 2):
+            for one, other in product(first.values(), second.values()):
                 shorter = min(len(one.keys), len(other.keys))
                 if one.keys[:shorter] == other.keys[:shorter]:
                     same = len(one.keys) == len(other.keys)
                     what = "change the same value" if same else "overlap: one is part of the other"
-                    self.add(other.position, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
+                    self.add_problem(other.position, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
 
-    def conditions(self, block: Node) -> list[Condition]:
-        """Return the conditions in the `require` of a block; reports those that cannot be read."""
+    def read_conditions(self, block: Node) -> list[Condition]:
+        """Return the conditions under the key `require` of a block; reports those that cannot be read."""
         node, found = child(block, "require"), list[Condition]()
         for item in node.items if isinstance(node, SequenceNode) else ():
             assert isinstance(item, ScalarNode)
             try:
                 found.append(parse_condition(str(item.value)))
             except ConditionError as error:
-                self.add(item.position, "SC017", str(error), GRAMMAR)
+                self.add_problem(item.position, "SC017", str(error), GRAMMAR)
         return found
 
-    def check_paths(self, conditions: Sequence[Condition], block: Node) -> None:
-        """Report paths of conditions that are neither varied nor written in the scenario, if all could be read."""
+    def check_condition_paths(self, conditions: Sequence[Condition], block: Node) -> None:
+        """Report paths in the conditions of a block that are neither varied nor written in the scenario.
+
+        Call it after `build_axes`. It reports nothing if some conditions of the block could not be read.
+        """
         node = child(block, "require")
         if not isinstance(node, SequenceNode) or len(conditions) < len(node.items):
             return
@@ -200,10 +223,10 @@ class AxisBuilder:
             for path in condition.paths:
                 if path not in self.targets and written_value(self.tree, path) is None:
                     message = f"`{path}` is neither varied nor written in the scenario"
-                    self.add(item.position, "SC030", message, "write its value, or vary it")
+                    self.add_problem(item.position, "SC030", message, "write its value, or vary it")
 
-    def add(self, position: Position, code: str, message: str, hint: str = "") -> None:
-        """Add a problem once."""
+    def add_problem(self, position: Position, code: str, message: str, hint: str = "") -> None:
+        """Add a problem unless it has been added before."""
         problem = Problem(*position, code=code, message=message, hint=hint)
         if problem not in self.problems:
             self.problems.append(problem)

@@ -1,4 +1,8 @@
-"""Conditions on varied values (`require:`): comparisons of paths, numbers with units, and texts."""
+"""Parse and evaluate the conditions on varied values under `require:`, such as `goals[0].pose.x > robot.pose.x + 1`.
+
+Conditions have the syntax of Python. They are parsed with `ast` and interpreted here, so that they cannot run code. The
+function `value` takes a path as text, because `pass.clearance.min` is not valid Python.
+"""
 
 import ast
 import math
@@ -13,6 +17,7 @@ from simscen.loading.variations.paths import PathError, resolve_path
 from simscen.loading.yaml.tree import MappingNode, Node, child
 from simscen.spec.quantities import si_number
 
+# What conditions can contain, besides `and`, `or`, and `not`.
 _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
     ast.Eq: operator.eq, ast.NotEq: operator.ne,
@@ -21,28 +26,30 @@ _OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
 }  # fmt: skip
 _FUNCTIONS: dict[str, Callable[..., float]] = {"abs": abs, "min": min, "max": max, "hypot": math.hypot, "wrap": wrap}
-VALUE = "value"
-"""Function that takes a path as text, for paths that are no names in Python: `value('pass.clearance.min')`."""
 GRAMMAR = (
     "comparisons such as `goals[0].pose.x > robot.pose.x + 1` with and, or, not, + - * /, abs, min, max, hypot, wrap; "
     "quantities in quotes: '50 cm'; value('pass.clearance.min') for paths with words of Python"
 )
+"""Hint that explains the syntax of conditions to users."""
 
 
 class ConditionError(ValueError):
-    """A condition cannot be read, or cannot be evaluated with the values of a variation."""
+    """Error for a condition that cannot be read, or cannot be evaluated with the values of a variation."""
 
 
 @dataclass(frozen=True)
 class Condition:
-    """A condition as written, and the paths that it refers to."""
+    """Condition: the text as written, its parsed expression, and the paths that it refers to."""
 
     text: str
     expression: ast.expr
     paths: tuple[str, ...]
 
     def holds(self, values: Mapping[str, Any]) -> bool:
-        """Return whether it holds for these values, by path. Numbers count in SI units. Raises ConditionError."""
+        """Return whether the condition holds for `values`, which has the value of each of its paths as written.
+
+        Quantities are compared in SI units. Raises ConditionError if the condition cannot be evaluated.
+        """
         try:
             result = _evaluate(self.expression, values)
         except (TypeError, ZeroDivisionError, OverflowError) as error:
@@ -53,18 +60,18 @@ class Condition:
 
 
 def parse_condition(text: str) -> Condition:
-    """Read a condition. Raises ConditionError."""
+    """Return the condition in a text. Raises ConditionError if it cannot be read."""
     try:
         expression = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise ConditionError(f"`{text}` is not a condition") from None
     paths: dict[str, None] = {}
-    _check(expression, text, paths)
+    _collect_paths(expression, text, paths)
     return Condition(text, expression, tuple(paths))
 
 
-def _check(node: ast.expr, text: str, paths: dict[str, None]) -> None:
-    """Collect the paths of an expression. Raises ConditionError for anything that conditions do not have."""
+def _collect_paths(node: ast.expr, text: str, paths: dict[str, None]) -> None:
+    """Add the paths in an expression to `paths`. Raises ConditionError for syntax that conditions do not have."""
     match node:
         case ast.BoolOp(values=parts):
             pass
@@ -87,11 +94,11 @@ def _check(node: ast.expr, text: str, paths: dict[str, None]) -> None:
         case _:
             raise ConditionError(f"`{ast.unparse(node)}` cannot be used in a condition")
     for part in parts:
-        _check(part, text, paths)
+        _collect_paths(part, text, paths)
 
 
 def _path(node: ast.expr, text: str) -> str:
-    """Return the path that an expression such as `goals[0].pose.x` spells."""
+    """Return an expression such as `goals[0].pose.x` as a path. Raises ConditionError for another expression."""
     match node:
         case ast.Name(id=name):
             return name
@@ -105,6 +112,10 @@ def _path(node: ast.expr, text: str) -> str:
 
 
 def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
+    """Return the value of an expression: a number in SI units, a text, or a boolean.
+
+    Raises TypeError, ZeroDivisionError, or OverflowError if it cannot be evaluated.
+    """
     match node:
         case ast.BoolOp(op=ast.And(), values=parts):
             return all(_truth(part, values) for part in parts)
@@ -129,6 +140,7 @@ def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
 
 
 def _truth(node: ast.expr, values: Mapping[str, Any]) -> bool:
+    """Return the value of an expression that must be a boolean. Raises TypeError if it is something else."""
     result = _evaluate(node, values)
     if not isinstance(result, bool):
         raise TypeError(f"`{ast.unparse(node)}` is {result!r} instead of true or false")
@@ -136,24 +148,24 @@ def _truth(node: ast.expr, values: Mapping[str, Any]) -> bool:
 
 
 def plain_values(tree: MappingNode, conditions: Iterable[Condition], changes: Iterable[Change]) -> dict[str, Any]:
-    """Return the values of all paths of the conditions: as changed, or as written in the scenario."""
+    """Return the value of each path in the conditions: that of the change if it is changed, else that in `tree`."""
     changed = {change.target.path: change.value.plain for change in changes}
     paths = {path for condition in conditions for path in condition.paths}
     return {path: changed[path] if path in changed else written_value(tree, path) for path in sorted(paths)}
 
 
 def all_hold(conditions: Iterable[Condition], values: Mapping[str, Any]) -> bool:
-    """Return whether all conditions hold for these values. Raises ConditionError."""
+    """Return whether all conditions hold for these values by path. Raises ConditionError."""
     return all(condition.holds(values) for condition in conditions)
 
 
 def written_value(tree: MappingNode, path: str) -> Any:
-    """Return the value that the scenario has at a path, or None."""
+    """Return the value that is written in the scenario at a path; None if there is none."""
     try:
         keys = resolve_path(path, tree.position, tree).keys
     except PathError:
         return None
     node: Node | None = tree
     for key in keys:
-        node = None if node is None else child(node, key)
+        node = child(node, key)
     return None if node is None else node.plain

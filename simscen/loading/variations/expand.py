@@ -1,4 +1,7 @@
-"""Expand a scenario with `variations:` to one tree per variation."""
+"""Expand a scenario with `variations:` to one scenario for each variation.
+
+`variations:` consists of one or more blocks. Each block combines the options of its axes (see axes.py).
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,25 +18,33 @@ from simscen.loading.variations.paths import Target, set_value
 from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode
 
 VARIATIONS, ACCEPTANCE = "variations", "acceptance"
+"""Keys of a scenario."""
 MAX_TOTAL_VALUES = 5_000_000
-"""Limit on the number of values of all variations of a scenario together."""
+"""Limit on the number of keys and values of all variations of a scenario together, which bounds their memory."""
 MAX_REJECTED_DRAWS = 10_000
-"""Consecutive draws that do not meet `require`, after which the conditions count as impossible to meet."""
+"""Number of consecutive draws that do not meet `require` after which drawing is given up with an error."""
 _DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
-"""Keys that do not change the run, and so do not appear in names of variations."""
+"""Top-level keys that do not change what happens in a run. Their values do not appear in names of variations."""
 
 
 @dataclass(frozen=True)
 class Variation:
-    """Scenario with the values of `changes`; a file without variations is a single variation without a name."""
+    """Tree of a scenario in which `changes` have been made. A file without variations has one, with the name ""."""
 
     name: str
     tree: MappingNode = field(repr=False)
     changes: tuple[Change, ...] = ()
 
+    @classmethod
+    def of(cls, name: str, tree: MappingNode, changes: Sequence[Change]) -> "Variation":
+        """Make the changes to `tree`, and return the variation."""
+        for change in changes:
+            tree = set_value(tree, change.target, change.value)
+        return cls(name, tree, tuple(changes))
+
     @property
     def set_by(self) -> Mapping[Position, str]:
-        """The path of each changed value, by the position of the value and of each of its parts."""
+        """The path that set a value, by the position of the value; also for the parts of a changed mapping or list."""
         return {
             position: change.target.path
             for change in self.changes
@@ -48,7 +59,10 @@ class Variation:
 
 @dataclass(frozen=True)
 class Block:
-    """A block of variations: options to combine, and conditions that a combination must meet."""
+    """A block of variations: axes whose options are combined, and conditions that a combination must meet.
+
+    With `is_random`, it has a single axis, whose options are drawn at random.
+    """
 
     axes: Sequence[Sequence[Option]]
     conditions: Sequence[Condition]
@@ -60,7 +74,7 @@ class Block:
         return math.prod(map(len, self.axes))
 
     def options(self, index: int) -> list[Option]:
-        """Return the combination with this index. The last axis changes fastest."""
+        """Return the options of the combination with this index, from 0. The last axis changes fastest."""
         if self.is_random:
             return [self.axes[0][index]]
         chosen = []
@@ -72,9 +86,10 @@ class Block:
 
 @dataclass(frozen=True)
 class VariationSpace:
-    """All variations of a scenario, built on demand. Variations are numbered from 1.
+    """All variations of the scenario `tree`. They are numbered from 1 and built on demand.
 
-    `is_random`: they are independent random draws, and any number of them can be drawn.
+    `targets` are the targets of all varied paths, by path. With `is_random`, the variations are independent random
+    draws, and there is no largest number.
     """
 
     tree: MappingNode
@@ -84,7 +99,7 @@ class VariationSpace:
 
     @property
     def count(self) -> int:
-        """Number of variations, including those that do not meet the conditions. It does not limit random draws."""
+        """Number of variations, including those that do not meet the conditions; of random draws, the number to run."""
         return sum(block.count for block in self.blocks)
 
     def variation(self, number: int) -> Variation | None:
@@ -100,9 +115,10 @@ class VariationSpace:
         return self._options(number) is not None
 
     def numbers(self) -> Iterator[int]:
-        """Yield the numbers of the variations that `simscen run` runs. Raises ConditionError.
+        """Yield the numbers of the variations that `simscen run` runs: those that meet the conditions.
 
-        Random draws are repeated until `count` of them meet the conditions.
+        For random draws, these are the first `count` of them. Raises ConditionError if a condition cannot be evaluated,
+        or if too many draws in a row do not meet the conditions.
         """
         if not self.is_random:
             yield from (number for number in range(1, self.count + 1) if self._options(number) is not None)
@@ -117,7 +133,7 @@ class VariationSpace:
                 raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions")
 
     def all_named(self) -> list[Variation]:
-        """Return all variations, named after the values that differ. Raises ConditionError."""
+        """Return the variations that `simscen run` runs, named after the values that differ. Raises ConditionError."""
         numbers = list(self.numbers())
         chosen = [options for number in numbers if (options := self._options(number)) is not None]
         values = [
@@ -132,6 +148,7 @@ class VariationSpace:
         return [self._build(name, options) for options, name in zip(chosen, make_unique(names, is_named), strict=True)]
 
     def _options(self, number: int) -> list[Option] | None:
+        """Return the options of a variation; None if it does not meet the conditions. Raises IndexError."""
         index = number - 1
         for block in self.blocks:
             if index < block.count or self.is_random:
@@ -143,17 +160,14 @@ class VariationSpace:
         raise IndexError(number)
 
     def _build(self, name: str, options: Sequence[Option]) -> Variation:
-        changes = tuple(change for option in options for change in option.changes)
-        tree = self.tree
-        for change in changes:
-            tree = set_value(tree, change.target, change.value)
-        return Variation(name, tree, changes)
+        return Variation.of(name, self.tree, [change for option in options for change in option.changes])
 
 
 def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -> list[Variation] | list[Problem]:
-    """Return all variations of a scenario in order, or those with these `numbers`; or the problems of `variations`.
+    """Return all variations of a scenario in order, or those with these `numbers`; or problems of `variations:`.
 
-    Numbers that do not exist, or whose variations do not meet the conditions, are skipped.
+    Numbers that do not exist, or whose variations do not meet the conditions, are skipped. A scenario without
+    `variations:` is returned as one variation with the name "".
     """
     space = variation_space(tree)
     if not isinstance(space, VariationSpace):
@@ -162,7 +176,7 @@ def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -
     try:
         if numbers is not None:
             return [one for number in numbers if (one := _numbered(space, number)) is not None]
-        if problem := _too_many(space, position):
+        if problem := _too_many_problem(space, position):
             return [problem]
         found = space.all_named()
     except ConditionError as error:
@@ -173,13 +187,13 @@ def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -
 
 
 def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
-    """Return the variations of a scenario, None if it has none, or the problems of its `variations`."""
+    """Return the variations of a scenario; None if it has no `variations:`; or the problems of its `variations:`."""
     entry = tree.entries.get(VARIATIONS)
     if entry is None:
         return None
     from simscen.model.variations import VariationsSection  # most scenarios have no variations
 
-    own = MappingNode(tree.position, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
+    own = tree.without_keys(VARIATIONS)
     section = check(VariationsSection, MappingNode(tree.position, {VARIATIONS: entry}))
     if isinstance(section, list):
         return section
@@ -188,25 +202,27 @@ def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
     nodes = entry.value.items if isinstance(entry.value, SequenceNode) else [entry.value]
     is_random = len(specs) == 1 and specs[0].is_random
     for block, node in zip(specs, nodes, strict=True):
-        conditions = builder.conditions(node)
-        axes = [] if builder.problems and block.pairwise else builder.axes(block, node, conditions)
-        builder.check_paths(conditions, node)
+        conditions = builder.read_conditions(node)
+        axes = [] if builder.problems and block.pairwise else builder.build_axes(block, node, conditions)
+        builder.check_condition_paths(conditions, node)
         found.append(Block(axes, conditions, is_random))
     if specs and not is_random and ACCEPTANCE in tree.entries:
         message = "these variations are not independent random draws, so no confidence can be stated for a pass rate"
         hint = "vary with `sampled` and `method: random` alone, or remove `acceptance`"
-        builder.add(tree.entries[ACCEPTANCE].key, "SC016", message, hint)
+        builder.add_problem(tree.entries[ACCEPTANCE].key, "SC016", message, hint)
     return builder.problems or VariationSpace(own, found, builder.targets, is_random)
 
 
 def _numbered(space: VariationSpace, number: int) -> Variation | None:
+    """Return the variation with this number; None if it does not exist or does not meet the conditions."""
     try:
         return space.variation(number)
     except IndexError:
         return None
 
 
-def _too_many(space: VariationSpace, position: Position) -> Problem | None:
+def _too_many_problem(space: VariationSpace, position: Position) -> Problem | None:
+    """Return a problem if there are too many variations, or too many values in all of them; else None."""
     from simscen.model.variations import MAX_VARIATIONS
 
     if space.count > MAX_VARIATIONS:
@@ -214,9 +230,8 @@ def _too_many(space: VariationSpace, position: Position) -> Problem | None:
         return Problem(
             *position, "SC017", message, "run them with `simscen study`, or use `sampled` to draw some of them"
         )
-    weights = (sum(max(map(_weight, typical_options(axis))) for axis in block.axes) for block in space.blocks)
-    largest = max(weights, default=0)
-    values = _size(space.tree) + largest
+    sizes = (sum(max(map(_option_size, typical_options(axis))) for axis in block.axes) for block in space.blocks)
+    values = _size(space.tree) + max(sizes, default=0)
     if space.count * values > MAX_TOTAL_VALUES:
         message = (
             f"{space.count} variations of up to {values} values exceed the limit of {MAX_TOTAL_VALUES} values in total"
@@ -226,7 +241,7 @@ def _too_many(space: VariationSpace, position: Position) -> Problem | None:
 
 
 def _require_position(tree: MappingNode) -> Position:
-    """Return the position of the first `require`."""
+    """Return the position of the first `require`; that of `variations` if there is none."""
     value = tree.entries[VARIATIONS].value
     for block in value.items if isinstance(value, SequenceNode) else [value]:
         if isinstance(block, MappingNode) and "require" in block.entries:
@@ -235,6 +250,7 @@ def _require_position(tree: MappingNode) -> Position:
 
 
 def _name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
+    """Return the name of the variation with these options; `keys` has the short name of each path that it shows."""
     parts = []
     for option in options:
         shown = [change for change in option.changes if change.target.path in keys]
@@ -245,16 +261,17 @@ def _name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
     return name if name and name_error(name) is None else numbered_name(number)
 
 
-def _weight(option: Option) -> int:
+def _option_size(option: Option) -> int:
     return sum(_size(change.value) for change in option.changes)
 
 
 def _size(node: Node) -> int:
-    """Return the number of values below a node."""
+    """Return the number of keys and values of a node, including itself."""
     return sum(1 for _ in _positions(node))
 
 
 def _positions(node: Node) -> Iterator[Position]:
+    """Yield the positions of a node and of all keys and values below it."""
     yield node.position
     if isinstance(node, MappingNode):
         for entry in node.entries.values():

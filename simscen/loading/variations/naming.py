@@ -1,23 +1,21 @@
-"""Names of variations, derived from the values that differ, and problems merged over variations.
+"""Derive names of variations from the values that differ, such as `speed=0.5,mass=10`, and check given names.
 
-Names are short, unique, and valid as folder names.
+Names are short, unique, and valid as names of folders.
 """
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from collections.abc import Sequence
 
-from simscen.core.errors import Problem
 from simscen.loading.schema.messages import quoted
 from simscen.loading.variations.paths import Target, split_path
-from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, SequenceNode
+from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 MAX_NAME_CHARS, _MAX_VALUE_CHARS = 100, 40
+"""Largest length of a name, and of a value in it."""
 _VALID_NAME = re.compile(r"[^\W][\w.,=+%-]*")
 _NUMBERED = re.compile(r"variation-([1-9][0-9]{0,8})")
-_UNSAFE = re.compile(r"[^\w.+%-]+")
+_UNSAFE_CHARS = re.compile(r"[^\w.+%-]+")
 
 
 def name_error(name: str) -> str | None:
@@ -33,7 +31,7 @@ NAME_HINT = (
 
 
 def short_names(targets: Sequence[Target]) -> dict[str, str]:
-    """Return a short unique name for each path: its last part, and as many parts before it as needed."""
+    """Return a short unique name for each path: its last part, with as many parts before it as are needed."""
     parts = {target.path: split_path(target.path) for target in targets}
     part_counts = dict.fromkeys(parts, 1)
     while True:
@@ -48,10 +46,11 @@ def short_names(targets: Sequence[Target]) -> dict[str, str]:
 
 
 def derive_name(keys: dict[str, str], values: dict[str, Node], numbers: dict[str, int], number: int) -> str:
-    """Return the derived name of a variation: `speed=0.5,mass=10`.
+    """Return the derived name of the variation with this `number`: `speed=0.5,mass=10`.
 
-    `keys` has the short name of each path, and `values` its value. A value that is too long is replaced by its number
-    in `numbers`. `number` is that of the variation, and names it if the whole name is too long.
+    `keys` has the short name of each path, `values` its value, and `numbers` the number of this value among the values
+    of the path. A value that is too long is replaced by its number. If the whole name is too long, the number of the
+    variation is its name.
     """
     name = ",".join(f"{keys[path]}={_value(value) or f'no{numbers[path]}'}" for path, value in values.items())
     name = name if name[:1].isalnum() else f"x{name}"
@@ -72,7 +71,8 @@ def number_of(name: str) -> int | None:
 def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
     """Return the names, made unique without regard to case.
 
-    `is_fixed` tells which names the user has set; they stay. A derived name that is taken gets a suffix `+2`, `+3`, …
+    Names for which `is_fixed` is true were given by the author and stay. Another name that is already used gets a
+    suffix: `+2`, `+3`, …
     """
     taken = {name.casefold() for name, fixed in zip(names, is_fixed, strict=True) if fixed}
     found = []
@@ -86,7 +86,7 @@ def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
 
 
 def _value(node: Node) -> str:
-    """Return a value as part of a name; "" if it is too long."""
+    """Return a value as part of a name; "" if it is too long or has nested values."""
     match node:
         case ScalarNode(value=value):
             text = (
@@ -106,38 +106,5 @@ def _value(node: Node) -> str:
 
 
 def _safe(text: str) -> str:
-    return _UNSAFE.sub("_", text.replace(" ", "")).strip("_")
-
-
-class VariationProblems(NamedTuple):
-    """Problems of one variation.
-
-    `set_by` maps the position of each value that the variation sets to the path that sets it.
-    """
-
-    name: str
-    set_by: Mapping[Position, str]
-    problems: Sequence[Problem]
-
-
-def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
-    """Return the problems of all variations, with the names of the affected variations where not all are affected."""
-    if len(variations) == 1 and not variations[0].name:
-        return list(dict.fromkeys(variations[0].problems))
-    variations_by_problem: dict[Problem, list[VariationProblems]] = {}
-    for variation in variations:
-        for problem in dict.fromkeys(variation.problems):
-            variations_by_problem.setdefault(problem, []).append(variation)
-    return sorted(
-        _with_variation_names(problem, affected, len(variations)) for problem, affected in variations_by_problem.items()
-    )
-
-
-def _with_variation_names(problem: Problem, affected: Sequence[VariationProblems], variation_count: int) -> Problem:
-    path = affected[0].set_by.get(Position(problem.path, problem.line, problem.col))
-    names = [one.name for one in affected if one.name]
-    if not names or (path is None and len(names) == variation_count):
-        return problem
-    several = f" and {len(names) - 1} more" if len(names) > 1 else ""
-    where = "in all variations" if len(names) == variation_count else f"in the variation {quoted(names[0])}{several}"
-    return replace(problem, message=f"{problem.message} ({f'{quoted(path)}, ' if path else ''}{where})")
+    """Return a text without spaces, and with `_` for characters that are not allowed in names."""
+    return _UNSAFE_CHARS.sub("_", text.replace(" ", "")).strip("_")

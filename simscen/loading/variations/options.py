@@ -1,4 +1,4 @@
-"""Options of an axis of variations: changes that belong together, listed in the file or drawn at random."""
+"""Options of the axes of variations: changes of values that belong together, listed in a file or drawn at random."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # most scenarios have no variations
 
 @dataclass(frozen=True)
 class Change:
-    """Value for a path; `number` counts the values of the path from 1."""
+    """New value of a target. `number` is the number of the value among the values for this target, from 1."""
 
     target: Target
     value: Node
@@ -22,19 +22,20 @@ class Change:
 
 @dataclass(frozen=True)
 class Option:
-    """Changes that belong together, and their name if the author gave one."""
+    """Changes that are made together, and the name that the author gave them; "" for none."""
 
     changes: tuple[Change, ...]
     name: str = ""
 
 
 class RandomOptions(Sequence[Option]):
-    """Options of `sampled` with random values, which are drawn on demand.
+    """Options of `sampled` with `method: random`, which are drawn on demand.
 
-    The length is the `count`, but an index may exceed it.
+    The length is the `count` in the file, but higher indices can be drawn as well.
     """
 
     def __init__(self, sampled: "Sampled", ranges: MappingNode, targets: Sequence[Target]) -> None:
+        """Create the options; `ranges` is the tree of the distributions in `sampled`, by path."""
         self._sampled, self._ranges, self._targets = sampled, ranges, targets
 
     def __len__(self) -> int:
@@ -62,7 +63,10 @@ class RandomOptions(Sequence[Option]):
 
 
 def value_node(distribution: Node, value: object) -> Node:
-    """Return the node of a drawn value: one of the choices, or a new node at the position of its distribution."""
+    """Return the node of a value that was drawn from a distribution, whose tree is `distribution`.
+
+    For a ChoiceIndex, this is the node of the choice; for other values, a new node at the position of the distribution.
+    """
     from simscen.loading.variations.sampling import ChoiceIndex
 
     if isinstance(value, ChoiceIndex):
@@ -74,5 +78,5 @@ def value_node(distribution: Node, value: object) -> Node:
 
 
 def typical_options(axis: Sequence[Option]) -> Sequence[Option]:
-    """Return options with all targets of the axis: all, or the first one of random options."""
+    """Return options that represent the axis: all, but only the first of random ones, which change the same targets."""
     return axis[:1] if isinstance(axis, RandomOptions) else axis

@@ -1,19 +1,30 @@
-"""Paths to the values that a variation changes: `robot.pose.x`, `goals[0].pose`, `faults.lidar.noise.std`.
+"""Resolve paths to the values that a variation changes: `robot.pose.x`, `goals[0].pose`, `faults.lidar.noise.std`.
 
-Parts are joined by dots. An item of a list is given by its index from 0, `[0]` or `.0`, or by its name: its `name` or
-`id`, the place of a goal, the sensor of a fault, the kind of a criterion.
+The parts of a path are joined by dots. An item of a list is given by its index from 0, as `[0]` or `.0`, or by a name:
+its `name` or `id`, the place of a goal, the sensor of a fault, or the kind of a criterion or metric.
 """
 
 import re
 from dataclasses import dataclass
 
 from simscen.loading.schema.messages import quoted, short_value, suggestion
-from simscen.loading.yaml.tree import Entry, Key, MappingNode, Node, Position, ScalarNode, SequenceNode, dotted_path
+from simscen.loading.yaml.tree import (
+    Key,
+    Keys,
+    MappingNode,
+    Node,
+    Position,
+    ScalarNode,
+    SequenceNode,
+    child,
+    dotted_path,
+    replace_at,
+)
 
 LIST_KEYS = frozenset({"goals", "events", "faults", "pass", "metrics", "tags"})
 """Top-level keys of a scenario that contain lists."""
 KEYS_BY_KIND = frozenset({"pass", "metrics"})
-"""Top-level keys whose items may be given by their kind."""
+"""Top-level keys with lists whose items may be given by their kind."""
 FIXED_KEYS = {
     "simscen": "all variations use one version of the language",
     "extends": "all variations extend the same file; vary the values that differ",
@@ -22,11 +33,13 @@ FIXED_KEYS = {
 }
 """Keys that a variation cannot change, and the reason."""
 _PART = re.compile(r"""\.?(?:([^.\[\]]+)|\["([^"]*)"\]|\['([^']*)'\]|\[([^\]]*)\])""")
-_NAMES = ("name", "id", "sensor", "pose")
+"""One part of a path: a key, or a key or an index in brackets; a dot before it is skipped."""
+_NAME_KEYS = ("name", "id", "sensor", "pose")
+"""Keys whose texts can name an item of a list."""
 
 
 class PathError(ValueError):
-    """Path that leads to no value, with a hint."""
+    """Error for a path that is invalid, or leads to no value; `hint` says what to do."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
@@ -35,15 +48,18 @@ class PathError(ValueError):
 
 @dataclass(frozen=True)
 class Target:
-    """Path to a value as written, the position of the path, and the keys of the value."""
+    """Value that a variation changes: the path as written, the position of the path, and the keys of the value."""
 
     path: str
     position: Position
-    keys: tuple[Key, ...]
+    keys: Keys
 
 
 def resolve_path(path: str, position: Position, tree: MappingNode) -> Target:
-    """Return the target of a path, whose value need not exist in the scenario. Raises PathError."""
+    """Return the target of a path that is written at `position`. Raises PathError.
+
+    The value need not exist in the scenario: missing keys of mappings are allowed, missing items of lists are not.
+    """
     parts = split_path(path)
     if parts[0] in FIXED_KEYS:
         raise PathError(f"a variation cannot change `{parts[0]}`", FIXED_KEYS[parts[0]])
@@ -51,14 +67,14 @@ def resolve_path(path: str, position: Position, tree: MappingNode) -> Target:
 
 
 def set_value(tree: MappingNode, target: Target, value: Node) -> MappingNode:
-    """Return the scenario with the value set. New nodes have the position of the path."""
-    changed = _with_value(tree, target.keys, value, target.position)
+    """Return the scenario with `value` at the target. New mappings and keys have the position of the path."""
+    changed = replace_at(tree, target.keys, value, target.position)
     assert isinstance(changed, MappingNode)
     return changed
 
 
 def split_path(path: str) -> list[str]:
-    """Return the parts of a path. Raises PathError."""
+    """Return the parts of a path, without dots and brackets. Raises PathError for a path that is not valid."""
     parts, position = [], 0
     while position < len(path):
         match = _PART.match(path, position)
@@ -72,7 +88,8 @@ def split_path(path: str) -> list[str]:
     return parts
 
 
-def _keys(path: str, parts: list[str], tree: MappingNode) -> tuple[Key, ...]:
+def _keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
+    """Return the keys of the value to which the parts of a path lead. Raises PathError if they lead nowhere."""
     node: Node | None = tree
     keys: list[Key] = []
     for number, part in enumerate(parts):
@@ -84,15 +101,11 @@ def _keys(path: str, parts: list[str], tree: MappingNode) -> tuple[Key, ...]:
                 found = _item(path, keys, node, part, parts[number + 1 :])
                 keys += found
                 for key in found:
-                    node = (
-                        node.items[key]
-                        if isinstance(node, SequenceNode) and isinstance(key, int)
-                        else _child(node, key)
-                    )
+                    node = child(node, key)
             case ScalarNode():
                 raise PathError(
                     f"{quoted(path)} leads to nothing: `{dotted_path(keys)}` is {_describe(node)}, without a `{part}`",
-                    _file_hint(keys),
+                    _scalar_hint(keys),
                 )
             case None:
                 if keys[-1] in LIST_KEYS and len(keys) == 1:
@@ -102,7 +115,10 @@ def _keys(path: str, parts: list[str], tree: MappingNode) -> tuple[Key, ...]:
 
 
 def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list[str]) -> list[Key]:
-    """Return the keys of an item of a list; for an item given by its kind, also that kind."""
+    """Return the index of the item that `part` gives in the list at `keys`; then the kind, if `part` is a kind.
+
+    `rest` are the parts of the path after it. Raises PathError if there is no such item, or several.
+    """
     holder = dotted_path(keys)
     if part.isascii() and part.isdecimal():
         if int(part) >= len(items.items):
@@ -111,11 +127,11 @@ def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list
         return [int(part)]
     matches = [index for index, item in enumerate(items.items) if part in _names(item)]
     if len(matches) > 1 and rest:
-        matches = [index for index in matches if _child(items.items[index], rest[0]) is not None] or matches
+        matches = [index for index in matches if child(items.items[index], rest[0]) is not None] or matches
     kinds = [
         index
         for index, item in enumerate(items.items)
-        if keys and keys[0] in KEYS_BY_KIND and not matches and _child(item, part) is not None
+        if keys and keys[0] in KEYS_BY_KIND and not matches and child(item, part) is not None
     ]
     found = matches or kinds
     if len(found) > 1:
@@ -137,43 +153,24 @@ def _item(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list
 
 
 def _names(item: Node) -> list[str]:
+    """Return the names of an item of a list; the name of a text is the text itself."""
     if isinstance(item, ScalarNode):
         return [item.value] if isinstance(item.value, str) else []
     if not isinstance(item, MappingNode):
         return []
-    values = [item.entries[key].value for key in _NAMES if key in item.entries]
+    values = [item.entries[key].value for key in _NAME_KEYS if key in item.entries]
     return [value.value for value in values if isinstance(value, ScalarNode) and isinstance(value.value, str)]
-
-
-def _child(node: Node | None, key: Key) -> Node | None:
-    entry = node.entries.get(str(key)) if isinstance(node, MappingNode) else None
-    return entry.value if entry else None
 
 
 def _describe(leaf: ScalarNode) -> str:
     return short_value(leaf) if leaf.value is not None else "empty"
 
 
-def _file_hint(keys: list[Key]) -> str:
+def _scalar_hint(keys: list[Key]) -> str:
+    """Return what to do if a path leads into the scalar at `keys`, which names a file or a place; else ""."""
     if keys in (["world"], ["map"], ["robot", "model"]):
         what = "name other files by the path of this key" + (", or write the world inline" if keys == ["world"] else "")
         return f"values in another file cannot be varied; {what}"
     if keys[-1] == "pose":
         return f"vary {quoted(dotted_path(keys))} as a whole, or write it as `{{x: …, y: …, yaw: …}}`"
     return ""
-
-
-def _with_value(node: Node | None, keys: tuple[Key, ...], value: Node, position: Position) -> Node:
-    if not keys:
-        return value
-    first, *rest = keys
-    if isinstance(node, SequenceNode) and isinstance(first, int):
-        items = list(node.items)
-        items[first] = _with_value(items[first], tuple(rest), value, position)
-        return SequenceNode(node.position, tuple(items))
-    fields = node if isinstance(node, MappingNode) else MappingNode(position, {})
-    below = fields.entries.get(str(first))
-    entry = Entry(
-        below.key if below else position, _with_value(below.value if below else None, tuple(rest), value, position)
-    )
-    return MappingNode(fields.position, {**fields.entries, str(first): entry})

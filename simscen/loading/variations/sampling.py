@@ -1,6 +1,6 @@
-"""Values of variations: random draws from ranges, and pairwise covering arrays.
+"""Choose values of variations: draw them from distributions, or combine them so that each pair of values occurs.
 
-A drawn value depends only on the seed, the path and the number of the draw.
+A drawn value depends only on the seed, the path, and the number of the draw, so a further path does not change it.
 """
 
 import hashlib
@@ -18,35 +18,39 @@ _SIGNIFICANT_DIGITS = 6
 
 
 class ChoiceIndex(NamedTuple):
-    """Index of the chosen value in the list of choices."""
+    """Value drawn from a `choice`: the index of the chosen value in the list, from 0."""
 
     number: int
 
 
 def draw_values(sampled: Sampled, path: str) -> list[Any]:
-    """Return the values of one path, in the order of the variations. Raises ValueError for an invalid range."""
+    """Return the values of a path, in the order of the variations. Raises ValueError for an invalid distribution."""
     return [value_at(sampled.values[path], u) for u in _probabilities(sampled, path)]
 
 
 def draw_value(sampled: Sampled, path: str, index: int) -> Any:
-    """Return the random value of one path with this index from 0, which may exceed the count."""
+    """Return the random value of a path with this index, from 0. It may exceed the `count` in the file.
+
+    Raises ValueError for an invalid distribution.
+    """
     return value_at(sampled.values[path], _hash(sampled.seed, path, "value", index))
 
 
 def _probabilities(sampled: Sampled, path: str) -> list[float]:
-    """Return a cumulative probability for each variation, 0 and 1 excluded."""
+    """Return a cumulative probability between 0 and 1 (both excluded) for each variation, by the sampling method."""
     count = sampled.count
     if sampled.method == "sobol":
         return _sobol_probabilities(sampled, path)
     probabilities = [_hash(sampled.seed, path, "value", number) for number in range(count)]
     if sampled.method == "random":
         return probabilities
+    # Latin hypercube: each of `count` equal intervals is used once, in a random order.
     order = sorted(range(count), key=lambda number: _hash(sampled.seed, path, "stratum", number))
     return [(stratum + offset) / count for stratum, offset in zip(order, probabilities, strict=True)]
 
 
 def _sobol_probabilities(sampled: Sampled, path: str) -> list[float]:
-    """Return the coordinates of a path in a Sobol sequence, shifted by a random number modulo 1.
+    """Return the coordinates of a path in the points of a Sobol sequence, shifted by a random number modulo 1.
 
     (Joe and Kuo: Constructing Sobol Sequences with Better Two-Dimensional Projections, 2008; Cranley and Patterson:
     Randomization of Number Theoretic Methods for Multiple Integration, 1976.)
@@ -59,7 +63,7 @@ def _sobol_probabilities(sampled: Sampled, path: str) -> list[float]:
 
 @cache
 def _sobol_points(dimensions: int, count: int) -> Any:
-    """Return the first points (count, dimensions) of the unscrambled sequence."""
+    """Return the first points of the Sobol sequence without scrambling, shape (count, dimensions)."""
     from scipy.stats.qmc import Sobol  # the import takes half a second
 
     exponent = max(0, math.ceil(math.log2(count)))
@@ -67,12 +71,16 @@ def _sobol_points(dimensions: int, count: int) -> Any:
 
 
 def _hash(seed: int, path: str, purpose: str, number: int) -> float:
+    """Return a pseudorandom number from the uniform distribution on (0, 1) that depends only on the arguments."""
     digest = hashlib.sha256(f"{seed}\0{path}\0{purpose}\0{number}".encode()).digest()
     return ((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / 2**52
 
 
 def value_at(draw: Draw, u: float) -> Any:
-    """Return the value of a distribution at the cumulative probability `u`, 0 < u < 1. Raises ValueError."""
+    """Return the value of a distribution at the cumulative probability `u`, 0 < u < 1 (its quantile).
+
+    Quantities are texts with their unit, choices are ChoiceIndex. Raises ValueError for an invalid distribution.
+    """
     match draw.chosen:
         case Uniform(root=ends):
             (low, high), unit = _ordered(ends)
@@ -94,6 +102,7 @@ def value_at(draw: Draw, u: float) -> Any:
 
 
 def _ordered(ends: tuple[Amount, Amount]) -> tuple[tuple[float, float], str]:
+    """Return the ends of a range as numbers and their common unit. Raises ValueError if the range is empty."""
     (low, high), unit = to_common_unit(ends)
     if low > high:
         raise ValueError(f"the range is empty: {low:g} is greater than {high:g}")
@@ -101,6 +110,7 @@ def _ordered(ends: tuple[Amount, Amount]) -> tuple[tuple[float, float], str]:
 
 
 def _normal(normal: Normal, u: float) -> Any:
+    """Return the quantile of a normal distribution that is truncated to `min` and `max`. Raises ValueError."""
     from statistics import NormalDist  # slow to import, rarely needed
 
     ends = [end for end in (normal.min, normal.max) if end is not None]
@@ -121,23 +131,26 @@ def _normal(normal: Normal, u: float) -> Any:
 
 
 def _with_unit(number: float, unit: str) -> Any:
+    """Return a rounded number; with a unit, as text such as "0.5 m"."""
     rounded = float(f"{number:.{_SIGNIFICANT_DIGITS}g}")
     return f"{rounded!r} {unit}" if unit else rounded
 
 
 Row = tuple[int, ...]
-"""Index of the value of each parameter."""
-CANDIDATES = 30
-"""Rows that are tried for each row of the array; the row with the most new pairs is used."""
+"""Combination of values: for each parameter, the index of its value."""
+Pair = tuple[int, int, int, int]
+"""Pair of values of two parameters: (parameter, index of its value, later parameter, index of its value)."""
+CANDIDATE_ROWS = 30
+"""Number of rows that are tried for each row of the array; the one with the most new pairs is used."""
 MAX_CHECKED_ROWS = 200_000
-"""Limit of the search for a row that contains a given pair and is allowed."""
+"""Largest number of rows that are searched for one that contains a given pair and is allowed."""
 
 
 def covering_array(counts: Sequence[int], is_allowed: Callable[[Row], bool]) -> list[Row]:
-    """Return rows that contain each possible pair of values, and only rows that are allowed.
+    """Return few allowed rows that together contain each pair of values that occurs in any allowed row.
 
-    `counts` are the numbers of values of the parameters. A pair is possible if an allowed row contains it. Greedy and
-    deterministic. (Cohen et al.: The AETG System, 1997.)
+    `counts` are the numbers of values of the parameters. The search is greedy and deterministic. (Cohen et al.: The
+    AETG System, 1997.)
     """
     if len(counts) == 1:
         return [(value,) for value in range(counts[0]) if is_allowed((value,))]
@@ -153,7 +166,7 @@ def covering_array(counts: Sequence[int], is_allowed: Callable[[Row], bool]) -> 
         best = max(
             (
                 row
-                for attempt in range(CANDIDATES)
+                for attempt in range(CANDIDATE_ROWS)
                 if (row := _complete(pair, counts, uncovered, attempt, is_allowed)) is not None
             ),
             key=lambda row: len(pairs_of(row) & uncovered),
@@ -169,21 +182,22 @@ def covering_array(counts: Sequence[int], is_allowed: Callable[[Row], bool]) -> 
     return rows
 
 
-def pairs_of(row: Row) -> set[tuple[int, int, int, int]]:
-    """Return all pairs (parameter, value, parameter, value) of a row, the parameters in order."""
+def pairs_of(row: Row) -> set[Pair]:
+    """Return all pairs of values in a row."""
     return {(a, row[a], b, row[b]) for a, b in combinations(range(len(row)), 2)}
 
 
 def _complete(
-    pair: tuple[int, int, int, int],
+    pair: Pair,
     counts: Sequence[int],
-    uncovered: set[tuple[int, int, int, int]],
+    uncovered: set[Pair],
     attempt: int,
     is_allowed: Callable[[Row], bool],
 ) -> Row | None:
-    """Return a row with the pair whose other values are chosen greedily for most new pairs; None if not allowed.
+    """Return a row that contains the pair; None if the row that was found is not allowed.
 
-    `attempt` changes the order of the parameters and of equally good values.
+    The other values are chosen one by one so that the row gets most pairs of `uncovered`. `attempt` changes the order
+    of the parameters, and of values that are equally good.
     """
     a, x, b, y = pair
     chosen = {a: x, b: y}
@@ -209,10 +223,8 @@ def _complete(
     return row if is_allowed(row) else None
 
 
-def _any_row_with(
-    pair: tuple[int, int, int, int], counts: Sequence[int], is_allowed: Callable[[Row], bool]
-) -> Row | None:
-    """Return the first allowed row that contains the pair, or None if there is none among MAX_CHECKED_ROWS rows."""
+def _any_row_with(pair: Pair, counts: Sequence[int], is_allowed: Callable[[Row], bool]) -> Row | None:
+    """Return the first allowed row that contains the pair; None if there is none among the first MAX_CHECKED_ROWS."""
     a, x, b, y = pair
     fixed = {a: (x,), b: (y,)}
     choices = [fixed.get(parameter, range(count)) for parameter, count in enumerate(counts)]

@@ -1,4 +1,4 @@
-"""The ranges of `sampled` as a space to search, with one dimension for each path."""
+"""Space of values that `simscen falsify` searches: one dimension for each path under `sampled` in `variations:`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from simscen.loading.variations.axes import AxisBuilder
 from simscen.loading.variations.conditions import Condition, all_hold, plain_values
 from simscen.loading.variations.expand import VARIATIONS, Variation
 from simscen.loading.variations.options import Change, value_node
-from simscen.loading.variations.paths import Target, set_value
+from simscen.loading.variations.paths import Target
 from simscen.loading.variations.sampling import value_at
 from simscen.loading.yaml.tree import MappingNode, SequenceNode, node_at
 from simscen.model.variations import OneOf, Sampled, VariationsSection
@@ -17,7 +17,10 @@ from simscen.model.variations import OneOf, Sampled, VariationsSection
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """Paths to vary, their distributions, and conditions. Dimensions are in the order of the paths."""
+    """Distributions of the values of `targets`, and conditions on them. Each target is one dimension, in this order.
+
+    `tree` is the scenario without `variations`, and `ranges` is the tree of the distributions, by path.
+    """
 
     tree: MappingNode
     sampled: Sampled
@@ -26,15 +29,16 @@ class SearchSpace:
     conditions: Sequence[Condition]
 
     @property
-    def choices(self) -> list[int]:
-        """The number of values of each `choice`, 0 for other distributions."""
+    def choice_counts(self) -> list[int]:
+        """For each dimension, the number of values of a `choice`; 0 for other distributions."""
         chosen = [self.sampled.values[target.path].chosen for target in self.targets]
         return [len(one.root) if isinstance(one, OneOf) else 0 for one in chosen]
 
     def variation(self, name: str, point: Sequence[float]) -> Variation | None:
-        """Return the scenario with the values at a point of the unit cube; None if they do not meet the conditions.
+        """Return the scenario with the values at `point` as a variation; None if they do not meet the conditions.
 
-        Raises ConditionError if a condition cannot be evaluated.
+        `point` has a cumulative probability (0 < p < 1) for each dimension, at which the value is taken from its
+        distribution. Raises ConditionError if a condition cannot be evaluated.
         """
         changes = []
         for target, u in zip(self.targets, point, strict=True):
@@ -42,19 +46,16 @@ class SearchSpace:
             changes.append(Change(target, value_node(self.ranges.entries[target.path].value, value), 1))
         if not all_hold(self.conditions, plain_values(self.tree, self.conditions, changes)):
             return None
-        tree = self.tree
-        for change in changes:
-            tree = set_value(tree, change.target, change.value)
-        return Variation(name, tree, tuple(changes))
+        return Variation.of(name, self.tree, changes)
 
 
 def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
-    """Return the space that `variations: {sampled: …}` of a scenario describes, or problems."""
+    """Return the space that `variations: {sampled: …}` of a scenario describes; or the problems of `variations:`."""
     entry = tree.entries.get(VARIATIONS)
     if entry is None:
         message, hint = "the scenario has no `variations` to search", "add `sampled` with the range of each value"
         return [Problem(*tree.position, "SC010", message, hint)]
-    own = MappingNode(tree.position, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
+    own = tree.without_keys(VARIATIONS)
     section = check(VariationsSection, MappingNode(tree.position, {VARIATIONS: entry}))
     if isinstance(section, list):
         return section
@@ -64,9 +65,9 @@ def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
         message, hint = "only the ranges of `sampled` can be searched", "write one block with `sampled` alone"
         return [Problem(*entry.value.position, "SC016", message, hint)]
     builder, block = AxisBuilder(own), blocks[0]
-    conditions = builder.conditions(node)
-    builder.axes(block, node, conditions)
-    builder.check_paths(conditions, node)
+    conditions = builder.read_conditions(node)
+    builder.build_axes(block, node, conditions)
+    builder.check_condition_paths(conditions, node)
     if builder.problems:
         return builder.problems
     ranges = node_at(node, ("sampled", "values"))

@@ -1,7 +1,8 @@
 """Parse YAML to a tree with positions, within limits on depth and size.
 
-The tree is built from PyYAML's events. Its constructors are not used: they overwrite duplicate keys silently, raise
-plain ValueErrors, expand alias bombs, and overflow the C stack at 30 000 brackets.
+The tree is built from PyYAML's events, not by its constructors. These accept duplicate keys silently, raise plain
+ValueErrors, expand alias bombs (aliases of aliases that grow exponentially), and overflow the C stack at 30 000
+brackets.
 """
 
 from collections.abc import Iterator
@@ -16,11 +17,14 @@ from simscen.loading.yaml.textfile import LOOKALIKES, describe_lookalike, find_l
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode
 
 MAX_DEPTH = 40
+"""Largest number of nested mappings and lists."""
 MAX_VALUES = 100_000
+"""Largest number of keys and values of a file, after the expansion of aliases."""
 
 # libyaml, if PyYAML was built with it, yields the same events ten times faster.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _LIBYAML_TOO_DEEP = "exceeded maximum nesting depth"
+"""Message of libyaml for its own limit on the depth."""
 
 
 class _ParseError(Exception):
@@ -33,7 +37,8 @@ class _ParseError(Exception):
 def parse_yaml(text: str, path: str, *, last_wins: bool = False) -> tuple[Node | None, list[Problem]]:
     """Return the only document of `text` as a tree (None if it cannot be parsed), and all problems.
 
-    With `last_wins`, duplicate keys are warnings and the last one is used, as in parameter files of ROS 2.
+    `path` is the name of the file in problems. With `last_wins`, the last of several equal keys is used, and the others
+    are warnings, as in parameter files of ROS 2.
     """
     composer = _Composer(path, text, last_wins)
     try:
@@ -45,7 +50,10 @@ def parse_yaml(text: str, path: str, *, last_wins: bool = False) -> tuple[Node |
 
 @dataclass(frozen=True)
 class _Anchor:
-    """Anchored node with the number of its values and its depth; each alias counts them again."""
+    """Anchored node, the number of its keys and values, and the number of levels below it.
+
+    Each alias of the node counts them again toward the limits.
+    """
 
     node: Node
     values: int
@@ -54,6 +62,11 @@ class _Anchor:
 
 @dataclass
 class _Composer:
+    """Builds the tree of a text from PyYAML's events, and collects problems.
+
+    Methods that return a node return with it the number of levels below it. `depth` is the level of a node, from 1.
+    """
+
     path: str
     text: str
     last_wins: bool = False
@@ -65,7 +78,7 @@ class _Composer:
         self._values = 0
 
     def document(self) -> Node | None:
-        """Return the root of the first document. Raises _Refused if there is none, or a second one."""
+        """Return the root of the only document. Raises _ParseError if there is none, or a second one."""
         next(self._events)  # the start of the stream
         if isinstance(next(self._events), ev.StreamEndEvent):
             raise _ParseError(self._problem(None, "SC004", "the file is empty"))
@@ -97,7 +110,7 @@ class _Composer:
             raise _ParseError(self._problem(None, "SC003", str(error).splitlines()[0])) from None
 
     def _node(self, event: ev.Event, depth: int) -> tuple[Node, int]:
-        """Return the node that begins with `event`, and its depth."""
+        """Return the node that begins with `event`, and the number of levels below it. Raises _ParseError."""
         if isinstance(event, ev.AliasEvent):
             return self._alias(event, depth)
         if depth > MAX_DEPTH:
@@ -114,6 +127,7 @@ class _Composer:
         return node, height
 
     def _content(self, event: ev.NodeEvent, depth: int) -> tuple[Node, int]:
+        """Return the node that begins with `event`, which is not an alias."""
         if isinstance(event, ev.ScalarEvent):
             return ScalarNode(self._position_of(event), self._scalar(event)), 0
         if isinstance(event, ev.SequenceStartEvent):
@@ -121,6 +135,7 @@ class _Composer:
         return self._mapping(event, depth)
 
     def _scalar(self, event: ev.ScalarEvent) -> str | int | float | bool | None:
+        """Return the value of a scalar; reports an integer that is too large, and returns 0 instead."""
         if not event.implicit[0]:
             return str(event.value)
         try:
@@ -155,7 +170,10 @@ class _Composer:
         return MappingNode(self._position_of(start), self._merge(start, entries, merged)), height + 1
 
     def _merge(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
-        """Add the merge keys (`<<`): keys of the mapping itself win, then those of earlier aliases."""
+        """Return `entries` with the keys of the mappings `merged` that were given by the merge key `<<`.
+
+        The keys in `entries` have priority, then those of earlier mappings.
+        """
         for other in merged:
             if not isinstance(other, MappingNode):
                 self.problems.append(self._problem(start, "SC003", "`<<` expects a mapping or a list of mappings"))
@@ -171,6 +189,7 @@ class _Composer:
         return str(event.value)
 
     def _alias(self, event: ev.AliasEvent, depth: int) -> tuple[Node, int]:
+        """Return the node of the anchor to which an alias refers. Raises _ParseError if there is none, or a circle."""
         if event.anchor not in self._anchors:
             raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
         anchor = self._anchors[event.anchor]
@@ -182,6 +201,7 @@ class _Composer:
         return anchor.node, anchor.depth
 
     def _count(self, event: ev.Event, values: int) -> None:
+        """Add to the number of values. Raises _ParseError if there are too many."""
         self._values += values
         if self._values > MAX_VALUES:
             subject = "aliases expand to" if isinstance(event, ev.AliasEvent) else "the file has"
@@ -213,6 +233,7 @@ class _Composer:
         return Problem(*position, code=code, message=message, hint=hint)
 
     def _syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
+        """Return the problem for a syntax error of PyYAML, in words that name the likely mistake."""
         mark = error.problem_mark or error.context_mark
         if mark is None:
             return self._problem(None, "SC003", error.problem or "cannot be read as YAML")
@@ -235,7 +256,7 @@ class _Composer:
         return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message)
 
     def _lookalike(self, lines: list[str], first: int, last: int) -> Problem | None:
-        """Return a problem if these lines have a character that only looks like YAML syntax."""
+        """Return a problem if a character in the lines `first` to `last` (from 0) only looks like YAML syntax."""
         for number in range(first, min(last + 1, len(lines))):
             index = find_lookalike(lines[number].partition(" #")[0])
             if index is not None:

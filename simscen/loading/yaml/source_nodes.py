@@ -1,4 +1,4 @@
-"""Where each value of a YAML text begins and ends, for programs that change a text without writing it anew."""
+"""Find where each value of a YAML text begins and ends, so that an editor can replace single values in the text."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -14,10 +14,11 @@ _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 @dataclass(frozen=True)
 class SourceNode:
-    """Value in a text, which is `text[start:end]` without its anchor and without the comments after it.
+    """Value in a text: `text[start:end]` is the value without its anchor and tag, and without comments after it.
 
-    `flow` is true for values inside of brackets or braces, and for such a collection itself. `style` is the first
-    character of a scalar that is quoted or a block (`"`, `'`, `|`, or `>`), otherwise "".
+    `flow` is true for collections in brackets or braces, and for values inside of them (YAML's flow style). `style` is
+    the first character of a scalar that is quoted or a block (`"`, `'`, `|`, or `>`); "" for other values. Sequences
+    have `items`, mappings have `entries`.
     """
 
     kind: Literal["scalar", "sequence", "mapping", "alias"]
@@ -31,7 +32,7 @@ class SourceNode:
 
 @dataclass(frozen=True)
 class SourceEntry:
-    """Key of a mapping, which is `text[start:end]`, and its value."""
+    """Key and value in a mapping; the key is `text[start:end]`."""
 
     start: int
     end: int
@@ -39,7 +40,7 @@ class SourceEntry:
 
 
 def parse_source(text: str) -> SourceNode | None:
-    """Return the nodes of the first document of a text that `parse_yaml` accepts; None if it cannot be parsed."""
+    """Return the root of the first document of a text; None if it cannot be parsed."""
     try:
         events = yaml.parse(text, Loader=_Loader)
         start = next(event for event in events if isinstance(event, ev.NodeEvent))
@@ -49,7 +50,7 @@ def parse_source(text: str) -> SourceNode | None:
 
 
 def source_at(node: SourceNode, keys: Sequence[Key]) -> SourceNode | None:
-    """Return the node at `keys`; None if it does not exist in the text, or belongs to the anchor of an alias."""
+    """Return the node at `keys`; None if there is none, or if it belongs to an alias, and so is written elsewhere."""
     for key in keys:
         if isinstance(key, int) and node.kind == "sequence" and 0 <= key < len(node.items):
             node = node.items[key]
@@ -61,19 +62,22 @@ def source_at(node: SourceNode, keys: Sequence[Key]) -> SourceNode | None:
 
 
 class _Composer:
+    """Builds source nodes from PyYAML's events."""
+
     def __init__(self, text: str, events: Iterator[ev.Event]) -> None:
         self._text, self._events = text, events
 
     def node(self, event: ev.Event, flow: bool) -> SourceNode:
-        """Return the node that begins with `event`; `flow`: inside of brackets or braces."""
+        """Return the node that begins with `event`; `flow` means that it is inside of brackets or braces."""
         start, end = _index(event.start_mark), _index(event.end_mark)
         if isinstance(event, ev.AliasEvent):
             return SourceNode("alias", start, end, flow)
         assert isinstance(event, ev.NodeEvent)
-        start = self._without_properties(event, start, end)
+        start = self._after_properties(event, start)
         if isinstance(event, ev.ScalarEvent):
             style = "" if event.style in (None, "") else str(event.style)
-            return SourceNode("scalar", start, max(start, self._content_end(start, end)), flow, style)
+            end = start + len(self._text[start:end].rstrip())  # without the line breaks after a block
+            return SourceNode("scalar", start, end, flow, style)
         flow = flow or self._text[start : start + 1] in ("[", "{")
         if isinstance(event, ev.SequenceStartEvent):
             return self._sequence(start, flow)
@@ -98,8 +102,8 @@ class _Composer:
         end = _index(event.end_mark) if flow else last
         return SourceNode("mapping", start, end, flow, entries=entries)
 
-    def _without_properties(self, event: ev.NodeEvent, start: int, end: int) -> int:
-        """Return the index after the anchor and the tag of a node."""
+    def _after_properties(self, event: ev.NodeEvent, start: int) -> int:
+        """Return the index after the anchor and the tag (YAML's node properties) of a node that begins at `start`."""
         for _ in range(2):
             if self._text[start : start + 1] in ("&", "!") and (event.anchor or getattr(event, "tag", None)):
                 while start < len(self._text) and not self._text[start].isspace():
@@ -107,10 +111,6 @@ class _Composer:
                 while start < len(self._text) and self._text[start].isspace():
                     start += 1
         return start
-
-    def _content_end(self, start: int, end: int) -> int:
-        """Return the end of a scalar without the line breaks that follow it."""
-        return start + len(self._text[start:end].rstrip())
 
 
 def _index(mark: Any) -> int:

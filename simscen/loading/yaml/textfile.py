@@ -1,4 +1,4 @@
-"""Read text files from untrusted sources: size, encoding, control characters, lookalike characters."""
+"""Read text files from untrusted sources, and explain unsuitable content: control characters and lookalikes."""
 
 import errno
 import os
@@ -9,6 +9,7 @@ from pathlib import Path
 from simscen.core.errors import Problem
 
 MAX_FILE_BYTES = 1 << 20
+"""Largest size of a text file: 1 MiB."""
 
 # C0 and C1 controls, lone surrogates, bidirectional overrides (CVE-2021-42574), and the line breaks of YAML 1.1 that
 # editors do not treat as line breaks.
@@ -16,9 +17,10 @@ _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u
 
 
 def read_text(path: Path, display_name: str) -> str | Problem:
-    """Return the text of a regular UTF-8 file of at most 1 MiB with line breaks as \\n, or a problem.
+    """Return the text of a file with line breaks as \\n, or a problem; `display_name` is the name in problems.
 
-    `display_name` is the name of the file in problems. A FIFO, device, socket or folder is rejected without being read.
+    The file must be in UTF-8, without control characters, and not larger than 1 MiB. A FIFO, device, socket or folder
+    is rejected without being read.
     """
     try:
         raw = _read_bytes(path)
@@ -43,6 +45,7 @@ def os_error_reason(error: OSError) -> str:
 
 
 def _read_bytes(path: Path) -> bytes | str:
+    """Return the content of a file, or why it is not accepted. Raises OSError if it cannot be read."""
     if not stat.S_ISREG(path.stat().st_mode):
         return "not a regular file"
     # Between stat and open the file may have become a FIFO: O_NONBLOCK keeps the open from waiting for a writer.
@@ -55,6 +58,7 @@ def _read_bytes(path: Path) -> bytes | str:
 
 
 def _decode(raw: bytes, display_name: str) -> str | Problem:
+    """Return the text in the bytes of a file, or a problem with its encoding or its characters."""
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -75,6 +79,7 @@ def _normalize_line_breaks(text: str) -> str:
 
 
 def _position(text: str, index: int) -> tuple[int, int]:
+    """Return the line and the column of a character, both from 1."""
     line = text.count("\n", 0, index) + 1
     return line, index - (text.rfind("\n", 0, index) + 1) + 1
 
@@ -96,7 +101,7 @@ LOOKALIKES = {
     "\u2014": ("dash", "`-`"),
     "\u2212": ("minus sign", "`-`"),
 }
-"""Characters that look like YAML syntax and come with text copied from web pages: their name, and what to write."""
+"""Character that looks like YAML syntax, often copied from a web page → (its name, what to write instead)."""
 
 
 def find_lookalike(text: str) -> int | None:

@@ -1,4 +1,8 @@
-"""Tree of a YAML file with the positions of its keys and values."""
+"""Tree of a YAML file with the positions of its keys and values.
+
+Trees are immutable. A changed tree shares the nodes that did not change. Some functions take a `loc`: keys, or the
+location of an error in pydantic, which also names members of unions between the keys. These names are skipped.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,7 +12,7 @@ Scalar = str | int | float | bool | None
 
 
 class Position(NamedTuple):
-    """Position in a file; `line` and `col` count from 1."""
+    """Position in the file `path`, which is named as in problems. `line` and `col` count from 1."""
 
     path: str
     line: int
@@ -51,7 +55,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class MappingNode:
-    """Mapping, in the order of the file."""
+    """Mapping from keys to entries, in the order of the file."""
 
     position: Position
     entries: dict[str, Entry]
@@ -61,12 +65,19 @@ class MappingNode:
         """The mapping as a dict of plain Python values."""
         return {key: entry.value.plain for key, entry in self.entries.items()}
 
+    def without_keys(self, *keys: str) -> "MappingNode":
+        """Return the mapping without these keys."""
+        return MappingNode(self.position, {key: entry for key, entry in self.entries.items() if key not in keys})
+
 
 Node = ScalarNode | SequenceNode | MappingNode
 Key = str | int
+"""Key of a mapping, or index of an item in a sequence, from 0."""
+Keys = tuple[Key, ...]
+"""Keys and indices that lead from the top of a file to a value, e.g. ("goals", 0, "pose")."""
 
 
-def child(node: Node, key: Key) -> Node | None:
+def child(node: Node | None, key: Key) -> Node | None:
     """Return the node under a key or index; None if there is none."""
     if isinstance(node, MappingNode):
         entry = node.entries.get(str(key))
@@ -76,18 +87,44 @@ def child(node: Node, key: Key) -> Node | None:
     return None
 
 
-def existing_keys(node: Node, loc: Sequence[Key]) -> tuple[Key, ...]:
-    """Return the parts of a pydantic `loc` that exist in the tree; tags of unions do not."""
-    return tuple(key for key, _ in _walk(node, loc))
+def nodes_with_keys(node: Node, keys: Keys = ()) -> Iterator[tuple[Keys, Node]]:
+    """Yield a node and all nodes below it in the order of the file, each with its keys; `keys` are those of `node`."""
+    yield keys, node
+    if isinstance(node, MappingNode):
+        for key, entry in node.entries.items():
+            yield from nodes_with_keys(entry.value, (*keys, key))
+    elif isinstance(node, SequenceNode):
+        for index, item in enumerate(node.items):
+            yield from nodes_with_keys(item, (*keys, index))
+
+
+def replace_at(node: Node | None, keys: Keys, value: Node, position: Position) -> Node:
+    """Return the tree `node` with `value` at `keys`. Missing mappings and keys are added; they get `position`."""
+    if not keys:
+        return value
+    key, rest = keys[0], keys[1:]
+    if isinstance(node, SequenceNode) and isinstance(key, int):
+        items = list(node.items)
+        items[key] = replace_at(items[key], rest, value, position)
+        return SequenceNode(node.position, tuple(items))
+    mapping = node if isinstance(node, MappingNode) else MappingNode(position, {})
+    old = mapping.entries.get(str(key))
+    entry = Entry(old.key if old else position, replace_at(old.value if old else None, rest, value, position))
+    return MappingNode(mapping.position, {**mapping.entries, str(key): entry})
+
+
+def existing_keys(node: Node, loc: Sequence[Key]) -> Keys:
+    """Return the parts of `loc` that exist in the tree."""
+    return tuple(key for key, _ in _existing(node, loc))
 
 
 def key_position(node: Node, loc: Sequence[Key]) -> Position:
-    """Return the position of the last key of `loc`: a key of a mapping, an item of a sequence, or the node itself."""
-    return [node.position, *(position for _, position in _walk(node, loc))][-1]
+    """Return the position of the last existing part of `loc`: of a key or an item; of `node` if no part exists."""
+    return [node.position, *(position for _, position in _existing(node, loc))][-1]
 
 
 def value_position(node: Node, loc: Sequence[Key]) -> Position:
-    """Return the position of the value at `loc`; of its key if the value is empty."""
+    """Return the position of the value at `loc`. An empty value has the position of its key."""
     found = node_at(node, loc)
     if isinstance(found, ScalarNode) and found.value is None:
         return key_position(node, loc)
@@ -95,13 +132,14 @@ def value_position(node: Node, loc: Sequence[Key]) -> Position:
 
 
 def node_at(node: Node, loc: Sequence[Key]) -> Node:
-    """Return the deepest existing node along `loc`."""
+    """Return the node to which the existing parts of `loc` lead."""
     for part in loc:
         node = child(node, part) or node
     return node
 
 
-def _walk(node: Node, loc: Sequence[Key]) -> Iterator[tuple[Key, Position]]:
+def _existing(node: Node, loc: Sequence[Key]) -> Iterator[tuple[Key, Position]]:
+    """Yield the existing parts of `loc` with their positions."""
     for part in loc:
         below = child(node, part)
         if below is None:

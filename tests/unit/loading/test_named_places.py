@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import Problem
-from simscen.loading.files.single_files import load_criteria, load_world_file
+from simscen.loading.files.criteria_file import load_criteria
+from simscen.loading.files.single_files import load_world_file
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario, try_scenario
 from simscen.loading.scenario_text import criteria_of_text, resolved_text, spec_of_text

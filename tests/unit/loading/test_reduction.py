@@ -5,17 +5,17 @@ from typing import Any
 import pytest
 
 from simscen.loading.reduction import (
-    changed_text,
     changed_values,
     removable_parts,
     removed_parts,
-    rounded_tree,
     roundings,
+    with_roundings,
     with_seed,
     with_values,
     without_parts,
 )
 from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.rewriting import changed_text
 from simscen.loading.yaml.tree import MappingNode, Position, ScalarNode
 
 TEXT = """\
@@ -76,7 +76,7 @@ def test_numbers_are_rounded_with_their_units(digits: int, values: set[str]) -> 
     tree = parsed(TEXT)
     found = roundings(tree, digits)
     assert {one.value for one in found} == values
-    rounded = rounded_tree(tree, found)
+    rounded = with_roundings(tree, found)
     assert len(changed_values(tree, rounded)) == len(values)
     assert not removed_parts(tree, rounded)
 

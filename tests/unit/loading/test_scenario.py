@@ -136,3 +136,23 @@ def test_problems_of_scenario_and_world_are_reported_together(write: Write, scen
 def test_ids_have_no_suffix(tmp_path: Path) -> None:
     for name in ("a/b.scenario.yaml", "a/b.scenario.yml", "a/b.yaml", "a/b"):
         assert scenario_id(tmp_path / name, tmp_path) == "a/b"
+
+
+@pytest.mark.parametrize("path", ["m.yaml", "./m.yaml"])
+def test_one_path_cannot_name_the_masks_of_two_files(write: Write, scenario: str, tmp_path: Path, path: str) -> None:
+    """The item of `pass+` is next to another mask than the criterion of the base file, which has the path `m.yaml`."""
+    for folder in ("", "bases/"):
+        write(f"{folder}m.pgm", "P2 1 1 255 255")
+        write(f"{folder}m.yaml", "{image: m.pgm, resolution: 1, origin: [0, 0, 0]}")
+    write("bases/aisle.base.yaml", "pass: [{keepout: {mask: m.yaml}}]")
+    text = scenario.replace("pass:", "extends: bases/aisle.base.yaml\npass+:")
+    file = write("a.scenario.yaml", text.replace("{}}]", f"{{}}}}, {{keepout: {{mask: {path}}}}}]"))
+    found = try_scenario(file, tmp_path)
+    assert isinstance(found, list) is (path == "m.yaml")
+    if isinstance(found, list):
+        assert [(problem.path, problem.line, problem.code) for problem in found] == [("a.scenario.yaml", 6, "SC016")]
+    else:
+        assert {name: mask.map.path for name, mask in found.criterion_masks.items()} == {
+            "m.yaml": tmp_path / "bases" / "m.yaml",
+            "./m.yaml": tmp_path / "m.yaml",
+        }

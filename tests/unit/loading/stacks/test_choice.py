@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput
-from simscen.loading.known_names import resolve_places
+from simscen.loading.named_places import resolve_places
 from simscen.loading.scenario import load_scenario
 from simscen.loading.scenario_text import resolved_text, spec_of_text
 from simscen.loading.stacks.choice import StackChoice, load_stack_file

@@ -1,0 +1,157 @@
+"""Search routes of the robot to its goals and to areas that triggers wait for. Checks use the results.
+
+A fast approximate search runs first. If it finds no route, an exact search decides.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+from simscen.core.environment.world_model import Polygon
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.polygons import distance_to_polygon
+from simscen.core.geometry.shapes import Solid
+from simscen.loading.checks.scene import Scene
+from simscen.loading.open_ground import extend_bounds
+from simscen.loading.yaml.tree import Keys
+from simscen.triggers.base import AnyCondition
+from simscen.triggers.robot_state import RobotIn, RobotWithin
+from simscen.worlds.routes.simple_paths import SimplePaths, simple_paths_between
+
+if TYPE_CHECKING:
+    from simscen.worlds.routes.shortest_paths import ShortestPaths
+
+
+MAX_ROUTE_SILL_M = 0.03
+"""Height of obstacles that a route may cross. For starts and goals, it is the lower SILL_M of scene.py."""
+
+
+@dataclass(frozen=True)
+class RobotRoutes:
+    """Routes of the largest disc inside the robot's footprint. If the disc has no route, the robot has none either.
+
+    `stops` are the poses between which routes are needed: starts, goals, and the corners of trigger areas. `solids` are
+    the obstacles that block the robot. Methods without this parameter consider the fixed solids of the world.
+    """
+
+    scene: Scene
+    stops: tuple[Pose2, ...]
+
+    def is_reachable(self, starts: Sequence[Pose2], goal: Pose2, solids: tuple[Solid, ...]) -> bool:
+        """Return whether a route may lead from one of `starts` to the goal; False proves that there is none."""
+        approximate = self._approximate_paths(solids)
+        if approximate is not None and any(approximate.length(start[:2], goal[:2]) < float("inf") for start in starts):
+            return True
+        exact_paths = self._exact_paths(solids)
+        return any(exact_paths.may_reach(start, goal) for start in starts)
+
+    def can_enter(self, starts: Sequence[Pose2], towards: Pose2, distance: Callable[[Pose2], float]) -> bool:
+        """Return whether the center of the robot may get from one of `starts` into an area; False proves the opposite.
+
+        `distance` returns the distance of a pose from the area in m, at most 0 inside. `towards` is a point of the
+        area, to which the search is directed.
+        """
+        approximate = self._approximate_paths(self.scene.world.solids)
+
+        def is_inside(point: tuple[float, float]) -> bool:
+            return distance(Pose2(*point)) <= 0
+
+        if approximate is not None and any(
+            approximate.can_enter(start[:2], towards[:2], is_inside) for start in starts
+        ):
+            return True
+        return self._exact_paths(self.scene.world.solids).may_enter(starts, distance)
+
+    def length_upper_bound(self, start: Pose2, goal: Pose2) -> float:
+        """Return an upper bound on the length of the shortest route in m; inf if the fast search finds no route."""
+        approximate = self._paths_around_fixed
+        return float("inf") if approximate is None else approximate.length(start[:2], goal[:2])
+
+    def length(self, start: Pose2, goal: Pose2) -> float:
+        """Return the length of the shortest route in m; inf if there is none."""
+        return self._exact_paths(self.scene.world.solids).length(start, goal)
+
+    @property
+    def z_range(self) -> tuple[float, float]:
+        """Lowest and highest z in m between which an obstacle blocks a route."""
+        return self.scene.heights_above(MAX_ROUTE_SILL_M)
+
+    @cached_property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Bounds of the world, enlarged to contain all stops: (min x, min y, max x, max y) in m."""
+        return extend_bounds(self.scene.world.bounds, list(self.stops))
+
+    @cached_property
+    def _paths_around_fixed(self) -> SimplePaths | None:
+        """The fast search around the fixed solids of the world; None if a solid is too complex for it."""
+        return self.scene.cache.simple_paths(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
+
+    def _approximate_paths(self, solids: tuple[Solid, ...]) -> SimplePaths | None:
+        """Return the fast search; None if a solid is too complex for it."""
+        if solids is self.scene.world.solids:
+            return self._paths_around_fixed
+        return simple_paths_between(solids, self.scene.size.inscribed, self.z_range)
+
+    def _exact_paths(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
+        """Return the exact search."""
+        return self.scene.cache.shortest_paths(solids, self.bounds, self.scene.size.inscribed, self.z_range)
+
+
+class TriggerArea(NamedTuple):
+    """Area that the robot must enter before an event or a fault can start.
+
+    `keys` are those of the condition, and `event` is the name of the event or fault. `corners` has (x, y) in m, or a
+    single point. `distance` returns the distance in m of a pose from the area; it is at most 0 inside.
+    """
+
+    keys: Keys
+    event: str
+    description: str
+    corners: Polygon
+    distance: Callable[[Pose2], float]
+
+
+def trigger_areas(scene: Scene) -> list[TriggerArea]:
+    """Return the areas of all triggers of events and faults."""
+    spec = scene.loaded.spec
+    tests: list[tuple[Keys, str, AnyCondition | None]] = [
+        ((*step.keys, "when"), step.name, step.when) for step in spec.steps
+    ]
+    tests += [(("faults", k, "when"), fault.label, fault.when) for k, fault in enumerate(spec.faults)]
+    return [area for keys, name, test in tests if test is not None for area in _required_areas(scene, test, keys, name)]
+
+
+def _required_areas(scene: Scene, test: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
+    """Yield the areas that the robot must enter for the condition `test` of the event or fault `name` to be true."""
+    if not scene.loaded.includes_robot(test.robot) or test.any is not None or test.not_ is not None:
+        return
+    if test.all is not None:
+        for k, part in enumerate(test.all):
+            yield from _required_areas(scene, part, (*keys, "all", k), name)
+        return
+    keys = (*keys, test.kind)
+    match test.chosen if test.kind in ("robot_in", "robot_within") else None:
+        case RobotIn(region=region):
+            corners = scene.world.regions[region]
+            yield TriggerArea(keys, name, f"region `{region}`", corners, _distance_to_region(corners, 0.0))
+        case RobotWithin(region=str(region), distance=max_distance):
+            corners = scene.world.regions[region]
+            what = f"a position within {max_distance:g} m of region `{region}`"
+            yield TriggerArea(keys, name, what, corners, _distance_to_region(corners, max_distance))
+        case RobotWithin(of=[x, y], distance=max_distance):
+            what = f"a position within {max_distance:g} m of ({x:g}, {y:g})"
+            yield TriggerArea(keys, name, what, ((x, y),), lambda pose: pose.distance(Pose2(x, y)) - max_distance)
+        case _:
+            pass
+
+
+def _distance_to_region(corners: Polygon, max_distance: float) -> Callable[[Pose2], float]:
+    """Return the `distance` of the area that consists of a region and everything within `max_distance` m of it."""
+    return lambda pose: distance_to_polygon(pose, corners) - max_distance
+
+
+def robot_routes(scene: Scene) -> RobotRoutes:
+    """Return the routes between the start, all goals, and all trigger areas of a scene."""
+    corners = [Pose2(x, y) for area in scene.cached(trigger_areas) for x, y in area.corners]
+    return RobotRoutes(scene, (*scene.start_poses, *(goal.pose for _, goal in scene.targets), *corners))

@@ -1,0 +1,97 @@
+"""Load a file with criteria, by which logs are judged."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput, Problem
+from simscen.loading import multirobot
+from simscen.loading.files.assets import Assets, find_criterion_masks
+from simscen.loading.files.paths import PathSandbox
+from simscen.loading.loaded import CriterionMask, LoadedRobot, LoadedWorld
+from simscen.loading.named_places import NO_WORLD_HINT, place_references, places_of, resolve_places, unknown_places
+from simscen.loading.schema.messages import quoted
+from simscen.loading.schema.validate import check
+from simscen.loading.yaml.library import Library
+from simscen.loading.yaml.tree import MappingNode, key_position, value_position
+from simscen.model.scenario import CriteriaSpec
+
+
+@dataclass(frozen=True)
+class LoadedCriteria:
+    """Criteria of a file.
+
+    `lines` has the line of each criterion in `file`; 0 for criteria from a file that it extends. `masks` has the filter
+    masks of the criteria, by path as written. `library` is the reader of the file.
+    """
+
+    file: Path
+    spec: CriteriaSpec
+    lines: tuple[int, ...]
+    tree: MappingNode = field(repr=False)
+    library: Library = field(repr=False)
+    masks: Mapping[str, CriterionMask] = field(default_factory=dict)
+
+    def for_robot(self, robot: str) -> "LoadedCriteria":
+        """Return the criteria for a robot of a log; "" is the only robot of a log.
+
+        A file without `robots` applies to every robot. Raises InvalidInput if the robot is not in the `robots` of the
+        file.
+        """
+        trees = multirobot.split_by_robot(self.tree)
+        if robot in trees:
+            return _loaded(self.file, trees[robot], self.library)
+        if not trees:
+            return self
+        unknown = f"the log has a robot {quoted(robot)}, which is not listed here"
+        message = unknown if robot else "the log has one robot, but several are listed here"
+        problem = Problem(*key_position(self.tree, (multirobot.ROBOTS,)), code="SC030", message=message)
+        raise InvalidInput(self.library.with_source([problem]))
+
+    def load_world_and_robot(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
+        """Load the world and the robot that the file names; None if it names none. Raises InvalidInput."""
+        assets, robot = Assets(self.library), None
+        world = assets.world_of(self.spec.world, self.tree, self.file)
+        if self.spec.robot is not None:
+            robot = assets.robot(self.spec.robot.model, value_position(self.tree, ("robot", "model")))
+        if assets.problems:
+            raise InvalidInput(self.library.with_source(assets.problems))
+        return world, robot
+
+
+def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedCriteria:
+    """Load the criteria in the file `path`, merged with the files that it extends and with `defaults.yaml`.
+
+    Other files must lie in `root` or a folder of `world_path`. Raises InvalidInput with all problems.
+    """
+    library = Library(PathSandbox.around(root, world_path))
+    file = library.sandbox.resolve_argument(path)
+    if isinstance(file, Problem):
+        raise InvalidInput([file])
+    tree, problems = library.read(file, defaults=True)
+    if problems or not isinstance(tree, MappingNode):
+        spec = [] if problems or tree is None else check(CriteriaSpec, tree, multirobot.criteria_robot_problems)
+        raise InvalidInput(library.with_source([*problems, *(spec if isinstance(spec, list) else ())]))
+    spec = check(CriteriaSpec, tree, multirobot.criteria_robot_problems)
+    if isinstance(spec, list):
+        raise InvalidInput(library.with_source(spec))
+    return _loaded(file, tree, library)
+
+
+def _loaded(file: Path, tree: MappingNode, library: Library) -> LoadedCriteria:
+    """Return the criteria in a tree of `file`. Raises InvalidInput, for example for unknown places or masks."""
+    spec = check(CriteriaSpec, tree)
+    if isinstance(spec, list):
+        raise InvalidInput(library.with_source(spec))
+    assets = Assets(library)
+    masks = find_criterion_masks(spec, tree, assets)
+    if any(place_references(spec)):
+        known = places_of(assets.world_of(spec.world, tree, file))
+        assets.problems += unknown_places(spec, tree, known, NO_WORLD_HINT)
+        spec = resolve_places(spec, known)
+    if assets.problems:
+        raise InvalidInput(library.with_source(sorted(assets.problems)))
+    display_name = library.sandbox.display_name(file)
+    positions = [value_position(tree, ("pass", index)) for index in range(len(spec.pass_))]
+    lines = tuple(position.line if position.path == display_name else 0 for position in positions)
+    return LoadedCriteria(file, spec, lines, tree, library, masks)

@@ -1,0 +1,47 @@
+"""Problems of the variations of a scenario, merged so that a problem of several variations is reported once."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from simscen.core.errors import Problem
+from simscen.loading.schema.messages import quoted
+from simscen.loading.yaml.tree import Position
+
+
+class VariationProblems(NamedTuple):
+    """Problems of the variation called `name`.
+
+    `set_by` has the path that set a value, by the position of the value, for all values that the variation changes.
+    """
+
+    name: str
+    set_by: Mapping[Position, str]
+    problems: Sequence[Problem]
+
+
+def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
+    """Return each problem once, with a message that says which variations have it, and which varied path is its cause.
+
+    A problem that all variations have, and that is not at a varied value, is returned unchanged.
+    """
+    if len(variations) == 1 and not variations[0].name:
+        return list(dict.fromkeys(variations[0].problems))
+    variations_by_problem: dict[Problem, list[VariationProblems]] = {}
+    for variation in variations:
+        for problem in dict.fromkeys(variation.problems):
+            variations_by_problem.setdefault(problem, []).append(variation)
+    return sorted(
+        _with_variation_names(problem, affected, len(variations)) for problem, affected in variations_by_problem.items()
+    )
+
+
+def _with_variation_names(problem: Problem, affected: Sequence[VariationProblems], variation_count: int) -> Problem:
+    """Return a problem of the variations `affected` with a message that says which of them have it."""
+    path = affected[0].set_by.get(Position(problem.path, problem.line, problem.col))
+    names = [one.name for one in affected if one.name]
+    if not names or (path is None and len(names) == variation_count):
+        return problem
+    several = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    where = "in all variations" if len(names) == variation_count else f"in the variation {quoted(names[0])}{several}"
+    return replace(problem, message=f"{problem.message} ({f'{quoted(path)}, ' if path else ''}{where})")

@@ -1,0 +1,122 @@
+"""Write changed content over a YAML text, so that the parts that did not change keep their lines and comments."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import yaml
+
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.scalars import Dumper, to_yaml
+from simscen.loading.yaml.tree import MappingNode, SequenceNode
+
+LINE_WIDTH_CHARS = 100
+"""Width at which lists and mappings in new lines are broken."""
+
+
+def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str = "") -> str:
+    """Return `content` as YAML text. Top-level keys and list items that are equal in `text` keep their lines.
+
+    The lines of a key or item include the comments directly above it. `path` is the name of the file of `text`.
+    `comment` is put at the top, with `# ` before each of its lines. If lines cannot be kept, for example because they
+    refer to anchors in other lines, all of `content` is written anew.
+    """
+    original, _ = parse_yaml(text, path)
+    lines = text.splitlines()
+    known = original.plain if isinstance(original, MappingNode) else {}
+    segments = _segments(original, lines) if isinstance(original, MappingNode) else {}
+    head = "".join(f"# {line}\n" for line in comment.splitlines())
+    parts = [head]
+    for key, value in content.items():
+        if key in segments and known.get(key) == value:
+            parts.append(_block(segments[key]))
+        elif isinstance(original, MappingNode) and key in segments and isinstance(value, list):
+            parts.append(_list_text(key, value, original, lines, segments[key]))
+        else:
+            parts.append(_dumped({key: value}))
+    whole = "".join(parts)
+    written, problems = parse_yaml(whole, path)
+    if problems or written is None or written.plain != content:
+        return head + to_yaml(content)
+    return whole
+
+
+def _segments(original: MappingNode, lines: Sequence[str]) -> dict[str, list[str]]:
+    """Return the lines of each top-level key with the comments directly above it; {} if the mapping is in braces."""
+    keys = sorted(original.entries, key=lambda key: original.entries[key].key.line)
+    if any(original.entries[key].key.col != 1 for key in keys):
+        return {}
+    starts = [_with_comments(original.entries[key].key.line - 1, lines) for key in keys]
+    ends = [*starts[1:], len(lines)]
+    return {key: list(lines[start:end]) for key, start, end in zip(keys, starts, ends, strict=True)}
+
+
+def _with_comments(start: int, lines: Sequence[str]) -> int:
+    """Return the index of the first of the comment lines directly above the line `start`; `start` if there are none."""
+    while start > 0 and lines[start - 1].lstrip().startswith("#"):
+        start -= 1
+    return start
+
+
+def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequence[str], segment: Sequence[str]) -> str:
+    """Return the text of a top-level key with a list whose unchanged items keep their lines.
+
+    `lines` are all lines of the original text, `segment` are those of the key.
+    """
+    node = original.entries[key].value
+    start = original.entries[key].key.line - 1
+    if not isinstance(node, SequenceNode) or not value or not node.items:
+        return _dumped({key: value})
+    first_lines = [item.position.line - 1 for item in node.items]
+    on_own_lines = all(lines[line].lstrip().startswith("- ") for line in first_lines) and len(set(first_lines)) == len(
+        first_lines
+    )
+    if not on_own_lines or first_lines[0] == start:
+        return _dumped({key: value})
+    starts = [_with_comments(line, lines) for line in first_lines]
+    end = _with_comments(start, lines) + len(segment)
+    ends = [*starts[1:], end]
+    indent = len(lines[first_lines[0]]) - len(lines[first_lines[0]].lstrip())
+    texts = [_block(lines[first:last]) for first, last in zip(starts, ends, strict=True)]
+    head = _block(lines[_with_comments(start, lines) : starts[0]])
+    parts, rest = [], list(zip((item.plain for item in node.items), texts, strict=True))
+    for item in value:
+        same = next((index for index, (plain, _) in enumerate(rest) if plain == item), None)
+        if same is None:
+            parts.append(_indented(_dumped([item]), indent))
+        else:
+            parts.append(rest[same][1])
+            rest = rest[same + 1 :]
+    return head + "".join(parts)
+
+
+def _block(lines: Sequence[str]) -> str:
+    """Return lines as text, without blank lines at the end."""
+    trimmed = list(lines)
+    while trimmed and not trimmed[-1].strip():
+        trimmed.pop()
+    return "".join(f"{line}\n" for line in trimmed)
+
+
+def _indented(text: str, columns: int) -> str:
+    return "".join(f"{' ' * columns}{line}\n" for line in text.splitlines())
+
+
+def _dumped(data: Any) -> str:
+    """Return the YAML of a list or top-level mapping; only the innermost collections are in braces and brackets."""
+    if isinstance(data, dict):
+        return "".join(_entry(key, value) for key, value in data.items())
+    return _flow(data)
+
+
+def _entry(key: str, value: Any) -> str:
+    """Return a top-level key with its value, on the same line if that is short."""
+    text = _flow({key: value})
+    is_braced = text.startswith("{")
+    return f"{text.strip()[1:-1]}\n" if is_braced else text
+
+
+def _flow(data: Any) -> str:
+    text: str = yaml.dump(
+        data, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=LINE_WIDTH_CHARS, default_flow_style=None
+    )
+    return text
