@@ -12,7 +12,7 @@ import typer
 
 from simscen.bench.speed.measurement import Measurement, Measurements
 from simscen.cli.diagnostics import print_text
-from simscen.cli.installation import processor
+from simscen.cli.installation import describe_processor
 from simscen.core.errors import UsageError
 
 FORMAT = 1
@@ -30,7 +30,7 @@ class Result:
     @classmethod
     def on_this_machine(cls, figures: Measurements) -> "Result":
         """Return the result with the processor of this machine and the installed version of simscen."""
-        return cls(figures, processor(), version("simscen"))
+        return cls(figures, describe_processor(), version("simscen"))
 
 
 def as_json(result: Result, sections: dict[str, Any] | None = None) -> str:

@@ -28,7 +28,7 @@ def command(
         typer.Option(
             metavar="SCENARIO",
             help="Copy this scenario and the files it needs: a file, or the name of a shipped scenario.",
-            autocompletion=completions.shipped,
+            autocompletion=completions.scenarios_to_copy,
         ),
     ] = "",
     from_log: Annotated[

@@ -12,6 +12,7 @@ from typing import Annotated, TextIO
 import typer
 
 from simscen.cli.diagnostics import print_text
+from simscen.cli.process import discard_output
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.session_events import SessionEvent
 from simscen.report.console_reporter import text_reporter
@@ -62,9 +63,7 @@ class Screen:
             yield
         except OSError as error:
             self.stdout_error = self.stdout_error or error
-            null = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(null, sys.stdout.fileno())
-            os.close(null)
+            discard_output(sys.stdout.fileno())
 
     def append_summary(self, text: str) -> None:
         """Append to the file that GitHub Actions shows as the summary of a step."""
