@@ -18,8 +18,8 @@ from _pytest._code.code import ReprEntryNative, ReprExceptionInfo, ReprFileLocat
 
 import simscen
 from simscen.cli.diagnostics import as_text
-from simscen.cli.session.selection import Checks, world_problems
-from simscen.cli.session.stacks import stacks_of
+from simscen.cli.session.file_checks import FileChecker, world_problems
+from simscen.cli.session.stacks import parse_stacks
 from simscen.core.errors import InvalidInput, SimscenError, UsageError
 from simscen.core.records.case import Run
 from simscen.core.records.run_result import Outcome
@@ -136,13 +136,13 @@ class ScenarioFile(pytest.File):
         config = self.config
         root, world_path = default_root([self.path]), config.getini("simscen_world_path")
         chosen = config.getoption("--simscen-stack") or config.getini("simscen_stack")
-        checks = Checks(root, world_path, fast=True, stacks=stacks_of(chosen, root, world_path))
+        checker = FileChecker(root, world_path, fast=True, stacks=parse_stacks(chosen, root, world_path))
         options = SessionOptions(seed=_seed(config), repeat=config.getoption("--simscen-repeat"))
-        for choice in checks.choices:
-            scenarios, problems = checks.scenario(self.path, choice)
+        for choice in checker.choices:
+            scenarios, problems = checker.check_scenario(self.path, choice)
             _raise_errors(problems)
             for scenario in scenarios:
-                loaded = scenario.with_changes(several_stacks=len(checks.choices) > 1)
+                loaded = scenario.with_changes(several_stacks=len(checker.choices) > 1)
                 for seed in scenario_seeds(loaded, options):
                     every_seed = options.repeat > 1
                     yield ScenarioRun.create(self, loaded, seed, every_seed)

@@ -82,9 +82,9 @@ def command(
     from simscen.cli.benchmarks.navigation_experiments import Sizes, available_experiments
     from simscen.cli.benchmarks.navigation_runs import completed_trials, execute_experiments, summarize_experiment
     from simscen.cli.benchmarks.navigation_table import as_json, as_text
-    from simscen.cli.session.run_session import output_folder
+    from simscen.cli.session.run_session import open_output_folder
 
-    folder, journal = output_folder(out, resume)
+    folder, journal = open_output_folder(out, resume)
     generated = folder / "generated"
     generated.mkdir(exist_ok=True)
     experiments: list[Experiment] = []

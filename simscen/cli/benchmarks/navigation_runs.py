@@ -11,9 +11,9 @@ from simscen.bench.navigation.experiments import Drive, Experiment
 from simscen.bench.navigation.summary import Row, Trial, mean, summarize
 from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
-from simscen.cli.session.backends import backend_of, signals_interrupt
+from simscen.cli.session.backends import backend_of, interrupt_on_signals
+from simscen.cli.session.file_checks import world_problems
 from simscen.cli.session.pending_runs import plan_session
-from simscen.cli.session.selection import world_problems
 from simscen.core.errors import Exit, InvalidInput
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionEvent
@@ -77,7 +77,7 @@ def execute_experiments(
         progress(event)
 
     options = SessionOptions(workers=workers, wall_limit=WALL_LIMIT_S)
-    with signals_interrupt(), backend_of(options) as backend:
+    with interrupt_on_signals(), backend_of(options) as backend:
         finished_runs, stopped = run_session(pending.jobs, options, backend, listen)
     print_progress("")
     results = {finished.key: finished for finished in (*pending.reused, *finished_runs)}

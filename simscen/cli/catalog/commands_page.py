@@ -38,7 +38,7 @@ class Parameter:
     help: str
 
 
-def commands_of(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
+def functions_of_command(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
     """Yield the functions of a command and its subcommands, each with the words that call it."""
     module = importlib.import_module(f"simscen.cli.commands.{name}")
     app = getattr(module, "app", None)

@@ -4,7 +4,7 @@ import sys
 from itertools import groupby
 from pathlib import Path
 
-from simscen.cli.catalog.commands_page import commands_of, exit_code_section, section
+from simscen.cli.catalog.commands_page import exit_code_section, functions_of_command, section
 from simscen.cli.catalog.json_schema import MODELS, as_text, schema_of
 from simscen.cli.catalog.reference_topics import metrics_page, signals_page
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, topics
@@ -108,7 +108,7 @@ def commands_page() -> str:
     """Return docs/reference/commands.md."""
     rows = "\n".join(f"| `simscen {name}` | {text} |" for name, text in COMMANDS.items())
     intro = "# Commands\n\n`simscen COMMAND --help` prints the same."
-    sections = [section(command, function) for name in COMMANDS for command, function in commands_of(name)]
+    sections = [section(command, function) for name in COMMANDS for command, function in functions_of_command(name)]
     table = f"| command | what it does |\n|---|---|\n{rows}\n"
     return "\n".join([f"{_GENERATED_NOTE}{intro}\n\n{table}", *sections, exit_code_section()])
 

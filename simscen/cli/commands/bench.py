@@ -108,14 +108,14 @@ def suite_command(
     """
     from simscen.cli.process import engine_output_on_stderr
     from simscen.cli.session.backends import FORK_SERVER
-    from simscen.cli.session.selection import Selection, load_all
+    from simscen.cli.session.selection import Selection, load_selection
 
     before = load_baseline(compare)
     workers = jobs or len(os.sched_getaffinity(0))
     with engine_output_on_stderr(), TemporaryDirectory() as folder:
         from simscen.bench.speed.session_speed import evenly_spaced, measure_suite
 
-        scenarios, _ = load_all(paths or [Path("scenarios")], None, (), False, Selection())
+        scenarios, _ = load_selection(paths or [Path("scenarios")], None, (), False, Selection())
         suite = measure_suite(evenly_spaced(scenarios, most), workers, Path(folder), FORK_SERVER, print_progress)
     print_result(Result.on_this_machine(suite.figures), suite_text(suite), {"suite": asdict(suite)}, format_, before)
     if suite.unfinished:

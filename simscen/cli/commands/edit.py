@@ -58,11 +58,11 @@ def command(
     edited, text = _edited_file(file, new, map_, root, tuple(world_path or ()), lenient)
     if stack is not None and edited.kind != "scenario":
         raise UsageError("--stack has no effect on a world, which does not run; edit a scenario")
-    from simscen.cli.session.stacks import stacks_of
+    from simscen.cli.session.stacks import parse_stacks
     from simscen.editor.server import EditorServer
     from simscen.editor.session import EditorSession
 
-    stacks = stacks_of([] if stack is None else [stack], edited.root, edited.world_path)
+    stacks = parse_stacks([] if stack is None else [stack], edited.root, edited.world_path)
     chosen = next(iter(stacks.chosen), None)
     session = EditorSession(edited, _backend, text, lenient, chosen, stacks.with_command)
     try:

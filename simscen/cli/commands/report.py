@@ -8,7 +8,7 @@ import typer
 
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports, exit_code, require_writable
-from simscen.cli.session.terminal import Format, FormatOption, screen
+from simscen.cli.session.terminal import Format, FormatOption, open_screen
 from simscen.core.errors import Exit, UsageError
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.judge.metrics.session_summary import session_summary_line
@@ -66,7 +66,7 @@ def write_reports(
     require_writable(junit, folder)
     reports = Reports(folder, junit, junit_family.value, junit_only=only_junit)
     finished_runs = past.runs
-    with screen(format_) as output:
+    with open_screen(format_) as output:
         output(past.start_event(folder))
         for finished in finished_runs:
             output(finished)

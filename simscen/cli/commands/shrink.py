@@ -9,8 +9,8 @@ import typer
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, backend_of, workers_and_cluster
+from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.output_files import save
-from simscen.cli.session.selection import Checks
 from simscen.cli.session.shrinking import (
     CandidateRuns,
     Failure,
@@ -20,7 +20,7 @@ from simscen.cli.session.shrinking import (
     only_failing,
     with_inline_world,
 )
-from simscen.cli.session.stacks import stacks_of
+from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.shared_options import (
     JobsOption,
     LenientOption,
@@ -88,7 +88,7 @@ def command(
     """
     chosen = _chosen_run(run, seed, variation, stack)
     root_folder = root if root is not None else default_root([chosen.file])
-    stacks = stacks_of([] if chosen.stack is None else [chosen.stack], root_folder, world_path or ())
+    stacks = parse_stacks([] if chosen.stack is None else [chosen.stack], root_folder, world_path or ())
     scenario = ChangedScenario(
         chosen.file, root_folder, world_path or (), next(iter(stacks.chosen), None), chosen.variation
     )
@@ -97,12 +97,12 @@ def command(
         raise UsageError(f"{target} exists already; choose another file with --out")
     workers, cluster = workers_and_cluster(workers, backend, address)
     options = SessionOptions(workers, wall_limit=wall_limit, cluster=cluster)
-    checks = Checks(root_folder, world_path or (), lenient, stacks=stacks)
+    checker = FileChecker(root_folder, world_path or (), lenient, stacks=stacks)
     own_seed = child(scenario.tree, "seed")
     first_seed = chosen.seed or (own_seed.plain if own_seed is not None and isinstance(own_seed.plain, int) else 1)
     try:
         with backend_of(options) as processes:
-            candidates = CandidateRuns(scenario, checks, options, processes, first_seed, runs)
+            candidates = CandidateRuns(scenario, checker, options, processes, first_seed, runs)
             shrinking, before = _shrink(candidates, criterion, keep, keep_world)
     except Stopped as stopped:
         sys.exit(stopped.exit)

@@ -11,8 +11,8 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import as_github, as_json, as_text, print_text, relative_to_working_folder
-from simscen.cli.session.selection import Checks
-from simscen.cli.session.stacks import stacks_of
+from simscen.cli.session.file_checks import FileChecker
+from simscen.cli.session.stacks import parse_stacks
 from simscen.core.errors import Exit, Problem
 from simscen.loading.checks.files import CHECKED_DRAWS, STACK_KINDS, check_file, file_kind
 from simscen.loading.files.discovery import SUFFIXES, default_root, discover
@@ -56,27 +56,29 @@ def command(
     Exit code 0: all files are valid; 2: a file is invalid; 5: no files found.
     """
     root_folder = root if root is not None else default_root(paths)
-    stacks = stacks_of(stack or [], root_folder, world_path or [])
-    checks = Checks(root_folder, world_path or [], lenient, fast, picture, stacks=stacks, runs=bool(stack))
+    stacks = parse_stacks(stack or [], root_folder, world_path or [])
+    checker = FileChecker(
+        root_folder, world_path or [], lenient, fast, picture, stacks=stacks, requires_commands=bool(stack)
+    )
     checked = _Checked()
     for file in discover(paths, root_folder, SUFFIXES):
         kind = file_kind(file, root_folder)
-        checked.add(kind, relative_to_working_folder(_problems(kind, file, checks), root_folder))
+        checked.add(kind, relative_to_working_folder(_problems(kind, file, checker), root_folder))
     _PRINT[format_](checked)
     if checked.invalid_files:
         sys.exit(Exit.USAGE)
 
 
-def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
+def _problems(kind: str, file: Path, checker: FileChecker) -> list[Problem]:
     """Return the problems of the text; if there are no errors, also those of building the world or robot."""
     if kind in ("scenario", "study"):
         numbers = CHECKED_DRAWS if kind == "study" else None
-        found = [problem for choice in checks.choices for problem in checks.scenario(file, choice, numbers)[1]]
+        found = [problem for choice in checker.choices for problem in checker.check_scenario(file, choice, numbers)[1]]
         return list(dict.fromkeys(found))
-    found = check_file(kind, file, checks.root, checks.world_path)
+    found = check_file(kind, file, checker.root, checker.world_path)
     if kind in (*STACK_KINDS, "base") or any(problem.severity == "error" for problem in found):
         return found
-    check_built = checks.robot if kind == "robot" else checks.world
+    check_built = checker.check_robot if kind == "robot" else checker.check_world
     return [*found, *check_built(file)]
 
 

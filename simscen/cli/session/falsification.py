@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
 
-from simscen.cli.session.backends import backend_of, signals_interrupt
+from simscen.cli.session.backends import backend_of, interrupt_on_signals
+from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.output_files import JunitFamily, Reports, require_writable
 from simscen.cli.session.pending_runs import plan_runs
-from simscen.cli.session.run_session import output_folder
-from simscen.cli.session.selection import Checks
-from simscen.cli.session.stacks import stacks_of
-from simscen.cli.session.terminal import Format, Screen, screen
+from simscen.cli.session.run_session import open_output_folder
+from simscen.cli.session.stacks import parse_stacks
+from simscen.cli.session.terminal import Format, Screen, open_screen
 from simscen.core.errors import Exit, InvalidInput, Problem
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
@@ -84,10 +84,10 @@ def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
     """Run a search and write its reports and the failures it finds. Raises InvalidInput and UsageError."""
     falsification = Falsification(request)
     require_writable(request.junit, request.out, [request.file])
-    folder, journal = output_folder(request.out, None)
+    folder, journal = open_output_folder(request.out, None)
     reports = Reports(folder, request.junit, request.junit_family.value)
     reports.begin()
-    with screen(request.format_) as output, backend_of(request.options) as backend:
+    with open_screen(request.format_) as output, backend_of(request.options) as backend:
         return output.exit(falsification.execute(backend, journal, reports, output)), falsification
 
 
@@ -98,14 +98,14 @@ class Falsification:
         """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
         self._request = request
         root_folder = request.root if request.root is not None else default_root([request.file])
-        stacks = stacks_of([] if request.stack is None else [request.stack], root_folder, request.world_path)
+        stacks = parse_stacks([] if request.stack is None else [request.stack], root_folder, request.world_path)
         choice = next(iter(stacks.chosen), None)
         self._scenario = ChangedScenario(request.file, root_folder, request.world_path, choice, None)
         space = search_space(self._scenario.merged_tree)
         if not isinstance(space, SearchSpace):
             raise InvalidInput(space)
         self._space = space
-        self._checks = Checks(root_folder, request.world_path, request.lenient, stacks=stacks)
+        self._checker = FileChecker(root_folder, request.world_path, request.lenient, stacks=stacks)
         self._search: Search = make_search(request.method, space.choices, request.search_seed)
         self._variations: dict[str, Variation] = {}
         self._planned: list[PlannedRun] = []
@@ -131,7 +131,7 @@ class Falsification:
             valid = [job for job in jobs if job is not None]
             empty_batches = 0 if valid else empty_batches + 1
             self._plan(journal, valid)
-            with signals_interrupt():
+            with interrupt_on_signals():
                 finished_runs, stopped = run_session(valid, self._request.options, backend, listen)
             by_key = {finished.key: finished for finished in finished_runs}
             ordered = [None if job is None else by_key[job.key] for job in jobs]
@@ -199,7 +199,9 @@ class Falsification:
         if isinstance(loaded, list):
             self._problems = loaded
             return None
-        checked, problems = self._checks.variation(loaded.with_changes(variation=name, varied_values=variation.values))
+        checked, problems = self._checker.check_variation(
+            loaded.with_changes(variation=name, varied_values=variation.values)
+        )
         if checked is None:
             self._problems = problems
         return checked

@@ -8,8 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TypeVar
 
-from simscen.cli.session.backends import signals_interrupt
-from simscen.cli.session.selection import Checks
+from simscen.cli.session.backends import interrupt_on_signals
+from simscen.cli.session.file_checks import FileChecker
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.verdict import Status, Verdict
@@ -85,7 +85,7 @@ class CandidateRuns:
     """
 
     scenario: ChangedScenario
-    checks: Checks
+    checker: FileChecker
     options: SessionOptions
     backend: Backend
     seed: int
@@ -124,7 +124,7 @@ class CandidateRuns:
     def load(self, tree: MappingNode) -> LoadedScenario | None:
         """Load and check a candidate; None if it is invalid."""
         found = self.scenario.load(tree)
-        return None if isinstance(found, list) else self.checks.variation(found)[0]
+        return None if isinstance(found, list) else self.checker.check_variation(found)[0]
 
     def _run(self, scenarios: Sequence[LoadedScenario]) -> list[RunResult]:
         named = [scenario.with_changes(variation=f"candidate-{number}") for number, scenario in enumerate(scenarios)]
@@ -133,7 +133,7 @@ class CandidateRuns:
                 Job(number, scenario, scenario.key(self.seed), Path(folder, str(number)), self.options.wall_limit)
                 for number, scenario in enumerate(named)
             ]
-            with signals_interrupt():
+            with interrupt_on_signals():
                 finished_runs, stopped = run_session(jobs, self.options, self.backend, lambda _: None)
         if stopped is not None:
             raise Stopped(stopped)

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from simscen.cli.diagnostics import as_text, escaped, print_text
-from simscen.cli.session.backends import backend_of, signals_interrupt
+from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
 from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_reused
-from simscen.cli.session.run_session import output_folder
-from simscen.cli.session.selection import Selection, load_all
-from simscen.cli.session.stacks import commands_of
-from simscen.cli.session.terminal import Format, Screen, screen
+from simscen.cli.session.run_session import open_output_folder
+from simscen.cli.session.selection import Selection, load_selection
+from simscen.cli.session.stacks import external_commands
+from simscen.cli.session.terminal import Format, Screen, open_screen
 from simscen.core.errors import Exit, InvalidInput, NothingSelected, Problem, UsageError
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_store import RunStore
@@ -79,11 +79,11 @@ def execute_study(request: StudyRequest) -> Exit:
     study = _StudySession(request)
     first = study.load_first_batch()
     require_writable(request.junit, request.out or request.resume, study.inputs)
-    folder, journal = output_folder(request.out, request.resume)
-    used = {"plugins": plugin_packages(plugins_of_all(first)), "stacks": commands_of(first)}
+    folder, journal = open_output_folder(request.out, request.resume)
+    used = {"plugins": plugin_packages(plugins_of_all(first)), "stacks": external_commands(first)}
     reports = Reports(folder, request.junit, request.junit_family.value, used=used)
     reports.begin()
-    with screen(request.format_) as output, backend_of(request.options) as backend:
+    with open_screen(request.format_) as output, backend_of(request.options) as backend:
         return output.exit(study.execute(backend, journal, reports, output))
 
 
@@ -151,7 +151,7 @@ class _StudySession:
             write_reused(journal, reused)
             for finished in reused:
                 show(finished)
-            with signals_interrupt():
+            with interrupt_on_signals():
                 done, stopped = run_session(remaining, self._request.options, backend, listen)
             journal.complete([*reused, *done])
             finished_runs.extend([*reused, *done])
@@ -213,7 +213,7 @@ class _StudySession:
         names = [f"variation-{number}" for number in dict.fromkeys(numbers) if number is not None]
         missing = [number for number in dict.fromkeys(numbers) if number not in self._loaded]
         if missing:
-            found, warnings = load_all(
+            found, warnings = load_selection(
                 [request.file],
                 request.root,
                 request.world_path,

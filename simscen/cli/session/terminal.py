@@ -86,7 +86,7 @@ class Screen:
 
 
 @contextmanager
-def screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
+def open_screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
     """Print a session on stdout, and on GitHub also as the summary of the step. Raises UsageError if that is not
     writable.
 

@@ -5,13 +5,19 @@ import re
 import pytest
 import typer
 
-from simscen.cli.catalog.commands_page import EXIT_CODES, commands_of, exit_code_section, parameters_of, section
+from simscen.cli.catalog.commands_page import (
+    EXIT_CODES,
+    exit_code_section,
+    functions_of_command,
+    parameters_of,
+    section,
+)
 from simscen.cli.main import COMMANDS, app
 from simscen.core.errors import Exit
 
 
 def calls():
-    return [(words, function) for name in COMMANDS for words, function in commands_of(name)]
+    return [(words, function) for name in COMMANDS for words, function in functions_of_command(name)]
 
 
 def typers_own(words):
