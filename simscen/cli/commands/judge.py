@@ -68,7 +68,7 @@ def command(
         *((str(file), judging.judge(file, is_only_log=len(files) + len(without_log) == 1)) for file in files),
         *without_log,
     ]
-    if foreign != ForeignLogOptions() and not judging.foreign:
+    if foreign != ForeignLogOptions() and not judging.foreign_count:
         judging.notes.append("logs of simscen contain truth and times; options for logs of real robots have no effect")
     for note in judging.notes:
         print_text(f"note: {escaped(note)}", sys.stderr)

@@ -9,7 +9,7 @@ import typer
 
 from simscen.bench.localization.recorded_drive import Errors, Localized, compare_with_reference, localize
 from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.geometry import Pose2

@@ -10,7 +10,7 @@ from simscen.cli import completions
 from simscen.cli.completions import shipped_scenarios
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.from_log import FromLogOptions, write_scenario_from_log
-from simscen.cli.session.new_file import create_file
+from simscen.cli.session.user_files import create_file
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
 from simscen.loading.files.discovery import BASE_SUFFIXES, SCENARIO_SUFFIXES, default_root

@@ -8,7 +8,7 @@ import typer
 
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.logs import log_file, recorded_result
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.record.log_header import scenery_from_header

@@ -11,7 +11,7 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.judging import LogJudge
 from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, find_logs
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.cli.shared_options import (
     RootOption,
     SameFrameOption,

@@ -7,7 +7,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports, exit_code, require_writable
+from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports, exit_code, require_writable_junit
 from simscen.cli.session.terminal import Format, FormatOption, open_screen
 from simscen.core.errors import Exit, UsageError
 from simscen.judge.metrics.comparison import compare_stacks
@@ -63,7 +63,7 @@ def write_reports(
     only_junit: bool,
 ) -> NoReturn:
     """Write the reports of an output folder from its journal, print the session, and exit with its code."""
-    require_writable(junit, folder)
+    require_writable_junit(junit, folder)
     reports = Reports(folder, junit, junit_family.value, junit_only=only_junit)
     finished_runs = past.runs
     with open_screen(format_) as output:

@@ -11,7 +11,7 @@ import typer
 
 from simscen.cli.diagnostics import as_json as problems_as_json
 from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_working_folder
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.errors import Exit, InvalidInput
 from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import RobotFile, load_robot_file

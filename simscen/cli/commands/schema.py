@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.version import PACKAGE
 from simscen.spec.registry import GROUPS, installed
 

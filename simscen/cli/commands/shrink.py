@@ -10,17 +10,17 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, backend_of, workers_and_cluster
 from simscen.cli.session.file_checks import FileChecker
-from simscen.cli.session.output_files import save
 from simscen.cli.session.shrinking import (
     CandidateRuns,
     Failure,
-    Shrinking,
+    Shrinker,
     Stopped,
     failure_of,
-    only_failing,
     with_inline_world,
+    with_only_failed_criterion,
 )
 from simscen.cli.session.stacks import parse_stacks
+from simscen.cli.session.user_files import save
 from simscen.cli.shared_options import (
     JobsOption,
     LenientOption,
@@ -103,14 +103,14 @@ def command(
     try:
         with backend_of(options) as processes:
             candidates = CandidateRuns(scenario, checker, options, processes, first_seed, runs)
-            shrinking, before = _shrink(candidates, criterion, keep, keep_world)
+            shrinker, before = _shrink(candidates, criterion, keep, keep_world)
     except Stopped as stopped:
         sys.exit(stopped.exit)
-    comment = _comment(chosen, shrinking, first_seed)
-    text = changed_text(scenario.text, scenario.path, shrinking.tree.plain, comment)
+    comment = _comment(chosen, shrinker, first_seed)
+    text = changed_text(scenario.text, scenario.path, shrinker.tree.plain, comment)
     save(target, lambda file: write_atomically(file, text.encode()))
-    _print_summary(shrinking, before, target, chosen.stack)
-    sys.exit(Exit.PASSED if shrinking.is_complete else Exit.FAILED)
+    _print_summary(shrinker, before, target, chosen.stack)
+    sys.exit(Exit.PASSED if shrinker.is_complete else Exit.FAILED)
 
 
 class ChosenRun:
@@ -144,7 +144,7 @@ def _folder_name(key: RunKey) -> str:
     return f"{key.scenario}/{key.folder}"
 
 
-def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinking, MappingNode]:
+def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinker, MappingNode]:
     """Run and shrink the scenario; return also the scenario before. Raises UsageError if it does not fail."""
     scenario = candidates.scenario
     (first,) = candidates.results([scenario.tree])
@@ -152,21 +152,21 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
         raise UsageError(f"{scenario.file} is not valid; see simscen validate")
     failure = failure_of(first, criterion, keep)
     print_text(f"the run fails: {_failure_text(first, failure)}")
-    tree = only_failing(scenario.tree, failure, candidates.seed)
+    tree = with_only_failed_criterion(scenario.tree, failure, candidates.seed)
     if not keep_world and (loaded := candidates.load(tree)) is not None:
         inline = with_inline_world(tree, loaded.world.tree)
         if inline is not None and candidates.first_accepted([inline], failure.occurs_in) is not None:
             tree = inline
-    shrinking = Shrinking(candidates, failure, tree)
+    shrinker = Shrinker(candidates, failure, tree)
     if sys.stderr.isatty():
-        candidates.report = lambda: _show_progress(candidates.runs, _size(shrinking.tree))
+        candidates.report = lambda: _show_progress(candidates.runs, _size(shrinker.tree))
     if candidates.first_accepted([tree], failure.occurs_in) is None:
         raise UsageError("the run does not fail any more with this criterion alone; this is a bug in simscen")
     nominal = {change.target.keys: _value_at(scenario.base_tree, change.target.keys) for change in scenario.changes}
-    shrinking.shrink({keys: value for keys, value in nominal.items() if keys[0] in tree.entries})
+    shrinker.shrink({keys: value for keys, value in nominal.items() if keys[0] in tree.entries})
     if sys.stderr.isatty():
         print_text("", sys.stderr)
-    return shrinking, tree
+    return shrinker, tree
 
 
 def _show_progress(runs: int, size: int) -> None:
@@ -204,20 +204,20 @@ def _failure_text(result: RunResult, failure: Failure) -> str:
     return verdict.id if finding is None else f"{verdict.id}: {finding.measured} (limit {finding.limit})"
 
 
-def _comment(chosen: ChosenRun, shrinking: Shrinking, seed: int) -> str:
+def _comment(chosen: ChosenRun, shrinker: Shrinker, seed: int) -> str:
     source = f"{chosen.file.name}, seed {seed}" + (f", {chosen.variation}" if chosen.variation else "")
-    failure = shrinking.failure.verdict_id or "an error of the stack"
+    failure = shrinker.failure.verdict_id or "an error of the stack"
     return f"The smallest scenario that simscen shrink found to fail in {failure}, from {source}."
 
 
-def _print_summary(shrinking: Shrinking, before: MappingNode, target: Path, stack: str | None) -> None:
+def _print_summary(shrinker: Shrinker, before: MappingNode, target: Path, stack: str | None) -> None:
     for title, texts in (
-        ("not needed:", removed_parts(before, shrinking.tree)),
-        ("simplified:", changed_values(before, shrinking.tree)),
+        ("not needed:", removed_parts(before, shrinker.tree)),
+        ("simplified:", changed_values(before, shrinker.tree)),
     ):
         if texts:
             print_text("\n".join([title, *(f"  {escaped(text)}" for text in texts)]))
-    incomplete = "" if shrinking.is_complete else ", which did not suffice to try everything; see --runs"
-    print_text(f"{_size(shrinking.tree)} values left after {shrinking.runs.runs} runs{incomplete}")
+    incomplete = "" if shrinker.is_complete else ", which did not suffice to try everything; see --runs"
+    print_text(f"{_size(shrinker.tree)} values left after {shrinker.runs.runs} runs{incomplete}")
     option = "" if stack is None else f" --stack {escaped(stack)}"
     print_text(f"wrote {escaped(str(target))}; try: simscen run {escaped(display_path(target))}{option}")

@@ -11,7 +11,7 @@ import typer
 from pydantic import ValidationError
 
 from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_working_folder
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.builders import world_from_file

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
-from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
+from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable_junit
 from simscen.cli.session.pending_runs import PendingRuns, failed_runs, plan_session
 from simscen.cli.session.selection import Selection, load_selection
 from simscen.cli.session.stacks import external_commands
@@ -82,7 +82,7 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
     if request.last_failed:
         options = replace(options, only=_last_failed(scenarios, request))
     inputs = {file for each in scenarios for file in (*each.files.values(), *each.read_files)}
-    require_writable(request.junit, request.out or request.resume, inputs)
+    require_writable_junit(request.junit, request.out or request.resume, inputs)
     folder, journal = open_output_folder(request.out, request.resume)
     used = {"plugins": plugin_packages(plugins_of_all(scenarios)), "stacks": external_commands(scenarios)}
     reports = Reports(folder, request.junit, request.junit_family.value, used=used)

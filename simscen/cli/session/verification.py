@@ -1,4 +1,4 @@
-"""Verification of a reconstructed scenario for `simscen new --from-log --verify`: a table and a page."""
+"""Runs a reconstructed scenario and compares the run with the log, for `simscen new --from-log --verify`."""
 
 from __future__ import annotations
 
@@ -15,20 +15,22 @@ from rich.table import Table
 from rich.text import Text
 
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.errors import Exit, RunError
 from simscen.reconstruction.scenario_from_log import Reconstruction
 from simscen.reconstruction.verifying.comparison import Verification, compare_with_run
 from simscen.reconstruction.verifying.page import verification_page
 
 PAGE_SUFFIX = ".verified.html"
+"""End of the name of the page, after the name of the scenario."""
 MAX_COLUMNS = 100
+"""Width of the table in characters if stdout is not a terminal."""
 
 
 def verify_reconstruction(made: Reconstruction) -> None:
-    """Run the scenario, print how near the run comes to the log, and write a page with both.
+    """Run the scenario, print a table of the differences between run and log, and write a page that shows both.
 
-    Exits with code 1 if an incident of the log does not happen again.
+    Exits with code 1 if an incident of the log, such as a collision, does not happen in the run.
     """
     name = made.file.name.partition(".")[0]
     log = made.file.with_name(f"{name}.verified.mcap")
