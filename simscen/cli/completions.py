@@ -28,7 +28,7 @@ def files(incomplete: str) -> list[str]:
 
 def topics(incomplete: str) -> list[str]:
     """Return the names that `explain` knows; for an argument with a dot, the keys of topics."""
-    from simscen.cli.catalog.reference_topics import known_names
+    from simscen.cli.catalog.topic_lookup import known_names
 
     names = known_names(keys="." in incomplete)
     return [name for name in names if name.startswith(incomplete)]
