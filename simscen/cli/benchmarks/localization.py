@@ -1,17 +1,16 @@
-"""Command `simscen bench localization`, which measures the accuracy of AMCL."""
+"""Command `simscen bench localization`: measures the accuracy of AMCL."""
 
 import json
 import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
-from enum import Enum
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simscen.cli.benchmarks.navigation_table import align_columns, fits, label_cells, wrap_lines
-from simscen.cli.benchmarks.results import print_progress
+from simscen.cli.benchmarks.results import Format, print_progress
+from simscen.cli.benchmarks.tables import align_columns, fits, label_cells, wrap_lines
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import NothingSelected, UsageError
 from simscen.loading.schema.messages import quoted
@@ -20,13 +19,6 @@ from simscen.report.display_text import detect_style
 if TYPE_CHECKING:
     from simscen.bench.localization.campaign import Consistency, Interval, Row, Share, Trial
     from simscen.bench.localization.sparse_logs import SparseTrial
-
-
-class Format(str, Enum):
-    """Output format."""
-
-    TEXT = "text"
-    JSON = "json"
 
 
 def command(
@@ -46,15 +38,15 @@ def command(
 ) -> None:
     """Measure the accuracy of AMCL on generated logs.
 
-    The buildings are asymmetric office floors of 40 m and more, with a lidar of 181 or 361 beams over 180°, odometry of
-    slipping wheels, people, moved furniture, and glass. Each has eleven logs: five with a known start, two in a
-    building as mapped, with clean and with raw odometry, one with an unknown start, one with half of the floor rebuilt,
-    one with a map of the other half only, and one of a kidnapped robot. Each log is evaluated with Nav2's parameters,
-    simscen's defaults, and parameters for a consistent covariance. Intervals are by bootstrap over buildings. Lost
-    robots are listed on standard error. Takes a few minutes on two cores.
+    The buildings are asymmetric office floors of 40 m and more with people, moved furniture, and glass. The robot has a
+    lidar of 181 or 361 beams over 180° and wheels that slip. Each building has eleven logs: five with a known start;
+    two in the building as it was mapped, without and with slip; one with an unknown start; one in which half of the
+    floor was rebuilt after mapping; one with a map of only half of the floor; and one of a kidnapped robot. Each log is
+    evaluated with several sets of parameters, including Nav2's and simscen's defaults. Intervals are by bootstrap over
+    buildings. Lost robots are listed on standard error. Takes a few minutes on two cores.
 
-    With --sparse, the scans are 1 m or 0.5 rad apart, as in many public data sets. Each cell then shows lost runs,
-    median error, and error at the end.
+    With --sparse, the scans are 1 m or 0.5 rad apart, as in many public data sets. Each cell of the table then shows
+    the number of lost runs, the median error, and the error at the end.
     """
     from simscen.bench.localization.campaign import PARAMETER_SETS, run_buildings, summarize
 
@@ -116,11 +108,11 @@ COLUMN_NAMES = {
     "tracked": "tracked", "unknown": "start unknown", "outdated": "half rebuilt", "half": "half a map",
     "kidnapped": "kidnapped",
 }  # fmt: skip
-"""Circumstances of the logs and their column names in the table."""
+"""Heading of the column for each circumstance of the logs."""
 
 
 def as_text(rows: "Sequence[Row]", columns: int | None = None) -> str:
-    """Return one line per set of parameters, then the consistency of each, in at most `columns`."""
+    """Return one line per set of parameters, then the consistency of each, wrapped at `columns` (None: unlimited)."""
     head = ("parameters", *COLUMN_NAMES.values(), "median error", "ms a scan", "slowest")
     table = [_cells(row) for row in rows]
     lines = align_columns([head, *table], str.ljust)

@@ -1,4 +1,4 @@
-"""`simscen edit`."""
+"""Command `simscen edit`: starts the editor for a scenario or a world."""
 
 import os
 import signal
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from simscen.run.process.jobs import Backend
 
 SUFFIX = SCENARIO_SUFFIXES[0]
+"""End of the name of a new scenario."""
 
 
 def command(
@@ -47,11 +48,11 @@ def command(
 ) -> None:
     """Edit a scenario or a world on its map, in a browser.
 
-    The page shows the map and the text of the file side by side. Changes on the map or in a form change only the values
-    that they are about; comments, order, and formatting stay. Problems are shown while you edit. Nothing is written
-    until you save, and a file that another program changed is not overwritten without asking. Run simulates the text
-    without saving it. The page is served on this machine only, at an address with a secret token, until you press
-    Ctrl-C.
+    The page shows the map and the text of the file side by side. An edit on the map or in a form changes only its own
+    values in the text; comments, order, and formatting stay. Problems are shown while you edit. Nothing is written
+    until you save. If another program has changed the file, the page asks before it overwrites the file. The button Run
+    simulates the text without saving it. The page is served on this machine only, at an address with a secret token,
+    until you press Ctrl-C.
 
     Exit code 0: ended with Ctrl-C; 2: the file or an option is unusable.
     """
@@ -99,7 +100,7 @@ def _edited_file(
     world_path: tuple[Path, ...],
     lenient: bool,
 ) -> tuple["EditedFile", str]:
-    """Return the file to edit, and the text of a new one. Raises UsageError and InvalidInput."""
+    """Return the file to edit, and the text of a new file ("" for an existing one). Raises UsageError, InvalidInput."""
     if new != (map_ is not None):
         raise UsageError("--new and --map belong together: simscen edit --new --map office.yaml [FILE]")
     if map_ is not None:
@@ -110,7 +111,7 @@ def _edited_file(
         what = "it is not a regular file" if file.exists() else "no such file"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", what, "start a new one with --new --map office.yaml")])
     root_folder = root if root is not None else default_root([file])
-    return _file_of_kind(file, root_folder, world_path), ""
+    return _existing_file(file, root_folder, world_path), ""
 
 
 def _new_file(
@@ -131,7 +132,7 @@ def _new_file(
     return _inside(EditedFile(_real(target), "scenario", _real_folder(root_folder), world_path), target), text
 
 
-def _file_of_kind(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
+def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
     from simscen.editor.document import EditedFile
     from simscen.loading.checks.files import file_kind
     from simscen.loading.files.assets import SDF_SUFFIXES
@@ -145,7 +146,7 @@ def _file_of_kind(file: Path, root: Path, world_path: tuple[Path, ...]) -> "Edit
 
 
 def _inside(edited: "EditedFile", file: Path) -> "EditedFile":
-    """Return the file if it is inside the root. Raises InvalidInput."""
+    """Return `edited`. Raises InvalidInput if `file`, its path as the user wrote it, leads out of the root."""
     from simscen.loading.files.paths import PathSandbox
 
     entered = PathSandbox.around(edited.root, edited.world_path).resolve_argument(file)

@@ -1,4 +1,4 @@
-"""`simscen explain`."""
+"""Command `simscen explain`: describes names of the scenario language, and codes."""
 
 import shutil
 import textwrap
@@ -38,14 +38,17 @@ def command(
     if not name:
         print_text(_overview(width))
     else:
-        print_text(explained(name, width))
+        print_text(explanation(name, width))
 
 
-def explained(name: str, width: int = 100) -> str:
-    """Return the explanation of all topics with this name. Raises UsageError if there are none."""
+def explanation(name: str, width: int = 100) -> str:
+    """Return the text about a problem code, or about all topics with this name. Raises UsageError for an unknown name.
+
+    `width` is the number of columns.
+    """
     if name.upper() in CODES:
         return f"{name.upper()}\n{_wrapped(CODES[name.upper()], width, '  ')}"
-    return "\n\n".join(_explained(topic, width) for topic in _topics_named(name))
+    return "\n\n".join(_topic_text(topic, width) for topic in _topics_named(name))
 
 
 def _topics_named(name: str) -> list[Topic]:
@@ -79,7 +82,7 @@ def _overview(width: int) -> str:
     )
 
 
-def _explained(topic: Topic, width: int) -> str:
+def _topic_text(topic: Topic, width: int) -> str:
     kind = f"{topic.group} of {topic.origin}" if topic.origin else topic.group
     parts = [f"{topic.name} ({kind})", _paragraphs(topic.text, width)]
     if topic.value:

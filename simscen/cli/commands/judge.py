@@ -1,4 +1,4 @@
-"""`simscen judge`."""
+"""Command `simscen judge`: evaluates criteria on recorded runs."""
 
 import json
 import shlex
@@ -55,7 +55,7 @@ def command(
 
     A log written by simscen contains the truth, the goals, and the scenario. Use --scenario to try other criteria. In a
     folder, every log is judged. Logs of real robots with the standard ROS 2 topics need --scenario, and --truth for
-    criteria that use the true pose. A criterion that the log does not decide is inconclusive, never passed.
+    criteria that use the true pose. If a log is not sufficient to decide a criterion, the verdict is inconclusive.
 
     Exit code 0: all criteria hold; 1: one fails or is inconclusive; 2: a log or scenario is unusable; 3: a log could
     not be judged, or one of several logs is unusable; 5: no logs found.

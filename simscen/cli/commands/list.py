@@ -1,4 +1,4 @@
-"""`simscen list`."""
+"""Command `simscen list`: lists the scenarios that a selection matches."""
 
 from pathlib import Path
 from typing import Annotated

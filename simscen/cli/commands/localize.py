@@ -1,4 +1,4 @@
-"""`simscen localize`."""
+"""Command `simscen localize`: runs a localizer on a recorded drive."""
 
 import json
 import sys
@@ -24,7 +24,7 @@ from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import RobotModel, Surroundings
 
 MIN_COMPARED_SHARE = 0.99
-"""Share of the beliefs that must have a reference pose; below it, the output says how many were compared."""
+"""Fraction of the beliefs that must have a reference pose. If fewer have one, the output states the fraction."""
 
 
 def command(
@@ -86,6 +86,7 @@ def command(
 def _load_inputs(
     scenario: Path | None, map_: Path, robot: str, root: Path | None
 ) -> tuple[StackSpec, OccupancyGrid, RobotModel]:
+    """Return the stack of the scenario, the map, and the robot. Raises InvalidInput."""
     from simscen.loading.builders import load_map, robot_from_file
     from simscen.run.robot_interface import robot_model
 

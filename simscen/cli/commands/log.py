@@ -1,4 +1,4 @@
-"""`simscen log`: recovery of damaged logs and layouts for viewers."""
+"""Command `simscen log`: recovers damaged logs, and writes layouts for viewers."""
 
 import shlex
 import sys

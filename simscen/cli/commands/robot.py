@@ -1,4 +1,4 @@
-"""`simscen robot`: check of a robot by test drives."""
+"""Command `simscen robot`: checks a robot by test drives."""
 
 import math
 import sys
@@ -59,6 +59,7 @@ def check(
 
 
 def _check_and_print(file: RobotFile, argument: str, picture: Path | None, as_json: bool) -> int:
+    """Check a robot, print the result, and return the number of failed checks. `argument` is what the user wrote."""
     from simscen.cli.process import engine_output_on_stderr
     from simscen.loading.builders import robot_from_file
     from simscen.loading.checks.robot_geometry import geometry_warnings

@@ -1,6 +1,7 @@
-"""`simscen shrink`."""
+"""Command `simscen shrink`: writes the smallest scenario that still fails in the same way."""
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -60,12 +61,12 @@ def command(
     ] = "",
     keep: Annotated[
         float,
-        typer.Option(min=0, max=1, help="Share of the violation that must remain: 0.5 is half of it."),
+        typer.Option(min=0, max=1, help="Part of the violation that must remain: 0.5 is half of it."),
     ] = 0.5,
     out: Annotated[
         Path | None, typer.Option(help="File to write; default: NAME.minimal.scenario.yaml beside the scenario.")
     ] = None,
-    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Largest number of runs.")] = 500,
+    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Maximum number of runs.")] = 500,
     workers: JobsOption = None,
     backend: BackendOption = BackendName.LOCAL,
     address: AddressOption = None,
@@ -79,9 +80,9 @@ def command(
 ) -> None:
     """Find the smallest scenario that still fails in the same way.
 
-    Removes events, faults, people, obstacles, goals, and all other parts, one after the other and in groups, as long as
-    the same criterion still fails by enough. Then it rounds numbers. The result is a normal scenario file in which
-    unchanged parts keep their comments. It does not depend on the number of parallel runs.
+    Removes events, faults, people, obstacles, goals, and all other parts, in groups and one by one, as long as the same
+    criterion still fails and --keep of its violation remains. Then it rounds numbers. The result is a normal scenario
+    file in which unchanged parts keep their comments. It does not depend on the number of parallel runs.
 
     Exit code 0: the file was written; 1: it was written, but --runs did not suffice; 2: invalid options, or the run did
     not fail; 3: the run could not be completed.
@@ -113,11 +114,14 @@ def command(
     sys.exit(Exit.PASSED if shrinker.is_complete else Exit.FAILED)
 
 
+@dataclass(frozen=True)
 class ChosenRun:
-    """Run to reproduce: scenario file, seed, variation, and --stack."""
+    """Failed run to start from. None stands for the seed or the stack of the scenario, "" for no variation."""
 
-    def __init__(self, file: Path, seed: int | None, variation: str, stack: str | None) -> None:
-        self.file, self.seed, self.variation, self.stack = file, seed, variation, stack
+    file: Path
+    seed: int | None
+    variation: str
+    stack: str | None
 
 
 def _chosen_run(run: Path, seed: int | None, variation: str, stack: str | None) -> ChosenRun:
@@ -131,6 +135,7 @@ def _chosen_run(run: Path, seed: int | None, variation: str, stack: str | None) 
 
 
 def _planned_run(folder: Path) -> PlannedRun:
+    """Return the run to which a folder in an output folder belongs. Raises UsageError."""
     for session in folder.parents:
         if (session / JOURNAL_FILE).is_file():
             inside = folder.relative_to(session / RUNS_FOLDER).as_posix()
@@ -145,7 +150,10 @@ def _folder_name(key: RunKey) -> str:
 
 
 def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinker, MappingNode]:
-    """Run and shrink the scenario; return also the scenario before. Raises UsageError if it does not fail."""
+    """Run the scenario, make it as small as possible, and return the result and the scenario before.
+
+    Raises UsageError if the scenario is invalid or does not fail.
+    """
     scenario = candidates.scenario
     (first,) = candidates.results([scenario.tree])
     if first is None:
@@ -161,7 +169,7 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
     if sys.stderr.isatty():
         candidates.report = lambda: _show_progress(candidates.runs, _size(shrinker.tree))
     if candidates.first_accepted([tree], failure.occurs_in) is None:
-        raise UsageError("the run does not fail any more with this criterion alone; this is a bug in simscen")
+        raise UsageError("the run no longer fails if only this criterion is kept; this is a bug in simscen")
     nominal = {change.target.keys: _value_at(scenario.base_tree, change.target.keys) for change in scenario.changes}
     shrinker.shrink({keys: value for keys, value in nominal.items() if keys[0] in tree.entries})
     if sys.stderr.isatty():
@@ -217,7 +225,7 @@ def _print_summary(shrinker: Shrinker, before: MappingNode, target: Path, stack:
     ):
         if texts:
             print_text("\n".join([title, *(f"  {escaped(text)}" for text in texts)]))
-    incomplete = "" if shrinker.is_complete else ", which did not suffice to try everything; see --runs"
+    incomplete = "" if shrinker.is_complete else ", which were not enough to try everything; increase --runs"
     print_text(f"{_size(shrinker.tree)} values left after {shrinker.runs.runs} runs{incomplete}")
     option = "" if stack is None else f" --stack {escaped(stack)}"
     print_text(f"wrote {escaped(str(target))}; try: simscen run {escaped(display_path(target))}{option}")

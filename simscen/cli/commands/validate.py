@@ -1,4 +1,4 @@
-"""`simscen validate`."""
+"""Command `simscen validate`: checks files and prints their problems."""
 
 import sys
 from collections import Counter
@@ -13,6 +13,7 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import as_github, as_json, as_text, print_text, relative_to_working_folder
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.stacks import parse_stacks
+from simscen.cli.shared_options import RootOption, WorldPathOption
 from simscen.core.errors import Exit, Problem
 from simscen.loading.checks.files import CHECKED_DRAWS, STACK_KINDS, check_file, file_kind
 from simscen.loading.files.discovery import SUFFIXES, default_root, discover
@@ -33,10 +34,8 @@ def command(
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="Check scenarios with this stack, as in `simscen run`; repeatable."),
     ] = None,
-    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
-    world_path: Annotated[
-        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
-    ] = None,
+    root: RootOption = None,
+    world_path: WorldPathOption = None,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Report unsupported parts of SDF worlds as warnings instead of errors.")
     ] = False,
@@ -48,10 +47,10 @@ def command(
     """Check scenario, world, robot, and stack files without running anything.
 
     Lists every problem with file, line, and column. Folders are searched for *.scenario.yaml, *.study.yaml,
-    *.world.yaml, *.robot.yaml, *.stack.yaml, and *.base.yaml. A Nav2 parameter file is checked as a stack; parameters
-    without meaning here are listed. Base files and defaults.yaml may be incomplete. Scenarios are also checked in their
-    worlds: whether the robot is free at its start and goals, can arrive in time, and whether all events can take place
-    and all criteria can hold and fail. Of a study, the first 20 variations are checked.
+    *.world.yaml, *.robot.yaml, *.stack.yaml, and *.base.yaml. A Nav2 parameter file is checked as a stack, and
+    parameters that simscen does not use are listed. Base files and defaults.yaml may be incomplete. Scenarios are also
+    checked in their worlds: whether start and goals are free, the robot can arrive in time, all events can take place,
+    and all criteria can both pass and fail. Of a study, the first 20 variations are checked.
 
     Exit code 0: all files are valid; 2: a file is invalid; 5: no files found.
     """
@@ -84,7 +83,7 @@ def _problems(kind: str, file: Path, checker: FileChecker) -> list[Problem]:
 
 @dataclass
 class _Checked:
-    """Count of files by kind, and their problems."""
+    """Numbers of checked files by kind and of invalid files, and the problems of all files."""
 
     kinds: Counter[str] = field(default_factory=Counter)
     problems: list[Problem] = field(default_factory=list)

@@ -8,7 +8,7 @@ from simscen.cli.catalog import topic_lookup
 from simscen.cli.catalog.reference_topics import EXTERNAL_ONLY_CODES, NAV2_ERROR_CODES
 from simscen.cli.catalog.topic_lookup import known_names
 from simscen.cli.commands import explain
-from simscen.cli.commands.explain import explained
+from simscen.cli.commands.explain import explanation
 from simscen.core.errors import Exit
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.robot import Limits
@@ -120,7 +120,7 @@ def test_every_topic_every_key_and_every_code_is_explained(monkeypatch, is_quick
     for module in (explain, topic_lookup):
         monkeypatch.setattr(module, "all_topics", lambda: everything)  # to collect it costs most of the time
     for name in [*known_names(), *list(known_names(keys=True))[:: 5 if is_quick else 1]]:
-        assert explained(name), name
+        assert explanation(name), name
 
 
 def test_every_nav2_code_and_exit_code_has_a_description() -> None:
