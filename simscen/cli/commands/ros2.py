@@ -106,8 +106,7 @@ def command(
         typer.Option(
             min=0,
             max=100,
-            help="With lockstep: how often all nodes are asked again if no command has arrived; 0: as often as there are "
-            "nodes.",
+            help="With lockstep: how often all nodes are asked again if no command has arrived; 0: once per node.",
         ),
     ] = 0,
     wall_time: Annotated[bool, typer.Option(help="Accept nodes that do not use sim time.")] = False,
