@@ -86,7 +86,7 @@ def _folder(config: pytest.Config) -> Path:
 
 
 class Simscen:
-    """Value of the fixture `simscen`: runs scenarios in the process of the test with `simscen.simulate()`.
+    """Value of the fixture `simscen`, which runs scenarios with `simscen.simulate()` in the process of the test.
 
     Paths are relative to the folder of the test. The logs are written to the temporary folder of the test.
     """

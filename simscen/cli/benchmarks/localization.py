@@ -124,14 +124,14 @@ def as_text(rows: "Sequence[Row]", columns: int | None = None) -> str:
 def _cells(row: "Row") -> tuple[str, ...]:
     return (
         row.parameters,
-        *(_share(row.shares[name]) for name in COLUMN_NAMES),
+        *(_share_text(row.shares[name]) for name in COLUMN_NAMES),
         f"{row.median:.3f} m{_interval_text(row.median_interval)}",
         f"{row.ms:.1f}",
         f"{row.slowest_ms:.0f}",
     )
 
 
-def _share(share: "Share") -> str:
+def _share_text(share: "Share") -> str:
     return f"{share.count} of {share.of}{_interval_text(share.interval, '.2f')}"
 
 
@@ -140,17 +140,22 @@ def _interval_text(interval: "Interval", form: str = ".3f") -> str:
 
 
 def _consistency_lines(row: "Row") -> list[str]:
+    """Return the ANEES for each circumstance, with the values that a consistent covariance would give."""
     from simscen.bench.localization.campaign import MOMENTS_S
 
     def lines(name: str, consistency: "Consistency") -> list[str]:
         low, high = consistency.bounds or (0.0, 0.0)
-        right = "" if consistency.bounds is None else f"; right on average: {low:.2f} … {high:.2f} (95 %)"
+        right = (
+            ""
+            if consistency.bounds is None
+            else f"; if the covariance is right on average: {low:.2f} … {high:.2f} (95 %)"
+        )
         pairs = zip(MOMENTS_S, consistency.moments, strict=True)
         moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in pairs)
         low, high = consistency.moment_bounds
         return [
             f"  ANEES {name}: {consistency.anees:.2f}{right}; in the 95 % ellipsoid: {consistency.inside:.1%}",
-            f"    {moments}; normal, independent: {low:.2f} … {high:.2f} (95 %)",
+            f"    {moments}; with normal errors and independent logs: {low:.2f} … {high:.2f} (95 %)",
         ]
 
     return [row.parameters, *(line for name, consistency in row.sure.items() for line in lines(name, consistency))]

@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from simscen.core.environment.world_model import BuiltWorld
 
 SHIPPED_WORLDS = ("house", "office", "warehouse")
+"""Names of the shipped worlds with random goals."""
 BARN_SOURCE = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
 NAV2_SOURCE = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
+"""Messages for experiments whose data is missing: the option, and the website of the data."""
 LIDAR_HEIGHT_M = 0.2
 """Height of the lidar for which the maps of worlds are generated."""
 
@@ -56,7 +58,7 @@ class ExperimentGroup:
     name:    name of the group
     needs:   folder with the data; None if it was not given
     make:    creates the experiments, which may take a while
-    source:  option that names the folder, and the website of the data
+    source:  message if the folder was not given: its option, and the website of the data
     parts:   names of the experiments, if they differ from the name of the group, to select them before they are created
     """
 
@@ -68,7 +70,7 @@ class ExperimentGroup:
 
     @property
     def missing(self) -> str:
-        """Reason why the data is missing, or ""."""
+        """Message about missing data; "" if the data is available."""
         if self.needs is None:
             return self.source
         return "" if self.needs.is_dir() else f"there is no folder {self.needs}"
@@ -156,13 +158,13 @@ def _groups_without_parts(
     ]
 
 
-def _barn(generated: Path, data: Path, sizes: Sizes) -> Iterator[Experiment]:
-    """Yield the BARN challenge at 2 m/s, with default parameters, and with each controller at the same speed."""
+def _barn(generated: Path, barn_data: Path, sizes: Sizes) -> Iterator[Experiment]:
+    """Yield the BARN challenge at 2 m/s, with default parameters, and with each controller at 0.5 m/s."""
     seeds = sizes.seeds_or(5)
-    yield experiments.barn_challenge(generated, data, seeds)
-    yield experiments.barn_challenge(generated, data, seeds, "default parameters", barn.DEFAULT_STACK)
+    yield experiments.barn_challenge(generated, barn_data, seeds)
+    yield experiments.barn_challenge(generated, barn_data, seeds, "default parameters", barn.DEFAULT_STACK)
     for controller, stack in barn.CONTROLLERS.items():
-        yield experiments.barn_challenge(generated, data, seeds, controller, stack)
+        yield experiments.barn_challenge(generated, barn_data, seeds, controller, stack)
 
 
 def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:

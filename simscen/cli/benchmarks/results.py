@@ -72,6 +72,7 @@ def _figure(entry: dict[str, Any]) -> Measurement:
 
 
 HEAD = ("", "before", "after", "ratio", "rounds before", "rounds after", "")
+"""Headings of the comparison of two results."""
 MIN_ROUNDS = 2
 """Minimum number of rounds of a figure for telling changes from noise."""
 

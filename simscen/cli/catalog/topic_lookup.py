@@ -13,7 +13,7 @@ from simscen.spec.choice import Choice
 
 
 def all_topics() -> list[Topic]:
-    """Return all topics in the order of the overview. Problem codes, such as SC012, are no topics."""
+    """Return all topics in the order of the overview. Problem codes, such as SC012, are not topics."""
     return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True), *code_topics()]
 
 

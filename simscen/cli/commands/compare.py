@@ -23,7 +23,7 @@ BASELINE, CANDIDATE = "baseline", "candidate"
 
 
 class Gate(str, Enum):
-    """Condition under which `simscen compare` exits with 1: worse statistics, a run that fails now, or none."""
+    """Value of --fail-on: the difference for which `simscen compare` exits with 1."""
 
     WORSE = "worse"
     FLIP = "flip"
@@ -108,7 +108,7 @@ def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, cha
 def _links(sessions: dict[str, JournaledSession]) -> Links:
     """Return the replay or log of each run that did not pass, or the command that repeats it.
 
-    The keys are the side (BASELINE or CANDIDATE), the test, and the seed.
+    The keys are BASELINE or CANDIDATE, the name of the test with its variation and stack, and the seed.
     """
     return {
         (name, labeled_key(run.key, name).test, run.key.seed): _replay(run)

@@ -86,6 +86,7 @@ def command(
 
 
 def _backend() -> "Backend":
+    """Return the backend for the button Run. It is created only when the button is first used."""
     from simscen.cli.session.backends import backend_of
     from simscen.run.sessions.run_session import SessionOptions
 
@@ -117,6 +118,7 @@ def _edited_file(
 def _new_file(
     file: Path | None, map_: Path, root: Path | None, world_path: tuple[Path, ...], lenient: bool
 ) -> tuple["EditedFile", str]:
+    """Return a new scenario file for a map, which must not exist yet, and its text. Raises UsageError, InvalidInput."""
     from simscen.editor.document import EditedFile
     from simscen.editor.new_scenario import new_scenario_text
 
@@ -133,6 +135,7 @@ def _new_file(
 
 
 def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
+    """Return an existing scenario or world file. Raises InvalidInput for a file of another kind."""
     from simscen.editor.document import EditedFile
     from simscen.loading.checks.files import file_kind
     from simscen.loading.files.assets import SDF_SUFFIXES
@@ -161,4 +164,5 @@ def _real(file: Path) -> Path:
 
 
 def _real_folder(folder: Path) -> Path:
+    """Return the absolute path of a folder with all symbolic links resolved."""
     return Path(os.path.realpath(folder))

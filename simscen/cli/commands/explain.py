@@ -52,6 +52,7 @@ def explanation(name: str, width: int = 100) -> str:
 
 
 def _topics_named(name: str) -> list[Topic]:
+    """Return the topics with a name, in any case, or else the keys with this path. Raises UsageError."""
     known = all_topics()
     lowered = name.lower()
     found = [topic for topic in known if lowered in (name.lower() for name in _names(topic))]
@@ -65,6 +66,7 @@ def _topics_named(name: str) -> list[Topic]:
 
 
 def _names(topic: Topic) -> tuple[str, ...]:
+    """Return all names by which a topic can be explained."""
     return (topic.name, f"{topic.group}.{topic.name}", *((topic.alias,) if topic.alias else ()))
 
 
@@ -73,6 +75,7 @@ def _key_names(topics: list[Topic]) -> list[str]:
 
 
 def _overview(width: int) -> str:
+    """Return the list of all names by group."""
     groups: dict[str, list[str]] = {}
     for topic in all_topics():
         groups.setdefault(topic.group, []).append(topic.name)
@@ -95,6 +98,7 @@ def _topic_text(topic: Topic, width: int) -> str:
 
 
 def _field(field: Field, width: int) -> str:
+    """Return the lines about one key."""
     needed = "required" if not field.default else "" if field.default == OPTIONAL else f"default {field.default}"
     head = f"  {field.key}: {field.kind}" + (f" ({needed})" if needed else "")
     return "\n".join([head, _wrapped(field.text, width, "      ")]) if field.text else head

@@ -1,4 +1,4 @@
-"""Command `simscen falsify`: parses the options of a search for values with which a scenario fails."""
+"""Command `simscen falsify`: searches for values with which a scenario fails."""
 
 import sys
 from pathlib import Path

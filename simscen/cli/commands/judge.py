@@ -81,6 +81,7 @@ def command(
 
 
 def _print(runs: list[tuple[str, RunFinished]], same_criteria: bool) -> None:
+    """Print the results by the path of their log: one in full, several in a table if their criteria are the same."""
     if len(runs) == 1:
         lines = list(full_log_lines(runs[0][1], runs[0][0]))
     elif same_criteria:

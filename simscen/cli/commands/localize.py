@@ -157,6 +157,7 @@ def _draw(
 
 
 def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str]:
+    """Return the printed lines. `lost` is the error in m above which the robot counts as lost."""
     x, y, yaw = localized.poses[-1].tolist()
     seconds = localized.times[-1] - localized.times[0]
     lines = [f"{localized.scans} scans in {seconds:.1f} s; final belief ({x:.2f}, {y:.2f}, {yaw:.3f})"]
@@ -175,6 +176,7 @@ def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str
 
 
 def _document(localized: Localized, errors: Errors | None, seed: int) -> dict[str, object]:
+    """Return the JSON output of --json."""
     document: dict[str, object] = {"scans": localized.scans, "seed": seed, "end": localized.poses[-1].tolist()}
     if errors is None:
         return document | {"error": None}

@@ -108,6 +108,7 @@ def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
 
 
 def _row(trial: "Trial") -> str:
+    """Return the line of one test drive."""
     motions = (trial.command, trial.odometry, trial.truth)
     driven = " ".join(f"{motion.driven:7.3f}" for motion in motions)
     turned = " ".join(f"{_degrees(motion.turned):7.1f}" for motion in motions)
@@ -116,6 +117,7 @@ def _row(trial: "Trial") -> str:
 
 
 def _line(check: "DriveCheck") -> str:
+    """Return the line of one check, and below it the advice if the check failed."""
     verdict = "ok" if check.passed else "FAILED"
     line = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
     return line if check.passed or not check.advice else f"{line}\n          {check.advice}"

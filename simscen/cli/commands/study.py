@@ -1,4 +1,4 @@
-"""Command `simscen study`: parses the options of a study."""
+"""Command `simscen study`: runs one scenario many times."""
 
 import sys
 from pathlib import Path

@@ -40,7 +40,7 @@ from simscen.run.sessions.search import Point, Search, SearchMethod, make_search
 BATCH = 8
 """Runs between two updates of the search. Fixed, so that a search does not depend on the number of workers."""
 MAX_EMPTY_BATCHES = 50
-"""Batches in a row without a valid point after which the search gives up."""
+"""Number of batches in a row without any valid values after which the search gives up."""
 SQUARE_SIZE_M = 1.0
 """Side of a square. Failures in the same criterion count as different if they are in different squares."""
 CONFIDENCE = 0.95

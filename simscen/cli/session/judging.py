@@ -55,8 +55,8 @@ class LogJudge:
     def judge(self, log: Path, is_only_log: bool) -> RunFinished:
         """Evaluate a log and return its result.
 
-        If the log is unusable, raise InvalidInput if `is_only_log`. Otherwise its result is an error, so that the other
-        logs are still evaluated.
+        An unusable log raises InvalidInput if it is the only one. If it is one of several, its result is an error, so
+        that the other logs are still evaluated.
         """
         try:
             return (

@@ -52,7 +52,9 @@ class JunitFamily(str, Enum):
     XUNIT2 = "xunit2"
 
 
-JunitFamilyOption = Annotated[JunitFamily, typer.Option(help="xunit2 omits what the schema of Jenkins forbids.")]
+JunitFamilyOption = Annotated[
+    JunitFamily, typer.Option(help="Dialect of JUnit XML; xunit2 omits what the schema of Jenkins forbids.")
+]
 
 
 class Reports:
@@ -229,7 +231,7 @@ def session_info_json(used: Mapping[str, object], wall: float | None = None) -> 
 MIN_UPDATE_INTERVAL_S = 1.0
 """Minimum time between two updates of the page, in seconds; the page itself reloads every two seconds."""
 UPDATE_INTERVAL_FACTOR = 10
-"""Minimum time between two updates as a multiple of the time that an update takes."""
+"""Minimum time between two updates as a multiple of the time that an update takes, so that updates stay cheap."""
 
 
 class LivePage:

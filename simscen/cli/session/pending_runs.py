@@ -168,8 +168,10 @@ def failed_runs(
     found = frozenset(key for key in last.runs if _is_selected(key, selected.get((key.test, key.stack_name)), options))
     missing = len(last.runs) - len(found)
     if not found:
-        return None, f"{_runs(last.runs)} failed last, none of them selected: {RUN_ALL}"
-    return found, f"{_runs(last.runs)} failed last" + (f": {len(found)} selected, {missing} not" if missing else "")
+        return None, f"{_runs(last.runs)} failed in the last session, but none is selected: {RUN_ALL}"
+    return found, f"{_runs(last.runs)} failed in the last session" + (
+        f": {len(found)} selected, {missing} not" if missing else ""
+    )
 
 
 def _is_selected(key: RunKey, scenario: LoadedScenario | None, options: SessionOptions) -> bool:

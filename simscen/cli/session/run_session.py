@@ -149,9 +149,10 @@ def _check_journal(journal: Journal) -> bool:
 
 
 def open_output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:
-    """Open the folder of --out or --resume, or create one in simscen-out, and lock its journal for this process.
+    """Return the output folder and its journal, which is locked so that no other process can use the folder.
 
-    Raises InvalidInput and UsageError before anything in the folder changes.
+    The folder is that of --out or --resume, or a new one in simscen-out. Raises InvalidInput and UsageError before
+    anything in the folder changes.
     """
     if resume is not None and out is not None:
         raise UsageError("--out and --resume exclude each other")
