@@ -50,12 +50,12 @@ def simulate(
     pin_kernels()  # before NumPy is imported
     from pathlib import Path
 
-    from simscen.cli.session.stacks import load_with
+    from simscen.cli.session.stacks import load_with_stack
     from simscen.run.preparation import prepare
     from simscen.run.simulate import simulate as run
 
     root_folder = None if root is None else Path(root)
-    loaded = load_with(stack, Path(scenario), root_folder, [Path(folder) for folder in world_path], variation)
+    loaded = load_with_stack(stack, Path(scenario), root_folder, [Path(folder) for folder in world_path], variation)
     return run(prepare(loaded), seed, log=None if log is None else Path(log))
 
 

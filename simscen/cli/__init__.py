@@ -1,1 +1,1 @@
-"""The command line: one module for each command, imported when it is called."""
+"""Command-line interface `simscen`: entry point, commands, sessions, benchmarks, and generated reference pages."""

@@ -1,4 +1,7 @@
-"""Shell completion of arguments. Imports happen inside the functions, so that commands do not pay for them."""
+"""Shell completion of arguments: each function returns the values that start with an incomplete argument.
+
+Commands import this module, so its functions import what they need only when they are called.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,38 +10,37 @@ from simscen.core.version import PACKAGE
 
 
 def scenarios(incomplete: str) -> list[str]:
-    """Complete scenario files and folders."""
+    """Return scenario files and folders."""
     from simscen.loading.files.discovery import SCENARIO_SUFFIXES
 
     return list(_files(incomplete, SCENARIO_SUFFIXES))
 
 
 def logs(incomplete: str) -> list[str]:
-    """Complete logs and folders."""
+    """Return logs and folders."""
     return list(_files(incomplete, (".mcap",)))
 
 
 def files(incomplete: str) -> list[str]:
-    """Complete YAML files and folders."""
+    """Return YAML files and folders."""
     return list(_files(incomplete, (".yaml", ".yml")))
 
 
 def topics(incomplete: str) -> list[str]:
-    """Complete topics of `explain`; after a name and a dot, the keys of that topic."""
-    from simscen.cli.catalog.reference_topics import known_names
+    """Return the names that `explain` knows; for an argument with a dot, the keys of topics."""
+    from simscen.cli.catalog.topic_lookup import known_names
 
     names = known_names(keys="." in incomplete)
     return [name for name in names if name.startswith(incomplete)]
 
 
-def shipped(incomplete: str) -> list[str]:
-    """Complete ids of shipped scenarios and scenario files."""
-
+def scenarios_to_copy(incomplete: str) -> list[str]:
+    """Return ids of shipped scenarios, and scenario files and folders."""
     return [*(name for name in shipped_scenarios() if name.startswith(incomplete)), *scenarios(incomplete)]
 
 
 def stacks(incomplete: str) -> list[str]:
-    """Complete names of stacks: shipped, installed, and configured by the user."""
+    """Return names of stacks: shipped, installed, and configured by the user."""
     from simscen.cli.process import config_file
     from simscen.core.errors import SimscenError
     from simscen.loading.stacks.userconfig import load_config
@@ -68,17 +70,15 @@ def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
                 yield f"{parent}{slash}{path.name}"
 
 
-SUFFIX = ".scenario.yaml"
 _SHIPPED_ROOTS = (PACKAGE / "data" / "library", PACKAGE.parent)
-"""Folders of the shipped scenarios: in an installed package, and in a checkout."""
+"""Folders that contain the folder `scenarios`: the first in an installed package, the second in a checkout."""
+_SUFFIX = ".scenario.yaml"
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """Return the files by id, such as "navigation/goal"; empty if the installation does not contain them."""
-    scenario_folder = next((root / "scenarios" for root in _SHIPPED_ROOTS if (root / "scenarios").is_dir()), None)
-    if scenario_folder is None:
+    """Return the files of the shipped scenarios by id, such as "navigation/goal"; empty if they are not installed."""
+    folder = next((root / "scenarios" for root in _SHIPPED_ROOTS if (root / "scenarios").is_dir()), None)
+    if folder is None:
         return {}
-    return {
-        path.relative_to(scenario_folder).as_posix().removesuffix(SUFFIX): path
-        for path in sorted(scenario_folder.rglob(f"*{SUFFIX}"))
-    }
+    files = sorted(folder.rglob(f"*{_SUFFIX}"))
+    return {file.relative_to(folder).as_posix().removesuffix(_SUFFIX): file for file in files}

@@ -1,4 +1,4 @@
-"""Output of problems as text, as JSON, and as GitHub annotations."""
+"""Formats problems (errors and warnings about files) as text, JSON, or GitHub annotations, and prints text safely."""
 
 import json
 import os
@@ -22,7 +22,9 @@ from simscen.report.display_text import (
 )
 
 MAX_PROBLEMS_PER_FILE = 50
+"""Number of problems of one file that are printed; further ones are only counted."""
 MAX_COLUMNS = 100
+"""Maximum number of characters in a line of a hint or of the source."""
 
 _WORD = r"(?:[^\s,\]\}\[\{:#]|:(?=\S)|(?<=\S)#)+"
 _TOKEN = re.compile(rf"""'(?:[^']|'')*'|"(?:[^"\\]|\\.)*"|-(?=\s)|{_WORD}(?: +{_WORD})*""")
@@ -31,12 +33,18 @@ _WORKFLOW_COMMAND = re.compile(r"^(\s*):(?=:)", re.MULTILINE)
 
 
 def relative_to_working_folder(problems: Iterable[Problem], root: Path) -> list[Problem]:
-    """Return the problems with paths relative to the working directory, so that terminals and editors can open them."""
+    """Convert the paths of problems from relative to `root` to relative to the working directory.
+
+    Terminals and editors can open such paths. An absolute path is used if it is shorter.
+    """
     return [replace(problem, path=_relative_path(problem.path, root)) for problem in problems]
 
 
 def as_text(problems: Sequence[Problem]) -> str:
-    """Return each problem with its source line, a caret, and a hint; at most MAX_PROBLEMS_PER_FILE for each file."""
+    """Return each problem with its source line, a caret, and its hint; at most MAX_PROBLEMS_PER_FILE for each file.
+
+    The problems of one file must be adjacent.
+    """
     blocks = []
     for path, group in groupby(problems, key=lambda problem: problem.path):
         found = list(group)
@@ -47,7 +55,7 @@ def as_text(problems: Sequence[Problem]) -> str:
 
 
 def as_json(problems: Iterable[Problem], **more: Any) -> str:
-    """Return a JSON object with the list `problems` and the keyword arguments."""
+    """Return a JSON object with the list `problems`, and with the keyword arguments as further keys."""
     keys = ("path", "line", "col", "code", "severity", "message", "hint")
     listed = [{key: getattr(problem, key) for key in keys} for problem in problems]
     return escape_ci_markers_in_json(json.dumps({**more, "problems": listed}, indent=2))
@@ -67,7 +75,7 @@ def escaped(text: str) -> str:
 
 
 def print_text(text: str, stream: TextIO | None = None) -> None:
-    """Print to a stream of any encoding; default: stdout."""
+    """Print to a stream (default: stdout). Characters that its encoding lacks are replaced by ASCII."""
     out = sys.stdout if stream is None else stream
     try:
         text.encode(out.encoding or "ascii")
@@ -94,7 +102,7 @@ def _block(problem: Problem) -> str:
 
 
 def _excerpt(problem: Problem) -> list[str]:
-    """Return the source line and carets under the key or value; a long line is cut around it."""
+    """Return the source line, and carets under the key or value; of a long line, only the part around them."""
     source, start = problem.source.replace("\t", " "), max(problem.col - 1, 0)
     token = _TOKEN.match(source, start)
     length = len(token[0]) if token else 1

@@ -1,4 +1,7 @@
-"""Checks of the machine and the installation for `simscen doctor`."""
+"""Checks of the machine and the installation for `simscen doctor`.
+
+Each check returns a text about what it found, or raises CheckFailed.
+"""
 
 import os
 import platform
@@ -15,27 +18,27 @@ from simscen.run.reproducibility import PACKAGES, cpu_flags
 
 SUPPORTED_PYTHONS = ((3, 10), (3, 11), (3, 12), (3, 13))
 MIN_DISK_BYTES = 500 << 20
-"""About a hundred logs of one minute."""
+"""Space for about a hundred logs of one minute."""
 MIN_MEMORY_BYTES = 1 << 30
-"""Enough for a run in a typical world."""
+"""Memory that is enough for a run in a typical world."""
 MIN_SHARED_MEMORY_BYTES = 16 << 20
-"""What OpenMP and the renderer request in /dev/shm."""
+"""Space in /dev/shm that OpenMP and the renderer request."""
 MIN_OPEN_FILES = 64
-"""Enough for a run."""
+"""Number of open files that is enough for a run."""
 
 
 class CheckFailed(Exception):
-    """A failed check: the reason and what to do."""
+    """A check failed; the message states the reason and what to do."""
 
 
-def python() -> str:
+def check_python() -> str:
     """Check the Python version, and return it with the path of the interpreter."""
     if sys.version_info[:2] not in SUPPORTED_PYTHONS:
         raise CheckFailed(f"{platform.python_version()}: simscen needs Python 3.10 to 3.13")
     return f"{platform.python_version()} ({sys.executable})"
 
 
-def packages() -> str:
+def check_packages() -> str:
     """Check that all packages are installed in supported versions, and return the versions."""
     if problems := unmet_requirements():
         raise CheckFailed("; ".join(problems))
@@ -49,12 +52,12 @@ def _version(name: str) -> str:
         raise CheckFailed(f"{name} is not installed: pip install {name}") from None
 
 
-def processor() -> str:
-    """Return architecture, cores, and CPU flags; logs of different CPUs may differ in the last bits."""
+def describe_processor() -> str:
+    """Return architecture, number of cores, and CPU flags: the logs of different CPUs may differ in the last bits."""
     return f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, {' '.join(cpu_flags()) or 'flags unknown'}"
 
 
-def fork() -> str:
+def check_fork() -> str:
     """Check that processes can be forked: each run is forked from another process."""
     if sys.platform != "linux":
         raise CheckFailed(f"{sys.platform}: simscen runs on Linux only")
@@ -66,8 +69,8 @@ def fork() -> str:
     return "processes can be forked"
 
 
-def pidfd() -> str:
-    """Check for pidfd_open, which the supervisor uses to wait for processes."""
+def check_pidfd() -> str:
+    """Check that the system call pidfd_open works, with which the supervisor waits for processes."""
     try:
         os.close(os.pidfd_open(os.getpid()))
     except (AttributeError, OSError) as error:
@@ -75,7 +78,7 @@ def pidfd() -> str:
     return f"Linux {platform.release()}"
 
 
-def writable(folder: Path) -> str:
+def check_writable(folder: Path) -> str:
     """Check that a file can be written in a folder."""
     try:
         with tempfile.NamedTemporaryFile(dir=folder) as file:
@@ -86,31 +89,31 @@ def writable(folder: Path) -> str:
     return f"{folder} is writable"
 
 
-def disk_space(folder: Path) -> str:
+def check_disk_space(folder: Path) -> str:
     """Check that the folder is writable and has space for logs."""
-    result = writable(folder)
+    result = check_writable(folder)
     free = shutil.disk_usage(folder).free
     if free < MIN_DISK_BYTES:
         raise CheckFailed(f"only {free / 2**20:.0f} MiB are free in {folder}; a run of one minute writes about 5 MiB")
     return f"{result}, {free / 2**30:.1f} GiB free"
 
 
-def resource_limits() -> str:
+def check_resource_limits() -> str:
     """Check that the limits of shell, container, and system allow a run."""
     memory = min(_soft_limit(resource.RLIMIT_AS), _cgroup_memory(), MAX_MEMORY_BYTES)
     files, length = _soft_limit(resource.RLIMIT_NOFILE), _soft_limit(resource.RLIMIT_FSIZE)
     if memory < MIN_MEMORY_BYTES:
         hint = "raise `ulimit -v` or the container's limit to 1 GiB for each job"
-        raise CheckFailed(f"a run gets {_mib(memory)} of memory; {hint}")
+        raise CheckFailed(f"a run gets only {_mib(memory)} of memory; {hint}")
     if files < MIN_OPEN_FILES:
-        raise CheckFailed(f"a process may open {files} files; raise `ulimit -n` to {MAX_OPEN_FILES}")
+        raise CheckFailed(f"a process may open only {files} files; raise `ulimit -n` to {MAX_OPEN_FILES}")
     if length < MIN_DISK_BYTES:
-        raise CheckFailed(f"a file may have {_mib(length)}; raise `ulimit -f`, or logs are truncated")
+        raise CheckFailed(f"a file may have only {_mib(length)}; raise `ulimit -f`, otherwise logs are truncated")
     size = _mib(min(length, MAX_FILE_BYTES))
     return f"a run may use {_mib(memory)} of memory, {min(files, MAX_OPEN_FILES)} files of {size}"
 
 
-def shared_memory() -> str:
+def check_shared_memory() -> str:
     """Check that /dev/shm has free space; Docker limits it to 64 MiB."""
     try:
         free = shutil.disk_usage("/dev/shm").free
@@ -122,12 +125,13 @@ def shared_memory() -> str:
 
 
 def _soft_limit(limit: int) -> int:
+    """Return the soft limit of a resource (RLIMIT_…), or sys.maxsize if it is unlimited."""
     soft = resource.getrlimit(limit)[0]
     return sys.maxsize if soft == resource.RLIM_INFINITY else soft
 
 
 def _cgroup_memory() -> int:
-    """Return the memory limit of the control group (version 2, then 1)."""
+    """Return the memory limit of the control group (version 2 or 1) in bytes, or sys.maxsize if there is none."""
     for name in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         try:
             text = Path(name).read_text(encoding="ascii").strip()

@@ -1,4 +1,4 @@
-"""The `simscen` command group: dispatch to commands and conversion of errors into exit codes."""
+"""Command group `simscen`: dispatches to the commands and converts errors to exit codes."""
 
 import gc
 import importlib.util
@@ -16,15 +16,15 @@ from simscen.cli.process import (
     OUTPUT_LOST_ERRNOS,
     PYDANTIC_PLUGINS_VARIABLE,
     flush_output,
-    occupy_descriptors,
+    reopen_closed_streams,
     report_lost_output,
-    require_folder,
+    require_working_directory,
 )
 from simscen.core.errors import Exit, InvalidInput, SimscenError
 
 
 class _LazyModule(ModuleType):
-    """Placeholder of a module that is replaced by the real one on the first attribute access."""
+    """Placeholder for a module that is imported when one of its attributes is first accessed."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__") and name != "__path__":  # requested by the import system; __path__ for submodules
@@ -38,9 +38,10 @@ class _LazyModule(ModuleType):
 
 
 def import_lazily(name: str, *functions: str) -> None:
-    """Defer the import of a module until one of its attributes is used.
+    """Defer the import of a module until one of its attributes is accessed.
 
-    `from name import function` counts as use, except for the given `functions`, which load the module when called.
+    `from name import attribute` is such an access, except for the names in `functions`. Each of these is imported as a
+    stand-in function, which imports the module when it is called.
     """
     if name in sys.modules:
         return
@@ -57,6 +58,8 @@ def import_lazily(name: str, *functions: str) -> None:
 
 
 def _lazy_function(module: str, function: str) -> Any:
+    """Return a stand-in function that imports the module and calls its function with the same arguments."""
+
     def call(*arguments: Any, **keywords: Any) -> Any:
         if isinstance(sys.modules[module], _LazyModule):
             del sys.modules[module]
@@ -92,11 +95,13 @@ COMMANDS = {
     "bench": "Measure speed, navigation, and localization.",
     "doctor": "Check that this installation can run scenarios.",
 }
-"""Command name and help. `simscen.cli.commands.<name>` has a function `command`, or an `app` with subcommands."""
+"""Help text of each command by name.
 
+The module `simscen.cli.commands.<name>` has a function `command`, or an `app` with subcommands.
+"""
 
 LIGHT_COMMANDS = frozenset({"validate", "list", "schema", "explain", "new", "completion"})
-"""Commands that must start fast. They import NumPy lazily, which is a quarter of their startup time."""
+"""Commands that must start fast. Importing NumPy takes long, so they import it only when they use it."""
 
 
 def is_light(arguments: Sequence[str]) -> bool:
@@ -105,14 +110,14 @@ def is_light(arguments: Sequence[str]) -> bool:
 
 
 class CommandGroup(TyperGroup):
-    """Command group that imports the module of a command when it is called, so that `validate` never loads PyBullet."""
+    """Command group that imports only the module of the called command, so that `validate` never loads PyBullet."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the available commands in the order of COMMANDS."""
         return [name for name in COMMANDS if importlib.util.find_spec(_module(name))]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Import the module of a command and return the command, or None if it does not exist."""
+        """Import the module of a command and return the command, or None if there is no such command."""
         if cmd_name not in COMMANDS or not importlib.util.find_spec(_module(cmd_name)):
             return None
         if cmd_name in LIGHT_COMMANDS or cmd_name == "run":
@@ -164,8 +169,8 @@ def _simscen(
 
 def main() -> None:
     """Run the command line and exit. Expected errors are printed without a traceback and set the exit code."""
-    occupy_descriptors()
-    # Pydantic plug-ins of other packages could change what is valid, and looking for them costs 12 ms.
+    reopen_closed_streams()
+    # Pydantic plug-ins of other packages could change which files are valid, and searching for them takes time.
     os.environ[PYDANTIC_PLUGINS_VARIABLE] = "__all__"
     import_lazily("importlib.metadata", "entry_points")
     if COMPLETION_VARIABLE in os.environ:
@@ -176,11 +181,11 @@ def main() -> None:
 
 
 def _run_command() -> int:
-    """Run the command and return its exit code, or that of the error that ended it."""
+    """Run the command and return its exit code. If an error ends the command, return the exit code of the error."""
     try:
         try:
             if sys.argv[1:2] and not sys.argv[1].startswith("-"):
-                require_folder()
+                require_working_directory()
             app()
         except SimscenError as error:
             return _print_error(error)

@@ -1,4 +1,4 @@
-"""Environment of the simscen process: standard streams, working directory, variables, user configuration."""
+"""Process of a command: standard streams, working directory, environment variables, and user configuration file."""
 
 import errno
 import os
@@ -11,19 +11,21 @@ from simscen.core.cpu_kernels import pinned_variables
 from simscen.core.errors import Exit, UsageError
 
 OUTPUT_LOST_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
-"""Errors of a stream that accepts no more output: disk full, quota exceeded, terminal closed."""
+"""Error numbers of a stream that accepts no more output: disk full, quota exceeded, terminal closed."""
 
 PYDANTIC_PLUGINS_VARIABLE = "PYDANTIC_DISABLE_PLUGINS"
+"""Environment variable that disables plug-ins of pydantic."""
 COMPLETION_VARIABLE = "_SIMSCEN_COMPLETE"
-"""Variable by which a shell asks click for completions."""
+"""Environment variable through which a shell asks click for completions."""
 _PYDANTIC_PLUGINS_AT_START = os.environ.get(PYDANTIC_PLUGINS_VARIABLE)
-"""The caller's value; `simscen` overrides it for its own process."""
+"""Value that the caller of simscen set; simscen overrides it for its own process."""
 
 
-def occupy_descriptors() -> None:
+def reopen_closed_streams() -> None:
     """Redirect closed standard streams (`simscen run . >&-`) to /dev/null.
 
-    Otherwise the next opened file, for example the journal, would get the descriptor and everything printed to it.
+    Otherwise the next file that is opened, for example the journal, would get the file descriptor of the closed stream,
+    and everything printed to the stream would be written to that file.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -34,7 +36,7 @@ def occupy_descriptors() -> None:
             setattr(sys, name, open(number, "r" if number == 0 else "w", encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
-def require_folder() -> None:
+def require_working_directory() -> None:
     """Raise UsageError if the working directory has been deleted."""
     try:
         Path.cwd()
@@ -44,11 +46,11 @@ def require_folder() -> None:
 
 def report_lost_output(error: OSError) -> Exit:
     """Print to stderr why stdout accepts no more output, discard all further output, and return INCOMPLETE."""
-    _discard_output(1)
+    discard_output(1)
     try:
         print(f"simscen: cannot write the output: {error.strerror}", file=sys.stderr, flush=True)
     except OSError:
-        _discard_output(2)
+        discard_output(2)
     return Exit.INCOMPLETE
 
 
@@ -58,15 +60,16 @@ def flush_output(code: Exit | int) -> Exit | int:
         sys.stdout.flush()
         sys.stderr.flush()
     except BrokenPipeError:  # the reader has closed the pipe, as in `simscen list | head`
-        _discard_output(1)
-        _discard_output(2)
+        discard_output(1)
+        discard_output(2)
         return code or Exit.INCOMPLETE
     except OSError as error:
         return max(code, report_lost_output(error))
     return code
 
 
-def _discard_output(descriptor: int) -> None:
+def discard_output(descriptor: int) -> None:
+    """Redirect a file descriptor to /dev/null."""
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, descriptor)
     os.close(null)
@@ -87,7 +90,7 @@ def engine_output_on_stderr() -> Iterator[None]:
 
 
 def caller_environment() -> dict[str, str]:
-    """Return the environment variables as the caller of simscen set them, for programs started on their behalf."""
+    """Return the environment variables as the caller of simscen set them, for programs that simscen starts."""
     changed = {PYDANTIC_PLUGINS_VARIABLE, *pinned_variables()}
     variables = {name: value for name, value in os.environ.items() if name not in changed}
     if _PYDANTIC_PLUGINS_AT_START is not None:

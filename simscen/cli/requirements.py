@@ -1,10 +1,10 @@
-"""Check of the installed packages against the requirements of simscen."""
+"""Finds installed packages whose versions do not meet the requirements of simscen."""
 
 import re
 from collections.abc import Iterator
 
 MIN_TYPER = (0, 20)
-"""The oldest typer version that works with every version of click, as in pyproject.toml."""
+"""Oldest version of typer (major, minor) that works with every version of click; also in pyproject.toml."""
 
 _COMPARE = {
     ">=": lambda installed, required: installed >= required,
@@ -27,7 +27,7 @@ def unmet_requirements() -> list[str]:
 
 
 def unmet_typer() -> list[str]:
-    """Return a message if typer is too old; checking all packages takes 20 ms longer."""
+    """Return a message if typer is too old. Light commands check nothing else, because that would slow their start."""
     from typer import __version__
 
     required = f">={'.'.join(map(str, MIN_TYPER))}"

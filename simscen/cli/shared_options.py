@@ -1,4 +1,4 @@
-"""Options that several commands share: for simulated runs, and for logs, including foreign ones."""
+"""Command-line options that several commands share: options for runs, and options for reading logs."""
 
 from collections.abc import Collection
 from enum import Enum
@@ -30,7 +30,7 @@ LenientOption = Annotated[bool, typer.Option("--lenient", help="Skip unsupported
 
 
 class TimeStamps(str, Enum):
-    """Which time stamp of a message is used."""
+    """Time stamp of a message that is used: that in its header, or the time at which it was logged."""
 
     HEADER = "header"
     LOG = "log"
@@ -58,7 +58,11 @@ SameFrameOption = Annotated[
 def foreign_log_options(
     truth: str | None, topics: list[str] | None, time: TimeStamps, tick_rate: int, same_frame: bool
 ) -> ForeignLogOptions:
-    """Return how to read a log of a real robot according to the command-line options. Raises UsageError."""
+    """Return the options for reading a log that simscen did not write.
+
+    The parameters are the values of --truth, --topic, --time, --tick-rate, and --same-frame. Raises UsageError if
+    --truth or --topic is invalid.
+    """
     clock: Clock = "log" if time is TimeStamps.LOG else "header"
     options = ForeignLogOptions(truth, parse_topics(topics or [], TOPICS), tick_rate, clock, same_frame)
     _check_truth(options)
@@ -66,7 +70,7 @@ def foreign_log_options(
 
 
 def _check_truth(options: ForeignLogOptions) -> None:
-    """Raise UsageError if --truth is malformed or names the belief of the robot."""
+    """Raise UsageError if --truth is malformed or is the topic of the robot's belief."""
     if options.truth is None:
         return
     if not options.truth.startswith("/") and not (options.frames and all(options.frames)):
@@ -77,7 +81,10 @@ def _check_truth(options: ForeignLogOptions) -> None:
 
 
 def parse_topics(arguments: list[str], names: Collection[str]) -> dict[str, str]:
-    """Return the topics by name, from arguments such as "odom=/my/odom". Raises UsageError for other `names`."""
+    """Return the topics by name, from arguments such as "odom=/my/odom".
+
+    Raises UsageError if an argument has another form, or its name is not one of `names`.
+    """
     topics = {}
     for argument in arguments:
         name, equals, topic = argument.partition("=")

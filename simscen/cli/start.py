@@ -8,14 +8,14 @@ from typing import NoReturn
 
 INTERRUPTED = 130
 INCOMPLETE = 3
-"""Values of `simscen.core.errors.Exit`, which is not imported yet."""
+"""Exit codes, equal to those of `simscen.core.errors.Exit`, whose module is not imported yet."""
 
 
 def start() -> None:
     """Run the command line.
 
-    Garbage collection is off during imports, and light commands exit without interpreter teardown. Together this saves
-    about 40 ms (docs/design/startup.md).
+    To start and end fast, it disables garbage collection during imports and skips the teardown of the interpreter after
+    light commands (docs/design/startup.md).
     """
     gc.disable()
     try:
@@ -38,7 +38,10 @@ def start() -> None:
 
 
 def _check_requirements(all_packages: bool) -> None:
-    """Exit with a message if a package is missing or has an unsupported version; without `all_packages`, only typer."""
+    """Exit with a message if a package is missing or has an unsupported version.
+
+    Without `all_packages`, only typer is checked, which every command needs.
+    """
     from simscen.cli.requirements import unmet_requirements, unmet_typer
 
     if problems := unmet_requirements() if all_packages else unmet_typer():
@@ -46,6 +49,7 @@ def _check_requirements(all_packages: bool) -> None:
 
 
 def _exit_unusable(problems: list[str]) -> NoReturn:
+    """Print what is wrong with the installation, and exit with INCOMPLETE."""
     print(f"simscen: this installation does not work: {'; '.join(problems)}", file=sys.stderr)
     sys.exit(INCOMPLETE)
 

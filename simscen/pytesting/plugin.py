@@ -1,4 +1,4 @@
-"""pytest plug-in for scenarios: `pytest --simscen scenarios/`, and the fixture `simscen`.
+"""Hooks of the pytest plug-in for scenarios (`pytest --simscen scenarios/`), and the fixture `simscen`.
 
 Every pytest in an environment with simscen loads this plug-in, so it imports and collects nothing unless requested by
 --simscen, by `simscen_paths` in the configuration, or by a scenario file on the command line.
@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from simscen.pytesting.scenario_items import Simscen
 
 SUFFIXES = (".scenario.yaml", ".scenario.yml")
+"""Ends of the names of scenario files."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options and their configuration settings."""
+    """Add the command-line options of the plug-in, and the settings with the same meaning."""
     group = parser.getgroup("simscen")
     group.addoption(
         "--simscen",
@@ -59,12 +60,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the marker that all scenario items have."""
-    config.addinivalue_line("markers", "simscen: all runs of scenarios; their tags are markers as well")
+    """Register the marker `simscen`, which all scenario items have."""
+    config.addinivalue_line("markers", "simscen: all runs of scenarios; the tags of scenarios are markers as well")
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Collect a scenario file if it was requested."""
+    """Return a collector for a requested scenario file, and None for any other file."""
     if not file_path.name.endswith(SUFFIXES) or not _is_requested(file_path, parent):
         return None
     from simscen.pytesting.scenario_items import ScenarioFile

@@ -1,7 +1,6 @@
-"""Collection of scenario files by pytest, and their execution.
+"""Collectors and test items of pytest for scenario files: one item per run, named as on the command line.
 
-There is one item per run, named as on the command line, one fork server per worker, and one output folder per
-session.
+Each xdist worker has one fork server. All runs of a session write to one output folder.
 """
 
 from __future__ import annotations
@@ -11,16 +10,17 @@ from collections.abc import Iterator
 from datetime import datetime, timezone
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from _pytest._code.code import ReprEntryNative, ReprExceptionInfo, ReprFileLocation, ReprTraceback
 
 import simscen
 from simscen.cli.diagnostics import as_text
-from simscen.cli.session.selection import Checks, world_problems
-from simscen.cli.session.stacks import stacks_of
-from simscen.core.errors import InvalidInput, SimscenError, UsageError
+from simscen.cli.session.backends import FORK_SERVER
+from simscen.cli.session.file_checks import FileChecker, world_problems
+from simscen.cli.session.stacks import parse_stacks
+from simscen.core.errors import InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.case import Run
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
@@ -37,15 +37,6 @@ from simscen.run.sessions.output_folder import DEFAULT_FOLDER, run_folder
 from simscen.run.sessions.results import finished_run
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from simscen.core.errors import Problem
-    from simscen.core.records.session_events import RunFinished
-    from simscen.loading.loaded import LoadedScenario
-
-
-FORK_SERVER = ("-m", "simscen.cli.session.fork_server_main")
 WALL_LIMIT_S = 300.0
 """Wall-clock limit of a run, as in `simscen run`."""
 
@@ -54,13 +45,13 @@ class Runner:
     """Runs scenarios one after the other, each in its own process, and writes their files to `folder`."""
 
     def __init__(self, folder: Path) -> None:
-        """Create a runner that writes to a folder."""
+        """Create a runner. Its fork server starts with the first run."""
         self.folder = folder
         self._numbers = count()
         self._supervisor = Supervisor(1, FORK_SERVER)
 
     def run(self, scenario: LoadedScenario, seed: int) -> RunFinished:
-        """Run a scenario and return its result."""
+        """Run a scenario with a seed and return the result."""
         key = scenario.key(seed)
         job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT_S, ReplayMode.FAILED)
         ends = [update.end for update in self._supervisor.run([job], plugins_of(scenario)) if isinstance(update, Ended)]
@@ -75,7 +66,10 @@ _RUNNER: pytest.StashKey[Runner] = pytest.StashKey()
 
 
 def runner_of(config: pytest.Config) -> Runner:
-    """Return the runner of this process. A worker of xdist gets its folder from the controller."""
+    """Return the runner of this process, which is created at the first call.
+
+    The controller of xdist determines the output folder for all workers.
+    """
     if (runner := config.stash.get(_RUNNER, None)) is None:
         runner = config.stash[_RUNNER] = Runner(_folder(config))
         config.add_cleanup(runner.close)
@@ -83,6 +77,7 @@ def runner_of(config: pytest.Config) -> Runner:
 
 
 def _folder(config: pytest.Config) -> Path:
+    """Return the output folder: that of the controller, or a new one in the configured folder."""
     controller_folder = getattr(config, "workerinput", {}).get(OUT_OPTION)
     if controller_folder is not None:
         return Path(controller_folder)
@@ -91,9 +86,9 @@ def _folder(config: pytest.Config) -> Path:
 
 
 class Simscen:
-    """Value of the fixture `simscen`: runs scenarios in the process of the test with `simscen.simulate()`.
+    """Value of the fixture `simscen`, which runs scenarios with `simscen.simulate()` in the process of the test.
 
-    Paths are relative to the folder of the test. The log of each run, `run.log`, is in the test's temporary folder.
+    Paths are relative to the folder of the test. The logs are written to the temporary folder of the test.
     """
 
     def __init__(self, folder: Path, out: Path) -> None:
@@ -110,7 +105,7 @@ class Simscen:
         return simscen.simulate(self._folder / scenario, seed, log=log, stack=stack, variation=variation)
 
     def variations(self, scenario: str | Path) -> list[str]:
-        """Return the names of a scenario's variations; `[""]` without any."""
+        """Return the names of a scenario's variations; `[""]` if it has none."""
         return simscen.variations(self._folder / scenario)
 
 
@@ -121,7 +116,10 @@ PYTEST_MARKERS = frozenset(
 
 
 class ScenarioFile(pytest.File):
-    """Scenario file. An invalid file is a collection error with the messages of `simscen validate`."""
+    """Collector of the runs of a scenario file.
+
+    An invalid file is a collection error with the messages of `simscen validate`.
+    """
 
     def collect(self) -> Iterator[pytest.Item]:
         """Yield an item for each variation, seed, and stack."""
@@ -136,20 +134,20 @@ class ScenarioFile(pytest.File):
         config = self.config
         root, world_path = default_root([self.path]), config.getini("simscen_world_path")
         chosen = config.getoption("--simscen-stack") or config.getini("simscen_stack")
-        checks = Checks(root, world_path, fast=True, stacks=stacks_of(chosen, root, world_path))
+        checker = FileChecker(root, world_path, fast=True, stacks=parse_stacks(chosen, root, world_path))
         options = SessionOptions(seed=_seed(config), repeat=config.getoption("--simscen-repeat"))
-        for choice in checks.choices:
-            scenarios, problems = checks.scenario(self.path, choice)
+        for choice in checker.choices:
+            scenarios, problems = checker.check_scenario(self.path, choice)
             _raise_errors(problems)
             for scenario in scenarios:
-                loaded = scenario.with_changes(several_stacks=len(checks.choices) > 1)
+                loaded = scenario.with_changes(several_stacks=len(checker.choices) > 1)
                 for seed in scenario_seeds(loaded, options):
                     every_seed = options.repeat > 1
                     yield ScenarioRun.create(self, loaded, seed, every_seed)
 
 
 class ScenarioRun(pytest.Item):
-    """One run of a scenario: passed, failed with the reported reasons, expected to fail, or skipped."""
+    """Test item for one run of a scenario."""
 
     def __init__(self, *, scenario: LoadedScenario, seed: int, **kwargs: Any) -> None:
         """Take the scenario, the seed, and pytest's arguments."""
@@ -158,7 +156,7 @@ class ScenarioRun(pytest.Item):
 
     @classmethod
     def create(cls, parent: ScenarioFile, scenario: LoadedScenario, seed: int, every_seed: bool) -> ScenarioRun:
-        """Create an item with the scenario's tags as markers."""
+        """Create an item with the scenario's tags as markers. With `every_seed`, its name contains the seed."""
         folder = scenario.id.rpartition("/")[0]
         name = short_run_name(scenario.key(seed), every_seed, f"{folder}/" if folder else "")
         item: ScenarioRun = cls.from_parent(parent, name=name, scenario=scenario, seed=seed)
@@ -171,7 +169,7 @@ class ScenarioRun(pytest.Item):
         return item
 
     def runtest(self) -> None:
-        """Run the scenario in its own process."""
+        """Run the scenario in its own process. Raises ScenarioFailed unless it passes or fails as expected."""
         _raise_errors(world_problems(self._scenario))
         run = runner_of(self.config).run(self._scenario, self._seed)
         self.user_properties += _properties(run)
@@ -194,13 +192,13 @@ class ScenarioRun(pytest.Item):
 
 
 def _raise_errors(problems: list[Problem]) -> None:
-    """Raise InvalidInput for errors. Warnings are only reported by `simscen validate`."""
+    """Raise InvalidInput if there are errors. Warnings are ignored; `simscen validate` reports them."""
     if errors := [problem for problem in problems if problem.severity == "error"]:
         raise InvalidInput(errors)
 
 
 def _seed(config: pytest.Config) -> int | None:
-    """Return the seed from the command line or the configuration. Raises UsageError."""
+    """Return the seed from the command line or the configuration; None for the scenario's own. Raises UsageError."""
     given = config.getoption("--simscen-seed")
     setting = config.getini("simscen_seed")
     if given is not None or not setting:
@@ -211,7 +209,7 @@ def _seed(config: pytest.Config) -> int | None:
 
 
 def _properties(run: RunFinished) -> list[tuple[str, object]]:
-    """Return the properties of a run for junit.xml."""
+    """Return the names and values of the JUnit properties of a run."""
     files = {"log": run.artifacts.mcap, "picture": run.artifacts.picture}
     facts = {"seed": run.key.seed, "simulated_seconds": f"{run.result.simulated:.3f}", "again": run.again, **files}
     return [(name, value) for name, value in facts.items() if value]
@@ -227,9 +225,9 @@ class ScenarioFailed(AssertionError):
 
 
 def failure_representation(run: RunFinished) -> Any:
-    """Return the lines that the command line prints below a failed run.
+    """Return pytest's representation of a failure, with the lines that the command line prints below a failed run.
 
-    This is the only form in which xdist transfers a failure from worker to controller; it is not public in pytest.
+    The class is not public in pytest, but it is the only form in which xdist sends a failure to the controller.
     """
     lines = [f"{plain_text(line).removeprefix('      ')}\n" for line in violation_lines(run)]
     first = next((complaint.line for complaint in reported_violations(run) if not complaint.warning), 0)
@@ -238,7 +236,7 @@ def failure_representation(run: RunFinished) -> Any:
 
 
 def _cause(run: RunFinished) -> str:
-    """Return the first reason in one line."""
+    """Return the first reason of the failure in one line."""
     if run.outcome is Outcome.ERROR:
         return error_summary(run)
     return next((complaint.message for complaint in reported_violations(run) if not complaint.warning), "failed")

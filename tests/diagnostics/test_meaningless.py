@@ -9,20 +9,20 @@ from pathlib import Path
 import pytest
 
 from simscen.cli.diagnostics import as_text
-from simscen.cli.session.selection import Checks
+from simscen.cli.session.file_checks import FileChecker
 from simscen.core.errors import Problem
 from simscen.loading.codes import CODES
 
 HERE = Path(__file__).parent / "meaningless"
 CASES = sorted(HERE.glob("*.scenario.yaml"))
-CHECKS = Checks(HERE)
+CHECKER = FileChecker(HERE)
 OTHERS = {"SC014", "SC016", "SC030", "SC031", "SC032", "SC033", "SC035", "SC313", "SC314", "SC315"}
 
 
 @pytest.fixture(scope="module")
 def told() -> dict[Path, list[Problem]]:
     """What is said of each file; all of them share one small world."""
-    return {case: CHECKS.scenario(case)[1] for case in CASES}
+    return {case: CHECKER.check_scenario(case)[1] for case in CASES}
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda path: path.name.split(".")[0])
@@ -58,4 +58,4 @@ def test_shared_world_and_robots_are_valid(robot: str, tmp_path: Path) -> None:
         f"simscen: 1\nworld: room.world.yaml\nrobot: {{model: {robot}, pose: start}}\n"
         "goals: [{pose: desk}]\npass: [{goals_reached: {}}]\n"
     )
-    assert Checks(tmp_path).scenario(good)[1] == []
+    assert FileChecker(tmp_path).check_scenario(good)[1] == []

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.catalog.commands_page import commands_of, parameters_of
+from simscen.cli.catalog.commands_page import functions_of_command, parameters_of
 from simscen.cli.main import COMMANDS
 from simscen.core.errors import Exit
 
@@ -37,7 +37,7 @@ def test_commands_are_shown_with_options_that_they_have(page: str) -> None:
     for where, name, rest in shown():
         if where == page:
             words = f"{name} {rest.split()[0]}" if rest.split() else name
-            functions = dict(commands_of(name))
+            functions = dict(functions_of_command(name))
             function = functions.get(words) or functions.get(name) or next(iter(functions.values()))
             known = {option for p in parameters_of(function) for option in p.spelling.split(", ")} | GLOBAL
             unknown += [f"simscen {name} {option}" for option in OPTION.findall(rest) if option not in known]

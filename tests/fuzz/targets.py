@@ -11,7 +11,7 @@ from pathlib import Path
 from mcap import records
 from mutate import mutant
 
-from simscen.cli.session.selection import Checks
+from simscen.cli.session.file_checks import FileChecker
 from simscen.core.errors import InvalidInput, Problem
 from simscen.judge.evaluation import judge
 from simscen.loading.scenario_text import spec_of_text
@@ -76,7 +76,7 @@ def read_scenario(mutated: Path) -> list[Problem]:
     """What `validate` says; what it accepts must be fit to be run."""
     folder = mutated.parent
     file = mutated if mutated.name.endswith(".scenario.yaml") else folder / "a.scenario.yaml"
-    variations, problems = Checks(folder).scenario(file)
+    variations, problems = FileChecker(folder).check_scenario(file)
     for loaded in variations:
         prepare(loaded)
     return problems

@@ -1,1 +1,1 @@
-"""Commands of `simscen bench` and their output."""
+"""Subcommands of `simscen bench` and their output."""

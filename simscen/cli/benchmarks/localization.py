@@ -1,17 +1,16 @@
-"""Command `simscen bench localization`, which measures the accuracy of AMCL."""
+"""Command `simscen bench localization`: measures the accuracy of AMCL."""
 
 import json
 import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
-from enum import Enum
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simscen.cli.benchmarks.navigation_table import align_columns, fits, label_cells, wrap_lines
-from simscen.cli.benchmarks.results import print_progress
+from simscen.cli.benchmarks.results import Format, print_progress
+from simscen.cli.benchmarks.tables import align_columns, fits, label_cells, wrap_lines
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import NothingSelected, UsageError
 from simscen.loading.schema.messages import quoted
@@ -20,13 +19,6 @@ from simscen.report.display_text import detect_style
 if TYPE_CHECKING:
     from simscen.bench.localization.campaign import Consistency, Interval, Row, Share, Trial
     from simscen.bench.localization.sparse_logs import SparseTrial
-
-
-class Format(str, Enum):
-    """Output format."""
-
-    TEXT = "text"
-    JSON = "json"
 
 
 def command(
@@ -46,15 +38,15 @@ def command(
 ) -> None:
     """Measure the accuracy of AMCL on generated logs.
 
-    The buildings are asymmetric office floors of 40 m and more, with a lidar of 181 or 361 beams over 180°, odometry of
-    slipping wheels, people, moved furniture, and glass. Each has eleven logs: five with a known start, two in a
-    building as mapped, with clean and with raw odometry, one with an unknown start, one with half of the floor rebuilt,
-    one with a map of the other half only, and one of a kidnapped robot. Each log is evaluated with Nav2's parameters,
-    simscen's defaults, and parameters for a consistent covariance. Intervals are by bootstrap over buildings. Lost
-    robots are listed on standard error. Takes a few minutes on two cores.
+    The buildings are asymmetric office floors of 40 m and more with people, moved furniture, and glass. The robot has a
+    lidar of 181 or 361 beams over 180° and wheels that slip. Each building has eleven logs: five with a known start;
+    two in the building as it was mapped, without and with slip; one with an unknown start; one in which half of the
+    floor was rebuilt after mapping; one with a map of only half of the floor; and one of a kidnapped robot. Each log is
+    evaluated with several sets of parameters, including Nav2's and simscen's defaults. Intervals are by bootstrap over
+    buildings. Lost robots are listed on standard error. Takes a few minutes on two cores.
 
-    With --sparse, the scans are 1 m or 0.5 rad apart, as in many public data sets. Each cell then shows lost runs,
-    median error, and error at the end.
+    With --sparse, the scans are 1 m or 0.5 rad apart, as in many public data sets. Each cell of the table then shows
+    the number of lost runs, the median error, and the error at the end.
     """
     from simscen.bench.localization.campaign import PARAMETER_SETS, run_buildings, summarize
 
@@ -116,11 +108,11 @@ COLUMN_NAMES = {
     "tracked": "tracked", "unknown": "start unknown", "outdated": "half rebuilt", "half": "half a map",
     "kidnapped": "kidnapped",
 }  # fmt: skip
-"""Circumstances of the logs and their column names in the table."""
+"""Heading of the column for each circumstance of the logs."""
 
 
 def as_text(rows: "Sequence[Row]", columns: int | None = None) -> str:
-    """Return one line per set of parameters, then the consistency of each, in at most `columns`."""
+    """Return one line per set of parameters, then the consistency of each, wrapped at `columns` (None: unlimited)."""
     head = ("parameters", *COLUMN_NAMES.values(), "median error", "ms a scan", "slowest")
     table = [_cells(row) for row in rows]
     lines = align_columns([head, *table], str.ljust)
@@ -132,14 +124,14 @@ def as_text(rows: "Sequence[Row]", columns: int | None = None) -> str:
 def _cells(row: "Row") -> tuple[str, ...]:
     return (
         row.parameters,
-        *(_share(row.shares[name]) for name in COLUMN_NAMES),
+        *(_share_text(row.shares[name]) for name in COLUMN_NAMES),
         f"{row.median:.3f} m{_interval_text(row.median_interval)}",
         f"{row.ms:.1f}",
         f"{row.slowest_ms:.0f}",
     )
 
 
-def _share(share: "Share") -> str:
+def _share_text(share: "Share") -> str:
     return f"{share.count} of {share.of}{_interval_text(share.interval, '.2f')}"
 
 
@@ -148,17 +140,22 @@ def _interval_text(interval: "Interval", form: str = ".3f") -> str:
 
 
 def _consistency_lines(row: "Row") -> list[str]:
+    """Return the ANEES for each circumstance, with the values that a consistent covariance would give."""
     from simscen.bench.localization.campaign import MOMENTS_S
 
     def lines(name: str, consistency: "Consistency") -> list[str]:
         low, high = consistency.bounds or (0.0, 0.0)
-        right = "" if consistency.bounds is None else f"; right on average: {low:.2f} … {high:.2f} (95 %)"
+        right = (
+            ""
+            if consistency.bounds is None
+            else f"; if the covariance is right on average: {low:.2f} … {high:.2f} (95 %)"
+        )
         pairs = zip(MOMENTS_S, consistency.moments, strict=True)
         moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in pairs)
         low, high = consistency.moment_bounds
         return [
             f"  ANEES {name}: {consistency.anees:.2f}{right}; in the 95 % ellipsoid: {consistency.inside:.1%}",
-            f"    {moments}; normal, independent: {low:.2f} … {high:.2f} (95 %)",
+            f"    {moments}; with normal errors and independent logs: {low:.2f} … {high:.2f} (95 %)",
         ]
 
     return [row.parameters, *(line for name, consistency in row.sure.items() for line in lines(name, consistency))]

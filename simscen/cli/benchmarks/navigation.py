@@ -1,13 +1,13 @@
-"""Command `simscen bench nav`, which measures the navigation of the reference stack."""
+"""Command `simscen bench nav`: measures the navigation of the reference stack."""
 
 import os
 import sys
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from simscen.cli.benchmarks.results import Format
 from simscen.cli.diagnostics import as_text as problems_as_text
 from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
 from simscen.core.errors import Exit, NothingSelected
@@ -15,13 +15,6 @@ from simscen.report.display_text import detect_style
 
 if TYPE_CHECKING:
     from simscen.bench.navigation.experiments import Experiment
-
-
-class Format(str, Enum):
-    """Output format."""
-
-    TEXT = "text"
-    JSON = "json"
 
 
 def command(
@@ -75,21 +68,23 @@ def command(
     worlds and generated buildings, degraded sensing, ramps, two robots in a corridor, Nav2's system test, corner cases,
     and localization. Intervals are by bootstrap over worlds. The worlds of BARN and Nav2 are not included; pass their
     folders as options. Experiments without data are skipped with a message. Each run that does not pass is printed on
-    standard error with the command that repeats it. An interrupted session prints its results so far, and continues
-    with --resume and the same options. Exit code 0; 3: a run could not be completed.
+    standard error with the command that repeats it. An interrupted session prints the results that it has; use --resume
+    with the same options to continue it.
+
+    Exit code 0: all runs were completed; 3: a run could not be completed.
     """
     from simscen.bench.navigation.summary import compare_drives
-    from simscen.cli.benchmarks.navigation_experiments import Sizes, available_experiments
+    from simscen.cli.benchmarks.navigation_experiments import Sizes, experiment_groups
     from simscen.cli.benchmarks.navigation_runs import completed_trials, execute_experiments, summarize_experiment
     from simscen.cli.benchmarks.navigation_table import as_json, as_text
-    from simscen.cli.session.run_session import output_folder
+    from simscen.cli.session.run_session import open_output_folder
 
-    folder, journal = output_folder(out, resume)
+    folder, journal = open_output_folder(out, resume)
     generated = folder / "generated"
     generated.mkdir(exist_ok=True)
     experiments: list[Experiment] = []
     sizes = Sizes(first, seeds, fields, dynamic, goals, lost)
-    for group in available_experiments(barn, nav2, project, generated, sizes):
+    for group in experiment_groups(barn, nav2, project, generated, sizes):
         is_whole = _is_selected(group.name, only)
         if not is_whole and not any(_is_selected(name, only) for name in group.parts):
             continue
@@ -124,7 +119,10 @@ def command(
 
 
 def with_stack(file: Path, experiments: list["Experiment"], generated: Path, project: Path) -> list["Experiment"]:
-    """Return the same experiments with the parameters of a stack file. Raises InvalidInput."""
+    """Return the same experiments with the parameters of a stack file.
+
+    New scenarios are written to `generated`. `project` is the root of the stack file. Raises InvalidInput.
+    """
     from simscen.bench.navigation.experiments import with_stack_parameters
     from simscen.loading.stacks.choice import load_stack_file
 

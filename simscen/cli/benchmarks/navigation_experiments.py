@@ -1,4 +1,4 @@
-"""Experiments of `simscen bench nav`."""
+"""Groups of experiments of `simscen bench nav`, with the functions that create them."""
 
 from __future__ import annotations
 
@@ -15,17 +15,24 @@ if TYPE_CHECKING:
     from simscen.core.environment.world_model import BuiltWorld
 
 SHIPPED_WORLDS = ("house", "office", "warehouse")
+"""Names of the shipped worlds with random goals."""
 BARN_SOURCE = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
 NAV2_SOURCE = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
+"""Messages for experiments whose data is missing: the option, and the website of the data."""
 LIDAR_HEIGHT_M = 0.2
 """Height of the lidar for which the maps of worlds are generated."""
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Size of the experiments, and the `first` number of their fields, buildings, drives, and seeds.
+    """Sizes of the experiments.
 
-    `seeds` is None for the default number of each experiment.
+    first:    number of the first field, building, drive, and seed
+    seeds:    number of seeds of each scenario; None for the default of each experiment
+    fields:   number of generated obstacle fields; there are half as many narrow fields
+    dynamic:  number of fields of moving cylinders at each speed
+    goals:    number of random goals in each world, of ramps, and of corridors
+    lost:     number of drives with an unknown start
     """
 
     first: int = 1
@@ -36,7 +43,7 @@ class Sizes:
     lost: int = 50
 
     def seeds_or(self, default: int) -> Sequence[int]:
-        """Return the seeds of a scenario that runs with `default` seeds unless `seeds` is set."""
+        """Return the seeds of a scenario: `seeds` of them if that is set, otherwise `default`."""
         return self.numbers(self.seeds or default)
 
     def numbers(self, count: int) -> Sequence[int]:
@@ -45,11 +52,14 @@ class Sizes:
 
 
 @dataclass(frozen=True)
-class AvailableExperiment:
-    """Group of experiments, the folder that it needs, and the function that creates it.
+class ExperimentGroup:
+    """Group of experiments that need the same data.
 
-    `parts` are the names of its experiments that differ from its own; creating all experiments may take a while.
-    Without a folder, `source` names the option for it and the origin of its data.
+    name:    name of the group
+    needs:   folder with the data; None if it was not given
+    make:    creates the experiments, which may take a while
+    source:  message if the folder was not given: its option, and the website of the data
+    parts:   names of the experiments, if they differ from the name of the group, to select them before they are created
     """
 
     name: str
@@ -60,20 +70,24 @@ class AvailableExperiment:
 
     @property
     def missing(self) -> str:
-        """Reason why the group cannot run, or ""."""
+        """Message about missing data; "" if the data is available."""
         if self.needs is None:
             return self.source
         return "" if self.needs.is_dir() else f"there is no folder {self.needs}"
 
 
-def available_experiments(
-    data: Path | None, nav2: Path | None, project: Path, generated: Path, sizes: Sizes
-) -> list[AvailableExperiment]:
-    """Return all groups of experiments in the order of the table; generated files are written to `generated`."""
+def experiment_groups(
+    barn_data: Path | None, nav2: Path | None, project: Path, generated: Path, sizes: Sizes
+) -> list[ExperimentGroup]:
+    """Return all groups of experiments in the order of the table.
+
+    `barn_data` and `nav2` are the folders of --barn and --nav2. `project` is the folder with simscen's scenarios and
+    worlds. Generated files are written to `generated`.
+    """
     worlds, scenarios = project / "worlds", project / "scenarios"
     return [
         replace(group, parts=_parts(group.name, scenarios))
-        for group in _experiment_groups(data, nav2, worlds, scenarios, generated, sizes)
+        for group in _groups_without_parts(barn_data, nav2, worlds, scenarios, generated, sizes)
     ]
 
 
@@ -102,39 +116,39 @@ def _parts(name: str, scenarios: Path) -> list[str]:
             return []
 
 
-def _experiment_groups(
-    data: Path | None, nav2: Path | None, worlds: Path, scenarios: Path, generated: Path, sizes: Sizes
-) -> list[AvailableExperiment]:
+def _groups_without_parts(
+    barn_data: Path | None, nav2: Path | None, worlds: Path, scenarios: Path, generated: Path, sizes: Sizes
+) -> list[ExperimentGroup]:
     return [
-        AvailableExperiment("BARN", data, lambda: list(_barn(generated, data or Path(), sizes)), BARN_SOURCE),
-        AvailableExperiment(
+        ExperimentGroup("BARN", barn_data, lambda: list(_barn(generated, barn_data or Path(), sizes)), BARN_SOURCE),
+        ExperimentGroup(
             "generated fields",
             generated,
             lambda: [experiments.generated_fields(generated, sizes.numbers(sizes.fields))],
         ),
-        AvailableExperiment(
+        ExperimentGroup(
             "narrow fields", generated, lambda: experiments.narrow_fields(generated, sizes.numbers(sizes.fields // 2))
         ),
-        AvailableExperiment(
+        ExperimentGroup(
             "dynamic fields", generated, lambda: experiments.dynamic_fields(generated, sizes.numbers(sizes.dynamic))
         ),
-        AvailableExperiment("random goals", worlds, lambda: list(_random_goals(generated, worlds, sizes))),
-        AvailableExperiment("degraded sensing", worlds, lambda: _degraded(generated, worlds, sizes)),
-        AvailableExperiment(
+        ExperimentGroup("random goals", worlds, lambda: list(_random_goals(generated, worlds, sizes))),
+        ExperimentGroup("degraded sensing", worlds, lambda: _degraded(generated, worlds, sizes)),
+        ExperimentGroup(
             "ramps", generated, lambda: [office_maps.ramps(generated / "ramps", sizes.numbers(sizes.goals))]
         ),
-        AvailableExperiment(
+        ExperimentGroup(
             "two robots",
             generated,
             lambda: [office_maps.two_robots(generated / "corridors", sizes.numbers(sizes.goals))],
         ),
-        AvailableExperiment(
+        ExperimentGroup(
             "tb3_sandbox", nav2, lambda: experiments.sandbox(generated, nav2 or Path(), sizes.seeds_or(20)), NAV2_SOURCE
         ),
-        AvailableExperiment(
+        ExperimentGroup(
             "corner cases", scenarios, lambda: experiments.corner_cases(scenarios, scenarios.parent, sizes.seeds_or(20))
         ),
-        AvailableExperiment(
+        ExperimentGroup(
             "localization",
             worlds,
             lambda: experiments.localization_experiments(
@@ -144,13 +158,13 @@ def _experiment_groups(
     ]
 
 
-def _barn(generated: Path, data: Path, sizes: Sizes) -> Iterator[Experiment]:
-    """Yield the BARN challenge at 2 m/s, with default parameters, and with each controller at the same speed."""
+def _barn(generated: Path, barn_data: Path, sizes: Sizes) -> Iterator[Experiment]:
+    """Yield the BARN challenge at 2 m/s, with default parameters, and with each controller at 0.5 m/s."""
     seeds = sizes.seeds_or(5)
-    yield experiments.barn_challenge(generated, data, seeds)
-    yield experiments.barn_challenge(generated, data, seeds, "default parameters", barn.DEFAULT_STACK)
+    yield experiments.barn_challenge(generated, barn_data, seeds)
+    yield experiments.barn_challenge(generated, barn_data, seeds, "default parameters", barn.DEFAULT_STACK)
     for controller, stack in barn.CONTROLLERS.items():
-        yield experiments.barn_challenge(generated, data, seeds, controller, stack)
+        yield experiments.barn_challenge(generated, barn_data, seeds, controller, stack)
 
 
 def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:
@@ -163,7 +177,7 @@ def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Exper
 
 
 def _degraded(generated: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
-    """Return the experiments in shipped worlds and generated buildings, a quarter as many worlds as `goals`."""
+    """Return the experiments with degraded sensing. The number of worlds is a quarter of `sizes.goals`."""
     folder, maps = generated / "degraded", generated / "degraded_buildings"
     count = max(1, sizes.goals // 4)
     buildings = _generated_buildings(maps, sizes.numbers(max(0, count - len(SHIPPED_WORLDS))))
@@ -181,7 +195,7 @@ def _generated_buildings(folder: Path, numbers: Sequence[int]) -> Mapping[str, B
 
 
 def _build_worlds(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:
-    """Return the built worlds by the names that scenarios in `folder` use for them."""
+    """Return the built worlds by their file names. `folder` is created for the scenarios that use them."""
     from simscen.loading.builders import world_from_file
     from simscen.loading.files.single_files import load_world_file
     from simscen.worlds.built_world import build_world_and_map

@@ -1,4 +1,4 @@
-"""Runs the experiments of `simscen bench nav` as ordinary scenario runs."""
+"""Executes the experiments of `simscen bench nav` as ordinary runs, and summarizes their results."""
 
 import shlex
 import sys
@@ -11,9 +11,9 @@ from simscen.bench.navigation.experiments import Drive, Experiment
 from simscen.bench.navigation.summary import Row, Trial, mean, summarize
 from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
-from simscen.cli.session.backends import backend_of, signals_interrupt
+from simscen.cli.session.backends import backend_of, interrupt_on_signals
+from simscen.cli.session.file_checks import world_problems
 from simscen.cli.session.pending_runs import plan_session
-from simscen.cli.session.selection import world_problems
 from simscen.core.errors import Exit, InvalidInput
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionEvent
@@ -36,10 +36,12 @@ ANEES_TIMES_S = (5.0, 10.0, 20.0, 30.0)
 
 @dataclass(frozen=True)
 class LocalizationAccuracy:
-    """Accuracy of the localization: RMSE in m (mean and worst over runs), and ANEES at ANEES_TIMES_S.
+    """Accuracy of the localization in an experiment. The names of the fields are keys of the JSON output.
 
-    `bounds` is the 95 % interval of the ANEES for a consistent covariance. The names of the fields are keys of the JSON
-    output.
+    rmse:        root mean square error of the position in m, mean over the runs; None if no run has it
+    worst_rmse:  the largest of these errors in m
+    anees:       average NEES over the runs, by the time in the run in seconds (ANEES_TIMES_S)
+    bounds:      95 % interval of the ANEES for a consistent covariance
     """
 
     rmse: float | None
@@ -62,11 +64,10 @@ class ExperimentResult:
 def execute_experiments(
     experiments: Sequence[Experiment], journal: Journal, workers: int
 ) -> tuple[list[list[Trial]], Exit | None]:
-    """Execute those runs of each experiment that have no result in the journal yet.
+    """Execute the runs that have no result in the journal yet, and print progress and failures to stderr.
 
-    Prints progress and failures to stderr.
-
-    Returns the trials of each experiment, and the exit code of an interrupt or None. Raises InvalidInput.
+    Return the trials of each experiment, and the exit code of the signal that interrupted the runs, or None. Raises
+    InvalidInput.
     """
     jobs, drives = _plan_jobs(experiments, journal.folder)
     pending = plan_session(journal, jobs, workers)
@@ -77,7 +78,7 @@ def execute_experiments(
         progress(event)
 
     options = SessionOptions(workers=workers, wall_limit=WALL_LIMIT_S)
-    with signals_interrupt(), backend_of(options) as backend:
+    with interrupt_on_signals(), backend_of(options) as backend:
         finished_runs, stopped = run_session(pending.jobs, options, backend, listen)
     print_progress("")
     results = {finished.key: finished for finished in (*pending.reused, *finished_runs)}
@@ -99,14 +100,14 @@ def _was_interrupted(run: RunFinished) -> bool:
 
 
 ExperimentDrive = tuple[int, Drive]
-"""Index of an experiment, and one of its drives."""
+"""Index of an experiment in the list of experiments, and one of its drives."""
 
 
 def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, ExperimentDrive]]:
-    """Return a job for each run, and the experiment and drive of each.
+    """Return a job for each run, and the experiment and drive of each run.
 
-    Raises ValueError for two runs with the same key. Only the first scenario of each experiment is checked as by
-    `simscen validate`: the others are generated the same way, and the reachability of their goals was checked then.
+    Only the first scenario of each experiment is validated. The others are generated in the same way, and their goals
+    were checked for reachability then. Raises InvalidInput, and ValueError for two runs with the same key.
     """
     jobs: list[Job] = []
     drives: dict[RunKey, ExperimentDrive] = {}
@@ -132,7 +133,7 @@ def _top_speed(scenario: LoadedScenario) -> float | None:
 
 
 def repeat_command(job: Job) -> str:
-    """Return the command that repeats a run."""
+    """Return the command that repeats a run, with the root and the world path of its experiment."""
     scenario = job.scenario
     folders = [part for folder in scenario.world_path for part in ("--world-path", str(folder))]
     root = ["--root", str(scenario.root)]
@@ -140,7 +141,7 @@ def repeat_command(job: Job) -> str:
 
 
 class _Progress:
-    """Prints a counter to a terminal, and each run that did not pass."""
+    """Prints the number of finished runs to a terminal, and each run that did not pass."""
 
     def __init__(self, total: int, done: int, jobs: dict[RunKey, Job]) -> None:
         self._total, self._jobs, self._done = total, jobs, done

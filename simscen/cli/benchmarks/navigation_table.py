@@ -1,54 +1,13 @@
-"""Tables of `simscen bench`, fitted to the width of the terminal."""
+"""Output of `simscen bench nav` as text, fitted to the width of the terminal, and as JSON."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 
 from simscen.bench.navigation.barn import PUBLISHED_DWA_RESULTS
 from simscen.bench.navigation.summary import Difference, DriveComparison, Row
 from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
-from simscen.report.display_text import StyledText, plain_text, wrap_line
-
-TableRow = Sequence[str]
-Adjust = Callable[[str, int], str]
-
-
-def fits(lines: Sequence[str], columns: int | None) -> bool:
-    """Return whether no line is longer than `columns`; None is unlimited."""
-    return columns is None or max(map(len, lines)) <= columns
-
-
-def align_columns(table: Sequence[TableRow], adjust: Adjust = str.rjust) -> list[str]:
-    """Return one line per row with aligned cells: the first cell left-aligned, the others with `adjust`."""
-    widths = column_widths(table)
-    return [
-        "  ".join((row[0].ljust(widths[0]), *map(adjust, row[1:], widths[1:]))).rstrip()
-        for row in table
-    ]  # fmt: skip
-
-
-def stack_rows(table: Sequence[TableRow], columns: int) -> list[str]:
-    """Return two lines per row: its name, and its aligned numbers."""
-    widths = column_widths(table)[1:]
-    gap = "  " if 2 + sum(widths) + 2 * (len(widths) - 1) <= columns else " "
-    return [line for name, *rest in table for line in (name, "  " + gap.join(map(str.rjust, rest, widths)))]
-
-
-def label_cells(head: TableRow, row: TableRow, columns: int) -> list[str]:
-    """Return the name of a row, then its labeled numbers, as many per line as fit."""
-    pieces = tuple(StyledText(f"  {name} {cell}") for name, cell in zip(head[1:], row[1:], strict=True))
-    return [row[0], *(plain_text(line) for line in wrap_line(pieces, columns))]
-
-
-def wrap_lines(lines: Sequence[str], columns: int | None) -> list[str]:
-    """Return the lines, wrapped between words if they are too long."""
-    return [plain_text(piece) for line in lines for piece in wrap_line((StyledText(line),), columns)]
-
-
-def column_widths(table: Sequence[TableRow]) -> list[int]:
-    """Return the widths of the columns of a table."""
-    return [max(map(len, cells)) for cells in zip(*table, strict=True)]
-
+from simscen.cli.benchmarks.tables import align_columns, fits, label_cells, stack_rows, wrap_lines
 
 PUBLISHED_DWA_LINE = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
     f"{name} {value:.3f}" for name, value in PUBLISHED_DWA_RESULTS.items()
@@ -70,9 +29,10 @@ TABLE_HEAD = (
 
 
 def as_text(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = (), columns: int | None = None) -> str:
-    """Return the table of results, the effect of other stack parameters, and published figures for comparison.
+    """Return the table of results, then the effect of --stack on each pair of experiments, then published figures.
 
-    If a line would be longer than `columns`, each experiment has one line for its name and one for its numbers.
+    If a line would be longer than `columns`, each experiment has one line for its name and one for its numbers. None
+    stands for unlimited width.
     """
     table = [TABLE_HEAD, *(_cells(result.tally) for result in rows)]
     lines = align_columns(table)
@@ -89,7 +49,7 @@ def as_text(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] =
 
 
 def as_json(rows: Sequence[ExperimentResult], pairs: Sequence[DriveComparison] = ()) -> str:
-    """Return all numbers, and those of DWA, as JSON."""
+    """Return all numbers as JSON, with the published figures of DWA."""
     data = {"experiments": [asdict(row) for row in rows], "dwa_published": PUBLISHED_DWA_RESULTS}
     return json.dumps({**data, "versus": [asdict(pair) for pair in pairs]} if pairs else data, indent=2)
 

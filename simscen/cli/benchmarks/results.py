@@ -1,4 +1,4 @@
-"""Result files of `simscen bench`, and their comparison."""
+"""Results of `simscen bench`: JSON files, printed output, and the comparison of two results."""
 
 import json
 import sys
@@ -11,8 +11,9 @@ from typing import Annotated, Any
 import typer
 
 from simscen.bench.speed.measurement import Measurement, Measurements
+from simscen.cli.benchmarks.tables import align_columns
 from simscen.cli.diagnostics import print_text
-from simscen.cli.installation import processor
+from simscen.cli.installation import describe_processor
 from simscen.core.errors import UsageError
 
 FORMAT = 1
@@ -21,7 +22,7 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class Result:
-    """Measurements of one call, with the machine and the version of simscen."""
+    """Figures that one call of `simscen bench` measured, with the machine and the version of simscen."""
 
     figures: Measurements
     machine: str
@@ -30,11 +31,11 @@ class Result:
     @classmethod
     def on_this_machine(cls, figures: Measurements) -> "Result":
         """Return the result with the processor of this machine and the installed version of simscen."""
-        return cls(figures, processor(), version("simscen"))
+        return cls(figures, describe_processor(), version("simscen"))
 
 
 def as_json(result: Result, sections: dict[str, Any] | None = None) -> str:
-    """Return all numbers as JSON; `sections` are the data from which they were computed."""
+    """Return the result as JSON. `sections` are further keys: the data from which the figures were computed."""
     header = {"simscen_bench": FORMAT, "simscen": result.simscen, "machine": result.machine}
     figures = {name: asdict(figure) for name, figure in result.figures.items()}
     return json.dumps({**header, "figures": figures, **(sections or {})}, indent=2)
@@ -71,8 +72,9 @@ def _figure(entry: dict[str, Any]) -> Measurement:
 
 
 HEAD = ("", "before", "after", "ratio", "rounds before", "rounds after", "")
+"""Headings of the comparison of two results."""
 MIN_ROUNDS = 2
-"""Minimum number of rounds for a statement about noise."""
+"""Minimum number of rounds of a figure for telling changes from noise."""
 
 
 def compare_command(
@@ -88,13 +90,15 @@ def compare_command(
 
 
 def comparison_text(before: Result, after: Result) -> str:
-    """Return one line per common figure, then the figures of only one result. Raises UsageError if none is common."""
+    """Return one line for each figure that both results have, then the names of the others.
+
+    Raises UsageError if the results have no common figure.
+    """
     common = [name for name in after.figures if name in before.figures]
     if not common:
         raise UsageError("the two results have no common figure; compare results of the same command")
     table = [HEAD, *(_row(name, before.figures[name], after.figures[name]) for name in common)]
-    widths = [max(len(row[column]) for row in table) for column in range(len(HEAD))]
-    lines = [_aligned(row, widths) for row in table]
+    lines = align_columns(table)
     for figures, label in ((before.figures, "before"), (after.figures, "after")):
         if names := [name for name in figures if name not in common]:
             lines.append(f"only {label}: " + ", ".join(names))
@@ -106,8 +110,7 @@ def comparison_text(before: Result, after: Result) -> str:
 
 
 def judgment(before: Measurement, after: Measurement) -> str:
-    """Return `noise` if the ranges of the rounds overlap, otherwise `better` or `worse`; "" if there are too few
-    rounds."""
+    """Return "noise" if the ranges of the rounds overlap, otherwise "better" or "worse"; "" for too few rounds."""
     if min(len(before.rounds), len(after.rounds)) < MIN_ROUNDS:
         return ""
     if min(after.rounds) <= max(before.rounds) and min(before.rounds) <= max(after.rounds):
@@ -129,11 +132,6 @@ def _spread(figure: Measurement) -> str:
     return f"{min(figure.rounds):.4g} … {max(figure.rounds):.4g}" if len(figure.rounds) > 1 else "-"
 
 
-def _aligned(row: tuple[str, ...], widths: list[int]) -> str:
-    first, *rest = zip(row, widths, strict=True)
-    return "  ".join((first[0].ljust(first[1]), *(cell.rjust(width) for cell, width in rest))).rstrip()
-
-
 class Format(str, Enum):
     """Output format."""
 
@@ -145,13 +143,13 @@ COMPARE_HELP = "Compare with this result of --format json, and tell changes from
 
 
 def print_progress(text: str) -> None:
-    """Replace the progress line of a terminal by this text; without a terminal on stderr, print nothing."""
+    """Replace the progress line of a terminal by a text. Print nothing if stderr is not a terminal."""
     if sys.stderr.isatty():
         print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
 
 def print_result(result: Result, text: str, sections: dict[str, Any], format_: Format, before: Result | None) -> None:
-    """Print a result; as text, also the comparison with an earlier one."""
+    """Print a result as JSON with its sections, or as text with a comparison with the result `before`, if any."""
     print_progress("")
     if format_ is Format.JSON:
         print(as_json(result, sections))
@@ -162,5 +160,5 @@ def print_result(result: Result, text: str, sections: dict[str, Any], format_: F
 
 
 def load_baseline(file: Path | None) -> Result | None:
-    """Read the result to compare with, before anything is measured. Raises UsageError."""
+    """Return the result in the file of --compare, or None. Called before anything is measured. Raises UsageError."""
     return None if file is None else read_result(file)

@@ -1,7 +1,8 @@
-"""Reference page of the commands, generated from their functions."""
+"""Sections of docs/reference/commands.md, generated from the functions of the commands."""
 
 import importlib
 import inspect
+import re
 import types
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -25,12 +26,20 @@ EXIT_CODES = {
     Exit.INTERRUPTED: "Interrupted by Ctrl-C (SIGINT).",
     Exit.TERMINATED: "Interrupted by SIGTERM.",
 }
+"""Meaning of each exit code."""
 _TYPE_NAMES = {int: "integer", float: "number", str: "text", Path: "path"}
+_ESCAPED = re.compile(r"[*<]")
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """Argument or option: its spelling, the kind of its value, its default ("" = none), and its description."""
+    """Argument or option of a command.
+
+    spelling:  names, such as "-j, --jobs"
+    value:     kind of its value, such as "integer, 1 to 256"; "" for a flag
+    default:   default value; "" if there is none
+    help:      description
+    """
 
     spelling: str
     value: str
@@ -38,8 +47,8 @@ class Parameter:
     help: str
 
 
-def commands_of(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """Yield the functions of a command and its subcommands, each with the words that call it."""
+def functions_of_command(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Yield the words that call a command, such as "world export", and its function; likewise for each subcommand."""
     module = importlib.import_module(f"simscen.cli.commands.{name}")
     app = getattr(module, "app", None)
     if app is None:
@@ -54,14 +63,14 @@ def commands_of(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
 
 
 def parameters_of(function: Callable[..., Any]) -> list[Parameter]:
-    """Return the parameters of the function of a command in the order of its help."""
+    """Return the arguments and options of the function of a command, in the order of its help."""
     return [_parameter(*annotated) for annotated in _annotated_parameters(function)]
 
 
-def section(command: str, function: Callable[..., Any]) -> str:
-    """Return the section of a command, with the words that call it and its function."""
+def command_section(command: str, function: Callable[..., Any]) -> str:
+    """Return the Markdown section of a command, given the words that call it and its function."""
     rows = [
-        f"| `{p.spelling}` | {p.value} | {f'`{p.default}`' if p.default else ''} | {_plain(p.help)} |"
+        f"| `{p.spelling}` | {p.value} | {f'`{p.default}`' if p.default else ''} | {_plain(p.help.strip())} |"
         for p in parameters_of(function)
     ]
     head = ["| argument or option | value | default | meaning |", "|---|---|---|---|"]
@@ -70,7 +79,7 @@ def section(command: str, function: Callable[..., Any]) -> str:
 
 
 def exit_code_section() -> str:
-    """Return the section of the exit codes."""
+    """Return the Markdown section about exit codes."""
     rows = "\n".join(f"| {code.value} | {text} |" for code, text in EXIT_CODES.items())
     text = "If several apply, the first of 129, 130, 143, 4, 3, 1 is returned."
     return f"## Exit codes\n\n{text}\n\n| code | meaning |\n|---|---|\n{rows}\n"
@@ -93,7 +102,8 @@ def _annotated_parameters(
 def _parameter(parameter: inspect.Parameter, kind: Any, info: ArgumentInfo | OptionInfo) -> Parameter:
     repeated, kind = _item_type(kind)
     required = parameter.default is inspect.Parameter.empty
-    default = "" if required or parameter.default in (None, False, "") else _default_text(parameter.default)
+    has_no_default = required or parameter.default is None or parameter.default is False or parameter.default == ""
+    default = "" if has_no_default else _default_text(parameter.default)
     if isinstance(info, ArgumentInfo):
         name = (info.metavar or parameter.name).upper()
         spelling = f"{name}…" if repeated else name if required else f"[{name}]"
@@ -122,8 +132,12 @@ def _value_text(kind: Any, info: ArgumentInfo | OptionInfo) -> str:
 
 
 def _plain(text: str) -> str:
-    """Escape text for Markdown, so that *.world.yaml and <run-id> are neither emphasis nor HTML."""
-    return text.replace("*", "\\*").replace("<", "\\<").replace("|", "\\|")
+    """Escape text for a Markdown table, so that *.world.yaml and <run-id> are neither emphasis nor HTML.
+
+    In code between backticks, only `|` is escaped.
+    """
+    parts = text.replace("|", "\\|").split("`")
+    return "`".join(part if index % 2 else _ESCAPED.sub(r"\\\g<0>", part) for index, part in enumerate(parts))
 
 
 def _default_text(default: Any) -> str:

@@ -1,10 +1,10 @@
-"""Generator of schemas and reference pages: `python -m simscen.cli.catalog.generate [--check]`."""
+"""Writes the generated JSON Schemas and reference pages: `python -m simscen.cli.catalog.generate [--check]`."""
 
 import sys
 from itertools import groupby
 from pathlib import Path
 
-from simscen.cli.catalog.commands_page import commands_of, exit_code_section, section
+from simscen.cli.catalog.commands_page import command_section, exit_code_section, functions_of_command
 from simscen.cli.catalog.json_schema import MODELS, as_text, schema_of
 from simscen.cli.catalog.reference_topics import metrics_page, signals_page
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, topics
@@ -14,18 +14,19 @@ from simscen.loading.codes import CODES
 from simscen.spec.quantities import UNITS
 
 ROOT = Path(__file__).resolve().parents[3]
+"""Folder of the repository."""
 
 
 def generated_files() -> dict[str, str]:
-    """Return the content of all generated files by path in the repository."""
+    """Return the text of each generated file, by its path in the repository."""
     schemas = {f"simscen/data/schemas/{name}.schema.json": as_text(schema_of(name)) for name in MODELS}
     return {
         **schemas,
         "docs/reference/language.md": language_page(),
         "docs/reference/problems.md": problems_page(),
         "docs/reference/commands.md": commands_page(),
-        "docs/reference/metrics.md": metrics_reference(),
-        "docs/reference/signals.md": signals_reference(),
+        "docs/reference/metrics.md": _GENERATED_NOTE + metrics_page(),
+        "docs/reference/signals.md": _GENERATED_NOTE + signals_page(),
     }
 
 
@@ -85,42 +86,31 @@ _HEADINGS = ("What is measured:", "When it fails:", "Why this:", "Source:")
 
 
 def language_page(installed: bool = False) -> str:
-    """Return docs/reference/language.md, including types from installed plugins if `installed`."""
+    """Return the text of docs/reference/language.md, with the types of installed packages if `installed`."""
+    all_topics = [*topics(installed), *added_topics(AnyMeasure, installed)]
     parts = [f"{_GENERATED_NOTE}# Language reference\n", _units()]
-    for group, members in groupby(_topics(installed), key=lambda topic: topic.group):
+    for group, members in groupby(all_topics, key=lambda topic: topic.group):
         title, text = _GROUPS[group]
         parts += [f"## {title}\n\n{text}\n", *(_section(topic) for topic in members)]
     return "\n".join(parts)
 
 
-def _topics(installed: bool) -> list[Topic]:
-    return [*topics(installed), *added_topics(AnyMeasure, installed)]
-
-
 def problems_page() -> str:
-    """Return docs/reference/problems.md."""
+    """Return the text of docs/reference/problems.md."""
     rows = "\n".join(f"| {code} | {text} |" for code, text in CODES.items())
     intro = "# Problem codes\n\n`simscen explain CODE` prints the same."
     return f"{_GENERATED_NOTE}{intro}\n\n| code | meaning |\n|---|---|\n{rows}\n"
 
 
 def commands_page() -> str:
-    """Return docs/reference/commands.md."""
+    """Return the text of docs/reference/commands.md."""
     rows = "\n".join(f"| `simscen {name}` | {text} |" for name, text in COMMANDS.items())
     intro = "# Commands\n\n`simscen COMMAND --help` prints the same."
-    sections = [section(command, function) for name in COMMANDS for command, function in commands_of(name)]
+    sections = [
+        command_section(command, function) for name in COMMANDS for command, function in functions_of_command(name)
+    ]
     table = f"| command | what it does |\n|---|---|\n{rows}\n"
     return "\n".join([f"{_GENERATED_NOTE}{intro}\n\n{table}", *sections, exit_code_section()])
-
-
-def metrics_reference() -> str:
-    """Return docs/reference/metrics.md."""
-    return _GENERATED_NOTE + metrics_page()
-
-
-def signals_reference() -> str:
-    """Return docs/reference/signals.md."""
-    return _GENERATED_NOTE + signals_page()
 
 
 def _units() -> str:

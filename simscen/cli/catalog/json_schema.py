@@ -1,4 +1,4 @@
-"""JSON Schemas of simscen's YAML files for editors: completion, hover texts, and precise errors."""
+"""Generates the JSON Schemas of simscen's YAML files, which editors use for completion, hover texts, and errors."""
 
 import json
 from typing import Any
@@ -27,12 +27,13 @@ MODELS: dict[str, type[BaseModel]] = {
     "config": UserConfigSpec,
     "base": ScenarioSpec,
 }
+"""Model of each kind of file. A base file contains some of the keys of a scenario."""
 DRAFT = "http://json-schema.org/draft-07/schema#"
-"""Version that yaml-language-server supports best."""
+"""Version of JSON Schema: the one that yaml-language-server supports best."""
 
 
 def schema_of(name: str, installed: bool = False) -> Schema:
-    """Return the JSON Schema of a kind of file such as "scenario"; `installed` adds the types of installed packages."""
+    """Return the JSON Schema of a kind of file, a key of MODELS; `installed` adds the types of installed packages."""
     model = MODELS[name]
     generated = model.model_json_schema(schema_generator=_InstalledTypesGenerator if installed else _Generator)
     if name == "stack":
@@ -51,7 +52,7 @@ def schema_of(name: str, installed: bool = False) -> Schema:
 
 
 def _remove_scenario_keys(generated: Schema) -> None:
-    """Remove the keys that a stack file must leave to the scenario."""
+    """Remove the keys that only a scenario may set, not a stack file."""
     for definition in generated["$defs"].values():
         for key in SCENARIO_KEYS:
             definition.get("properties", {}).pop(key, None)
@@ -78,7 +79,7 @@ def _make_extensible_keys_optional(generated: Schema) -> None:
 
 
 def _referenced_definitions(schema: Schema, definitions: Schema, lists: bool) -> set[str]:
-    """Return the definitions that a schema refers to outside of lists, or within lists with `lists`."""
+    """Return the definitions to which a schema refers: within lists if `lists`, otherwise outside of lists."""
     found: set[str] = set()
     seen: set[tuple[str, bool]] = set()
 
@@ -114,7 +115,7 @@ _EXTENDS: Schema = {
 
 
 class _Generator(GenerateJsonSchema):
-    """Generator of pydantic schemas that adds single-key choices and the docstrings of values that are not mappings."""
+    """Schema generator of pydantic that also requires exactly one key of a choice, and describes plain values."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         result, model = super().model_schema(schema), schema["cls"]
@@ -126,7 +127,7 @@ class _Generator(GenerateJsonSchema):
 
 
 class _InstalledTypesGenerator(_Generator):
-    """Generator that also adds the usable types of installed packages."""
+    """Schema generator that also adds the usable types of installed packages."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         result, model = super().model_schema(schema), schema["cls"]
@@ -158,9 +159,9 @@ class _InstalledTypesGenerator(_Generator):
 def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
     """Return a schema that requires exactly one of `keys`.
 
-    A mapping with another key instead gets only the error that this key is unknown. A mapping without such keys gets
-    "expected one of …". `maxProperties` is not used, since yaml-language-server would then offer no completions: it
-    counts the key that is being typed.
+    For a mapping with an unknown key instead, an editor shows only that this key is unknown. For a mapping with only
+    modifiers, it shows "expected one of …". `maxProperties` is not used, because yaml-language-server counts the key
+    that is being typed and would offer no completions.
     """
     present: list[Schema] = [{"type": "object", "required": [key]} for key in keys]
     modifiers = [field.alias or name for name, field in model.model_fields.items() if name in model.modifiers]
@@ -173,7 +174,7 @@ def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
 
 
 def _simplify(node: Any, definitions: Schema) -> Any:
-    """Return a schema without titles, nulls, and large defaults, and with unions as if/then."""
+    """Return a schema without titles, nulls, and bulky defaults, and with unions as if/then."""
     if isinstance(node, list):
         return [_simplify(item, definitions) for item in node]
     if not isinstance(node, dict):
@@ -212,7 +213,10 @@ def _by_type(node: Schema, definitions: Schema) -> Schema:
 
 
 def _by_key(node: Schema, keys: dict[str, str], definitions: Schema) -> Schema:
-    """Return a union of which some members have no `type`: each of them is selected by its only required key."""
+    """Return a union as if/then in which the members without `type` are selected by their only required key.
+
+    `keys` are these keys by the reference of the member.
+    """
     rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
     others = [option for option in node["oneOf"] if option.get("$ref") not in keys]
     schema = others[0] if len(others) == 1 else _by_type({"oneOf": others}, definitions)
@@ -235,7 +239,7 @@ def _by_json_type(node: Schema) -> Schema:
 
 
 def _without_null(node: Schema) -> Schema:
-    """Return an optional value without null, since an optional key is omitted instead."""
+    """Remove null from the schema of an optional value: an optional key is omitted instead."""
     options = node.get("anyOf", [])
     if {"type": "null"} not in options:
         return node
@@ -247,11 +251,13 @@ def _without_null(node: Schema) -> Schema:
 
 
 def _without_noise(node: Schema) -> Schema:
+    """Remove the title of a schema, and its default if that is null, a mapping, or a list."""
     bulky = isinstance(node.get("default"), dict | list) or node.get("default", 0) is None
     return {key: value for key, value in node.items() if key != "title" and not (key == "default" and bulky)}
 
 
 def _join_descriptions(text: str, more: str) -> str:
+    """Append a further description in parentheses, if it is different."""
     if text and more and text != more:
         return f"{text}\n\n({more})"
     return text or more

@@ -1,21 +1,13 @@
-"""Topics of `simscen explain` about results: signals, metrics, error codes, types of JUnit errors, and exit codes."""
-
-from collections.abc import Iterator, Sequence
-
-from pydantic import BaseModel
+"""Topics of `simscen explain` about results: signals, metrics, and error and exit codes; also their reference pages."""
 
 from simscen.cli.catalog.commands_page import EXIT_CODES
-from simscen.cli.catalog.json_schema import MODELS
-from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, fields_of, topics
+from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics
 from simscen.core.errors import BROKEN_COMPONENT
 from simscen.core.messages.navigation import ErrorCode
 from simscen.criteria.base import AnyMeasure
 from simscen.criteria.trace_signals.catalog import SIGNALS, Signal
 from simscen.judge.metrics.catalog import METRICS, Metric
-from simscen.loading.codes import CODES
-from simscen.loading.schema.lookup import models_at
 from simscen.run.external.protocol import CRASHED, FAILED, PROTOCOL, TIMEOUT
-from simscen.spec.choice import Choice
 
 NAV2_ERROR_CODES = {
     ErrorCode.NONE: "No error.",
@@ -53,9 +45,12 @@ EXTERNAL_ONLY_CODES = frozenset({
     ErrorCode.FOLLOW_WAYPOINTS_UNKNOWN, ErrorCode.TASK_EXECUTOR_FAILED, ErrorCode.NO_VALID_WAYPOINTS,
     ErrorCode.BACKUP_INVALID_INPUT, ErrorCode.NAVIGATE_UNKNOWN,
 })  # fmt: skip
-"""Codes that the reference stack never returns: its planners and controllers have no time limit, its planners return no
-empty path, every robot can drive backward, and goals are checked before a run."""
-EXTERNAL_ONLY_NOTE = "The reference stack never returns it; Nav2, external stacks, and installed components may."
+"""Codes that the reference stack never returns.
+
+Its planners and controllers have no time limit, its planners return no empty path, every robot can drive backward, and
+goals are checked before a run.
+"""
+EXTERNAL_ONLY_NOTE = "The reference stack never returns this code; Nav2, external stacks, and installed components may."
 
 JUNIT_ERROR_TYPES = {
     "crashed": "The process of the run ended unexpectedly.",
@@ -105,30 +100,31 @@ Derivatives are differences over the time between two samples. A jump by `kidnap
 
 
 def signal_topics() -> list[Topic]:
-    """Return the overview of all signals, then the topic of each."""
-    rows = tuple(Field(name, value_kind(signal), OPTIONAL, signal.text) for name, signal in SIGNALS.items())
+    """Return a topic that lists all signals, then a topic for each signal."""
+    rows = tuple(Field(name, signal_kind(signal), OPTIONAL, signal.text) for name, signal in SIGNALS.items())
     single = [
-        Topic("signal", name, None, description(signal), example(name, signal)) for name, signal in SIGNALS.items()
+        Topic("signal", name, None, signal_description(signal), signal_example(name, signal))
+        for name, signal in SIGNALS.items()
     ]
     return [Topic("signal", "signals", None, SIGNALS_TEXT, rows=rows), *single]
 
 
-def value_kind(signal: Signal) -> str:
-    """Return the kind of the values: "length in m", "number", "yes or no"."""
+def signal_kind(signal: Signal) -> str:
+    """Return the kind of the values of a signal, such as "length in m", "number", or "yes or no"."""
     return f"{signal.dimension} in {signal.unit}" if signal.unit else signal.dimension
 
 
-def description(signal: Signal) -> str:
+def signal_description(signal: Signal) -> str:
     """Return the description of a signal with its unit and its arguments."""
     return (
-        f"{signal.text}\n\nIt is a {value_kind(signal)}.{_arguments_sentence(signal)}"
+        f"{signal.text}\n\nIt is a {signal_kind(signal)}.{_arguments_sentence(signal)}"
         if not signal.is_boolean
         else signal.text + _arguments_sentence(signal)
     )
 
 
-def example(name: str, signal: Signal) -> str:
-    """Return a condition that uses the signal."""
+def signal_example(name: str, signal: Signal) -> str:
+    """Return an example in YAML: a condition that uses the signal."""
     arguments = "".join(
         f", {key}: {_EXAMPLE_ARGUMENTS[key]}" for key in (*signal.required_arguments[:1], *signal.optional_arguments)
     )
@@ -155,7 +151,7 @@ def _arguments_sentence(signal: Signal) -> str:
 
 
 def signals_page() -> str:
-    """Return the content of docs/reference/signals.md."""
+    """Return the text of docs/reference/signals.md."""
     head = "| signal | meaning | unit | arguments |\n|---|---|---|---|"
     rows = [
         f"| `{name}` | {signal.text} | {signal.unit or signal.dimension} | {_arguments_text(signal)} |"
@@ -174,8 +170,8 @@ METRICS_TEXT = """\
 Every run reports these numbers in result.json, independently of its criteria. They are computed from the trace, so
 `simscen judge` returns the same numbers for its log. They refer to the truth unless noted otherwise. A number that is
 not defined (a robot that never moved has no smoothness) is null, and `undefined` contains the reason. A jump by
-`kidnap` counts neither as driving nor as turning. How safe people feel near a
-robot is not measured; `intrusion_*` are computed from distances."""
+`kidnap` counts neither as driving nor as turning. How safe people feel near a robot is not measured; `intrusion_*` are
+computed from distances."""
 
 METRICS_CAVEATS = """\
 SPARC and LDLJ are reported, but affect the verdict only with a `smoothness` criterion. SPARC hardly notices a stop of
@@ -208,7 +204,10 @@ robot: `a/collisions`), and those of installed packages. See [Statistics](statis
 
 
 def metric_topics(installed: bool = False) -> list[Topic]:
-    """Return the overview of all metrics, then the topic of each; with those of installed packages if `installed`."""
+    """Return a topic that lists all metrics, then a topic for each metric.
+
+    `installed` adds the metrics of installed packages.
+    """
     rows = tuple(Field(name, metric.unit or "number", OPTIONAL, metric.text) for name, metric in METRICS.items())
     single = [Topic("metric", name, None, _metric_text(metric)) for name, metric in METRICS.items()]
     return [
@@ -219,7 +218,7 @@ def metric_topics(installed: bool = False) -> list[Topic]:
 
 
 def metrics_page() -> str:
-    """Return the content of docs/reference/metrics.md."""
+    """Return the text of docs/reference/metrics.md."""
     rows = [
         f"| `{name}` | {metric.unit} | {metric.text.replace('|', chr(92) + '|')} | {metric.source} |"
         for name, metric in METRICS.items()
@@ -234,79 +233,3 @@ def metrics_page() -> str:
 def _metric_text(metric: Metric) -> str:
     unit = f"\n\nIts unit is {metric.unit}." if metric.unit else ""
     return metric.text + unit + (f"\n\nSource: {metric.source}." if metric.source else "")
-
-
-def all_topics() -> list[Topic]:
-    """Return all topics in the order of the overview, without problem codes."""
-    return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True), *code_topics()]
-
-
-def known_names(keys: bool = False) -> list[str]:
-    """Return all names that can be explained in order, or the paths of all keys with `keys`."""
-    found = all_topics()
-    return keys_of_topics(found) if keys else [*dict.fromkeys(topic.name for topic in found), *CODES]
-
-
-def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
-    """Return the topics of all keys that a path such as `goals.pose` or `stack.localizer.alpha1` can mean.
-
-    The path starts at a topic or at the top of a file; a single key matches in all topics.
-    """
-    parts = path.split(".")
-    if len(parts) == 1:
-        found = [
-            _key_topic(f"{topic.name}.{path}", field, ())
-            for topic in known
-            for field in topic.fields
-            if field.key == path
-        ]
-    else:
-        found = [topic for model, keys in _path_starts(parts, known) for topic in _keys_below(model, keys, path)]
-        name, _, key = path.rpartition(".")
-        listed = [row for topic in known if topic.name == name for row in topic.rows if row.key == key]
-        found += [_key_topic(path, row, ()) for row in listed]
-    return list({(topic.name, topic.text): topic for topic in found}.values())
-
-
-def keys_of_topics(known: Sequence[Topic]) -> list[str]:
-    """Return the paths of all keys of all topics."""
-    return [f"{topic.name}.{field.key}" for topic in known for field in topic.fields]
-
-
-def _path_starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[type[BaseModel], list[str]]]:
-    for length in (1, 2):
-        prefix, keys = ".".join(parts[:length]), parts[length:]
-        for topic in known:
-            if keys and topic.model is not None and prefix in (topic.name, f"{topic.group}.{topic.name}"):
-                yield topic.model, keys
-    for model in MODELS.values():
-        yield model, parts
-
-
-def _keys_below(model: type[BaseModel], keys: list[str], path: str) -> Iterator[Topic]:
-    """Yield the last of `keys` below a model, with its own keys if its value is one mapping."""
-    *parents, key = keys
-    for parent in models_at(model, _with_indices(model, parents)):
-        for field in fields_of(parent):
-            if field.key == key:
-                children = models_at(parent, _with_indices(parent, [key]))
-                rows = fields_of(children[0]) if len(children) == 1 and not issubclass(children[0], Choice) else []
-                yield _key_topic(path, field, tuple(rows))
-
-
-def _with_indices(model: type[BaseModel], keys: list[str]) -> list[str | int]:
-    """Return the keys, each followed by an index if its value is a list."""
-    path: list[str | int] = []
-    for key in keys:
-        path.append(key)
-        if not models_at(model, path) or models_at(model, [*path, 0]) != models_at(model, path):
-            path.append(0)
-    return path
-
-
-def _key_topic(path: str, field: Field, rows: tuple[Field, ...]) -> Topic:
-    needed = (
-        "required" if not field.default else "optional" if field.default == OPTIONAL else f"default {field.default}"
-    )
-    text = f"{field.text}\n\n{field.kind} ({needed})" if field.text else f"{field.kind} ({needed})"
-    return Topic("key", path, None, text, rows=rows)

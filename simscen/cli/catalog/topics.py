@@ -1,4 +1,7 @@
-"""Topics of the scenario language with description, fields, and example, for `simscen explain` and the reference."""
+"""Topics of the scenario language, such as its criteria and faults, for `simscen explain` and the language reference.
+
+They are collected from the pydantic models and their docstrings.
+"""
 
 import inspect
 import re
@@ -45,12 +48,19 @@ from simscen.triggers.base import AnyCondition, Trigger
 
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
 OPTIONAL = "–"
+"""Shown instead of the default of an optional key that has no default value."""
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 
 @dataclass(frozen=True)
 class Field:
-    """Key of a mapping: the kind of its value, its default ("" = required), and its description."""
+    """Key of a mapping.
+
+    key:      name
+    kind:     kind of its value, such as "length in m, ≥ 0"
+    default:  default value, or OPTIONAL; "" for a required key
+    text:     description
+    """
 
     key: str
     kind: str
@@ -60,7 +70,17 @@ class Field:
 
 @dataclass(frozen=True)
 class Topic:
-    """Named part of the language, such as a criterion, in a `group` such as "trigger"."""
+    """Named part of the language that can be explained.
+
+    group:    kind of part, such as "trigger"
+    name:     name in the language, such as "stopped_within"
+    model:    model of its value; None if the topic has no value of its own
+    text:     description
+    example:  YAML text
+    rows:     keys to list instead of the keys of `model`
+    origin:   package that adds the topic, with its version; "" for topics of simscen
+    alias:    other name: the number of an error code
+    """
 
     group: str
     name: str
@@ -69,27 +89,25 @@ class Topic:
     example: str = ""
     rows: tuple[Field, ...] = ()
     origin: str = ""
-    """Package that adds the topic, with its version; "" for topics of simscen."""
     alias: str = ""
-    """Other name of the topic: the number of an error code."""
 
     @property
     def fields(self) -> list[Field]:
-        """Keys in order; empty for a value that is not a mapping."""
+        """Keys of the value in order; empty if the value is not a mapping."""
         if self.rows:
             return list(self.rows)
         return fields_of(self.model) if self.model is not None and not issubclass(self.model, RootModel) else []
 
     @property
     def value(self) -> str:
-        """Kind of a value that is not a mapping; "" for a mapping."""
+        """Kind of the value, such as "text", if it is not a mapping; otherwise ""."""
         if self.model is not None and issubclass(self.model, RootModel):
             return kind_of(self.model)
         return ""
 
 
 def topics(installed: bool = False) -> list[Topic]:
-    """Return all topics in the order of the language; with those of installed packages if `installed`."""
+    """Return all topics in the order of the reference; with the topics of installed packages if `installed`."""
     return [
         *_choices("trigger", AnyCondition),
         *added_topics(AnyCondition, installed),
@@ -106,17 +124,17 @@ def topics(installed: bool = False) -> list[Topic]:
         *(_topic("stack", name, model) for name, model in _STACK.items()),
         *_installed_types("stack", installed),
         *(_topic("stack file", name, model) for name, model in _STACK_FILES.items()),
-        *(_topic("localizer", kind, model) for kind, model in by_type(localizers.Localizer)),
+        *(_topic("localizer", kind, model) for kind, model in members_by_type(localizers.Localizer)),
         *_installed_types("localizer", installed),
         *_installed_types("planner", installed),
-        *(_topic("controller", kind, model) for kind, model in by_type(controllers.Controller)),
+        *(_topic("controller", kind, model) for kind, model in members_by_type(controllers.Controller)),
         *_installed_types("controller", installed),
         *(_topic("behavior", name, model) for name, model in _BEHAVIORS.items()),
         *_installed_types("behavior", installed),
         *_installed_types("goal_checker", installed),
         *(_topic("world", name, model) for name, model in _WORLD.items()),
         *(_topic("robot", name, model) for name, model in _ROBOT.items()),
-        *(_topic("drive", kind, model) for kind, model in by_type(robot.Drive)),
+        *(_topic("drive", kind, model) for kind, model in members_by_type(robot.Drive)),
         *_choices("sensor", robot.Sensor),
         *added_topics(robot.Sensor, installed),
     ]
@@ -190,7 +208,7 @@ _ROBOT: dict[str, type[BaseModel]] = {
 
 
 def fields_of(model: type[BaseModel]) -> list[Field]:
-    """Return the keys of a mapping in the order of the model; of a choice, only its modifiers."""
+    """Return the keys of a model in order. A choice, which needs exactly one key, lists only its modifiers."""
     docs = field_docs(model)
     names = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
     return [
@@ -201,7 +219,10 @@ def fields_of(model: type[BaseModel]) -> list[Field]:
 
 
 def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
-    """Return the description of a type with unit and range, such as "length in m, ≥ 0"."""
+    """Return the description of a type with unit and range, such as "length in m, ≥ 0".
+
+    `metadata` are further annotations of the type.
+    """
     if isinstance(kind, FieldInfo):
         return kind_of(kind.annotation, tuple(kind.metadata))
     if mark := next((mark for mark in metadata if isinstance(mark, ExtensibleUnion)), None):
@@ -243,8 +264,8 @@ def _plural_of_member(kind: str) -> str:
     return f"{match['noun']}s{match['unit'] or ''}{bounds}"
 
 
-def by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
-    """Yield the shipped members of a union discriminated by `type`."""
+def members_by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
+    """Yield the value of `type` and the model of each shipped member of a union that is discriminated by `type`."""
     mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ExtensibleUnion)), None)
     members = get_args(get_args(union if mark is None else mark.shipped_union)[0])
     for member in members:
@@ -300,7 +321,7 @@ def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
 
 
 def added_topics(choice: type[Choice], installed: bool = True) -> Iterator[Topic]:
-    """Yield the usable choices of installed packages, or nothing without `installed`."""
+    """Yield the topics of the usable choices that installed packages add, or nothing if not `installed`."""
     if not installed:
         return
     origins = {entry.name: entry.origin for entry in registry.installed(choice.group)}
@@ -309,7 +330,7 @@ def added_topics(choice: type[Choice], installed: bool = True) -> Iterator[Topic
 
 
 def _installed_types(group: str, installed: bool) -> Iterator[Topic]:
-    """Yield the usable types of installed packages in a group, or nothing without `installed`."""
+    """Yield the topics of the usable types of a group that installed packages add, or nothing if not `installed`."""
     if installed:
         origins = {entry.name: entry.origin for entry in registry.installed(group)}
         for name, model in extensible_union.installed_specs(group):

@@ -1,1 +1,1 @@
-"""The commands of `simscen`: one module each, imported when the command is called."""
+"""Commands of `simscen`: one module per command, which is imported only when the command is called."""

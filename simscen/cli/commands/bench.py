@@ -1,4 +1,4 @@
-"""Command `simscen bench`, which measures speed, and its subcommands."""
+"""Command `simscen bench`: measures the speed of simscen; its subcommands measure suites, worlds, and navigation."""
 
 import json
 import os
@@ -30,8 +30,8 @@ def growth_command(
 ) -> None:
     """Measure how the cost of a simulated second grows with the size of the scenario.
 
-    A patrol of 15 s with more of one quantity at a time: static obstacles, pushable objects, scripted objects, lidar
-    beams, AMCL particles, and robots. Prints CPU times of one core; takes a minute and a half.
+    Repeats a patrol of 15 s and increases one quantity at a time: static obstacles, pushable objects, scripted objects,
+    lidar beams, AMCL particles, or robots. Prints CPU times of one core. Takes a minute and a half.
     """
     from simscen.cli.process import engine_output_on_stderr
 
@@ -61,9 +61,9 @@ def worlds_command(
 ) -> None:
     """Measure the cost of a simulated second in large worlds.
 
-    The patrol of a house, a generated hall with 40 movable meshes, and a generated ROS map of 100 x 100 m with 400
-    blocks and noise: at most 60 s each with all features enabled, as CPU time of one core and as multiples of the
-    house.
+    Runs the patrol of a house, a run in a generated hall with 40 movable meshes, and a run on a generated ROS map of
+    100 x 100 m with 400 blocks and noise. Each takes at most 60 simulated seconds with all features enabled. Prints the
+    CPU time of one core, also as a multiple of the time for the house.
     """
     from simscen.cli.process import engine_output_on_stderr
 
@@ -102,20 +102,22 @@ def suite_command(
 ) -> None:
     """Measure the speed of a suite of scenarios on all cores.
 
-    Runs each scenario once with all steps of `simscen run` except reports. Prints runs per minute, the wall time of the
-    session as a multiple of the time that PyBullet alone needs on one core to step and scan (measured before and
-    after), and the memory of the workers. Exit code 0; 3: a run was aborted.
+    Runs each scenario once with all steps of `simscen run` except reports. Prints the runs per minute, the wall time of
+    the session, and the memory of the workers. The wall time is also a multiple of the time that PyBullet alone needs
+    on one core for the same steps and scans, measured before and after the session.
+
+    Exit code 0: all runs were completed; 3: a run was aborted.
     """
     from simscen.cli.process import engine_output_on_stderr
     from simscen.cli.session.backends import FORK_SERVER
-    from simscen.cli.session.selection import Selection, load_all
+    from simscen.cli.session.selection import Selection, load_selection
 
     before = load_baseline(compare)
     workers = jobs or len(os.sched_getaffinity(0))
     with engine_output_on_stderr(), TemporaryDirectory() as folder:
         from simscen.bench.speed.session_speed import evenly_spaced, measure_suite
 
-        scenarios, _ = load_all(paths or [Path("scenarios")], None, (), False, Selection())
+        scenarios, _ = load_selection(paths or [Path("scenarios")], None, (), False, Selection())
         suite = measure_suite(evenly_spaced(scenarios, most), workers, Path(folder), FORK_SERVER, print_progress)
     print_result(Result.on_this_machine(suite.figures), suite_text(suite), {"suite": asdict(suite)}, format_, before)
     if suite.unfinished:
@@ -124,7 +126,7 @@ def suite_command(
 
 
 def suite_text(suite: "Suite") -> str:
-    """Return the lines about the wall time, the CPU time, and the memory of a suite."""
+    """Return the lines about the wall time, the CPU time, and the memory of the runs of a suite."""
     figures, baseline = suite.figures, suite.bare * suite.simulated
     duration = f"{suite.simulated:.0f} s simulated in {suite.wall:.1f} s of wall time, {suite.workers} at a time"
     return "\n".join([
@@ -157,15 +159,20 @@ def command(
 ) -> None:
     """Measure speed, navigation, and localization.
 
-    Without a subcommand, measures a patrol of 60 s with all features enabled (240 Hz physics, 360 beams at 10 Hz, 500
-    to 2000 particles, full MCAP log) on one core: speed relative to real time and to PyBullet alone with the same steps
-    and scans, and the share of each part; the overhead of a run: set-up and verdicts, its process, the start of a
-    session, and the memory of a worker; a scan of 720 beams and a step in two fields of obstacles, compared to PyBullet
-    with one body each; and the patrol with its stack as an external process: wall time that the engine waits for it per
-    cycle. Other times are CPU times.
+    Without a subcommand, simulates a patrol of 60 s on one core with all features enabled: 240 Hz physics, 360 beams at
+    10 Hz, 500 to 2000 particles, and a full MCAP log. Prints:
 
-    Takes less than a minute on an idle machine. The subcommands take longer. --compare FILE compares the result with
-    one of --format json, `compare` compares two of them.
+    - the speed relative to real time, and to PyBullet alone with the same steps and scans, and the share of each part
+
+    - the overhead of a run: set-up and verdicts, its process, the start of a session, and the memory of a worker
+
+    - the time of a scan of 720 beams and of a physics step in two fields of obstacles, compared to PyBullet with one
+      body for each obstacle
+
+    - the wall time per cycle for which the engine waits for the stack, if the stack is an external process
+
+    All other times are CPU times. Takes less than a minute on an idle machine; the subcommands take longer. --compare
+    compares the result with an earlier result of --format json, and the subcommand `compare` compares two such results.
     """
     if ctx.invoked_subcommand is not None:
         return

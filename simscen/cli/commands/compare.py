@@ -1,4 +1,4 @@
-"""`simscen compare`."""
+"""Command `simscen compare`: compares the runs of two output folders."""
 
 import json
 import sys
@@ -24,7 +24,7 @@ BASELINE, CANDIDATE = "baseline", "candidate"
 
 
 class Gate(str, Enum):
-    """Condition under which `simscen compare` exits with 1."""
+    """Value of --fail-on: the difference for which `simscen compare` exits with 1."""
 
     WORSE = "worse"
     FLIP = "flip"
@@ -41,16 +41,16 @@ class ComparisonFormat(str, Enum):
 
 def command(
     baseline: Annotated[Path, typer.Argument(help="Output folder of the baseline, e.g. of the main branch.")],
-    candidate: Annotated[Path, typer.Argument(help="Output folder that is compared with it.")],
+    candidate: Annotated[Path, typer.Argument(help="Output folder to compare with the baseline.")],
     fail_on: Annotated[
         Gate,
         typer.Option(
-            help="Exit with 1 if: worse: a pass rate or metric is significantly worse; flip: any run passed before and "
-            "fails now; never."
+            help="When to exit with 1. worse: a pass rate or a metric is significantly worse; flip: a run that passed "
+            "in the baseline fails in the candidate; never: not at all."
         ),
     ] = Gate.WORSE,
     alpha: Annotated[
-        float, typer.Option(min=1e-6, max=0.5, help="Highest probability of calling equal versions worse.")
+        float, typer.Option(min=1e-6, max=0.5, help="Highest probability of reporting equal versions as worse.")
     ] = Significance.alpha,
     min_effect: Annotated[
         float, typer.Option(min=0.0, help="Smallest relative change of a mean that matters: 0.05 is 5 %.")
@@ -93,7 +93,7 @@ def command(
 
 
 def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, changed_scenarios: bool) -> None:
-    """Raise InvalidInput if a scenario is not the same in both sessions."""
+    """Raise InvalidInput if a scenario has changed between the sessions, unless `changed_scenarios`."""
     baseline, current = (
         {run.key.test: run for run in session.planned if run.definition} for session in sessions.values()
     )
@@ -107,7 +107,10 @@ def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, cha
 
 
 def _links(sessions: dict[str, JournaledSession]) -> Links:
-    """Return the replay or log of each run that did not pass, or else the command that repeats it."""
+    """Return the replay or log of each run that did not pass, or the command that repeats it.
+
+    The keys are BASELINE or CANDIDATE, the name of the test with its variation and stack, and the seed.
+    """
     return {
         (name, labeled_key(run.key, name).test, run.key.seed): _replay(run)
         for name, session in sessions.items()
@@ -117,6 +120,7 @@ def _links(sessions: dict[str, JournaledSession]) -> Links:
 
 
 def _replay(run: RunFinished) -> str:
+    """Return the existing replay or log of a run, or else the command that repeats it."""
     files = run.artifacts.replay, run.artifacts.mcap
     return next((file for file in files if file and Path(file).is_file()), run.again)
 

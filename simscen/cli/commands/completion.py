@@ -1,4 +1,4 @@
-"""Command `simscen completion`."""
+"""Command `simscen completion`: prints the shell completion script."""
 
 from enum import Enum
 from typing import Annotated

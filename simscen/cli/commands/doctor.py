@@ -1,4 +1,4 @@
-"""`simscen doctor`."""
+"""Command `simscen doctor`: checks the installation and prints the result of each check."""
 
 import hashlib
 import os
@@ -16,7 +16,7 @@ from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.installation import CheckFailed
 from simscen.core.errors import Exit, InvalidInput, SimscenError
 
-SCENARIO = """\
+_SCENARIO = """\
 simscen: 1
 world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
 robot: {pose: {x: 1, y: 1}}
@@ -26,9 +26,12 @@ pass: [{collisions: {max: 0}}]
 """
 
 INDENT = 15
+"""Column of the result of a check, after its sign and name."""
 MIN_REAL_TIME_FACTOR = 1.0
+"""Simulated seconds per second of CPU time that a patrol must reach."""
 
 Check = tuple[str, Callable[[], str]]
+"""Name of a check, and its function, which returns a text about what it found or raises CheckFailed."""
 
 
 def command() -> None:
@@ -52,20 +55,20 @@ def command() -> None:
 
 
 def checks() -> Iterator[Check]:
-    """Yield name and function of each check in order; a function returns its result or raises CheckFailed."""
-    yield "python", installation.python
-    yield "packages", installation.packages
-    yield "processor", installation.processor
-    yield "fork", installation.fork
-    yield "pidfd", installation.pidfd
-    yield "limits", installation.resource_limits
-    yield "shared", installation.shared_memory
-    yield "temporary", partial(installation.writable, Path(tempfile.gettempdir()))
-    yield "here", partial(installation.disk_space, Path.cwd())
-    yield "cache", cache
-    yield "stacks", stacks
-    yield "run", run_twice
-    yield "speed", speed
+    """Yield all checks in the order in which they run."""
+    yield "python", installation.check_python
+    yield "packages", installation.check_packages
+    yield "processor", installation.describe_processor
+    yield "fork", installation.check_fork
+    yield "pidfd", installation.check_pidfd
+    yield "limits", installation.check_resource_limits
+    yield "shared", installation.check_shared_memory
+    yield "temporary", partial(installation.check_writable, Path(tempfile.gettempdir()))
+    yield "here", partial(installation.check_disk_space, Path.cwd())
+    yield "cache", check_cache
+    yield "stacks", check_stacks
+    yield "run", check_run
+    yield "speed", check_speed
 
 
 def _line(sign: str, name: str, result: str) -> str:
@@ -76,7 +79,7 @@ def _line(sign: str, name: str, result: str) -> str:
     return wrapper.fill(result)
 
 
-def cache() -> str:
+def check_cache() -> str:
     """Check the cache of maps and shortest paths, and return its folder and size."""
     from simscen.run.scenario_cache import (
         CACHE_DIR_VARIABLE,
@@ -98,7 +101,7 @@ def cache() -> str:
     return f"{folder}: {count} files, {size / 1e6:.1f} MB of at most {MAX_CACHE_BYTES / 1e6:.0f}; safe to delete"
 
 
-def stacks() -> str:
+def check_stacks() -> str:
     """Check the external stacks in the user's configuration, and return their commands."""
     from simscen.cli.process import caller_environment, config_file
     from simscen.loading.stacks.userconfig import load_config
@@ -114,7 +117,7 @@ def stacks() -> str:
     return f"{config.file}: {stack_list or 'no stacks'}"
 
 
-def speed() -> str:
+def check_speed() -> str:
     """Check that a patrol runs faster than real time, and return its speed."""
     from simscen.cli.process import engine_output_on_stderr
 
@@ -129,7 +132,7 @@ def speed() -> str:
     return result
 
 
-def run_twice() -> str:
+def check_run() -> str:
     """Simulate one second twice, check that both runs pass with equal logs, and return the hash of the log."""
     from simscen.cli.session.backends import backend_of
     from simscen.core.records.run_result import Outcome
@@ -138,7 +141,7 @@ def run_twice() -> str:
 
     with tempfile.TemporaryDirectory(prefix="simscen-doctor-") as name:
         folder = Path(name).resolve()
-        (folder / "doctor.scenario.yaml").write_text(SCENARIO, encoding="utf-8")
+        (folder / "doctor.scenario.yaml").write_text(_SCENARIO, encoding="utf-8")
         options = SessionOptions(workers=2, twice=True, wall_limit=60.0)
         try:
             jobs = plan_jobs([load_scenario(folder / "doctor.scenario.yaml", folder)], options, folder / "out")

@@ -1,4 +1,4 @@
-"""`simscen edit`."""
+"""Command `simscen edit`: starts the editor for a scenario or a world."""
 
 import os
 import signal
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from simscen.run.process.jobs import Backend
 
 SUFFIX = SCENARIO_SUFFIXES[0]
+"""End of the name of a new scenario."""
 
 
 def command(
@@ -47,22 +48,22 @@ def command(
 ) -> None:
     """Edit a scenario or a world on its map, in a browser.
 
-    The page shows the map and the text of the file side by side. Changes on the map or in a form change only the values
-    that they are about; comments, order, and formatting stay. Problems are shown while you edit. Nothing is written
-    until you save, and a file that another program changed is not overwritten without asking. Run simulates the text
-    without saving it. The page is served on this machine only, at an address with a secret token, until you press
-    Ctrl-C.
+    The page shows the map and the text of the file side by side. An edit on the map or in a form changes only its own
+    values in the text; comments, order, and formatting stay. Problems are shown while you edit. Nothing is written
+    until you save. If another program has changed the file, the page asks before it overwrites the file. The button Run
+    simulates the text without saving it. The page is served on this machine only, at an address with a secret token,
+    until you press Ctrl-C.
 
     Exit code 0: ended with Ctrl-C; 2: the file or an option is unusable.
     """
     edited, text = _edited_file(file, new, map_, root, tuple(world_path or ()), lenient)
     if stack is not None and edited.kind != "scenario":
         raise UsageError("--stack has no effect on a world, which does not run; edit a scenario")
-    from simscen.cli.session.stacks import stacks_of
+    from simscen.cli.session.stacks import parse_stacks
     from simscen.editor.server import EditorServer
     from simscen.editor.session import EditorSession
 
-    stacks = stacks_of([] if stack is None else [stack], edited.root, edited.world_path)
+    stacks = parse_stacks([] if stack is None else [stack], edited.root, edited.world_path)
     chosen = next(iter(stacks.chosen), None)
     session = EditorSession(edited, _backend, text, lenient, chosen, stacks.with_command)
     try:
@@ -85,6 +86,7 @@ def command(
 
 
 def _backend() -> "Backend":
+    """Return the backend for the button Run. It is created only when the button is first used."""
     from simscen.cli.session.backends import backend_of
     from simscen.run.sessions.run_session import SessionOptions
 
@@ -99,7 +101,7 @@ def _edited_file(
     world_path: tuple[Path, ...],
     lenient: bool,
 ) -> tuple["EditedFile", str]:
-    """Return the file to edit, and the text of a new one. Raises UsageError and InvalidInput."""
+    """Return the file to edit, and the text of a new file ("" for an existing one). Raises UsageError, InvalidInput."""
     if new != (map_ is not None):
         raise UsageError("--new and --map belong together: simscen edit --new --map office.yaml [FILE]")
     if map_ is not None:
@@ -110,12 +112,13 @@ def _edited_file(
         what = "it is not a regular file" if file.exists() else "no such file"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", what, "start a new one with --new --map office.yaml")])
     root_folder = root if root is not None else default_root([file])
-    return _file_of_kind(file, root_folder, world_path), ""
+    return _existing_file(file, root_folder, world_path), ""
 
 
 def _new_file(
     file: Path | None, map_: Path, root: Path | None, world_path: tuple[Path, ...], lenient: bool
 ) -> tuple["EditedFile", str]:
+    """Return a new scenario file for a map, which must not exist yet, and its text. Raises UsageError, InvalidInput."""
     from simscen.editor.document import EditedFile
     from simscen.editor.new_scenario import new_scenario_text
 
@@ -131,7 +134,8 @@ def _new_file(
     return _inside(EditedFile(_real(target), "scenario", _real_folder(root_folder), world_path), target), text
 
 
-def _file_of_kind(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
+def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
+    """Return an existing scenario or world file. Raises InvalidInput for a file of another kind."""
     from simscen.editor.document import EditedFile
     from simscen.loading.checks.files import file_kind
     from simscen.loading.files.assets import SDF_SUFFIXES
@@ -145,7 +149,7 @@ def _file_of_kind(file: Path, root: Path, world_path: tuple[Path, ...]) -> "Edit
 
 
 def _inside(edited: "EditedFile", file: Path) -> "EditedFile":
-    """Return the file if it is inside the root. Raises InvalidInput."""
+    """Return `edited`. Raises InvalidInput if `file`, its path as the user wrote it, leads out of the root."""
     from simscen.loading.files.paths import PathSandbox
 
     entered = PathSandbox.around(edited.root, edited.world_path).resolve_argument(file)
@@ -160,4 +164,5 @@ def _real(file: Path) -> Path:
 
 
 def _real_folder(folder: Path) -> Path:
+    """Return the absolute path of a folder with all symbolic links resolved."""
     return Path(os.path.realpath(folder))

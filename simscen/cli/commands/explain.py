@@ -1,4 +1,4 @@
-"""`simscen explain`."""
+"""Command `simscen explain`: describes names of the scenario language, and codes."""
 
 import shutil
 import textwrap
@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.catalog.reference_topics import all_topics, key_topics, known_names
+from simscen.cli.catalog.topic_lookup import all_topics, key_topics, known_names
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import UsageError
@@ -38,17 +38,21 @@ def command(
     if not name:
         print_text(_overview(width))
     else:
-        print_text(explained(name, width))
+        print_text(explanation(name, width))
 
 
-def explained(name: str, width: int = 100) -> str:
-    """Return the explanation of all topics with this name. Raises UsageError if there are none."""
+def explanation(name: str, width: int = 100) -> str:
+    """Return the text about a problem code, or about all topics with this name. Raises UsageError for an unknown name.
+
+    `width` is the number of columns.
+    """
     if name.upper() in CODES:
         return f"{name.upper()}\n{_wrapped(CODES[name.upper()], width, '  ')}"
-    return "\n\n".join(_explained(topic, width) for topic in _topics_named(name))
+    return "\n\n".join(_topic_text(topic, width) for topic in _topics_named(name))
 
 
 def _topics_named(name: str) -> list[Topic]:
+    """Return the topics with a name, in any case, or else the keys with this path. Raises UsageError."""
     known = all_topics()
     lowered = name.lower()
     found = [topic for topic in known if lowered in (name.lower() for name in _names(topic))]
@@ -62,6 +66,7 @@ def _topics_named(name: str) -> list[Topic]:
 
 
 def _names(topic: Topic) -> tuple[str, ...]:
+    """Return all names by which a topic can be explained."""
     return (topic.name, f"{topic.group}.{topic.name}", *((topic.alias,) if topic.alias else ()))
 
 
@@ -70,6 +75,7 @@ def _key_names(topics: list[Topic]) -> list[str]:
 
 
 def _overview(width: int) -> str:
+    """Return the list of all names by group."""
     groups: dict[str, list[str]] = {}
     for topic in all_topics():
         groups.setdefault(topic.group, []).append(topic.name)
@@ -79,7 +85,7 @@ def _overview(width: int) -> str:
     )
 
 
-def _explained(topic: Topic, width: int) -> str:
+def _topic_text(topic: Topic, width: int) -> str:
     kind = f"{topic.group} of {topic.origin}" if topic.origin else topic.group
     parts = [f"{topic.name} ({kind})", _paragraphs(topic.text, width)]
     if topic.value:
@@ -92,6 +98,7 @@ def _explained(topic: Topic, width: int) -> str:
 
 
 def _field(field: Field, width: int) -> str:
+    """Return the lines about one key."""
     needed = "required" if not field.default else "" if field.default == OPTIONAL else f"default {field.default}"
     head = f"  {field.key}: {field.kind}" + (f" ({needed})" if needed else "")
     return "\n".join([head, _wrapped(field.text, width, "      ")]) if field.text else head

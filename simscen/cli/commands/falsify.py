@@ -1,4 +1,4 @@
-"""`simscen falsify`."""
+"""Command `simscen falsify`: searches for values with which a scenario fails."""
 
 import sys
 from pathlib import Path
@@ -39,14 +39,16 @@ def command(
             "ranges evenly; random: independent draws; auto: tpe if Optuna is installed, otherwise sobol."
         ),
     ] = SearchMethod.AUTO,
-    failures: Annotated[int, typer.Option(min=1, max=1000, help="Stop after so many different failures.")] = 1,
-    runs: Annotated[int, typer.Option(min=1, max=1_000_000, help="Largest number of runs.")] = 200,
+    failures: Annotated[
+        int, typer.Option(min=1, max=1000, help="Number of different failures after which the search stops.")
+    ] = 1,
+    runs: Annotated[int, typer.Option(min=1, max=1_000_000, help="Maximum number of runs.")] = 200,
     probability: Annotated[
         float | None,
         typer.Option(
             min=1e-6,
             max=0.5,
-            help="With --method random: stop when a larger rate of failures is ruled out with 95 % confidence.",
+            help="With --method random: stop when a higher rate of failures is ruled out with 95 % confidence.",
         ),
     ] = None,
     search_seed: Annotated[
@@ -70,9 +72,10 @@ def command(
 ) -> None:
     """Search the ranges of a scenario for values with which it fails.
 
-    The search looks for small margins of the criteria. Each failure that differs from the others, in its criterion,
-    the events and faults that happened, or its place, is written as a scenario NAME.failure-N.scenario.yaml beside the
-    file. The result does not depend on the number of parallel runs.
+    The search prefers values for which the criteria have small margins. It writes each new kind of failure beside the
+    file as a scenario NAME.failure-N.scenario.yaml. Two failures are of different kinds if they differ in the failed
+    criteria, in the events and faults that had happened, or in their place. The result does not depend on the number of
+    parallel runs.
 
     Exit code 0: no failure was found; 1: a failure was found; 2: an invalid scenario; 3: a run could not be completed;
     129, 130, and 143: interrupted.

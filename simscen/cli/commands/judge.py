@@ -1,4 +1,4 @@
-"""`simscen judge`."""
+"""Command `simscen judge`: evaluates criteria on recorded runs."""
 
 import json
 import shlex
@@ -55,7 +55,7 @@ def command(
 
     A log written by simscen contains the truth, the goals, and the scenario. Use --scenario to try other criteria. In a
     folder, every log is judged. Logs of real robots with the standard ROS 2 topics need --scenario, and --truth for
-    criteria that use the true pose. A criterion that the log does not decide is inconclusive, never passed.
+    criteria that use the true pose. If a log is not sufficient to decide a criterion, the verdict is inconclusive.
 
     Exit code 0: all criteria hold; 1: one fails or is inconclusive; 2: a log or scenario is unusable; 3: a log could
     not be judged, or one of several logs is unusable; 5: no logs found.
@@ -68,7 +68,7 @@ def command(
         *((str(file), judging.judge(file, is_only_log=len(files) + len(without_log) == 1)) for file in files),
         *without_log,
     ]
-    if foreign != ForeignLogOptions() and not judging.foreign:
+    if foreign != ForeignLogOptions() and not judging.foreign_count:
         judging.notes.append("logs of simscen contain truth and times; options for logs of real robots have no effect")
     for note in judging.notes:
         print_text(f"note: {escaped(note)}", sys.stderr)
@@ -81,6 +81,7 @@ def command(
 
 
 def _print(runs: list[tuple[str, RunFinished]], same_criteria: bool) -> None:
+    """Print the results by the path of their log: one in full, several in a table if their criteria are the same."""
     if len(runs) == 1:
         lines = list(full_log_lines(runs[0][1], runs[0][0]))
     elif same_criteria:

@@ -1,4 +1,4 @@
-"""`simscen list`."""
+"""Command `simscen list`: lists the scenarios that a selection matches."""
 
 from pathlib import Path
 from typing import Annotated
@@ -45,6 +45,7 @@ def command(
 
 
 def _expectation(scenario: LoadedScenario) -> str:
+    """Return why the scenario is skipped or expected to fail, or ""."""
     spec = scenario.spec
     if spec.skip is not None:
         return f"(skipped: {spec.skip})"
@@ -52,6 +53,7 @@ def _expectation(scenario: LoadedScenario) -> str:
 
 
 def _stack(scenario: LoadedScenario) -> str:
+    """Return the names of the scenario's external stacks, or ""."""
     stacks = [view.spec.stack for view in scenario.robot_views.values()]
     names = dict.fromkeys(stack.external for stack in stacks if isinstance(stack, ExternalStackSpec))
     return f"({'stack' if len(names) == 1 else 'stacks'} {', '.join(names)})" if names else ""

@@ -1,4 +1,4 @@
-"""`simscen localize`."""
+"""Command `simscen localize`: runs a localizer on a recorded drive."""
 
 import json
 import sys
@@ -9,7 +9,7 @@ import typer
 
 from simscen.bench.localization.recorded_drive import Errors, Localized, compare_with_reference, localize
 from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.geometry import Pose2
@@ -25,7 +25,7 @@ from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import RobotModel, Surroundings
 
 MIN_COMPARED_SHARE = 0.99
-"""Share of the beliefs that must have a reference pose; below it, the output says how many were compared."""
+"""Fraction of the beliefs that must have a reference pose. If fewer have one, the output states the fraction."""
 
 
 def command(
@@ -87,6 +87,7 @@ def command(
 def _load_inputs(
     scenario: Path | None, map_: Path, robot: str, root: Path | None
 ) -> tuple[StackSpec, OccupancyGrid, RobotModel]:
+    """Return the stack of the scenario, the map, and the robot. Raises InvalidInput."""
     from simscen.loading.builders import load_map, robot_from_file
     from simscen.run.robot_interface import robot_model
 
@@ -157,6 +158,7 @@ def _draw(
 
 
 def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str]:
+    """Return the printed lines. `lost` is the error in m above which the robot counts as lost."""
     x, y, yaw = localized.poses[-1].tolist()
     seconds = localized.times[-1] - localized.times[0]
     lines = [f"{localized.scans} scans in {seconds:.1f} s; final belief ({x:.2f}, {y:.2f}, {yaw:.3f})"]
@@ -175,6 +177,7 @@ def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str
 
 
 def _document(localized: Localized, errors: Errors | None, seed: int) -> dict[str, object]:
+    """Return the JSON output of --json."""
     document: dict[str, object] = {"scans": localized.scans, "seed": seed, "end": localized.poses[-1].tolist()}
     if errors is None:
         return document | {"error": None}

@@ -1,4 +1,4 @@
-"""`simscen log`: recovery of damaged logs and layouts for viewers."""
+"""Command `simscen log`: recovers damaged logs, and writes layouts for viewers."""
 
 import shlex
 import sys
@@ -9,7 +9,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.errors import UsageError
 from simscen.record.log_reader import recover as recover_log
 

@@ -1,4 +1,4 @@
-"""`simscen merge`."""
+"""Command `simscen merge`: merges the output folders of shards."""
 
 from pathlib import Path
 from typing import Annotated

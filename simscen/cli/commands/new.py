@@ -1,4 +1,4 @@
-"""`simscen new`."""
+"""Command `simscen new`: writes a scenario to start from, a copy of one, or one reconstructed from a log."""
 
 import os
 from pathlib import Path
@@ -10,7 +10,7 @@ from simscen.cli import completions
 from simscen.cli.completions import shipped_scenarios
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.from_log import FromLogOptions, write_scenario_from_log
-from simscen.cli.session.new_file import create_file
+from simscen.cli.session.user_files import create_file
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
 from simscen.loading.files.discovery import BASE_SUFFIXES, SCENARIO_SUFFIXES, default_root
@@ -28,7 +28,7 @@ def command(
         typer.Option(
             metavar="SCENARIO",
             help="Copy this scenario and the files it needs: a file, or the name of a shipped scenario.",
-            autocompletion=completions.shipped,
+            autocompletion=completions.scenarios_to_copy,
         ),
     ] = "",
     from_log: Annotated[
@@ -40,10 +40,10 @@ def command(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="With --from-log: output file; default: NAME, or that of the log.")
+        Path | None, typer.Option(help="With --from-log: output file; default: NAME, or the name of the log.")
     ] = None,
     map_: Annotated[
-        Path | None, typer.Option("--map", help="With --from-log: ROS map (yaml) to use instead of that in the log.")
+        Path | None, typer.Option("--map", help="With --from-log: ROS map (yaml) to use instead of the map in the log.")
     ] = None,
     world: Annotated[
         Path | None, typer.Option(help="With --from-log: world file to use instead of walls from the map.")
@@ -57,7 +57,9 @@ def command(
     ] = "",
     truth: Annotated[
         str | None,
-        typer.Option(help="With --from-log: topic of the true pose, or `none`; default: that of simscen's own logs."),
+        typer.Option(
+            help="With --from-log: topic of the true pose, or `none`; default: the topic of simscen's own logs."
+        ),
     ] = None,
     topic: Annotated[
         list[str] | None,
@@ -78,10 +80,10 @@ def command(
     file for scenarios to extend. If the project has a folder `schemas`, the file refers to the schema for editors.
     Existing files are never overwritten.
 
-    With --from-log, it is reconstructed from a recorded drive: goals, objects that are not on the map, faults of
-    sensors, and criteria that the drive held or broke. A comment gives the evidence for each part, and the first lines
-    list what the log does not show. The log can be of simscen or of a real robot (MCAP, or a rosbag2 folder). --verify
-    runs the scenario, prints how near the run comes to the log, and writes a page that shows both.
+    With --from-log, the scenario is reconstructed from a recorded drive of simscen or of a real robot (MCAP, or a
+    rosbag2 folder). It contains the goals, objects that are not on the map, faults of sensors, and criteria that the
+    drive met or violated. A comment gives the evidence for each part, and the first lines list what the log does not
+    show. --verify runs the scenario, compares the run with the log, and writes a page that shows both.
 
     Exit code 0: written; 1: with --verify, an incident of the log does not happen again; 2: an input is unusable, or a
     file cannot be written; 3: with --verify, the run could not be completed.
@@ -110,7 +112,7 @@ def command(
         raise UsageError(f"{name!r} is a base file; --like copies only scenarios")
     file = Path(name if is_base or name.endswith(SCENARIO_SUFFIXES) else f"{name}{SCENARIO_SUFFIXES[0]}")
     with create_file(file, name):
-        written = _copy(like, file) if like else _starter(file, "base" if is_base else "scenario")
+        written = _copy(like, file) if like else _write_starter(file, "base" if is_base else "scenario")
     for other in written[1:]:
         print_text(f"wrote {escaped(str(other))}")
     verb = "validate" if is_base else "run"
@@ -118,7 +120,7 @@ def command(
 
 
 def _target(name: str, out: Path | None, log: Path) -> Path:
-    """Return the file of a scenario from a log. Raises UsageError."""
+    """Return the file to write for a log, by default with the name of the log. Raises UsageError."""
     if name and out is not None:
         raise UsageError("give either NAME or --out")
     written = str(out) if out is not None else name or log.resolve().name.partition(".")[0]
@@ -127,7 +129,8 @@ def _target(name: str, out: Path | None, log: Path) -> Path:
     return Path(written if written.endswith((".yaml", ".yml")) else f"{written}{SCENARIO_SUFFIXES[0]}")
 
 
-def _starter(file: Path, kind: str) -> list[Path]:
+def _write_starter(file: Path, kind: str) -> list[Path]:
+    """Write the commented scenario or base file that simscen ships, and return the written files."""
     text = (PACKAGE / "data" / f"starter.{kind}.yaml").read_text(encoding="utf-8")
     file.write_text(_schema_comment(file, kind) + text, encoding="utf-8")
     return [file]
@@ -143,6 +146,7 @@ def _schema_comment(file: Path, kind: str) -> str:
 
 
 def _copy(like: str, file: Path) -> list[Path]:
+    """Copy a scenario and the files that it needs, and return the written files. Raises InvalidInput, UsageError."""
     from simscen.loading.files.copying import copy_scenario
 
     source = _source(like)

@@ -1,4 +1,4 @@
-"""`simscen plot`."""
+"""Command `simscen plot`: draws a recorded run as a picture."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,7 +8,7 @@ import typer
 
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.logs import log_file, recorded_result
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.record.log_header import scenery_from_header
@@ -47,6 +47,6 @@ def _draw(log: Log, file: Path, picture: Path) -> None:
 
 
 def _unknown_map(log: Log) -> OccupancyGrid:
-    """Return a map of one unknown cell at the start of the robot, for a robot without a map."""
+    """Return a map of one unknown cell at the start of the robot, to draw the run of a robot without a map."""
     start = log.header.case.start
     return OccupancyGrid(np.full((1, 1), UNKNOWN, dtype=np.int8), 0.05, Pose2(start.x, start.y))

@@ -1,4 +1,4 @@
-"""`simscen plugins`."""
+"""Command `simscen plugins`: lists the types that installed packages add."""
 
 import inspect
 import json
@@ -16,6 +16,7 @@ from simscen.core.errors import Exit
 from simscen.spec.registry import GROUPS, PREFIX, BrokenPlugin, Entry, installed, unknown_groups
 
 INDENT = 6
+"""Columns before the description of a type."""
 
 
 class Format(str, Enum):

@@ -1,4 +1,4 @@
-"""`simscen replay`."""
+"""Command `simscen replay`: writes a page that plays recorded runs."""
 
 import sys
 import webbrowser
@@ -11,7 +11,7 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.judging import LogJudge
 from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, find_logs
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.cli.shared_options import (
     RootOption,
     SameFrameOption,
@@ -35,7 +35,7 @@ def command(
         typer.Argument(help="Logs, or folders to search for logs.", autocompletion=completions.logs),
     ],
     against: Annotated[
-        Path | None, typer.Option(help="Show this run beside it, for example another seed or stack.")
+        Path | None, typer.Option(help="Second run to show beside the first, for example with another seed or stack.")
     ] = None,
     out: Annotated[
         Path | None,
@@ -54,8 +54,8 @@ def command(
     """Write a page that plays a recorded run, or two runs side by side.
 
     The page shows what the robot saw, believed, and did at any time, the events, the signals, the verdicts, and the
-    text of the scenario. It opens at the time of the failure. It is a single file that needs no network. Logs of real
-    robots are shown as far as they contain the data.
+    text of the scenario. It starts at the time of the failure. It is a single file that needs no network. Of the log of
+    a real robot, it shows the data that the log contains.
 
     Exit code 0: written; 2: a log is unusable, or the page cannot be written; 5: no logs found.
     """

@@ -1,4 +1,4 @@
-"""`simscen report`."""
+"""Command `simscen report`: writes the reports of an output folder again."""
 
 import sys
 from pathlib import Path
@@ -7,8 +7,8 @@ from typing import Annotated, NoReturn
 import typer
 
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports, exit_code, require_writable
-from simscen.cli.session.terminal import Format, FormatOption, screen
+from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports, exit_code, require_writable_junit
+from simscen.cli.session.terminal import Format, FormatOption, open_screen
 from simscen.core.errors import Exit, UsageError
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.judge.metrics.session_summary import session_summary_line
@@ -30,9 +30,9 @@ def command(
 ) -> None:
     """Write the reports of an output folder again from its journal.
 
-    The reports contain every planned run, even if simscen was killed: a started run is then an error of type
-    `interrupted`, one that was not started `not-run`. Nothing is simulated or judged again. With --junit, the folder is
-    not changed.
+    The reports contain every planned run, even if simscen was killed. A run that was not finished is then an error of
+    type `interrupted`, and a run that was not started is an error of type `not-run`. Nothing is simulated or judged
+    again. With --junit, the folder is not changed.
 
     Exit code as for `simscen run`: 0: all passed; 1: a criterion failed; 2: not an output folder, or still in use; 3: a
     run was not completed.
@@ -63,10 +63,10 @@ def write_reports(
     only_junit: bool,
 ) -> NoReturn:
     """Write the reports of an output folder from its journal, print the session, and exit with its code."""
-    require_writable(junit, folder)
+    require_writable_junit(junit, folder)
     reports = Reports(folder, junit, junit_family.value, junit_only=only_junit)
     finished_runs = past.runs
-    with screen(format_) as output:
+    with open_screen(format_) as output:
         output(past.start_event(folder))
         for finished in finished_runs:
             output(finished)

@@ -1,4 +1,4 @@
-"""`simscen robot`: check of a robot by test drives."""
+"""Command `simscen robot`: checks a robot by test drives."""
 
 import math
 import sys
@@ -11,7 +11,7 @@ import typer
 
 from simscen.cli.diagnostics import as_json as problems_as_json
 from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_working_folder
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.errors import Exit, InvalidInput
 from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import RobotFile, load_robot_file
@@ -59,6 +59,7 @@ def check(
 
 
 def _check_and_print(file: RobotFile, argument: str, picture: Path | None, as_json: bool) -> int:
+    """Check a robot, print the result, and return the number of failed checks. `argument` is what the user wrote."""
     from simscen.cli.process import engine_output_on_stderr
     from simscen.loading.builders import robot_from_file
     from simscen.loading.checks.robot_geometry import geometry_warnings
@@ -107,6 +108,7 @@ def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
 
 
 def _row(trial: "Trial") -> str:
+    """Return the line of one test drive."""
     motions = (trial.command, trial.odometry, trial.truth)
     driven = " ".join(f"{motion.driven:7.3f}" for motion in motions)
     turned = " ".join(f"{_degrees(motion.turned):7.1f}" for motion in motions)
@@ -115,6 +117,7 @@ def _row(trial: "Trial") -> str:
 
 
 def _line(check: "DriveCheck") -> str:
+    """Return the line of one check, and below it the advice if the check failed."""
     verdict = "ok" if check.passed else "FAILED"
     line = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
     return line if check.passed or not check.advice else f"{line}\n          {check.advice}"

@@ -1,4 +1,4 @@
-"""Command `simscen ros2`: adapter between a run and a ROS 2 graph."""
+"""Command `simscen ros2`: starts the adapter between a run and a ROS 2 graph, or checks a Nav2 parameter file."""
 
 import json
 import os
@@ -23,25 +23,26 @@ from simscen.ros2.options import AdapterError
 SOCKET_VARIABLE = "SIMSCEN_STACK_FD"
 """Environment variable with the file descriptor of the socket to the engine, which is set during a run."""
 _ADAPTER_START = Path(__file__).parents[2] / "ros2" / "start.py"
+"""Program of the adapter. It runs with the Python of ROS, which lacks the packages of simscen."""
 _BASE = "base_link"
 
 
 class GraphKind(str, Enum):
-    """Kind of the ROS 2 graph: any nodes, or Nav2."""
+    """Kind of the ROS 2 graph: any nodes, or nodes of Nav2, for which additional checks exist."""
 
     ANY = "graph"
     NAV2 = "nav2"
 
 
 class Sync(str, Enum):
-    """Synchronization of simulation and graph."""
+    """Synchronization of the simulation with the graph: wait for the nodes, or run at a fixed pace."""
 
     LOCKSTEP = "lockstep"
     PACED = "paced"
 
 
 class Goals(str, Enum):
-    """Interface to which goals are sent."""
+    """Action or topic to which goals are sent; `auto` selects the one that exists."""
 
     AUTO = "auto"
     NAVIGATE_TO_POSE = "navigate_to_pose"
@@ -92,7 +93,7 @@ def command(
     ready: Annotated[float, typer.Option(min=0.1, max=3600, help="Maximum time to wait for the graph, in s.")] = 20.0,
     settle: Annotated[
         float,
-        typer.Option(min=0, max=60, help="Time for which the graph must stay unchanged before the run starts, in s."),
+        typer.Option(min=0, max=60, help="Time in s for which the graph must stay unchanged before the run starts."),
     ] = 1.0,
     answer: Annotated[
         float, typer.Option(min=0.1, max=3600, help="Maximum time to wait for the answer of a node, in s.")
@@ -105,7 +106,7 @@ def command(
         typer.Option(
             min=0,
             max=100,
-            help="With lockstep: additional rounds of requests to all nodes to wait for a command; 0: one per node.",
+            help="With lockstep: how often all nodes are asked again if no command has arrived; 0: once per node.",
         ),
     ] = 0,
     wall_time: Annotated[bool, typer.Option(help="Accept nodes that do not use sim time.")] = False,
@@ -115,7 +116,7 @@ def command(
     Use it as `simscen run SCENARIO --stack mine='simscen ros2 --launch "ros2 launch …"'`. The adapter runs
     with the Python of your ROS installation, of any distribution and with any RMW, and needs only rclpy there. It
     publishes sensors, /tf, /map, and /clock, receives commands, and sends goals to Nav2's actions or to /goal_pose. If
-    the graph lacks something that the run needs, the run ends with an error that names it.
+    something that the run needs is missing in the graph, the run ends with an error that names it.
 
     Without a run, `simscen ros2 nav2 --params FILE` only checks the parameter file. Exit code 0: Nav2 can work with
     these parameters; 2: it cannot, or the command line is invalid.
@@ -155,7 +156,7 @@ def _read_parameters(params: Path) -> Nav2Parameters:
 
 
 def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, bases: list[str]) -> None:
-    """Check a parameter file. Raises UsageError if there is none, because there is nothing else to do without a run."""
+    """Check a parameter file. Raises UsageError if there is none: without a run, there is nothing else to do."""
     if kind is not GraphKind.NAV2 or parameters is None:
         command = shlex.join(["simscen", *sys.argv[1:]])
         raise UsageError(f"no run to connect to; use simscen run SCENARIO --stack mine={shlex.quote(command)}")

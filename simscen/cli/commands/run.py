@@ -1,4 +1,4 @@
-"""`simscen run`."""
+"""Command `simscen run`: reads the options of a session, and executes the session or the watch mode."""
 
 import os
 import sys
@@ -76,8 +76,8 @@ def command(
     shard: Annotated[
         str,
         typer.Option(
-            help="i/n: run the i-th of n parts of the scenarios; auto: by the variables of GitLab, CircleCI, "
-            "Buildkite, Slurm arrays, and Kubernetes indexed jobs. `simscen merge` joins the results."
+            help="i/n: run the i-th of n parts of the scenarios; auto: take i and n from the variables of GitLab, "
+            "CircleCI, Buildkite, Slurm arrays, or Kubernetes indexed jobs. `simscen merge` merges the results."
         ),
     ] = "1/1",
     shard_by: Annotated[
@@ -98,8 +98,8 @@ def command(
         typer.Option(
             "--last-failed",
             "--lf",
-            help="Run what failed the last time, according to the sessions in simscen-out or beside --out; if nothing "
-            "failed, run everything.",
+            help="Run only what failed in the last session in simscen-out, or beside --out; if nothing failed, run "
+            "everything.",
         ),
     ] = False,
     durations: Annotated[

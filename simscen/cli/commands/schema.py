@@ -1,4 +1,4 @@
-"""`simscen schema`."""
+"""Command `simscen schema`: prints or writes the JSON Schemas for editors."""
 
 from enum import Enum
 from pathlib import Path
@@ -7,13 +7,13 @@ from typing import Annotated
 import typer
 
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.version import PACKAGE
 from simscen.spec.registry import GROUPS, installed
 
 
-class Kind(str, Enum):
-    """Kinds of files that have a schema."""
+class SchemaKind(str, Enum):
+    """Kind of file that a schema describes."""
 
     SCENARIO = "scenario"
     WORLD = "world"
@@ -24,7 +24,7 @@ class Kind(str, Enum):
 
 
 def command(
-    kind: Annotated[Kind, typer.Argument(help="Kind of file.")] = Kind.SCENARIO,
+    kind: Annotated[SchemaKind, typer.Argument(help="Kind of file.")] = SchemaKind.SCENARIO,
     write: Annotated[Path | None, typer.Option(help="Write all schemas into this folder.")] = None,
 ) -> None:
     """Print or write the JSON Schemas that editors use.
@@ -33,19 +33,19 @@ def command(
     first line of a scenario. The schemas include the types of installed packages.
     """
     if write is None:
-        print_text(text_of(kind.value).rstrip())
+        print_text(schema_text(kind.value).rstrip())
         return
-    for each in Kind:
-        text = text_of(each.value)
+    for each in SchemaKind:
+        text = schema_text(each.value)
         file = write / f"{each.value}.schema.json"
         save(file, lambda path, text=text: path.write_text(text, encoding="utf-8"))  # type: ignore[misc]
         print_text(escaped(str(file)))
 
 
-def text_of(kind: str) -> str:
-    """Return a schema including the types of installed packages.
+def schema_text(kind: str) -> str:
+    """Return the schema of a kind of file, with the types of installed packages.
 
-    Without such types, the shipped schema is returned, because generating one imports every model.
+    If no package adds types, return the shipped schema: generating a schema imports every model, which takes time.
     """
     if any(installed(group) for group in GROUPS):
         from simscen.cli.catalog.json_schema import as_text, schema_of

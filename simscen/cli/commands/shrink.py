@@ -1,6 +1,7 @@
-"""`simscen shrink`."""
+"""Command `simscen shrink`: writes the smallest scenario that still fails in the same way."""
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -9,18 +10,18 @@ import typer
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, backend_of, workers_and_cluster
-from simscen.cli.session.output_files import save
-from simscen.cli.session.selection import Checks
+from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.shrinking import (
     CandidateRuns,
     Failure,
-    Shrinking,
+    Shrinker,
     Stopped,
     failure_of,
-    only_failing,
     with_inline_world,
+    with_only_failed_criterion,
 )
-from simscen.cli.session.stacks import stacks_of
+from simscen.cli.session.stacks import parse_stacks
+from simscen.cli.session.user_files import save
 from simscen.cli.shared_options import (
     JobsOption,
     LenientOption,
@@ -61,12 +62,12 @@ def command(
     ] = "",
     keep: Annotated[
         float,
-        typer.Option(min=0, max=1, help="Share of the violation that must remain: 0.5 is half of it."),
+        typer.Option(min=0, max=1, help="Part of the violation that must remain: 0.5 is half of it."),
     ] = 0.5,
     out: Annotated[
         Path | None, typer.Option(help="File to write; default: NAME.minimal.scenario.yaml beside the scenario.")
     ] = None,
-    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Largest number of runs.")] = 500,
+    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Maximum number of runs.")] = 500,
     workers: JobsOption = None,
     backend: BackendOption = BackendName.LOCAL,
     address: AddressOption = None,
@@ -80,16 +81,16 @@ def command(
 ) -> None:
     """Find the smallest scenario that still fails in the same way.
 
-    Removes events, faults, people, obstacles, goals, and all other parts, one after the other and in groups, as long as
-    the same criterion still fails by enough. Then it rounds numbers. The result is a normal scenario file in which
-    unchanged parts keep their comments. It does not depend on the number of parallel runs.
+    Removes events, faults, people, obstacles, goals, and all other parts, in groups and one by one, as long as the same
+    criterion still fails and --keep of its violation remains. Then it rounds numbers. The result is a normal scenario
+    file in which unchanged parts keep their comments. It does not depend on the number of parallel runs.
 
     Exit code 0: the file was written; 1: it was written, but --runs did not suffice; 2: invalid options, or the run did
     not fail; 3: the run could not be completed.
     """
     chosen = _chosen_run(run, seed, variation, stack)
     root_folder = root if root is not None else default_root([chosen.file])
-    stacks = stacks_of([] if chosen.stack is None else [chosen.stack], root_folder, world_path or ())
+    stacks = parse_stacks([] if chosen.stack is None else [chosen.stack], root_folder, world_path or ())
     scenario = ChangedScenario(
         chosen.file, root_folder, world_path or (), next(iter(stacks.chosen), None), chosen.variation
     )
@@ -98,27 +99,30 @@ def command(
         raise UsageError(f"{target} exists already; choose another file with --out")
     workers, cluster = workers_and_cluster(workers, backend, address)
     options = SessionOptions(workers, wall_limit=wall_limit, cluster=cluster)
-    checks = Checks(root_folder, world_path or (), lenient, stacks=stacks)
+    checker = FileChecker(root_folder, world_path or (), lenient, stacks=stacks)
     own_seed = child(scenario.tree, "seed")
     first_seed = chosen.seed or (own_seed.plain if own_seed is not None and isinstance(own_seed.plain, int) else 1)
     try:
         with backend_of(options) as processes:
-            candidates = CandidateRuns(scenario, checks, options, processes, first_seed, runs)
-            shrinking, before = _shrink(candidates, criterion, keep, keep_world)
+            candidates = CandidateRuns(scenario, checker, options, processes, first_seed, runs)
+            shrinker, before = _shrink(candidates, criterion, keep, keep_world)
     except Stopped as stopped:
         sys.exit(stopped.exit)
-    comment = _comment(chosen, shrinking, first_seed)
-    text = changed_text(scenario.text, scenario.path, shrinking.tree.plain, comment)
+    comment = _comment(chosen, shrinker, first_seed)
+    text = changed_text(scenario.text, scenario.path, shrinker.tree.plain, comment)
     save(target, lambda file: write_atomically(file, text.encode()))
-    _print_summary(shrinking, before, target, chosen.stack)
-    sys.exit(Exit.PASSED if shrinking.is_complete else Exit.FAILED)
+    _print_summary(shrinker, before, target, chosen.stack)
+    sys.exit(Exit.PASSED if shrinker.is_complete else Exit.FAILED)
 
 
+@dataclass(frozen=True)
 class ChosenRun:
-    """Run to reproduce: scenario file, seed, variation, and --stack."""
+    """Failed run to start from. None stands for the seed or the stack of the scenario, "" for no variation."""
 
-    def __init__(self, file: Path, seed: int | None, variation: str, stack: str | None) -> None:
-        self.file, self.seed, self.variation, self.stack = file, seed, variation, stack
+    file: Path
+    seed: int | None
+    variation: str
+    stack: str | None
 
 
 def _chosen_run(run: Path, seed: int | None, variation: str, stack: str | None) -> ChosenRun:
@@ -132,6 +136,7 @@ def _chosen_run(run: Path, seed: int | None, variation: str, stack: str | None) 
 
 
 def _planned_run(folder: Path) -> PlannedRun:
+    """Return the run to which a folder in an output folder belongs. Raises UsageError."""
     for session in folder.parents:
         if (session / JOURNAL_FILE).is_file():
             inside = folder.relative_to(session / RUNS_FOLDER).as_posix()
@@ -145,29 +150,32 @@ def _folder_name(key: RunKey) -> str:
     return f"{key.scenario}/{key.folder}"
 
 
-def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinking, MappingNode]:
-    """Run and shrink the scenario; return also the scenario before. Raises UsageError if it does not fail."""
+def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinker, MappingNode]:
+    """Run the scenario, make it as small as possible, and return the result and the scenario before.
+
+    Raises UsageError if the scenario is invalid or does not fail.
+    """
     scenario = candidates.scenario
     (first,) = candidates.results([scenario.tree])
     if first is None:
         raise UsageError(f"{scenario.file} is not valid; see simscen validate")
     failure = failure_of(first, criterion, keep)
     print_text(f"the run fails: {_failure_text(first, failure)}")
-    tree = only_failing(scenario.tree, failure, candidates.seed)
+    tree = with_only_failed_criterion(scenario.tree, failure, candidates.seed)
     if not keep_world and (loaded := candidates.load(tree)) is not None:
         inline = with_inline_world(tree, loaded.world.tree)
         if inline is not None and candidates.first_accepted([inline], failure.occurs_in) is not None:
             tree = inline
-    shrinking = Shrinking(candidates, failure, tree)
+    shrinker = Shrinker(candidates, failure, tree)
     if sys.stderr.isatty():
-        candidates.report = lambda: _show_progress(candidates.runs, _size(shrinking.tree))
+        candidates.report = lambda: _show_progress(candidates.runs, _size(shrinker.tree))
     if candidates.first_accepted([tree], failure.occurs_in) is None:
-        raise UsageError("the run does not fail any more with this criterion alone; this is a bug in simscen")
+        raise UsageError("the run no longer fails if only this criterion is kept; this is a bug in simscen")
     nominal = {change.target.keys: _value_at(scenario.base_tree, change.target.keys) for change in scenario.changes}
-    shrinking.shrink({keys: value for keys, value in nominal.items() if keys[0] in tree.entries})
+    shrinker.shrink({keys: value for keys, value in nominal.items() if keys[0] in tree.entries})
     if sys.stderr.isatty():
         print_text("", sys.stderr)
-    return shrinking, tree
+    return shrinker, tree
 
 
 def _show_progress(runs: int, size: int) -> None:
@@ -205,20 +213,20 @@ def _failure_text(result: RunResult, failure: Failure) -> str:
     return verdict.id if finding is None else f"{verdict.id}: {finding.measured} (limit {finding.limit})"
 
 
-def _comment(chosen: ChosenRun, shrinking: Shrinking, seed: int) -> str:
+def _comment(chosen: ChosenRun, shrinker: Shrinker, seed: int) -> str:
     source = f"{chosen.file.name}, seed {seed}" + (f", {chosen.variation}" if chosen.variation else "")
-    failure = shrinking.failure.verdict_id or "an error of the stack"
+    failure = shrinker.failure.verdict_id or "an error of the stack"
     return f"The smallest scenario that simscen shrink found to fail in {failure}, from {source}."
 
 
-def _print_summary(shrinking: Shrinking, before: MappingNode, target: Path, stack: str | None) -> None:
+def _print_summary(shrinker: Shrinker, before: MappingNode, target: Path, stack: str | None) -> None:
     for title, texts in (
-        ("not needed:", removed_parts(before, shrinking.tree)),
-        ("simplified:", changed_values(before, shrinking.tree)),
+        ("not needed:", removed_parts(before, shrinker.tree)),
+        ("simplified:", changed_values(before, shrinker.tree)),
     ):
         if texts:
             print_text("\n".join([title, *(f"  {escaped(text)}" for text in texts)]))
-    incomplete = "" if shrinking.is_complete else ", which did not suffice to try everything; see --runs"
-    print_text(f"{_size(shrinking.tree)} values left after {shrinking.runs.runs} runs{incomplete}")
+    incomplete = "" if shrinker.is_complete else ", which were not enough to try everything; increase --runs"
+    print_text(f"{_size(shrinker.tree)} values left after {shrinker.runs.runs} runs{incomplete}")
     option = "" if stack is None else f" --stack {escaped(stack)}"
     print_text(f"wrote {escaped(str(target))}; try: simscen run {escaped(display_path(target))}{option}")

@@ -1,4 +1,4 @@
-"""`simscen study`."""
+"""Command `simscen study`: runs one scenario many times."""
 
 import sys
 from pathlib import Path
@@ -34,8 +34,8 @@ def command(
         typer.Option(
             min=1,
             max=1_000_000,
-            help="Number of random runs; default: that of `acceptance`, or `count` of `sampled`. At most so many for a "
-            "sequential claim.",
+            help="Number of random runs, or their maximum for a sequential claim; default: `runs` of `acceptance`, or "
+            "`count` of `sampled`.",
         ),
     ] = None,
     repeat: Annotated[

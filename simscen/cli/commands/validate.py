@@ -1,4 +1,4 @@
-"""`simscen validate`."""
+"""Command `simscen validate`: checks files and prints their problems."""
 
 import sys
 from collections import Counter
@@ -11,8 +11,9 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import as_github, as_json, as_text, print_text, relative_to_working_folder
-from simscen.cli.session.selection import Checks
-from simscen.cli.session.stacks import stacks_of
+from simscen.cli.session.file_checks import FileChecker
+from simscen.cli.session.stacks import parse_stacks
+from simscen.cli.shared_options import RootOption, WorldPathOption
 from simscen.core.errors import Exit, Problem
 from simscen.loading.checks.files import CHECKED_DRAWS, STACK_KINDS, check_file, file_kind
 from simscen.loading.files.discovery import SUFFIXES, default_root, discover
@@ -33,10 +34,8 @@ def command(
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="Check scenarios with this stack, as in `simscen run`; repeatable."),
     ] = None,
-    root: Annotated[Path | None, typer.Option(help="Root folder; scenarios may only refer to files below it.")] = None,
-    world_path: Annotated[
-        list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
-    ] = None,
+    root: RootOption = None,
+    world_path: WorldPathOption = None,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Report unsupported parts of SDF worlds as warnings instead of errors.")
     ] = False,
@@ -48,41 +47,43 @@ def command(
     """Check scenario, world, robot, and stack files without running anything.
 
     Lists every problem with file, line, and column. Folders are searched for *.scenario.yaml, *.study.yaml,
-    *.world.yaml, *.robot.yaml, *.stack.yaml, and *.base.yaml. A Nav2 parameter file is checked as a stack; parameters
-    without meaning here are listed. Base files and defaults.yaml may be incomplete. Scenarios are also checked in their
-    worlds: whether the robot is free at its start and goals, can arrive in time, and whether all events can take place
-    and all criteria can hold and fail. Of a study, the first 20 variations are checked.
+    *.world.yaml, *.robot.yaml, *.stack.yaml, and *.base.yaml. A Nav2 parameter file is checked as a stack, and
+    parameters that simscen does not use are listed. Base files and defaults.yaml may be incomplete. Scenarios are also
+    checked in their worlds: whether start and goals are free, the robot can arrive in time, all events can take place,
+    and all criteria can both pass and fail. Of a study, the first 20 variations are checked.
 
     Exit code 0: all files are valid; 2: a file is invalid; 5: no files found.
     """
     root_folder = root if root is not None else default_root(paths)
-    stacks = stacks_of(stack or [], root_folder, world_path or [])
-    checks = Checks(root_folder, world_path or [], lenient, fast, picture, stacks=stacks, runs=bool(stack))
+    stacks = parse_stacks(stack or [], root_folder, world_path or [])
+    checker = FileChecker(
+        root_folder, world_path or [], lenient, fast, picture, stacks=stacks, requires_commands=bool(stack)
+    )
     checked = _Checked()
     for file in discover(paths, root_folder, SUFFIXES):
         kind = file_kind(file, root_folder)
-        checked.add(kind, relative_to_working_folder(_problems(kind, file, checks), root_folder))
+        checked.add(kind, relative_to_working_folder(_problems(kind, file, checker), root_folder))
     _PRINT[format_](checked)
     if checked.invalid_files:
         sys.exit(Exit.USAGE)
 
 
-def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
+def _problems(kind: str, file: Path, checker: FileChecker) -> list[Problem]:
     """Return the problems of the text; if there are no errors, also those of building the world or robot."""
     if kind in ("scenario", "study"):
         numbers = CHECKED_DRAWS if kind == "study" else None
-        found = [problem for choice in checks.choices for problem in checks.scenario(file, choice, numbers)[1]]
+        found = [problem for choice in checker.choices for problem in checker.check_scenario(file, choice, numbers)[1]]
         return list(dict.fromkeys(found))
-    found = check_file(kind, file, checks.root, checks.world_path)
+    found = check_file(kind, file, checker.root, checker.world_path)
     if kind in (*STACK_KINDS, "base") or any(problem.severity == "error" for problem in found):
         return found
-    check_built = checks.robot if kind == "robot" else checks.world
+    check_built = checker.check_robot if kind == "robot" else checker.check_world
     return [*found, *check_built(file)]
 
 
 @dataclass
 class _Checked:
-    """Count of files by kind, and their problems."""
+    """Numbers of checked files by kind and of invalid files, and the problems of all files."""
 
     kinds: Counter[str] = field(default_factory=Counter)
     problems: list[Problem] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Command `simscen world`: inspect, convert, and export worlds."""
+"""Command `simscen world`: inspects, exports, and converts worlds."""
 
 import json
 import os
@@ -11,7 +11,7 @@ import typer
 from pydantic import ValidationError
 
 from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_working_folder
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.builders import world_from_file
@@ -33,7 +33,7 @@ WorldPath = Annotated[list[Path] | None, typer.Option(help="Additional folder wi
 Lenient = Annotated[bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")]
 Height = Annotated[float, typer.Option(min=0.0, max=100.0, help="Height of the lidar in meters.")]
 LIDAR_HEIGHT_M = 0.2
-"""Default height of the cross-section: that of the lidar of a small robot."""
+"""Default height of the cross-section of a world: the height of the lidar of a small robot."""
 
 
 @app.callback()
@@ -54,7 +54,7 @@ def inspect(
 ) -> None:
     """Print the content of a world: solids, bodies, extents, triangles, places, regions, and warnings.
 
-    Exit code 0; 2: the file or something in it is unusable.
+    Exit code 0: printed; 2: the file or something in it is unusable.
     """
     from simscen.worlds.built_world import build_world_and_map, inspect_world
 
@@ -87,8 +87,9 @@ def export(
 ) -> None:
     """Write a world as a ROS map for Nav2's map_server, as SLAM with a perfect lidar would have built it.
 
-    A world with its own map keeps the resolution of that map. Exit code 0; 2: the world is unusable or the map cannot
-    be written.
+    A world with its own map keeps the resolution of that map.
+
+    Exit code 0: written; 2: the world is unusable, or the map cannot be written.
     """
     from simscen.worlds.built_world import build_world_and_map
     from simscen.worlds.maps.ros_map import save_map
@@ -113,8 +114,9 @@ def convert(
     """Convert a world to a *.world.yaml file.
 
     Upright boxes, cylinders, and prisms are kept; meshes and all other shapes become upright prisms over their
-    cross-section at lidar height. Each change is printed. A ROS map is not copied; the world refers to its file. Exit
-    code 0; 2: the world is unusable or cannot be written.
+    cross-section at lidar height. Each change is printed. A ROS map is not copied; the world refers to its file.
+
+    Exit code 0: written; 2: the world is unusable or cannot be written.
     """
     root_folder = root or default_root([path])
     source = load_world_file(path, root_folder, world_path or ())
@@ -132,6 +134,7 @@ def convert(
 def _convert(
     source: LoadedWorld, root_folder: Path, world_path: list[Path], lenient: bool, height: float
 ) -> tuple[WorldSpec, list[str]]:
+    """Return the content of the world file, and a text about each change. Raises InvalidInput."""
     spec = source.spec or WorldSpec(simscen=1, name=source.name)
     if source.sdf is None:
         return spec, []
@@ -162,11 +165,14 @@ def _relative(file: Path, out: Path) -> str:
 MAX_SOLIDS = 20
 """Number of solids that are listed without --all."""
 MAX_NAME_LENGTH = 44
-"""Number of characters of a name; the end of a longer one is shown."""
+"""Number of characters of a name that are printed. Of a longer name, only the end is printed."""
 
 
 def summary_lines(summary: "WorldSummary", height: float, everything: bool) -> Iterator[str]:
-    """Yield the lines of an inspection, with the first MAX_SOLIDS solids, or all of them if `everything`."""
+    """Yield the lines of an inspection. `height` is the height of the cross-section in m.
+
+    If `everything`, all solids are listed; otherwise only the first MAX_SOLIDS.
+    """
     x0, y0, x1, y1 = summary.bounds
     yield f"  bounds    x {x0:.2f} … {x1:.2f} m, y {y0:.2f} … {y1:.2f} m ({x1 - x0:.2f} x {y1 - y0:.2f} m)"
     kinds = ", ".join(f"{count} {kind}" for kind, count in summary.shapes)

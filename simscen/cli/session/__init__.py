@@ -1,1 +1,1 @@
-"""A session of `simscen run`: selection of runs, execution, output files."""
+"""Sessions of `simscen run`, `study`, `falsify`, and `shrink`, and the evaluation of recorded logs."""

@@ -1,4 +1,4 @@
-"""The processes that execute the runs of a session."""
+"""Backends that execute the runs of a session (local processes or a Ray cluster), and their reaction to signals."""
 
 import os
 import signal
@@ -19,11 +19,12 @@ from simscen.run.sessions.run_session import SessionOptions
 REPEATED_SIGNAL_S = 0.5
 """Signals within this time count as one: wrappers forward a signal that the process has already received."""
 SHOW_CURSOR = b"\x1b[?25h"
+"""Terminal sequence that shows the cursor again."""
 
 
 @contextmanager
-def signals_interrupt(clock: Callable[[], float] = time.monotonic) -> Iterator[None]:
-    """Raise Interrupted on the first signal, so that reports are written; exit at once on a later one.
+def interrupt_on_signals(clock: Callable[[], float] = time.monotonic) -> Iterator[None]:
+    """Raise Interrupted on the first SIGINT, SIGTERM, or SIGHUP, so that reports are written; exit on a later one.
 
     Worker processes end with this process. The journal is complete at any time, so `simscen report` can still write the
     reports. A SIGHUP that is ignored, as under nohup, stays ignored.
@@ -52,7 +53,7 @@ def signals_interrupt(clock: Callable[[], float] = time.monotonic) -> Iterator[N
 
 
 def exit_at_once(number: int) -> None:
-    """Restore the cursor and exit with the exit code of the signal, without waiting for anything."""
+    """Restore the cursor and exit immediately with the exit code for signal `number`."""
     if os.isatty(1):
         os.write(1, SHOW_CURSOR + b"\n")
     os.write(2, b"simscen: stopped without reports; run `simscen report` to write them from the journal\n")
@@ -62,8 +63,8 @@ def exit_at_once(number: int) -> None:
 FORK_SERVER = ("-m", "simscen.cli.session.fork_server_main")
 """Python arguments that start the fork server."""
 
-OWN_CLUSTER = "auto"
-"""Ray's address of the cluster in RAY_ADDRESS, or of the one that was started on this machine."""
+DEFAULT_CLUSTER = "auto"
+"""Address for which Ray uses RAY_ADDRESS, or else the cluster that was started on this machine."""
 
 
 class BackendName(str, Enum):
@@ -86,7 +87,10 @@ AddressOption = Annotated[
 
 
 def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | None) -> tuple[int, str]:
-    """Return the number of parallel runs and the address of the cluster ("" for this machine). Raises UsageError."""
+    """Return the number of parallel runs, and the address of the Ray cluster ("" for local processes).
+
+    The parameters are the values of --jobs, --backend, and --address. Raises UsageError.
+    """
     if backend is BackendName.LOCAL:
         if address is not None:
             raise UsageError("--address is for --backend ray")
@@ -95,8 +99,8 @@ def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | N
         from simscen.run.process.ray_backend import cluster_cpus
     except ModuleNotFoundError:
         raise UsageError("--backend ray needs Ray; install it with: pip install ray") from None
-    cpus = cluster_cpus(address or OWN_CLUSTER)
-    return jobs or cpus, address or OWN_CLUSTER
+    cpus = cluster_cpus(address or DEFAULT_CLUSTER)
+    return jobs or cpus, address or DEFAULT_CLUSTER
 
 
 def backend_of(options: SessionOptions) -> Backend:

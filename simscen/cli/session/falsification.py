@@ -1,4 +1,4 @@
-"""`simscen falsify`: search the ranges of a scenario for values with which it fails."""
+"""Executes `simscen falsify`: searches the ranges of a scenario for values with which it fails."""
 
 import math
 import time
@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
 
-from simscen.cli.session.backends import backend_of, signals_interrupt
-from simscen.cli.session.output_files import JunitFamily, Reports, require_writable
+from simscen.cli.session.backends import backend_of, interrupt_on_signals
+from simscen.cli.session.file_checks import FileChecker
+from simscen.cli.session.output_files import JunitFamily, Reports, require_writable_junit
 from simscen.cli.session.pending_runs import plan_runs
-from simscen.cli.session.run_session import output_folder
-from simscen.cli.session.selection import Checks
-from simscen.cli.session.stacks import stacks_of
-from simscen.cli.session.terminal import Format, Screen, screen
+from simscen.cli.session.run_session import open_output_folder
+from simscen.cli.session.stacks import parse_stacks
+from simscen.cli.session.terminal import Format, Screen, open_screen
 from simscen.core.errors import Exit, InvalidInput, Problem
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
@@ -41,10 +41,11 @@ from simscen.run.sessions.search import Point, Search, SearchMethod, make_search
 BATCH = 8
 """Runs between two updates of the search. Fixed, so that a search does not depend on the number of workers."""
 MAX_EMPTY_BATCHES = 50
-"""Batches in a row without a valid point after which the search gives up."""
+"""Number of batches in a row without any valid values after which the search gives up."""
 SQUARE_SIZE_M = 1.0
-"""Failures in the same criterion are different if they are in different squares of this size."""
+"""Side of a square. Failures in the same criterion count as different if they are in different squares."""
 CONFIDENCE = 0.95
+"""Confidence of the bound on the rate of failures."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,12 @@ class FalsifyRequest:
 
 @dataclass(frozen=True)
 class FoundFailure:
-    """A failure that differs from the others, and the scenario file that reproduces it."""
+    """Failure that differs from the failures found before.
+
+    file:    scenario that reproduces it
+    run:     result of the run that failed
+    values:  values of the sampled keys, by their path in the scenario
+    """
 
     file: Path
     run: RunFinished
@@ -78,35 +84,41 @@ class FoundFailure:
 
 
 Signature = tuple[tuple[str, ...], frozenset[str], tuple[int, int] | None]
-"""Failed criteria, events and faults that had happened, and the square in which the first criterion failed."""
+"""Failed criteria, names of the events and faults that had happened, and (x, y) of the square of the first failure.
+
+Failures with equal signatures count as the same failure.
+"""
 
 
 def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
-    """Run a search and write its reports and the failures it finds. Raises InvalidInput and UsageError."""
+    """Run a search, and write its reports and the failures that it finds. Return the exit code and the search.
+
+    Raises InvalidInput and UsageError.
+    """
     falsification = Falsification(request)
-    require_writable(request.junit, request.out, [request.file])
-    folder, journal = output_folder(request.out, None)
+    require_writable_junit(request.junit, request.out, [request.file])
+    folder, journal = open_output_folder(request.out, None)
     reports = Reports(folder, request.junit, request.junit_family.value)
     reports.begin()
-    with screen(request.format_) as output, backend_of(request.options) as backend:
+    with open_screen(request.format_) as output, backend_of(request.options) as backend:
         return output.exit(falsification.execute(backend, journal, reports, output)), falsification
 
 
 class Falsification:
-    """Search that proposes values, runs them, and saves the failures that differ."""
+    """Search that proposes values, runs the scenario with them, and saves each new kind of failure."""
 
     def __init__(self, request: FalsifyRequest) -> None:
         """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
         self._request = request
         root_folder = request.root if request.root is not None else default_root([request.file])
-        stacks = stacks_of([] if request.stack is None else [request.stack], root_folder, request.world_path)
+        stacks = parse_stacks([] if request.stack is None else [request.stack], root_folder, request.world_path)
         choice = next(iter(stacks.chosen), None)
         self._scenario = ChangedScenario(request.file, root_folder, request.world_path, choice, None)
         space = search_space(self._scenario.merged_tree)
         if not isinstance(space, SearchSpace):
             raise InvalidInput(space)
         self._space = space
-        self._checks = Checks(root_folder, request.world_path, request.lenient, stacks=stacks)
+        self._checker = FileChecker(root_folder, request.world_path, request.lenient, stacks=stacks)
         self._search: Search = make_search(request.method, space.choice_counts, request.search_seed)
         self._variations: dict[str, Variation] = {}
         self._planned: list[PlannedRun] = []
@@ -117,7 +129,7 @@ class Falsification:
         self.found: list[FoundFailure] = []
 
     def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
-        """Search until enough failures are found or the budget is spent. Returns the exit code."""
+        """Search until enough failures are found or no more runs are allowed. Return the exit code."""
         start, stopped, empty_batches = time.monotonic(), None, 0
 
         def listen(event: SessionEvent) -> None:
@@ -132,7 +144,7 @@ class Falsification:
             valid = [job for job in jobs if job is not None]
             empty_batches = 0 if valid else empty_batches + 1
             self._plan(journal, valid)
-            with signals_interrupt():
+            with interrupt_on_signals():
                 finished_runs, stopped = run_session(valid, self._request.options, backend, listen)
             by_key = {finished.key: finished for finished in finished_runs}
             ordered = [None if job is None else by_key[job.key] for job in jobs]
@@ -159,8 +171,8 @@ class Falsification:
         """Whether the runs are independent random draws."""
         return self._request.method is SearchMethod.RANDOM
 
-    def largest_probability(self) -> float | None:
-        """Return the rate of failures that is ruled out with 95 % confidence; None unless the values are random."""
+    def max_failure_rate(self) -> float | None:
+        """Return the upper bound of the rate of failures with 95 % confidence; None if the values are not random."""
         counted = [finished for finished in self.finished_runs if is_counted(finished.result)]
         if not self.is_random or not counted:
             return None
@@ -171,11 +183,11 @@ class Falsification:
         request, bound = self._request, self._request.probability
         if len(self.found) >= request.failures or len(self.finished_runs) >= request.runs:
             return True
-        largest = self.largest_probability() if bound is not None else None
+        largest = self.max_failure_rate() if bound is not None else None
         return bound is not None and largest is not None and largest <= bound
 
     def _make_jobs(self, points: Sequence[Point], folder: Path) -> list[Job | None]:
-        """Return a job for each point; None for values that violate the conditions or make the scenario invalid."""
+        """Return a job for each point, or None if its values violate the conditions or make the scenario invalid."""
         jobs: list[Job | None] = []
         options = self._request.options
         for point in points:
@@ -200,7 +212,9 @@ class Falsification:
         if isinstance(loaded, list):
             self._problems = loaded
             return None
-        checked, problems = self._checks.variation(loaded.with_changes(variation=name, varied_values=variation.values))
+        checked, problems = self._checker.check_variation(
+            loaded.with_changes(variation=name, varied_values=variation.values)
+        )
         if checked is None:
             self._problems = problems
         return checked
@@ -222,7 +236,7 @@ class Falsification:
     def _save_failure(self, finished: RunFinished) -> None:
         """Write the scenario of a run that failed in a way that was not found before."""
         result = finished.result
-        if run_has_passed(result) or not is_counted(result) or (new := signature(result)) in self._signatures:
+        if result.outcome.good or not is_counted(result) or (new := signature(result)) in self._signatures:
             return
         if len(self.found) >= self._request.failures:
             return
@@ -231,7 +245,7 @@ class Falsification:
         tree = with_seed(variation.tree, result.key.seed)
         comment = f"Found by simscen falsify: {self._request.file.name} fails with these values."
         text = changed_text(self._scenario.text, self._scenario.path, tree.plain, comment)
-        file = free_file(self._request.file)
+        file = new_failure_file(self._request.file)
         write_atomically(file, text.encode())
         self.found.append(FoundFailure(file, finished, variation.values))
 
@@ -240,13 +254,8 @@ class Falsification:
         return Problem(str(self._request.file), 0, 0, "SC016", message)
 
 
-def run_has_passed(result: RunResult) -> bool:
-    """Return whether a run passed, or failed as expected."""
-    return result.outcome in (Outcome.PASSED, Outcome.FAILED_AS_EXPECTED)
-
-
 def signature(result: RunResult) -> Signature:
-    """Return what distinguishes failures: criteria, events and faults that happened, and the place."""
+    """Return the signature of a failed run."""
     failed = [verdict for verdict in result.verdicts if verdict.status is Status.FAIL]
     finding = failed[0].tightest if failed else None
     place = None if finding is None or finding.place is None else finding.place
@@ -256,13 +265,13 @@ def signature(result: RunResult) -> Signature:
     return kinds, happened, square
 
 
-def free_file(scenario: Path) -> Path:
+def new_failure_file(scenario: Path) -> Path:
     """Return a file NAME.failure-N.scenario.yaml beside the scenario that does not exist yet."""
     return next(file for number in count(1) if not (file := sibling(scenario, f"failure-{number}")).exists())
 
 
 def summary_lines(falsification: Falsification) -> list[str]:
-    """Return the lines that describe the failures, or that none was found."""
+    """Return the lines that list the failures, or state that none was found."""
     runs = len(falsification.finished_runs)
     lines = []
     for failure in falsification.found:
@@ -275,11 +284,12 @@ def summary_lines(falsification: Falsification) -> list[str]:
         lines.append(f"found {number} {'failure' if number == 1 else 'different failures'} in {runs} runs")
         return lines
     lines.append(f"found no failure in {runs} runs")
-    largest = falsification.largest_probability()
+    largest = falsification.max_failure_rate()
     if largest is not None:
         lines.append(f"with {CONFIDENCE:.0%} confidence, at most {100 * largest:.3g} % of random values fail")
     return lines
 
 
 def _margin(finished: RunFinished | None) -> float:
+    """Return the smallest margin of a run relative to its limit; NaN if there was no run, or it does not count."""
     return math.nan if finished is None or not is_counted(finished.result) else run_margin(finished.result)

@@ -1,4 +1,8 @@
-"""Program of the fork server: `python -I -m simscen.cli.session.fork_server_main [PLUGIN_PATH] FD`, internal."""
+"""Main module of the fork server, which prepares scenarios and forks a worker for each run.
+
+The supervisor starts it as `python -I -m simscen.cli.session.fork_server_main [PLUGIN_PATH] FD`, where FD is the file
+descriptor for replies.
+"""
 
 import os
 import resource
@@ -37,7 +41,7 @@ from simscen.worlds.raycasting import ray_scene
 
 
 def import_components(prepared: PreparedScenario) -> None:
-    """Import the shipped components of the scenario's stacks and sensors."""
+    """Import the shipped components of the scenario's stacks and sensors, so that the workers need not."""
     for part in prepared.each.values():
         for module in shipped_modules(_components((part.stack, part.robot.sensors))):
             import_module(module)
@@ -48,7 +52,7 @@ def import_components(prepared: PreparedScenario) -> None:
 
 
 def precompute(prepared: PreparedScenario) -> None:
-    """Compute data structures of world and map that each run would otherwise compute itself."""
+    """Compute the data structures of world and map that each worker would otherwise compute itself."""
     from simscen.run.robot_interface import robot_model
     from simscen.stack.costmap import layered_costmap
 
@@ -63,14 +67,14 @@ def precompute(prepared: PreparedScenario) -> None:
 
 
 def precompute_localizer(spec: LocalizerSpec, grid: OccupancyGrid) -> None:
-    """Compute what a shipped localizer derives from its map, so that all runs share it."""
+    """Compute the data that a shipped localizer derives from its map, so that all runs use the same memory."""
     module, _, name = spec.precomputation.partition(":")
     if module.startswith("simscen."):
         getattr(import_module(module), name)(spec, grid)
 
 
 def shipped_modules(components: Iterable[Component]) -> Iterator[str]:
-    """Yield the modules of the shipped components. Plug-ins are imported only in the worker process."""
+    """Yield the modules of the shipped components. Components of other packages are imported only in the worker."""
     for component in components:
         module = component.component.partition(":")[0]
         if module.startswith("simscen."):
@@ -78,12 +82,12 @@ def shipped_modules(components: Iterable[Component]) -> Iterator[str]:
 
 
 def _components(value: object) -> Iterator[Component]:
-    """Yield all component specifications in a specification."""
+    """Yield all component specifications that a specification contains."""
     if isinstance(value, Component):
         yield value
     inner: Iterable[object] = ()
     match value:
-        case Recovery():  # which writes its behaviors as names
+        case Recovery():  # its fields contain only the names of its behaviors
             inner = value.chosen()
         case BaseModel():
             inner = value.__dict__.values()
@@ -100,7 +104,7 @@ Image.preinit()  # imports now instead of in every fork that writes a picture
 
 
 def main() -> None:
-    """Serve the supervisor until it closes the connection."""
+    """Process the requests of the supervisor until it closes the connection."""
     *plugin_paths, replies = sys.argv[1:]
     for plugin_path in plugin_paths:
         apply_plugin_path(plugin_path)

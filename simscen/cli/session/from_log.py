@@ -1,4 +1,4 @@
-"""Reconstruction of a scenario from a log for `simscen new --from-log`."""
+"""Reconstructs a scenario from a recorded drive for `simscen new --from-log`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
-from simscen.cli.session.new_file import create_file
+from simscen.cli.session.user_files import create_file
 from simscen.cli.shared_options import parse_topics
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.discovery import default_root
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 class FromLogOptions:
     """Options of `simscen new --from-log`.
 
+    log:     recorded drive: an MCAP file or a rosbag2 folder
     out:     scenario file to write
     map:     map for the robot, instead of the one in the log
     world:   world file, instead of a world made from the log
@@ -41,13 +42,13 @@ class FromLogOptions:
 
 
 def write_scenario_from_log(options: FromLogOptions, verify: bool) -> None:
-    """Write the scenario and print a summary; with `verify`, also run it and compare the run with the log.
+    """Write the scenario and print a summary. With `verify`, also run the scenario and compare the run with the log.
 
-    Raises InvalidInput and UsageError.
+    Raises InvalidInput if the log or another file is unusable, and UsageError if the scenario cannot be written.
     """
     if not options.log.exists():
         raise InvalidInput([Problem(str(options.log), 0, 0, "SC001", "no such file or directory")])
-    made = _reconstructed(options)
+    made = _reconstruct(options)
     for file in made.files[1:]:
         print_text(f"wrote {escaped(str(file))}")
     for line in made.summary():
@@ -62,7 +63,7 @@ def write_scenario_from_log(options: FromLogOptions, verify: bool) -> None:
         verify_reconstruction(made)
 
 
-def _reconstructed(options: FromLogOptions) -> Reconstruction:
+def _reconstruct(options: FromLogOptions) -> Reconstruction:
     from simscen.reconstruction.drive.log_messages import TOPIC_ROLES
     from simscen.reconstruction.drive.reader import DriveOptions
     from simscen.reconstruction.scenario.given_parts import GivenFiles

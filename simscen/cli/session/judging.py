@@ -1,4 +1,4 @@
-"""Evaluation of recorded logs with their own criteria or with those of a file."""
+"""Evaluates recorded logs with the criteria that they contain, or with the criteria of a file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -30,17 +30,17 @@ from simscen.run.sessions.output_folder import run_folder
 
 
 class LogJudge:
-    """Evaluates logs with the criteria of `scenario`, or each with its own.
+    """Evaluates logs, each with its own criteria or all with the criteria of `scenario`.
 
-    `notes` collects remarks about the logs. `foreign` counts the logs that simscen did not write. `options` apply to
-    these logs, `root` and `world_path` to the files of the scenario.
+    `options` say how to read logs that simscen did not write. `root` and `world_path` apply to the files of `scenario`.
+    `notes` collects remarks about the logs; `foreign_count` is the number of logs that simscen did not write.
     """
 
     def __init__(
         self, options: ForeignLogOptions, scenario: Path | None, root: Path | None, world_path: Sequence[Path]
     ) -> None:
         self.notes: list[str] = []
-        self.foreign = 0
+        self.foreign_count = 0
         self._options, self._scenario, self._world_path = options, scenario, world_path
         self._case: Case | None = None
         self._file_masks: Mapping[str, MaskBlocks] | None = None
@@ -53,7 +53,11 @@ class LogJudge:
                 raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
 
     def judge(self, log: Path, is_only_log: bool) -> RunFinished:
-        """Evaluate a log. An unusable one raises InvalidInput if `is_only_log`; otherwise its result is an error."""
+        """Evaluate a log and return its result.
+
+        An unusable log raises InvalidInput if it is the only one. If it is one of several, its result is an error, so
+        that the other logs are still evaluated.
+        """
         try:
             return (
                 self._judge_simscen_log(log)
@@ -72,11 +76,11 @@ class LogJudge:
             return _not_judged(log, RunFailure("internal", reason))
 
     def judge_for_replay(self, log: Path) -> tuple[Log, RunResult]:
-        """Return a log with all data for a replay, and its result. Raises InvalidInput."""
+        """Return a log with its sensor data, and its result. Raises InvalidInput if it is unusable."""
         if _may_be_simscen_log(log) and is_simscen_log(log):
             read = read_run(log, with_sensors=True)
             return read, recorded_result(read, log) if self._criteria is None else self._judge_simscen_log(log).result
-        self.foreign += 1
+        self.foreign_count += 1
         if self._criteria is None:
             foreign, case = read_foreign_log(log, self._options, with_sensors=True), Case(Pose2(0.0, 0.0), ())
             result = skipped_result(RunKey(log.stem, 0), "", "not evaluated; set criteria with --scenario")
@@ -119,7 +123,7 @@ class LogJudge:
         return self._judge_by_file(log, key, read.trace, case, read.coverage, criteria)
 
     def _judge_foreign(self, log: Path) -> RunFinished:
-        self.foreign += 1
+        self.foreign_count += 1
         if self._criteria is None:
             hint = "set criteria with --scenario; a file with `pass:` is enough"
             raise InvalidInput([Problem(str(log), 0, 0, "SC801", "not a log of simscen", hint)])
@@ -128,7 +132,7 @@ class LogJudge:
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(self._scenario))
 
     def _judge_foreign_log(self, log: Path, with_sensors: bool = False) -> tuple[ForeignLog, RunResult]:
-        """Return a log that simscen did not record and its result by the criteria file."""
+        """Read a log that simscen did not write, and return it with its result by the criteria file."""
         assert self._criteria is not None
         with _scenario_errors(self._criteria):
             criteria = self._criteria.for_robot("")
@@ -142,7 +146,7 @@ class LogJudge:
         return read, self._judge_by_file(log, RunKey(log.stem, 0), read.trace, case, coverage, criteria).result
 
     def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskBlocks]:
-        """Return the filter masks that the criteria use; those of the criteria file are read once."""
+        """Return the costmap filter masks that the criteria use. The masks of the criteria file are read only once."""
         if criteria is self._criteria and self._file_masks is not None:
             return self._file_masks
         from simscen.run.preparation import masks_from_criteria
@@ -153,7 +157,7 @@ class LogJudge:
         return masks
 
     def _foreign_case(self) -> Case:
-        """Return the surroundings of the robot according to the criteria file, which is read once."""
+        """Return the world, goals, and robot of the criteria file. They are read only once."""
         assert self._criteria is not None
         if self._case is None:
             from simscen.run.preparation import case_from_criteria
@@ -183,12 +187,12 @@ def _may_be_simscen_log(log: Path) -> bool:
 
 
 class UnusableScenario(InvalidInput):
-    """The criteria file is invalid, independently of the log."""
+    """The criteria file is invalid. This concerns all logs, so the evaluation ends."""
 
 
 @contextmanager
 def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
-    """Convert InvalidInput of the criteria file to UnusableScenario."""
+    """Convert InvalidInput that the body of the `with` statement raises to UnusableScenario."""
     try:
         yield
     except InvalidInput as error:
@@ -196,7 +200,7 @@ def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
 
 
 def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
-    """Return the runs of output folders that have no log, so that the evaluation contains them."""
+    """Return the folder and the result of each run without a log in output folders, so that it is counted as well."""
     return [
         (str(run_folder(folder, run.key)), _without_log(run))
         for folder in folders

@@ -1,4 +1,4 @@
-"""Search for logs: a file, the folder of a run, a rosbag2, or a folder that contains any of them."""
+"""Finds the logs in files and folders that the user names, and the result in a log."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -17,13 +17,15 @@ from simscen.record.log_reader import Log
 COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
 """Names of the log in the folder of a run that was completed, and of one that was aborted."""
 BAG_METADATA = "metadata.yaml"
+"""Name of the file that every rosbag2 folder contains."""
 LOG_SUFFIXES = (".mcap", ".db3", ".bag")
 
 
 def find_logs(paths: Sequence[Path]) -> list[Path]:
-    """Return all logs without duplicates, sorted within a folder.
+    """Return the logs at and below the paths, without duplicates, sorted within each path.
 
-    Raises InvalidInput for an unusable path, and NothingSelected if there are no logs.
+    A path is a file or a folder; a rosbag2 folder is one log. Raises InvalidInput for an unusable path, and
+    NothingSelected if there are no logs.
     """
     found: dict[Path, None] = {}
     for path in paths:
@@ -53,12 +55,12 @@ def _logs(path: Path) -> Iterator[Path]:
 
 
 def is_bag(names: Sequence[str]) -> bool:
-    """Return whether a folder with these files is a rosbag2."""
+    """Return whether a folder with files of these names is a rosbag2."""
     return BAG_METADATA in names and any(name.endswith((".db3", ".mcap", ".db3.zstd", ".mcap.zstd")) for name in names)
 
 
 def log_file(run: Path) -> Path:
-    """Return the log in the folder of a run, or the file itself. Raises InvalidInput if the folder contains no log."""
+    """Return the log in the folder of a run; if `run` is a file, return it. Raises InvalidInput if there is no log."""
     if not run.is_dir():
         return run
     found = [run / name for name in (COMPLETE_LOG, PARTIAL_LOG) if (run / name).is_file()]
@@ -69,7 +71,7 @@ def log_file(run: Path) -> Path:
 
 
 def recorded_result(log: Log, file: Path) -> RunResult:
-    """Return the result in a log; for an incomplete log, the result of its criteria for the recorded part."""
+    """Return the result that a log contains. For an incomplete log, evaluate its criteria on the recorded part."""
     if log.result:
         return from_json(log.result)
     results = {name: _evaluate(robot_log, file, name) for name, robot_log in (log.robots or {"": log}).items()}

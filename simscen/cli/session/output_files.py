@@ -1,4 +1,4 @@
-"""Writing of the output files of a session (results.json, junit.xml, report.html, run.json), and its exit code."""
+"""Writes the output files of a session (results.json, junit.xml, report.html, run.json), and returns its exit code."""
 
 import errno
 import json
@@ -8,7 +8,7 @@ import sys
 import time
 import webbrowser
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, timezone
 from enum import Enum
 from functools import cached_property
@@ -19,7 +19,7 @@ import typer
 
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
-from simscen.core.files import require_not_input, require_regular_file
+from simscen.core.files import require_not_input
 from simscen.core.records.comparison import Comparison
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.run_store import RunStore
@@ -34,6 +34,7 @@ from simscen.run.reproducibility import arithmetic_fingerprints, cpu_flags, soft
 from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, write_atomically
 
 PAGE = "report.html"
+"""Name of the HTML report in the output folder."""
 RESERVED_NAMES = ("results.json", PAGE, "run.json", JOURNAL_FILE, RUNS_FOLDER)
 """Names in the output folder that `--junit` must not use. junit.xml is not among them: it is the JUnit report."""
 
@@ -45,13 +46,19 @@ class JunitFamily(str, Enum):
     XUNIT2 = "xunit2"
 
 
-JunitFamilyOption = Annotated[JunitFamily, typer.Option(help="xunit2 omits what the schema of Jenkins forbids.")]
+JunitFamilyOption = Annotated[
+    JunitFamily, typer.Option(help="Dialect of JUnit XML; xunit2 omits what the schema of Jenkins forbids.")
+]
 
 
 class Reports:
-    """Writer of the reports of a session in `folder`, and of the JUnit report `junit`.
+    """Writes the reports of a session to its output folder.
 
-    With `junit_only`, no other report is written. `used` are the installed packages and external stacks of the runs.
+    folder:      output folder
+    junit:       further file for the JUnit report, or None
+    family:      dialect of JUnit XML
+    junit_only:  write only the file `junit`
+    used:        entries for run.json: the installed packages and the external stacks of the runs
     """
 
     def __init__(
@@ -77,7 +84,7 @@ class Reports:
     def write(
         self, finished_runs: Sequence[RunFinished], comparison: Comparison | None = None, study: Study | None = None
     ) -> bool:
-        """Write the reports and return whether all were written; if one cannot be written, its old file remains."""
+        """Write the reports, and return whether all were written. If one cannot be written, its old file remains."""
         results = map(str.encode, json_parts(finished_runs, str(self.folder), comparison, study))
         documents: dict[Path, bytes | Iterable[bytes]] = {}
         if not self._junit_only:
@@ -89,7 +96,7 @@ class Reports:
         return not self._missing
 
     def write_live(self, finished_runs: Sequence[RunFinished], live: RunningSession) -> bool:
-        """Write the page of a running session."""
+        """Write the HTML report of a session that is still running, and return whether it was written."""
         page = to_html(Session(finished_runs, self._past, folder=str(self.folder), live=live))
         return _write(self.folder / PAGE, page.encode())
 
@@ -102,7 +109,7 @@ class Reports:
         return past_sessions(self.folder)
 
     def write_duration(self, wall: float) -> bool:
-        """Write run.json again with the duration of the session in seconds."""
+        """Write run.json again with the duration of the session in seconds, and return whether it was written."""
         return _write(self.folder / "run.json", session_info_json(self._used, wall))
 
     def finished_event(
@@ -135,7 +142,7 @@ class Reports:
         )
 
 
-CLAIM_EXITS = {
+CLAIM_EXIT_CODES = {
     ClaimStatus.HELD: Exit.PASSED,
     ClaimStatus.REFUTED: Exit.FAILED,
     ClaimStatus.UNDECIDED: Exit.UNDECIDED,
@@ -149,20 +156,20 @@ def exit_code(finished_runs: Sequence[RunFinished], study: Study | None = None) 
     If the session is a study with a claim, the status of the claim determines it; otherwise, the outcomes of the runs.
     """
     if study is not None and study.claim is not None:
-        return CLAIM_EXITS[study.claim.status]
+        return CLAIM_EXIT_CODES[study.claim.status]
     outcomes = {finished.outcome for finished in finished_runs}
     if outcomes == {Outcome.SKIPPED}:
         return Exit.NOTHING_SELECTED
     if Outcome.ERROR in outcomes:
-        only_skipped = all(a.result.error is None or a.result.error.kind == "not-run" for a in finished_runs)
-        return Exit.FAILED if only_skipped and Outcome.FAILED in outcomes else Exit.INCOMPLETE
+        only_not_run = all(a.result.error is None or a.result.error.kind == "not-run" for a in finished_runs)
+        return Exit.FAILED if only_not_run and Outcome.FAILED in outcomes else Exit.INCOMPLETE
     return Exit.FAILED if Outcome.FAILED in outcomes else Exit.PASSED
 
 
-def require_writable(junit: Path | None, folder: Path | None, inputs: Iterable[Path] = ()) -> None:
-    """Raise UsageError if a JUnit report cannot be written, before anything runs.
+def require_writable_junit(junit: Path | None, folder: Path | None, inputs: Iterable[Path] = ()) -> None:
+    """Raise UsageError if the file of --junit cannot be written. None is a session without --junit.
 
-    It must not be one of the `inputs`, nor another file that simscen writes in the output `folder`.
+    The file must not be one of the `inputs`, nor another file that simscen writes in the output `folder`.
     """
     if junit is None:
         return
@@ -196,8 +203,7 @@ def _write(path: Path, data: bytes | Iterable[bytes]) -> bool:
 def session_info_json(used: Mapping[str, object], wall: float | None = None) -> bytes:
     """Return the content of run.json.
 
-    `used` are installed packages and external stacks, `wall` is the duration of the session in seconds, or None while
-    it runs.
+    `used` are further entries. `wall` is the wall-clock duration of the session in seconds, or None while it runs.
     """
     return json.dumps(
         {
@@ -216,26 +222,14 @@ def session_info_json(used: Mapping[str, object], wall: float | None = None) -> 
     ).encode()
 
 
-def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ()) -> None:
-    """Write a file with `write`. Raises UsageError if that fails or would overwrite an input."""
-    try:
-        require_regular_file(path)
-        require_not_input(path, inputs)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write(path)
-    except OSError as error:
-        raise UsageError(f"cannot write {path}: {error.strerror}") from error
-
-
 MIN_UPDATE_INTERVAL_S = 1.0
 """Minimum time between two updates of the page, in seconds; the page itself reloads every two seconds."""
 UPDATE_INTERVAL_FACTOR = 10
-"""Minimum time between two updates as a multiple of the time that an update takes."""
+"""Minimum time between two updates as a multiple of the time that an update takes, so that updates stay cheap."""
 
 
 class LivePage:
-    """Listener that writes and opens the page of a session before the first run, and updates it until the reports are
-    written."""
+    """Listener that shows the HTML report of a running session in a browser, and updates it when runs finish."""
 
     def __init__(self, reports: Reports) -> None:
         self._reports = reports
@@ -244,7 +238,7 @@ class LivePage:
         self._running: dict[RunKey, None] = {}
 
     def __call__(self, event: SessionEvent) -> None:
-        """Update the page after a run if the last update is old enough."""
+        """Write and open the page when the session starts. Update it after a run, but not too often."""
         match event:
             case SessionStarted():
                 self._total = event.total
@@ -268,6 +262,6 @@ class LivePage:
 
 
 def open_page(page: Path) -> None:
-    """Open a page in the browser ($BROWSER, or that of the system); print its path if there is none."""
+    """Open a page in the browser of $BROWSER or of the system. If there is no browser, print the path of the page."""
     if not webbrowser.open(page.absolute().as_uri()):
         print_text(f"simscen: no browser found; open {page} in a browser", sys.stderr)

@@ -1,4 +1,4 @@
-"""Runs that a session executes: all, or those that an earlier session in the same folder did not complete."""
+"""Determines which planned runs a session must execute, and which results of earlier sessions it can reuse."""
 
 import json
 from collections.abc import Collection, Mapping, Sequence
@@ -20,14 +20,18 @@ from simscen.run.sessions.results import display_path, repeat_command
 from simscen.run.sessions.run_session import SessionOptions, scenario_seeds
 
 SHARED_RESULT_KEYS = ("scenario", "seed", "variation", "stack_name", "simulated_seconds", "verdicts")
-"""Keys of result.json that the log and the journal both contain."""
+"""Keys of result.json that the log and the journal both contain. If their values differ, the log is of another run."""
 
 
 @dataclass(frozen=True)
 class PendingRuns:
-    """Journal of a session, its jobs to execute, and the `reused` results of an earlier session.
+    """Runs that a session must still execute.
 
-    `stacks` are the names of the selected stacks.
+    journal:  journal of the session
+    jobs:     runs to execute
+    reused:   results of an earlier session in the same folder
+    workers:  number of parallel runs
+    stacks:   names of the stacks of --stack
     """
 
     journal: Journal
@@ -45,7 +49,8 @@ class PendingRuns:
 def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tuple[int, int] = (1, 1)) -> PendingRuns:
     """Write the plan of the session to its journal and return the pending runs. Raises UsageError if that fails.
 
-    Results of unchanged scenarios are reused unless they are errors; of two runs to be compared, both or neither.
+    A result of an earlier session is reused if its scenario has not changed and it is not an error. The two runs that
+    --check-determinism compares are reused together or not at all.
     """
     planned = plan_runs(jobs)
     remaining, reused = divide_runs(jobs, planned, previous_results(journal))
@@ -64,10 +69,13 @@ def plan_runs(jobs: Sequence[Job]) -> list[PlannedRun]:
 
 
 def divide_runs(
-    jobs: Sequence[Job], planned: Sequence[PlannedRun], known: Mapping[PlannedRun, RunFinished]
+    jobs: Sequence[Job], planned: Sequence[PlannedRun], earlier: Mapping[PlannedRun, RunFinished]
 ) -> tuple[list[Job], list[RunFinished]]:
-    """Return the jobs to execute, and the known results of the others."""
-    results = [known.get(run) for run in planned]
+    """Return the jobs that must be executed, and the earlier results of the other jobs.
+
+    `planned` are the runs of the jobs, in the same order.
+    """
+    results = [earlier.get(run) for run in planned]
     reused: list[RunFinished] = []
     remaining: list[Job] = []
     for number, (job, result) in enumerate(zip(jobs, results, strict=True)):
@@ -96,7 +104,10 @@ def _planned_run(job: Job, digests: ScenarioDigests) -> PlannedRun:
 
 
 def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
-    """Return the results in the folder by planned run, without errors and without runs whose log does not match."""
+    """Return the results in the folder of the journal by planned run.
+
+    Errors are left out, and results that differ from their log.
+    """
     try:
         past = read_journal(journal.folder)
     except InvalidInput:  # a new folder
@@ -122,7 +133,7 @@ def _has_matching_log(finished: RunFinished) -> bool:
 
 
 def _compared_index(jobs: Sequence[Job], number: int) -> int:
-    """Return the index of the run to compare with (--check-determinism), or `number` if there is none."""
+    """Return the index of the run with which --check-determinism compares a run, or `number` if there is none."""
     twin = number ^ 1
     if twin < len(jobs) and jobs[twin].key != jobs[number].key and jobs[twin].key.first == jobs[number].key.first:
         return twin
@@ -135,15 +146,17 @@ def _job_identity(job: Job) -> tuple[str, str, str]:
 
 
 RUN_ALL = "all selected scenarios run"
+"""End of a message about why --last-failed selects everything."""
 
 
 def failed_runs(
     scenarios: Sequence[LoadedScenario], options: SessionOptions, out: Path | None
 ) -> tuple[frozenset[RunKey] | None, str]:
-    """Return the runs of these scenarios that failed in the last session, and a message.
+    """Return the runs of these scenarios that failed in the last session, and a message for the user.
 
-    Returns None if there is no such session or nothing failed; then everything runs, as with pytest. Sessions are
-    searched in the parent of the output folder `out`. A failed run keeps its seed unless the options set seeds.
+    Returns None instead of runs if there is no such session or nothing failed: then all runs are executed, as with
+    `pytest --last-failed`. The session is searched in the parent of `out`, or in simscen-out if `out` is None. If the
+    options set seeds, only failed runs with one of these seeds are returned.
     """
     sessions_folder = DEFAULT_FOLDER if out is None else out.absolute().parent
     last = last_failed(sessions_folder)
@@ -155,8 +168,10 @@ def failed_runs(
     found = frozenset(key for key in last.runs if _is_selected(key, selected.get((key.test, key.stack_name)), options))
     missing = len(last.runs) - len(found)
     if not found:
-        return None, f"{_runs(last.runs)} failed last, none of them selected: {RUN_ALL}"
-    return found, f"{_runs(last.runs)} failed last" + (f": {len(found)} selected, {missing} not" if missing else "")
+        return None, f"{_runs(last.runs)} failed in the last session, but none is selected: {RUN_ALL}"
+    return found, f"{_runs(last.runs)} failed in the last session" + (
+        f": {len(found)} selected, {missing} not" if missing else ""
+    )
 
 
 def _is_selected(key: RunKey, scenario: LoadedScenario | None, options: SessionOptions) -> bool:

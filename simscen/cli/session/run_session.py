@@ -1,4 +1,4 @@
-"""Session of `simscen run`, from its options to its exit code."""
+"""Executes `simscen run`: loads the scenarios, simulates their runs, and writes the reports."""
 
 import sys
 import time
@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Protocol
 
 from simscen.cli.diagnostics import as_text, print_text
-from simscen.cli.session.backends import backend_of, signals_interrupt
-from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
+from simscen.cli.session.backends import backend_of, interrupt_on_signals
+from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable_junit
 from simscen.cli.session.pending_runs import PendingRuns, failed_runs, plan_session
-from simscen.cli.session.selection import Selection, load_all
-from simscen.cli.session.stacks import commands_of
-from simscen.cli.session.terminal import Format, Screen, screen
+from simscen.cli.session.selection import Selection, load_selection
+from simscen.cli.session.stacks import external_commands
+from simscen.cli.session.terminal import Format, Screen, open_screen
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.run_store import RunStore
@@ -62,9 +62,13 @@ class SessionRequest:
 
 
 def execute_session(request: SessionRequest, observer: Observer | None = None) -> Exit:
-    """Run the session and write its reports. Raises InvalidInput, UsageError, and NothingSelected before any run."""
+    """Run the session, write its reports, and return the exit code.
+
+    `observer` also receives the scenarios and events. Raises InvalidInput, UsageError, and NothingSelected before any
+    run.
+    """
     options = request.options
-    scenarios, warnings = load_all(
+    scenarios, warnings = load_selection(
         request.paths, request.root, request.world_path, request.lenient, request.selection, request.stacks
     )
     if observer is not None:
@@ -78,19 +82,20 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
     if request.last_failed:
         options = replace(options, only=_last_failed(scenarios, request))
     inputs = {file for each in scenarios for file in (*each.files.values(), *each.read_files)}
-    require_writable(request.junit, request.out or request.resume, inputs)
-    folder, journal = output_folder(request.out, request.resume)
-    used = {"plugins": plugin_packages(plugins_of_all(scenarios)), "stacks": commands_of(scenarios)}
+    require_writable_junit(request.junit, request.out or request.resume, inputs)
+    folder, journal = open_output_folder(request.out, request.resume)
+    used = {"plugins": plugin_packages(plugins_of_all(scenarios)), "stacks": external_commands(scenarios)}
     reports = Reports(folder, request.junit, request.junit_family.value, used=used)
     reports.begin()
     pending = plan_session(journal, plan_jobs(scenarios, options, folder), options.workers, request.selection.shard)
-    with screen(request.format_, request.durations) as output:
+    with open_screen(request.format_, request.durations) as output:
         listeners: list[Listener] = [*([observer] if observer else []), *([LivePage(reports)] if request.open_ else [])]
         code = _run(pending, options, reports, output, listeners)
     return output.exit(code)
 
 
 def _last_failed(scenarios: Sequence[LoadedScenario], request: SessionRequest) -> frozenset[RunKey] | None:
+    """Return the runs that --last-failed selects, or None for all runs, and print which these are."""
     if request.resume is not None:
         raise UsageError("--last-failed and --resume exclude each other")
     only, message = failed_runs(scenarios, request.options, request.out)
@@ -101,7 +106,10 @@ def _last_failed(scenarios: Sequence[LoadedScenario], request: SessionRequest) -
 def _run(
     pending: PendingRuns, options: SessionOptions, reports: Reports, output: Screen, listeners: Sequence[Listener]
 ) -> Exit:
-    """Execute the pending runs, report to journal, screen, listeners, and reports, and return the exit code."""
+    """Execute the pending runs, write the reports, and return the exit code.
+
+    Every event goes to the journal, the screen, and the listeners.
+    """
     start = time.monotonic()
 
     def show(event: SessionEvent) -> None:
@@ -116,7 +124,7 @@ def _run(
     show(pending.started(reports.folder))
     for finished in pending.reused:
         show(finished)
-    with signals_interrupt(), backend_of(options) as backend:
+    with interrupt_on_signals(), backend_of(options) as backend:
         done, stopped = run_session(pending.jobs, options, backend, listen)
     finished_runs = RunStore(pending.reused)
     finished_runs.extend(done)
@@ -140,8 +148,12 @@ def _check_journal(journal: Journal) -> bool:
     return journal.error is None
 
 
-def output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:
-    """Return the output folder and its locked journal. Raises UsageError before anything in the folder changes."""
+def open_output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:
+    """Return the output folder and its journal, which is locked so that no other process can use the folder.
+
+    The folder is that of --out or --resume, or a new one in simscen-out. Raises InvalidInput and UsageError before
+    anything in the folder changes.
+    """
     if resume is not None and out is not None:
         raise UsageError("--out and --resume exclude each other")
     if resume is not None:

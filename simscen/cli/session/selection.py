@@ -1,39 +1,34 @@
-"""Selection of a session's scenarios, and their division over machines."""
+"""Loads the scenarios that the options of a session select, including those of one shard (--shard)."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
 from simscen.cli.diagnostics import escaped, relative_to_working_folder
-from simscen.cli.session.stacks import Stacks, stacks_of
+from simscen.cli.session.file_checks import FileChecker
+from simscen.cli.session.stacks import parse_stacks
 from simscen.core.errors import InvalidInput, NothingSelected, Problem, UsageError
-from simscen.core.files import collect_read_files
-from simscen.loading.builders import world_from_file
-from simscen.loading.checks.built_world import check_built_world
-from simscen.loading.checks.robot_geometry import robot_problems
-from simscen.loading.checks.scene_runner import check_in_world, world_reader_notes
 from simscen.loading.codes import STACK_CANNOT
 from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.files.paths import is_folder
-from simscen.loading.files.single_files import load_robot_file, load_world_file
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.scenario import try_variations
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.variations.naming import number_of
-from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
-from simscen.loading.world_cache import WorldCache
 
 
 class _ParallelJob(NamedTuple):
-    """Environment variables of a CI system with the number of a job, the number of jobs, and the first number.
+    """Environment variables with which a CI system numbers the jobs that run in parallel.
 
-    `first` is the first number in a system without a variable for it.
+    index_variable:  number of this job
+    count_variable:  number of jobs
+    first_variable:  number of the first job; "" if the system has no such variable
+    first:           number of the first job in a system without such a variable
     """
 
     index_variable: str
@@ -52,7 +47,10 @@ PARALLEL_JOBS = (
 
 
 def shard_of(text: str, environ: Mapping[str, str]) -> tuple[int, int]:
-    """Parse `i/n`, or find both in the environment for `auto`. Raises UsageError."""
+    """Return the number and the count of a shard from the value of --shard, such as "2/4". Raises UsageError.
+
+    For `auto`, both come from the variables of the CI system in `environ`.
+    """
     text = _parallel_job(environ) if text == "auto" else text
     number, slash, count = text.partition("/")
     if slash and text.isascii() and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count):
@@ -61,6 +59,7 @@ def shard_of(text: str, environ: Mapping[str, str]) -> tuple[int, int]:
 
 
 def _parallel_job(environ: Mapping[str, str]) -> str:
+    """Return "i/n" from the variables of a CI system. Raises UsageError if none are set."""
     for job in PARALLEL_JOBS:
         index, count = environ.get(job.index_variable, ""), environ.get(job.count_variable, "")
         first = environ.get(job.first_variable, str(job.first))
@@ -70,14 +69,15 @@ def _parallel_job(environ: Mapping[str, str]) -> str:
     raise UsageError(f"--shard auto: none of these variables and its count are set: {known}; use --shard i/n")
 
 
-def share_of_scenarios(
+def scenarios_of_shard(
     scenarios: list[LoadedScenario], number: int, count: int, times: Mapping[str, float]
 ) -> list[LoadedScenario]:
     """Return the scenarios of shard `number` of `count`, in their order. Raises NothingSelected if there are none.
 
-    `times` are seconds by the title of the scenario. Without any, each shard gets every n-th scenario, so that folders
-    with slow scenarios are spread. Otherwise, the longest scenario goes to the shard with the least work, and so on
-    (longest processing time first); a scenario without a time counts as the median.
+    `times` are the durations of earlier runs in seconds, by scenario title. If there are none, each shard gets every
+    n-th scenario, which spreads the slow scenarios of a folder over the shards. Otherwise, the scenarios are assigned
+    from the longest to the shortest, each to the shard with the shortest total time. A scenario without a time counts
+    as the median.
     """
     if times and count > 1:
         default = median(times.values())
@@ -95,7 +95,7 @@ def share_of_scenarios(
 
 
 def scenario_times(folders: Sequence[Path]) -> dict[str, float]:
-    """Return the mean wall-clock seconds of a run by the title of its scenario, from earlier output folders.
+    """Return the mean wall-clock time of the runs of each scenario in seconds, by title, from earlier output folders.
 
     Raises InvalidInput if a folder has no journal.
     """
@@ -112,10 +112,13 @@ def scenario_times(folders: Sequence[Path]) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Selection:
-    """Filter of scenarios: `keyword` and `tags` as in pytest, `shard` (i, n) with 1 <= i <= n.
+    """Filter of scenarios.
 
-    `variations` are names of variations; () selects all. `times` are the seconds of scenarios in earlier runs; shards
-    are balanced by them.
+    keyword:     expression about ids, as with `pytest -k`; "" selects all
+    tags:        a scenario must have one of these tags; () selects all
+    shard:       (i, n) with 1 <= i <= n: selects the i-th of n parts
+    variations:  names of variations; () selects all
+    times:       durations of scenarios in earlier runs in seconds, by title, with which shards are balanced
     """
 
     keyword: str = ""
@@ -125,13 +128,13 @@ class Selection:
     times: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def numbers(self) -> list[int] | None:
-        """Numbers of the selected variations, if all are selected by number (`variation-7`)."""
+    def variation_numbers(self) -> list[int] | None:
+        """Numbers of the selected variations if all have names such as `variation-7`; otherwise None."""
         numbers = [number for name in self.variations if (number := number_of(name)) is not None]
         return numbers if numbers and len(numbers) == len(self.variations) else None
 
 
-def load_all(
+def load_selection(
     paths: Sequence[Path],
     root: Path | None,
     world_path: Sequence[Path],
@@ -139,23 +142,24 @@ def load_all(
     selection: Selection,
     stacks: Sequence[str] = (),
 ) -> tuple[list[LoadedScenario], list[Problem]]:
-    """Return the selected scenarios, each variation with each of `stacks`, and warnings about them.
+    """Return the selected scenarios below `paths`, each variation with each of `stacks`, and warnings about them.
 
-    A scenario that one of `stacks` cannot run is marked to be skipped if it was found in a folder; if it is one of
-    `paths`, it is invalid. Raises InvalidInput with the problems of all files, whether selected or not, and
-    NothingSelected.
+    `stacks` are values of --stack; without any, each scenario has its own stack. If a stack cannot run a scenario that
+    was found in a folder, that scenario is marked as skipped; if the scenario is one of `paths`, it is invalid. Raises
+    InvalidInput with the problems of all files, including files that are not selected, and NothingSelected if no
+    scenario is selected.
     """
     root_folder = root if root is not None else default_root(paths)
-    checks = Checks(root_folder, world_path, lenient, stacks=stacks_of(stacks, root_folder, world_path))
-    choices = checks.choices
+    checker = FileChecker(root_folder, world_path, lenient, stacks=parse_stacks(stacks, root_folder, world_path))
+    choices = checker.choices
     loaded: dict[str, list[LoadedScenario]] = {}
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
     named = {path.absolute() for path in paths if not is_folder(path)}
     for file, choice in product(discover(paths, root_folder), choices):
-        variations, found = checks.scenario(file, choice, selection.numbers)
+        variations, found = checker.check_scenario(file, choice, selection.variation_numbers)
         if choice is not None and file not in named and (reason := impossible_with(choice, found)):
-            variations, found = checks.scenario(file, None, selection.numbers)
+            variations, found = checker.check_scenario(file, None, selection.variation_numbers)
             variations = [one.skipped(choice, reason) for one in variations]
         for scenario in variations:
             loaded.setdefault(scenario.title, []).append(scenario.with_changes(several_stacks=len(choices) > 1))
@@ -164,7 +168,7 @@ def load_all(
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(relative_to_working_folder(problems, root_folder))
     unique = select_variations([with_stacks[0] for with_stacks in loaded.values()], selection.variations)
-    selected = share_of_scenarios(select(unique, selection.keyword, selection.tags), *selection.shard, selection.times)
+    selected = scenarios_of_shard(select(unique, selection.keyword, selection.tags), *selection.shard, selection.times)
     relevant = dict.fromkeys(warning for one in selected for warning in warnings[one.id])
     return [scenario for one in selected for scenario in loaded[one.title]], relative_to_working_folder(
         relevant, root_folder
@@ -172,7 +176,7 @@ def load_all(
 
 
 def impossible_with(choice: StackChoice, problems: Sequence[Problem]) -> str:
-    """Return why a scenario cannot run with a stack; "" if it can, or if it has an error with any stack."""
+    """Return why a scenario with these problems cannot run with the stack; "" if the stack is not the reason."""
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors or any(problem.code != STACK_CANNOT for problem in errors):
         return ""
@@ -189,89 +193,3 @@ def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> 
         hint = suggestion(missing[0], known) or "no scenario has variations"
         raise NothingSelected(f"no variation is called {quoted(missing[0], 120)}; {hint}")
     return [one for one in scenarios if not names or one.variation in names]
-
-
-@dataclass(frozen=True)
-class Checks:
-    """Validation of files; with `fast`, without checks that need geometry.
-
-    Pictures of scenarios with geometric problems are written to the folder `pictures`. An external stack without a
-    command is an error if `runs`, otherwise a warning.
-    """
-
-    root: Path
-    world_path: Sequence[Path] = ()
-    lenient: bool = False
-    fast: bool = False
-    pictures: Path | None = None
-    cache: WorldCache = field(default_factory=WorldCache)
-    stacks: Stacks = field(default_factory=Stacks)
-    runs: bool = True
-
-    @property
-    def choices(self) -> Sequence[StackChoice | None]:
-        """The stacks to check each scenario with; None = the scenario's own."""
-        return self.stacks.chosen or (None,)
-
-    def scenario(
-        self, file: Path, choice: StackChoice | None = None, numbers: Sequence[int] | None = None
-    ) -> tuple[Sequence[LoadedScenario], list[Problem]]:
-        """Return the variations of a scenario, or none if one of them is unusable, and the problems.
-
-        `numbers` selects variations by their numbers.
-        """
-        loaded = try_variations(file, self.root, self.world_path, choice, numbers)
-        if isinstance(loaded, list):
-            return (), loaded
-        checked = [self.variation(one) for one in loaded]
-        problems = merge_problems(
-            [
-                VariationProblems(one.variation, one.set_by, found)
-                for one, (_, found) in zip(loaded, checked, strict=True)
-            ]
-        )
-        usable = [one for one, _ in checked if one is not None]
-        return (usable if len(usable) == len(checked) else ()), problems
-
-    def variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
-        """Return a loaded variation with all its checks passed, or None, and the problems."""
-        loaded, undefined = self.stacks.with_command(loaded.with_changes(lenient=self.lenient))
-        if undefined and self.runs:
-            return None, [*loaded.notes, *undefined]
-        with collect_read_files() as read:
-            problems = [*loaded.notes, *([] if self.fast else world_problems(loaded, self.cache, self.pictures))]
-        problems += [replace(problem, severity="warning") for problem in undefined]
-        loaded = loaded.with_changes(read_files=tuple(sorted(read)))
-        usable = not any(problem.severity == "error" for problem in problems)
-        return (loaded if usable else None), list(dict.fromkeys(problems))
-
-    def world(self, file: Path) -> list[Problem]:
-        """Return the problems that are found by building a world."""
-        try:
-            source = load_world_file(file, self.root, self.world_path)
-            notes = list(source.map.notes) if source.map else []
-            if self.fast:
-                return notes
-            world = world_from_file(source, self.root, self.world_path, self.lenient)
-            return [*notes, *check_built_world(world, source), *world_reader_notes(world, source, self.root)]
-        except InvalidInput as error:
-            return error.problems
-
-    def robot(self, file: Path) -> list[Problem]:
-        """Return the problems that are found by building a robot."""
-        if self.fast:
-            return []
-        try:
-            return robot_problems(load_robot_file(str(file), self.root, self.world_path))
-        except InvalidInput as error:
-            return error.problems
-
-
-def world_problems(
-    scenario: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
-) -> list[Problem]:
-    """Return the problems that are found by building the world of a scenario."""
-    try:
-        return check_in_world(scenario, cache, pictures)
-    except InvalidInput as error:
-        return error.problems

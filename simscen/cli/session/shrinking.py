@@ -1,4 +1,4 @@
-"""`simscen shrink`: the smallest scenario that still fails in the same criterion."""
+"""Searches for the smallest scenario that still fails in the same criterion, for `simscen shrink`."""
 
 import hashlib
 import json
@@ -8,8 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TypeVar
 
-from simscen.cli.session.backends import signals_interrupt
-from simscen.cli.session.selection import Checks
+from simscen.cli.session.backends import interrupt_on_signals
+from simscen.cli.session.file_checks import FileChecker
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.verdict import Status, Verdict
@@ -33,14 +33,14 @@ from simscen.run.sessions.run_session import SessionOptions, run_session
 
 Part = TypeVar("Part")
 FirstFailing = Callable[[Sequence[Sequence[Part]]], int | None]
-"""Returns the index of the first candidate that still has the property, or None."""
+"""Function that returns the index of the first of several candidates that still fails, or None."""
 
 
 def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[Part]:
-    """Return a subset of the parts that still has the property, but loses it if any single part is removed.
+    """Return a subset of the parts that still fails, but passes if any single part is removed. All parts together fail.
 
-    `first_failing` gets candidates, each a subset of the parts in their original order; earlier candidates are
-    preferred. (Zeller and Hildebrandt: Simplifying and Isolating Failure-Inducing Input, 2002; with complements only.)
+    `first_failing` receives candidates, each a subset of the parts in their original order. (Delta debugging, with
+    complements only: Zeller and Hildebrandt, Simplifying and Isolating Failure-Inducing Input, 2002.)
     """
     remaining = list(parts)
     if not remaining or first_failing([[]]) is not None:
@@ -61,11 +61,11 @@ def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[P
 
 
 BATCH = 8
-"""Candidates that run at the same time. Fixed, so that the result does not depend on the number of workers."""
+"""Number of candidates that run together. Fixed, so that the result does not depend on the number of workers."""
 
 
 class Stopped(Exception):
-    """A signal ended the runs; `exit` is the exit code."""
+    """A signal interrupted the runs; `exit` is the exit code for it."""
 
     def __init__(self, code: Exit) -> None:
         super().__init__(str(code))
@@ -78,13 +78,14 @@ class BudgetSpent(Exception):
 
 @dataclass
 class CandidateRuns:
-    """Runs candidates with one seed. Results are cached by content, so that no candidate runs twice.
+    """Runs candidates: changed versions of `scenario`, each given as its YAML tree.
 
-    `max_runs` limits the number of runs, and `runs` counts them. `report` is called after each batch.
+    All candidates run with the same seed. Results are cached by content, so that no candidate runs twice. `max_runs`
+    limits the number of runs, and `runs` counts them. `report` is called after each batch.
     """
 
     scenario: ChangedScenario
-    checks: Checks
+    checker: FileChecker
     options: SessionOptions
     backend: Backend
     seed: int
@@ -106,7 +107,7 @@ class CandidateRuns:
         return None
 
     def results(self, trees: Sequence[MappingNode]) -> list[RunResult | None]:
-        """Return the results of some candidates; None for invalid ones. Raises BudgetSpent and Stopped."""
+        """Run candidates and return their results, None for an invalid candidate. Raises BudgetSpent and Stopped."""
         keys = [_content_key(tree) for tree in trees]
         new = {key: tree for key, tree in zip(keys, trees, strict=True) if key not in self._results}
         loaded = {key: self.load(tree) for key, tree in new.items()}
@@ -121,9 +122,9 @@ class CandidateRuns:
         return [self._results[key] for key in keys]
 
     def load(self, tree: MappingNode) -> LoadedScenario | None:
-        """Load and check a candidate; None if it is invalid."""
+        """Load and check a candidate. Return None if it is invalid."""
         found = self.scenario.load(tree)
-        return None if isinstance(found, list) else self.checks.variation(found)[0]
+        return None if isinstance(found, list) else self.checker.check_variation(found)[0]
 
     def _run(self, scenarios: Sequence[LoadedScenario]) -> list[RunResult]:
         named = [scenario.with_changes(variation=f"candidate-{number}") for number, scenario in enumerate(scenarios)]
@@ -132,7 +133,7 @@ class CandidateRuns:
                 Job(number, scenario, scenario.key(self.seed), Path(folder, str(number)), self.options.wall_limit)
                 for number, scenario in enumerate(named)
             ]
-            with signals_interrupt():
+            with interrupt_on_signals():
                 finished_runs, stopped = run_session(jobs, self.options, self.backend, lambda _: None)
         if stopped is not None:
             raise Stopped(stopped)
@@ -145,14 +146,16 @@ def _content_key(tree: MappingNode) -> str:
 
 
 MAX_ROUNDS = 3
-"""Maximum number of reductions: rounded numbers may make further parts unnecessary."""
+"""Maximum number of repetitions of removing and rounding: rounded numbers may make further parts unnecessary."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Failure to preserve: the failed criterion, or the error of the stack under test.
+    """Failure of a run that a smaller scenario must reproduce.
 
-    `max_margin` is the largest margin, below 0, that counts as the same failure; None if the criterion has no margins.
+    criterion:   kind of the failed criterion, such as "collisions"; "" for an error of the stack under test
+    verdict_id:  id of the verdict of this criterion
+    max_margin:  largest margin, below 0, that counts as the same failure; None if the criterion has no margins
     """
 
     criterion: str
@@ -160,7 +163,7 @@ class Failure:
     max_margin: float | None = None
 
     def occurs_in(self, result: RunResult) -> bool:
-        """Return whether a run fails in this way."""
+        """Return whether a run with this result reproduces the failure."""
         if not self.criterion:
             return result.error is not None and result.error.by_stack
         if result.outcome is not Outcome.FAILED:
@@ -177,8 +180,11 @@ class Failure:
 
 
 @dataclass
-class Shrinking:
-    """The smallest scenario so far, `tree`. `is_complete` is False if the budget of runs was spent too early."""
+class Shrinker:
+    """Makes a scenario smaller as long as its runs reproduce a failure.
+
+    `tree` is the smallest scenario so far. `is_complete` is False if the allowed number of runs did not suffice.
+    """
 
     runs: CandidateRuns
     failure: Failure
@@ -188,8 +194,8 @@ class Shrinking:
     def shrink(self, nominal: Mapping[Keys, Node | None]) -> None:
         """Make the scenario as small as possible.
 
-        `nominal` are the values, in the scenario without its variation, of the parts that the variation sets; None for
-        parts that do not exist there. Stops early if the budget of runs is spent.
+        `nominal` are the values without the variation, for all keys that the variation sets; None if a key does not
+        exist without the variation. Stops early if the allowed number of runs is reached.
         """
         try:
             self._restore_nominal(nominal)
@@ -203,6 +209,7 @@ class Shrinking:
             self.is_complete = False
 
     def _restore_nominal(self, nominal: Mapping[Keys, Node | None]) -> None:
+        """Undo the changes of the variation that the failure does not need."""
         parts = list(nominal)
 
         def build(varied: Sequence[Keys]) -> MappingNode:
@@ -211,7 +218,7 @@ class Shrinking:
         self.tree = build(self._minimize(parts, build))
 
     def _remove_parts(self) -> None:
-        """Remove parts, those near the top first, because they may be large."""
+        """Remove parts that the failure does not need, from the top of the tree down: parts at the top are larger."""
         depth = 1
         while depth <= max_depth(self.tree):
             before, parts = self.tree, removable_parts(self.tree, depth)
@@ -235,7 +242,7 @@ class Shrinking:
             self.tree = build(self._minimize([change.keys for change in changes], build))
 
     def _minimize(self, parts: Sequence[Part], build: Callable[[Sequence[Part]], MappingNode]) -> list[Part]:
-        """Return the parts that the failure needs. `build` returns the scenario with only some of them."""
+        """Return the parts that the failure needs. `build` returns the scenario with only the given parts."""
         if not parts:
             return []
         return minimize(
@@ -245,9 +252,10 @@ class Shrinking:
 
 
 def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
-    """Return the failure of a run in the criterion with this id, or in the first one that failed if "".
+    """Return the failure of a run in a criterion, given by its id or kind; "" stands for the first failed criterion.
 
-    `share` is the share of the violation that must remain. Raises UsageError if the run did not fail in it.
+    `share` is the fraction of the violation, from 0 to 1, that a smaller scenario must keep. Raises UsageError if the
+    run did not fail in the criterion.
     """
     if result.error is not None and result.error.by_stack and not criterion:
         return Failure("", "")
@@ -262,15 +270,15 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
 
 
 def smallest_margin(verdict: Verdict) -> float | None:
-    """Return the smallest margin of the findings that failed; None if they have none."""
+    """Return the smallest margin of the failed findings of a verdict; None if they have no margins."""
     margins = [
         finding.margin for finding in verdict.findings if finding.status is Status.FAIL and finding.margin is not None
     ]
     return min(margins, default=None)
 
 
-def only_failing(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
-    """Return the scenario with this seed, only the failing criterion, and without keys that do not affect the run."""
+def with_only_failed_criterion(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
+    """Return the scenario with this seed, with only the failed criterion, and without keys that do not affect a run."""
     entries = {key: entry for key, entry in tree.entries.items() if key not in UNNEEDED_KEYS}
     criteria = tree.entries.get("pass")
     if failure.criterion and criteria is not None and isinstance(criteria.value, SequenceNode):
@@ -283,7 +291,10 @@ def only_failing(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
 
 
 def with_inline_world(tree: MappingNode, world: MappingNode | None) -> MappingNode | None:
-    """Return the scenario with its world file written inline, so that it can be reduced; None if that is impossible."""
+    """Return the scenario with its world inline instead of in a file, so that the world can be reduced, too.
+
+    Return None if the world is not in a file.
+    """
     entry = tree.entries.get("world")
     if world is None or entry is None or not isinstance(entry.value, ScalarNode):
         return None

@@ -1,6 +1,6 @@
-"""Stacks chosen with `--stack NAME=VALUE` and defined in the user's configuration.
+"""Stacks that are chosen with `--stack NAME=VALUE`, and the commands of external stacks.
 
-Light commands import this module, so it imports the readers of configurations and programs inside functions.
+Light commands import this module, so it imports the readers of stack files and configurations inside functions.
 """
 
 from __future__ import annotations
@@ -26,11 +26,12 @@ from simscen.loading.stacks.userconfig import conflicting_stacks, undefined_stac
 from simscen.model.stack_files import ExternalStackSpec
 from simscen.spec.registry import entries, find
 
-YAML = (".yaml", ".yml")
+YAML_SUFFIXES = (".yaml", ".yml")
 STACK_HELP = (
     "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
     "file, a Nav2 parameter file, `reference`, another type of stack, or a name in your configuration. With several "
-    "robots, it drives each; if a robot's stack is `external: NAME`, NAME='COMMAND' only defines its command. "
+    "robots, the stack drives each of them; if a robot's stack is `external: NAME`, NAME='COMMAND' only defines its "
+    "command. "
 )
 if TYPE_CHECKING:
     from simscen.loading.stacks.userconfig import UserConfig
@@ -42,7 +43,8 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 class Stacks:
     """Stacks `chosen` with --stack, in order, and the commands of external stacks.
 
-    The user's configuration is read when a name requires it. The folder of the scenario is never searched.
+    The user's configuration is read only when a name needs it. The files of a project never define a command, so that
+    a scenario cannot start programs of its choice.
     """
 
     chosen: Sequence[StackChoice] = ()
@@ -56,7 +58,7 @@ class Stacks:
         return load_config(config_file())
 
     def with_command(self, loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:
-        """Return the scenario with the commands of its external stacks, and problems for stacks without a command.
+        """Return the scenario with the commands of its external stacks, and a problem for each stack without a command.
 
         Raises InvalidInput if the configuration is invalid.
         """
@@ -67,8 +69,8 @@ class Stacks:
                 *(one for _, found in checked.values() for one in found),
                 *conflicting_stacks(loaded, names, config_file()),
             ]
-            whole = replace(loaded, robots={name: view for name, (view, _) in checked.items()})
-            return whole, list(dict.fromkeys(problems))
+            complete = replace(loaded, robots={name: view for name, (view, _) in checked.items()})
+            return complete, list(dict.fromkeys(problems))
         stack = loaded.spec.stack
         if not isinstance(stack, ExternalStackSpec):
             return loaded, []
@@ -79,7 +81,7 @@ class Stacks:
         return loaded, [problem] if problem is not None else []
 
     def command(self, name: str) -> ExternalCommand | None:
-        """Return the command of an external stack as defined by --stack, else by the configuration."""
+        """Return the command of an external stack from --stack, else from the configuration, else None."""
         if name not in self._commands:
             given = next(
                 (choice.external_command for choice in self.chosen if choice.name == name and choice.external_command),
@@ -89,8 +91,11 @@ class Stacks:
         return self._commands[name]
 
 
-def commands_of(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, object]]:
-    """Return the commands of the scenarios' external stacks by name, without environment variables (secrets)."""
+def external_commands(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, object]]:
+    """Return the commands of the scenarios' external stacks by name, as JSON data for run.json.
+
+    Environment variables are left out, because they can contain secrets.
+    """
     stacks = ((view.spec.stack, view.external_command) for loaded in scenarios for view in loaded.robot_views.values())
     found = {stack.external: runs for stack, runs in stacks if isinstance(stack, ExternalStackSpec) and runs}
     return {
@@ -99,15 +104,16 @@ def commands_of(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, obje
     }
 
 
-def load_with(
+def load_with_stack(
     stack: str | None, file: Path, root: Path | None, world_path: Sequence[Path], variation: str = ""
 ) -> LoadedScenario:
-    """Load a scenario or one of its variations with the stack of a `--stack` option or its own.
+    """Load a scenario, or one of its variations, and replace its stack.
 
-    Raises InvalidInput, and UsageError if the variation does not exist or is missing.
+    `stack` is a value of --stack, or None to keep the stack of the scenario. Raises InvalidInput, and UsageError if
+    the variation does not exist, or if none is given although the scenario has variations.
     """
     root_folder = root or default_root([file])
-    stacks = stacks_of([] if stack is None else [stack], root_folder, world_path)
+    stacks = parse_stacks([] if stack is None else [stack], root_folder, world_path)
     chosen = next(iter(stacks.chosen), None)
     loaded, problems = stacks.with_command(load_scenario(file, root_folder, world_path, chosen, variation))
     if problems:
@@ -115,8 +121,8 @@ def load_with(
     return loaded
 
 
-def stacks_of(arguments: Sequence[str], root: Path, world_path: Sequence[Path] = ()) -> Stacks:
-    """Parse the values of --stack.
+def parse_stacks(arguments: Sequence[str], root: Path, world_path: Sequence[Path] = ()) -> Stacks:
+    """Parse the values of --stack, such as "mine=my_stack.stack.yaml".
 
     Raises UsageError for a malformed value, a missing program, or a duplicate name, and InvalidInput for an invalid
     stack file or configuration.
@@ -132,6 +138,7 @@ def stacks_of(arguments: Sequence[str], root: Path, world_path: Sequence[Path] =
 
 
 def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -> StackChoice:
+    """Parse one value of --stack. `stacks` finds commands in the user's configuration."""
     name, equals, value = text.partition("=")
     if not _NAME.fullmatch(name):
         hint = "a name consists of letters, digits, `_`, `.`, and `-`"
@@ -141,7 +148,7 @@ def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Sta
     value = value if equals else name
     if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):
         return StackChoice(name, value, type=value)
-    if value.endswith(STACK_SUFFIXES) or (value.endswith(YAML) and Path(value).is_file()):
+    if value.endswith(STACK_SUFFIXES) or (value.endswith(YAML_SUFFIXES) and Path(value).is_file()):
         from simscen.loading.stacks.choice import load_stack_file
 
         try:

@@ -1,4 +1,4 @@
-"""Session of `simscen study`: draw runs one batch after the other until the claim is decided."""
+"""Executes `simscen study`: simulates runs in batches until the claim is decided or all runs are done."""
 
 import sys
 import time
@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from simscen.cli.diagnostics import as_text, escaped, print_text
-from simscen.cli.session.backends import backend_of, signals_interrupt
-from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable
+from simscen.cli.session.backends import backend_of, interrupt_on_signals
+from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable_junit
 from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_reused
-from simscen.cli.session.run_session import output_folder
-from simscen.cli.session.selection import Selection, load_all
-from simscen.cli.session.stacks import commands_of
-from simscen.cli.session.terminal import Format, Screen, screen
+from simscen.cli.session.run_session import open_output_folder
+from simscen.cli.session.selection import Selection, load_selection
+from simscen.cli.session.stacks import external_commands
+from simscen.cli.session.terminal import Format, Screen, open_screen
 from simscen.core.errors import Exit, InvalidInput, NothingSelected, Problem, UsageError
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_store import RunStore
@@ -42,7 +42,7 @@ from simscen.run.sessions.run_session import SessionOptions, run_session
 SEQUENTIAL_BATCH = 32
 """Runs between two evaluations of a sequential claim. Fixed, so that runs do not depend on the number of workers."""
 BATCH = 256
-"""Maximum number of runs whose scenarios are in memory, without a sequential claim."""
+"""Runs of a batch without a sequential claim. It limits how many scenarios are in memory."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,13 @@ class StudyRequest:
 
 
 class StudyRun(NamedTuple):
-    """A run: the number of its variation (None without variations), the index of its seed, and the number of variations
-    drawn so far."""
+    """Run of a study.
+
+    number:      number of its variation; None for a scenario without variations
+    seed_index:  its seed is the first seed of the study plus this index
+    drawn:       number of variations that were drawn up to this run, including those that violate the conditions;
+                 0 if nothing is drawn or there are no conditions
+    """
 
     number: int | None
     seed_index: int
@@ -75,15 +80,15 @@ class StudyRun(NamedTuple):
 
 
 def execute_study(request: StudyRequest) -> Exit:
-    """Run a study and write its reports. Raises InvalidInput and UsageError before any run."""
+    """Run a study, write its reports, and return the exit code. Raises InvalidInput and UsageError before any run."""
     study = _StudySession(request)
     first = study.load_first_batch()
-    require_writable(request.junit, request.out or request.resume, study.inputs)
-    folder, journal = output_folder(request.out, request.resume)
-    used = {"plugins": plugin_packages(plugins_of_all(first)), "stacks": commands_of(first)}
+    require_writable_junit(request.junit, request.out or request.resume, study.inputs)
+    folder, journal = open_output_folder(request.out, request.resume)
+    used = {"plugins": plugin_packages(plugins_of_all(first)), "stacks": external_commands(first)}
     reports = Reports(folder, request.junit, request.junit_family.value, used=used)
     reports.begin()
-    with screen(request.format_) as output, backend_of(request.options) as backend:
+    with open_screen(request.format_) as output, backend_of(request.options) as backend:
         return output.exit(study.execute(backend, journal, reports, output))
 
 
@@ -92,8 +97,8 @@ class _StudySession:
 
     def __init__(self, request: StudyRequest) -> None:
         self._request = request
-        self._home = request.root if request.root is not None else default_root([request.file])
-        space = read_variation_space(request.file, self._home, request.world_path)
+        self._root_folder = request.root if request.root is not None else default_root([request.file])
+        space = read_variation_space(request.file, self._root_folder, request.world_path)
         self._space = space if space is not None and space.blocks else None
         self._is_random = self._space is None or self._space.is_random
         self._loaded: dict[int | None, LoadedScenario] = {}
@@ -107,7 +112,10 @@ class _StudySession:
         self.inputs: set[Path] = set()
 
     def load_first_batch(self) -> list[LoadedScenario]:
-        """Load the scenarios of the first runs, and determine the number of runs. Raises InvalidInput."""
+        """Determine the number of runs, and load the scenarios of the first runs.
+
+        Raises InvalidInput, UsageError, and NothingSelected.
+        """
         request = self._request
         first_number = None if self._space is None else next(_allowed_numbers(self._space, request.file))
         scenario = self._load([first_number])[0]
@@ -127,10 +135,10 @@ class _StudySession:
         return self._load([run.number for run in self._batch])
 
     def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
-        """Run all batches and write the reports. Returns the exit code."""
+        """Run all batches, write the reports, and return the exit code."""
         start, finished_runs, stopped = time.monotonic(), RunStore(), None
         invalid: InvalidInput | None = None
-        known = previous_results(journal)
+        earlier = previous_results(journal)
         title = next(iter(self._loaded.values())).id
         live = LivePage(reports) if self._request.open_ else None
 
@@ -147,11 +155,11 @@ class _StudySession:
         show(SessionStarted(__version__, self.total, 1, workers, str(reports.folder), (title,)))
         while self._batch and stopped is None:
             jobs = self._jobs(len(finished_runs), reports.folder)
-            remaining, reused = self._plan(journal, jobs, known)
+            remaining, reused = self._plan(journal, jobs, earlier)
             write_reused(journal, reused)
             for finished in reused:
                 show(finished)
-            with signals_interrupt():
+            with interrupt_on_signals():
                 done, stopped = run_session(remaining, self._request.options, backend, listen)
             journal.complete([*reused, *done])
             finished_runs.extend([*reused, *done])
@@ -177,7 +185,7 @@ class _StudySession:
         return BATCH if self._claim is None or self._claim.method == "fixed" else SEQUENTIAL_BATCH
 
     def _count_runs(self) -> int:
-        """Return the number of runs; at most, for a sequential claim."""
+        """Return the number of runs; for a sequential claim, the maximum. Raises UsageError."""
         request, space = self._request, self._space
         if not self._is_random:
             assert space is not None
@@ -195,7 +203,7 @@ class _StudySession:
         raise UsageError("the number of runs is missing; set it with --runs, or with `acceptance` in the scenario")
 
     def _all_runs(self) -> Iterator[StudyRun]:
-        """Yield the runs: a new seed for each random run, the same seeds for each of the chosen values."""
+        """Yield the runs. Each random run has a seed of its own; chosen values all run with the same seeds."""
         space = self._space
         if space is None:
             yield from (StudyRun(None, index, 0) for index in range(self.total))
@@ -213,7 +221,7 @@ class _StudySession:
         names = [f"variation-{number}" for number in dict.fromkeys(numbers) if number is not None]
         missing = [number for number in dict.fromkeys(numbers) if number not in self._loaded]
         if missing:
-            found, warnings = load_all(
+            found, warnings = load_selection(
                 [request.file],
                 request.root,
                 request.world_path,
@@ -231,6 +239,7 @@ class _StudySession:
         return [self._loaded[number] for number in numbers]
 
     def _jobs(self, first: int, folder: Path) -> list[Job]:
+        """Return the jobs of the batch, numbered from `first` on."""
         options, jobs = self._request.options, []
         for index, run in enumerate(self._batch):
             scenario = self._loaded[run.number]
@@ -239,11 +248,11 @@ class _StudySession:
         return jobs
 
     def _plan(
-        self, journal: Journal, jobs: Sequence[Job], known: Mapping[PlannedRun, RunFinished]
+        self, journal: Journal, jobs: Sequence[Job], earlier: Mapping[PlannedRun, RunFinished]
     ) -> tuple[list[Job], list[RunFinished]]:
-        """Write the runs of a batch to the journal; return the jobs to execute, and the known results of the others."""
+        """Write the runs of a batch to the journal. Return the jobs to execute, and the results that can be reused."""
         planned = plan_runs(jobs)
-        remaining, reused = divide_runs(jobs, planned, known)
+        remaining, reused = divide_runs(jobs, planned, earlier)
         is_first = not self._planned
         self._planned += planned
         self._drawn = self._batch[-1].drawn
@@ -268,7 +277,10 @@ class _StudySession:
 
 
 def _allowed_numbers(space: VariationSpace, file: Path) -> Iterator[int]:
-    """Yield the numbers of all variations that meet the conditions; endlessly for random draws. Raises InvalidInput."""
+    """Yield the numbers of the variations that meet the conditions in `require`, without end for random draws.
+
+    Raises InvalidInput if no variation, or none of many draws in a row, meets the conditions.
+    """
     numbers = count(1) if space.is_random else range(1, space.count + 1)
     rejected, found = 0, False
     try:

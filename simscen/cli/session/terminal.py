@@ -1,4 +1,4 @@
-"""Printed output of a session, which may fail (closed pipe, full disk) without affecting the output files."""
+"""Prints a session to stdout. If printing fails (closed pipe, full disk), the session and its output files go on."""
 
 import os
 import sys
@@ -12,6 +12,7 @@ from typing import Annotated, TextIO
 import typer
 
 from simscen.cli.diagnostics import print_text
+from simscen.cli.process import discard_output
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.session_events import SessionEvent
 from simscen.report.console_reporter import text_reporter
@@ -21,6 +22,7 @@ from simscen.report.text_reporters import Reporter
 from simscen.run.sessions.output_folder import probe_writable
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
+"""Environment variable with the file that GitHub Actions shows as the summary of a step."""
 PICTURES_URL = "SIMSCEN_PICTURES_URL"
 """Environment variable with the URL of the uploaded output folder, from which the job summary shows pictures."""
 
@@ -37,7 +39,7 @@ FormatOption = Annotated[Format, typer.Option("--format", help="Output format.")
 
 
 class Screen:
-    """Prints events until printing fails.
+    """Prints the events of a session until printing fails.
 
     `stdout_error` is the first error of writing to stdout, `summary_error` that of writing the job summary; None if
     there was none.
@@ -56,15 +58,15 @@ class Screen:
 
     @contextmanager
     def suppress_errors(self) -> Iterator[None]:
-        """Record an error of stdout, and discard further output so that the interpreter does not fail when it flushes
-        at exit."""
+        """Record an error of stdout, and discard all further output.
+
+        Otherwise the interpreter would fail when it flushes stdout at its exit.
+        """
         try:
             yield
         except OSError as error:
             self.stdout_error = self.stdout_error or error
-            null = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(null, sys.stdout.fileno())
-            os.close(null)
+            discard_output(sys.stdout.fileno())
 
     def append_summary(self, text: str) -> None:
         """Append to the file that GitHub Actions shows as the summary of a step."""
@@ -87,11 +89,11 @@ class Screen:
 
 
 @contextmanager
-def screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
-    """Print a session on stdout, and on GitHub also as the summary of the step. Raises UsageError if that is not
-    writable.
+def open_screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
+    """Provide a Screen for the body of the `with` statement, and print the end of the session after it.
 
-    `slow` is the number of slowest runs to list at the end; 0 lists all.
+    On GitHub, the session is also written as the summary of the step; UsageError is raised if that is not possible.
+    `slow` is the number of slowest runs to list at the end: 0 lists all, None lists none.
     """
     summary = _step_summary() if format_ is Format.GITHUB else None
     printer = _printer(format_, summary, slow)
@@ -117,7 +119,10 @@ def _printer(format_: Format, summary: TextIO | None, slow: int | None) -> Repor
 
 
 def _step_summary() -> StringIO | None:
-    """Return the buffer of the summary of the step, or None outside of GitHub Actions. Raises UsageError."""
+    """Return a buffer for the summary of the step, or None outside of GitHub Actions.
+
+    Raises UsageError if the file of the summary cannot be written.
+    """
     path = os.environ.get(STEP_SUMMARY)
     if not path:
         return None

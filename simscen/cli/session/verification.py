@@ -1,4 +1,4 @@
-"""Verification of a reconstructed scenario for `simscen new --from-log --verify`: a table and a page."""
+"""Runs a reconstructed scenario and compares the run with the log, for `simscen new --from-log --verify`."""
 
 from __future__ import annotations
 
@@ -15,25 +15,27 @@ from rich.table import Table
 from rich.text import Text
 
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.output_files import save
+from simscen.cli.session.user_files import save
 from simscen.core.errors import Exit, RunError
 from simscen.reconstruction.scenario_from_log import Reconstruction
 from simscen.reconstruction.verifying.comparison import Verification, compare_with_run
 from simscen.reconstruction.verifying.page import verification_page
 
 PAGE_SUFFIX = ".verified.html"
+"""End of the name of the page, after the name of the scenario."""
 MAX_COLUMNS = 100
+"""Width of the table in characters if stdout is not a terminal."""
 
 
-def verify_reconstruction(made: Reconstruction) -> None:
-    """Run the scenario, print how near the run comes to the log, and write a page with both.
+def verify_reconstruction(reconstruction: Reconstruction) -> None:
+    """Run the scenario, print a table of the differences between run and log, and write a page that shows both.
 
-    Exits with code 1 if an incident of the log does not happen again.
+    Exits with code 1 if an incident of the log, such as a collision, does not happen in the run.
     """
-    name = made.file.name.partition(".")[0]
-    log = made.file.with_name(f"{name}.verified.mcap")
-    _run(made.file, log)
-    verified = compare_with_run(made, log)
+    name = reconstruction.file.name.partition(".")[0]
+    log = reconstruction.file.with_name(f"{name}.verified.mcap")
+    _run(reconstruction.file, log)
+    verified = compare_with_run(reconstruction, log)
     _print_table(verified)
     for incident in verified.incidents:
         print_text(escaped(incident.sentence))
@@ -43,10 +45,12 @@ def verify_reconstruction(made: Reconstruction) -> None:
         print_text("neither the log nor the run has an incident")
     failed = ", ".join(verified.failed)
     print_text(escaped(f"criteria that fail in the run: {failed}" if failed else "all criteria hold in the run"))
-    page = made.file.with_name(f"{name}{PAGE_SUFFIX}")
-    text = verification_page(made.contents.name, made.surroundings, made.findings.objects, verified)
-    save(page, lambda path: _write(path, text), [made.file, made.log])
-    recorded, run = (escaped(shlex.quote(str(file))) for file in (made.log, log))
+    page = reconstruction.file.with_name(f"{name}{PAGE_SUFFIX}")
+    text = verification_page(
+        reconstruction.contents.name, reconstruction.surroundings, reconstruction.findings.objects, verified
+    )
+    save(page, lambda path: _write(path, text), [reconstruction.file, reconstruction.log])
+    recorded, run = (escaped(shlex.quote(str(file))) for file in (reconstruction.log, log))
     print_text(f"log of the run: {run}; to play both: simscen replay {run} --against {recorded}")
     print_text(f"page: {escaped(str(page))}")
     if not verified.reproduces:

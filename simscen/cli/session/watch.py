@@ -1,4 +1,4 @@
-"""Watch mode of `simscen run`: reruns the scenarios whose files have changed."""
+"""Watch mode of `simscen run`: reruns scenarios when one of their files changes."""
 
 import json
 import os
@@ -22,10 +22,11 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.run.reproducibility import scenario_files
 
 FileStamps = dict[Path, tuple[int, int, int] | None]
+"""Modification time in ns, size in bytes, and inode of each file; None if the file does not exist."""
 
 
 def file_stamps(files: Iterable[Path]) -> FileStamps:
-    """Return a stamp of each file that changes when it is saved; None if the file does not exist."""
+    """Return the stamps of the files. The stamp of a file changes when the file is saved."""
     return {file: _stamp(file) for file in files}
 
 
@@ -38,7 +39,7 @@ def _stamp(file: Path) -> tuple[int, int, int] | None:
 
 
 class WatchReporter:
-    """Observer of a session that reports the files and outcomes of scenarios to the watching process as JSON lines."""
+    """Observer of a session that tells the watching process, as JSON lines, the files and outcomes of scenarios."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
@@ -68,10 +69,10 @@ class WatchReporter:
 
 
 class WatchState:
-    """The watched scenarios, the files of each, and which of them did not pass.
+    """Watched scenarios with the files that each depends on, and the scenarios that did not pass.
 
-    `find_scenarios` returns the scenarios below `paths`. After a session that an invalid file prevented from running,
-    the change of any file starts it again.
+    `find_scenarios` returns the scenarios below `paths`. If an invalid file prevents a session from running, the change
+    of any file starts that session again.
     """
 
     def __init__(self, find_scenarios: Callable[[], Sequence[Path]], paths: Iterable[Path]) -> None:
@@ -85,7 +86,7 @@ class WatchState:
 
     @property
     def scenarios(self) -> list[Path]:
-        """All scenarios."""
+        """All watched scenarios."""
         return sorted(self._files)
 
     @property
@@ -99,12 +100,12 @@ class WatchState:
         return sorted({*self._folders, *self._invalid, *(file for files in self._files.values() for file in files)})
 
     def begin(self, paths: Sequence[Path]) -> None:
-        """Record that a session with these paths begins."""
+        """Record that a session with these scenarios or folders begins."""
         self._requested, self._invalid = paths, set()
         self._not_passed -= {file for path in paths for file in self._below(path)}
 
     def update(self, line: str) -> None:
-        """Process a line of the WatchReporter of a session."""
+        """Process a line that the WatchReporter of the session has written."""
         message = json.loads(line)
         if "invalid" in message:
             self._invalid = set(map(Path, message["invalid"]))
@@ -117,7 +118,7 @@ class WatchState:
             self._not_passed.add(scenario)
 
     def end(self, code: int) -> None:
-        """Record that the session ended; after an invalid file it is still pending."""
+        """Record that the session ended with an exit code. After an invalid file, the next change runs it again."""
         self._unfinished = self._requested if code == Exit.USAGE else ()
 
     def scenarios_to_run(self, changed: set[Path]) -> Sequence[Path]:
@@ -134,7 +135,7 @@ class WatchState:
         return [file for file in self._files if file.is_relative_to(path.absolute())]
 
     def _discovered(self) -> Sequence[Path]:
-        """Return the scenarios; none if searching for them fails, which the next session reports."""
+        """Return the existing scenarios; none if the search fails, because the next session reports the error."""
         try:
             return self._find_scenarios()
         except SimscenError:
@@ -142,14 +143,16 @@ class WatchState:
 
 
 POLL_INTERVAL_S = 0.25
-"""Time between two checks of the files, in seconds; two equal checks end a burst of changes."""
-STOPPED = (Exit.HUNG_UP, Exit.INTERRUPTED, Exit.TERMINATED)
+"""Time between two checks of the files, in seconds. A burst of changes ends when two checks find no difference."""
+INTERRUPTED_CODES = (Exit.HUNG_UP, Exit.INTERRUPTED, Exit.TERMINATED)
+"""Exit codes of an interrupted session, which also ends the watch mode."""
 
 
 def watch_session(request: SessionRequest) -> int:
     """Run a session, rerun affected scenarios until q or Ctrl-C is pressed, and return the last exit code.
 
-    Each session is a fork of this process, so that everything, including plug-ins, is loaded again each time.
+    Each session runs in a fork of this process, which loads no scenarios and plug-ins itself, so that every session
+    loads the current files. Raises UsageError for options that exclude --watch.
     """
     for name, value in (("--out", request.out), ("--resume", request.resume)):
         if value is not None:
@@ -161,7 +164,7 @@ def watch_session(request: SessionRequest) -> int:
     root_folder = request.root or default_root(request.paths)
     state = WatchState(lambda: discover(request.paths, root_folder), request.paths)
     code, seen = _run_in_child(replace(request, root=root_folder), state)
-    while code not in STOPPED:
+    while code not in INTERRUPTED_CODES:
         _print_status(state)
         files = _wait_for_changes(state, seen)
         if files is None:
@@ -172,7 +175,7 @@ def watch_session(request: SessionRequest) -> int:
 
 
 def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, FileStamps]:
-    """Run a session in a child process. Return its exit code, and the stamps of the files from before it began."""
+    """Run a session in a child process. Return its exit code, and the stamps that the files had before it began."""
     stamps_before = file_stamps(state.files)
     reading, writing = os.pipe()
     sys.stdout.flush()
@@ -216,7 +219,7 @@ def _print_status(state: WatchState) -> None:
 
 
 def _wait_for_changes(state: WatchState, seen: FileStamps) -> Sequence[Path] | None:
-    """Return the scenarios to run next once a key is pressed or a file changes; None to quit."""
+    """Wait for a key or a change of a file, and return the scenarios to run next; None to quit."""
     with _keys() as keys:
         while True:
             key = keys()
@@ -238,14 +241,14 @@ def _wait_for_changes(state: WatchState, seen: FileStamps) -> Sequence[Path] | N
 
 
 def _stamps_after_pause(state: WatchState) -> FileStamps:
-    """Return the stamps after another pause."""
+    """Wait for POLL_INTERVAL_S, and return the stamps of the files."""
     select.select([], [], [], POLL_INTERVAL_S)
     return file_stamps(state.files)
 
 
 @contextmanager
 def _keys() -> Iterator["_Keys"]:
-    """Read single keys without echo, and restore the terminal at the end."""
+    """Provide a reader of single keys without echo, and restore the terminal at the end."""
     if not os.isatty(0):
         yield _Keys()
         return

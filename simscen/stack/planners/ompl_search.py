@@ -260,7 +260,7 @@ def _state(information: Any, point: Point) -> Any:
 def stop_after(iterations: int, is_done: Termination = lambda: False, least: int = 0) -> Termination:
     """Return a termination condition: stop after so many iterations, or when it `is_done` after at least `least`.
 
-    `is_done` is evaluated once per `CHECK_PERIOD` iterations. In between, itertools answers without running Python code.
+    `is_done` is evaluated once per `CHECK_PERIOD` iterations. In between, itertools answers, without Python code.
     """
 
     def answers() -> Iterator[Iterable[bool]]:

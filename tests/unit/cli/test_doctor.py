@@ -18,12 +18,12 @@ from simscen.run.scenario_cache import DiskCache, cache_folder
 @pytest.fixture
 def quick(monkeypatch):
     """Without the checks that take long."""
-    monkeypatch.setattr(doctor, "run_twice", lambda: "not now")
-    monkeypatch.setattr(doctor, "speed", lambda: "not now, either")
+    monkeypatch.setattr(doctor, "check_run", lambda: "not now")
+    monkeypatch.setattr(doctor, "check_speed", lambda: "not now, either")
 
 
 def test_working_installation_passes_within_80_columns(simscen, monkeypatch) -> None:
-    monkeypatch.setattr(doctor, "speed", lambda: "not now")
+    monkeypatch.setattr(doctor, "check_speed", lambda: "not now")
     monkeypatch.setenv("COLUMNS", "80")
     ended = simscen("doctor")
     assert ended.code == 0
@@ -44,15 +44,15 @@ def test_failed_check_is_reported_and_the_others_still_run(simscen, quick, monke
 
 
 def test_cache_is_shown_and_a_foreign_cache_fails(tmp_path: Path, monkeypatch) -> None:
-    assert doctor.cache() == "disabled by SIMSCEN_CACHE_DIR"
+    assert doctor.check_cache() == "disabled by SIMSCEN_CACHE_DIR"
     monkeypatch.setenv("SIMSCEN_CACHE_DIR", str(tmp_path))
     folder = cache_folder(os.environ)
-    assert doctor.cache() == f"{folder}: empty"
+    assert doctor.check_cache() == f"{folder}: empty"
     DiskCache(folder).put("a" * 64, bytes(99_968))
-    assert doctor.cache() == f"{folder}: 1 files, 0.1 MB of at most 256; safe to delete"
+    assert doctor.check_cache() == f"{folder}: 1 files, 0.1 MB of at most 256; safe to delete"
     folder.chmod(0o777)
     with pytest.raises(installation.CheckFailed, match="other users may write to it"):
-        doctor.cache()
+        doctor.check_cache()
 
 
 def test_speed_check_compares_a_patrol_with_pybullet(monkeypatch) -> None:
@@ -60,37 +60,37 @@ def test_speed_check_compares_a_patrol_with_pybullet(monkeypatch) -> None:
         return run_speed.Patrol(60.0, cpu, {"physics": 1.0}, bare, (cpu,), (bare,), {"physics": (1.0,)})
 
     monkeypatch.setattr(run_speed, "measure_patrol", lambda _: patrol(2.0, 0.5))
-    assert doctor.speed() == "30 times real time on one core, 4.0 times the cost of PyBullet alone"
+    assert doctor.check_speed() == "30 times real time on one core, 4.0 times the cost of PyBullet alone"
     monkeypatch.setattr(run_speed, "measure_patrol", lambda _: patrol(90.0, 20.0))
     with pytest.raises(installation.CheckFailed, match="a faster processor"):
-        doctor.speed()
+        doctor.check_speed()
 
 
 @pytest.mark.parametrize(
     ("what", "value", "expected_text"),
     [
-        (resource.RLIMIT_AS, 200 << 20, "a run gets 200 MiB of memory; raise `ulimit -v`"),
-        (resource.RLIMIT_NOFILE, 20, "may open 20 files; raise `ulimit -n`"),
-        (resource.RLIMIT_FSIZE, 1 << 20, "a file may have 1 MiB; raise `ulimit -f`"),
+        (resource.RLIMIT_AS, 200 << 20, "a run gets only 200 MiB of memory; raise `ulimit -v`"),
+        (resource.RLIMIT_NOFILE, 20, "may open only 20 files; raise `ulimit -n`"),
+        (resource.RLIMIT_FSIZE, 1 << 20, "a file may have only 1 MiB; raise `ulimit -f`"),
     ],
 )
 def test_tight_limits_fail_with_a_hint(monkeypatch, what, value, expected_text) -> None:
     real = resource.getrlimit
     monkeypatch.setattr(resource, "getrlimit", lambda asked: (value, value) if asked == what else real(asked))
     with pytest.raises(installation.CheckFailed, match=re.escape(expected_text)):
-        installation.resource_limits()
+        installation.check_resource_limits()
 
 
 def test_memory_limit_of_a_container_counts(monkeypatch) -> None:
     monkeypatch.setattr(installation, "_cgroup_memory", lambda: 300 << 20)
-    with pytest.raises(installation.CheckFailed, match="a run gets 300 MiB of memory"):
-        installation.resource_limits()
+    with pytest.raises(installation.CheckFailed, match="a run gets only 300 MiB of memory"):
+        installation.check_resource_limits()
 
 
 def test_unsupported_packages_fail(monkeypatch) -> None:
     monkeypatch.setattr(installation, "unmet_requirements", lambda: ["numpy 1.0 is installed"])
     with pytest.raises(installation.CheckFailed, match=r"numpy 1\.0 is installed"):
-        installation.packages()
+        installation.check_packages()
 
 
 def test_unsupported_python_and_missing_packages_fail(monkeypatch) -> None:
@@ -98,7 +98,7 @@ def test_unsupported_python_and_missing_packages_fail(monkeypatch) -> None:
         installation._version("no-such-package")
     monkeypatch.setattr(sys, "version_info", (3, 14, 0))
     with pytest.raises(installation.CheckFailed, match=r"needs Python 3\.10 to 3\.13"):
-        installation.python()
+        installation.check_python()
 
 
 def test_sandbox_without_pidfd_fails(monkeypatch) -> None:
@@ -107,24 +107,24 @@ def test_sandbox_without_pidfd_fails(monkeypatch) -> None:
 
     monkeypatch.setattr(os, "pidfd_open", refused)
     with pytest.raises(installation.CheckFailed, match="Operation not permitted"):
-        installation.pidfd()
+        installation.check_pidfd()
 
 
 def test_unwritable_folder_fails(tmp_path) -> None:
     with pytest.raises(installation.CheckFailed, match="cannot write in"):
-        installation.writable(tmp_path / "nowhere")
+        installation.check_writable(tmp_path / "nowhere")
 
 
 def test_configured_stacks_are_listed_and_missing_programs_fail(monkeypatch, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     file = tmp_path / "simscen/config.yaml"
-    assert doctor.stacks() == f"{file} does not exist; define external stacks with --stack"
+    assert doctor.check_stacks() == f"{file} does not exist; define external stacks with --stack"
     file.parent.mkdir()
     file.write_text("stacks: {mine: {command: sh -c 'exit 0'}, other: {command: sh}}\n")
-    assert doctor.stacks() == f"{file}: mine = sh -c 'exit 0', other = sh"
+    assert doctor.check_stacks() == f"{file}: mine = sh -c 'exit 0', other = sh"
     file.write_text("stacks:\n  mine: {command: ./gone}\n")
     with pytest.raises(installation.CheckFailed, match=r"config\.yaml:2:19: no such file or directory: `\./gone`"):
-        doctor.stacks()
+        doctor.check_stacks()
     file.write_text("stacks: [mine]\n")
     with pytest.raises(installation.CheckFailed, match=r"config\.yaml:1:9: expected a mapping, got a list"):
-        doctor.stacks()
+        doctor.check_stacks()

@@ -4,10 +4,11 @@ import pytest
 from pydantic import ValidationError
 
 import simscen as package
-from simscen.cli.catalog import reference_topics
-from simscen.cli.catalog.reference_topics import EXTERNAL_ONLY_CODES, NAV2_ERROR_CODES, known_names
+from simscen.cli.catalog import topic_lookup
+from simscen.cli.catalog.reference_topics import EXTERNAL_ONLY_CODES, NAV2_ERROR_CODES
+from simscen.cli.catalog.topic_lookup import known_names
 from simscen.cli.commands import explain
-from simscen.cli.commands.explain import explained
+from simscen.cli.commands.explain import explanation
 from simscen.core.errors import Exit
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.robot import Limits
@@ -43,7 +44,7 @@ def test_codes_are_explained(simscen) -> None:
 
 
 def test_codes_of_other_stacks_are_marked(simscen) -> None:
-    assert "The reference stack never returns it" in simscen("explain", "107").out.replace("\n  ", " ")
+    assert "The reference stack never returns this code" in simscen("explain", "107").out.replace("\n  ", " ")
     stack = Path(package.__file__).parent / "stack"
     sources = [path.read_text(encoding="utf-8") for path in stack.rglob("*.py")]
     named = {code for code in ErrorCode if any(f"ErrorCode.{code.name}" in text for text in sources)}
@@ -115,11 +116,11 @@ def test_misspelled_keys_and_codes_get_a_suggestion(simscen, name: str, meant: s
 
 def test_every_topic_every_key_and_every_code_is_explained(monkeypatch, is_quick: bool) -> None:
     """`make test` asks for every fifth key only."""
-    everything = reference_topics.all_topics()
-    for module in (explain, reference_topics):
+    everything = topic_lookup.all_topics()
+    for module in (explain, topic_lookup):
         monkeypatch.setattr(module, "all_topics", lambda: everything)  # to collect it costs most of the time
     for name in [*known_names(), *list(known_names(keys=True))[:: 5 if is_quick else 1]]:
-        assert explained(name), name
+        assert explanation(name), name
 
 
 def test_every_nav2_code_and_exit_code_has_a_description() -> None:

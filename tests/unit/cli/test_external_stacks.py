@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from simscen.cli.process import caller_environment, config_file
-from simscen.cli.session.selection import Selection, load_all
+from simscen.cli.session.selection import Selection, load_selection
 from simscen.core.errors import UsageError
 from simscen.run.reproducibility import scenario_digests
 
@@ -44,7 +44,7 @@ def configure(project: Path, text: str) -> Path:
 
 
 def loaded(name: str, *stacks: str):
-    return load_all([Path(f"{name}.scenario.yaml")], None, [], False, Selection(), stacks)[0]
+    return load_selection([Path(f"{name}.scenario.yaml")], None, [], False, Selection(), stacks)[0]
 
 
 def test_undefined_stack_name_is_an_error_with_its_location(simscen, project: Path) -> None:
@@ -133,7 +133,7 @@ def test_configuration_sets_limits_folder_and_variables(project: Path, monkeypat
     configure(project, f"stacks: {{mine: {text}}}\n")
     (project / "deep").mkdir()
     monkeypatch.chdir(project / "deep")
-    runs = load_all([project / "mine.scenario.yaml"], None, [], False, Selection(), ())[0][0].external_command
+    runs = load_selection([project / "mine.scenario.yaml"], None, [], False, Selection(), ())[0][0].external_command
     assert runs is not None
     assert (runs.cwd, runs.start_limit, runs.answer_limit) == (f"{project}", 120.0, 0.5)
     assert (runs.env["ROS_DOMAIN_ID"], runs.env["PYTHONPATH"]) == ("7", "/opt/mine")

@@ -5,12 +5,12 @@ import sys
 
 PROGRAM = """
 import os, signal, sys
-from simscen.cli.session.backends import signals_interrupt
+from simscen.cli.session.backends import interrupt_on_signals
 from simscen.run.process.supervisor import Interrupted
 
 now = iter({times})
 try:
-    with signals_interrupt(lambda: next(now)):
+    with interrupt_on_signals(lambda: next(now)):
         os.kill(os.getpid(), signal.SIGINT)
 except Interrupted as interrupted:
     print("interrupted by", interrupted.number, flush=True)

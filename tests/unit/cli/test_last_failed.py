@@ -35,16 +35,16 @@ def test_only_failed_runs_are_repeated(simscen, project: Path) -> None:
     assert ended.err == "simscen: there is no earlier session in simscen-out: all selected scenarios run\n"
     assert len(ran(project)) == 3
     ended = simscen("run", ".", "--lf")
-    assert (ended.code, ended.err) == (1, "simscen: 2 runs failed last\n")
+    assert (ended.code, ended.err) == (1, "simscen: 2 runs failed in the last session\n")
     assert ran(project) == [("b", 1, "failed"), ("c", 1, "failed")]
     (project / "b.scenario.yaml").write_text(ROOM)
     (project / "new.scenario.yaml").write_text(FAILING)
     (project / "c.scenario.yaml").rename(project / "d.scenario.yaml")
     ended = simscen("run", ".", "--lf")
-    assert (ended.code, ended.err) == (0, "simscen: 2 runs failed last: 1 selected, 1 not\n")
+    assert (ended.code, ended.err) == (0, "simscen: 2 runs failed in the last session: 1 selected, 1 not\n")
     assert ran(project) == [("b", 1, "passed")]
     ended = simscen("run", "a.scenario.yaml", "--lf")
-    assert ended.err == "simscen: 1 run failed last, none of them selected: all selected scenarios run\n"
+    assert ended.err == "simscen: 1 run failed in the last session, but none is selected: all selected scenarios run\n"
     assert ran(project) == [("a", 1, "passed")]
 
 

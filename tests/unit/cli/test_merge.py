@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
-from simscen.cli.session.selection import PARALLEL_JOBS, shard_of, share_of_scenarios
+from simscen.cli.session.selection import PARALLEL_JOBS, scenarios_of_shard, shard_of
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 
 SCENARIO = """\
@@ -114,15 +114,15 @@ def test_measured_times_balance_the_shards() -> None:
     """One scenario takes as long as all others; each scenario is in exactly one shard, in its order."""
     scenarios = [Titled(name) for name in "abcdef"]
     times = {"a": 1.0, "b": 1.0, "c": 5.0, "d": 1.0, "e": 1.0}  # f counts as the median
-    first, second = ([one.title for one in share_of_scenarios(scenarios, k, 2, times)] for k in (1, 2))  # type: ignore[arg-type]
+    first, second = ([one.title for one in scenarios_of_shard(scenarios, k, 2, times)] for k in (1, 2))  # type: ignore[arg-type]
     assert (first, second) == (["c"], ["a", "b", "d", "e", "f"])
 
 
 def test_without_times_each_shard_has_every_nth_scenario() -> None:
     scenarios = [Titled(name) for name in "abcde"]
-    assert [one.title for one in share_of_scenarios(scenarios, 2, 2, {})] == ["b", "d"]  # type: ignore[arg-type]
+    assert [one.title for one in scenarios_of_shard(scenarios, 2, 2, {})] == ["b", "d"]  # type: ignore[arg-type]
     with pytest.raises(NothingSelected):
-        share_of_scenarios(scenarios, 6, 6, {})  # type: ignore[arg-type]
+        scenarios_of_shard(scenarios, 6, 6, {})  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.benchmarks.navigation_experiments import Sizes, available_experiments
+from simscen.cli.benchmarks.navigation_experiments import Sizes, experiment_groups
 
 PROJECT = Path(__file__).parents[3]
 MADE_QUICKLY = (
@@ -20,13 +20,13 @@ HERE = ("BARN", "random goals", "degraded sensing", "tb3_sandbox", *MADE_QUICKLY
 
 
 def test_experiment_groups_are_listed_in_order(tmp_path: Path) -> None:
-    assert {offer.name for offer in available_experiments(None, None, PROJECT, tmp_path, Sizes())} == set(HERE)
+    assert {offer.name for offer in experiment_groups(None, None, PROJECT, tmp_path, Sizes())} == set(HERE)
 
 
 @pytest.mark.parametrize("name", MADE_QUICKLY)
 def test_group_lists_the_names_of_its_experiments(tmp_path: Path, name: str) -> None:
     small = Sizes(seeds=1, fields=2, dynamic=1, goals=1, lost=1)
-    (offer,) = (offer for offer in available_experiments(None, None, PROJECT, tmp_path, small) if offer.name == name)
+    (offer,) = (offer for offer in experiment_groups(None, None, PROJECT, tmp_path, small) if offer.name == name)
     assert [made.name for made in offer.make()] == (list(offer.parts) or [name])
 
 
@@ -36,7 +36,7 @@ def test_first_number_changes_drives_but_not_names(tmp_path: Path) -> None:
         small = Sizes(first, seeds=1, fields=2, dynamic=1, goals=1, lost=1)
         return [
             f"{made.name}: {drive.file.stem} {list(drive.seeds)}"
-            for offer in available_experiments(None, None, PROJECT, tmp_path / str(first), small)
+            for offer in experiment_groups(None, None, PROJECT, tmp_path / str(first), small)
             if offer.name in ("narrow fields", "dynamic fields", "ramps", "two robots", "localization", "corner cases")
             for made in offer.make()
             for drive in made.drives

@@ -5,13 +5,19 @@ import re
 import pytest
 import typer
 
-from simscen.cli.catalog.commands_page import EXIT_CODES, commands_of, exit_code_section, parameters_of, section
+from simscen.cli.catalog.commands_page import (
+    EXIT_CODES,
+    command_section,
+    exit_code_section,
+    functions_of_command,
+    parameters_of,
+)
 from simscen.cli.main import COMMANDS, app
 from simscen.core.errors import Exit
 
 
 def calls():
-    return [(words, function) for name in COMMANDS for words, function in commands_of(name)]
+    return [(words, function) for name in COMMANDS for words, function in functions_of_command(name)]
 
 
 def typers_own(words):
@@ -40,5 +46,11 @@ def test_every_exit_code_is_documented() -> None:
 
 
 def test_stars_and_brackets_are_escaped() -> None:
-    assert r"\*.scenario.yaml" in section("validate", dict(calls())["validate"])
-    assert r"simscen-out/\<session id>" in section("run", dict(calls())["run"])
+    assert r"\*.scenario.yaml" in command_section("validate", dict(calls())["validate"])
+    assert r"simscen-out/\<session id>" in command_section("run", dict(calls())["run"])
+
+
+def test_default_of_zero_is_listed_and_code_is_not_escaped() -> None:
+    sections = "".join(command_section(words, function) for words, function in calls())
+    assert "| `--port` | integer, 0 to 65535 | `0` |" in sections
+    assert "$schema=<path>/scenario.schema.json`" in sections

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.session.selection import Selection, load_all, shard_of
+from simscen.cli.session.selection import Selection, load_selection, shard_of
 from simscen.core.errors import InvalidInput, UsageError
 
 TEXT = """\
@@ -27,7 +27,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
 def test_every_scenario_is_in_exactly_one_shard(folder: Path, count: int) -> None:
-    shares = [load_all([folder], folder, [], False, Selection(shard=(k + 1, count)))[0] for k in range(count)]
+    shares = [load_selection([folder], folder, [], False, Selection(shard=(k + 1, count)))[0] for k in range(count)]
     ids = [scenario.id for share in shares for scenario in share]
     assert sorted(ids) == ["a", "b", "c", "d", "e"]
     assert max(map(len, shares)) - min(map(len, shares)) <= 1
@@ -42,7 +42,7 @@ def test_invalid_shards_are_rejected(text: str) -> None:
 def test_invalid_file_stops_the_session_even_if_not_selected(folder: Path) -> None:
     (folder / "bad.scenario.yaml").write_text("simscen: 1\n")
     with pytest.raises(InvalidInput, match=r"bad\.scenario\.yaml"):
-        load_all([folder], folder, [], False, Selection(keyword="a"))
+        load_selection([folder], folder, [], False, Selection(keyword="a"))
 
 
 def test_notes_of_a_world_are_reported_once(folder: Path) -> None:
@@ -52,7 +52,7 @@ def test_notes_of_a_world_are_reported_once(folder: Path) -> None:
     for name in "xy":
         text = TEXT.replace("room.world.yaml", "two.sdf\nmap: none").replace("{x: 1, y: 1}", "{x: 3, y: 3}")
         (folder / f"{name}.scenario.yaml").write_text(text)
-    _, warnings = load_all([folder], folder, [], False, Selection(keyword="x or y"))
+    _, warnings = load_selection([folder], folder, [], False, Selection(keyword="x or y"))
     assert [warning.severity for warning in warnings] == ["warning"]
     assert "only the first world of a file is loaded" in warnings[0].message
-    assert load_all([folder], folder, [], False, Selection(keyword="a"))[1] == []
+    assert load_selection([folder], folder, [], False, Selection(keyword="a"))[1] == []

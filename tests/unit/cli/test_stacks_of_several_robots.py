@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.session.selection import Selection, load_all
+from simscen.cli.session.selection import Selection, load_selection
 from simscen.loading.scenario_text import resolved_text, spec_of_text
 from simscen.run.reproducibility import scenario_digests
 
@@ -50,7 +50,7 @@ def project(simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def loaded(name: str, *stacks: str):
-    return load_all([Path(f"{name}.scenario.yaml")], None, [], False, Selection(), stacks)[0]
+    return load_selection([Path(f"{name}.scenario.yaml")], None, [], False, Selection(), stacks)[0]
 
 
 def runs(scenario) -> dict[str, str]:

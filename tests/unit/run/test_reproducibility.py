@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from simscen.cli.session.selection import Selection, load_all
+from simscen.cli.session.selection import Selection, load_selection
 from simscen.run import reproducibility as module
 from simscen.run.reproducibility import scenario_digests
 
@@ -116,7 +116,7 @@ def of(project: Path) -> Digest:
     def made(*world_path: str, name: str = "a", lenient: bool = False) -> str:
         folders = [project / folder for folder in world_path or ("models",)]
         file = project / f"p/{name}.scenario.yaml"
-        (loaded,), _ = load_all([file], project / "p", folders, lenient, Selection())
+        (loaded,), _ = load_selection([file], project / "p", folders, lenient, Selection())
         return scenario_digests(loaded).run
 
     return made
@@ -185,7 +185,7 @@ def test_lenient_option_changes_the_digest(of: Digest) -> None:
 def test_every_scenario_in_a_world_knows_all_files_of_it(project: Path, of: Digest) -> None:
     """Also the second one, whose world another has had built already."""
     (project / "p/b.scenario.yaml").write_text(FILES["p/a.scenario.yaml"])
-    loaded, _ = load_all([project / "p"], project / "p", [project / "models"], False, Selection())
+    loaded, _ = load_selection([project / "p"], project / "p", [project / "models"], False, Selection())
     first, second = (scenario.read_files for scenario in loaded)
     assert first == second
     assert {"model.sdf", "crate.stl", "hill.png", "cart.xacro", "size.xacro", "mast.stl"} <= {f.name for f in first}
@@ -220,7 +220,7 @@ def test_definition_is_the_scenario_without_its_stack(
     project: Path, file: str, old: str, new: str, is_other_definition: bool
 ) -> None:
     def definition() -> str:
-        (loaded,), _ = load_all(
+        (loaded,), _ = load_selection(
             [project / "p/a.scenario.yaml"], project / "p", [project / "models"], False, Selection()
         )
         return scenario_digests(loaded).definition
@@ -238,6 +238,6 @@ def test_definition_does_not_depend_on_the_folder_of_the_project(
     shutil.copytree(project, copy)
     digests = []
     for home in (project, copy):
-        (loaded,), _ = load_all([home / "p/a.scenario.yaml"], home / "p", [home / "models"], False, Selection())
+        (loaded,), _ = load_selection([home / "p/a.scenario.yaml"], home / "p", [home / "models"], False, Selection())
         digests.append(scenario_digests(loaded))
     assert digests[0].definition == digests[1].definition

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from search_plants import PLANTS, failure_threshold
 
-from simscen.cli.session.shrinking import CandidateRuns, Failure, Shrinking
+from simscen.cli.session.shrinking import CandidateRuns, Failure, Shrinker
 from simscen.core.geometry import Array
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
@@ -74,7 +74,7 @@ def test_a_found_failure_is_shrunk_in_sixty_runs(name: str) -> None:
         runs = PlantRuns(plant, threshold)
         tree = tree_of(found)
         margin = runs.result(values_of(tree)).verdicts[0].findings[0].margin
-        shrinking = Shrinking(runs, Failure("plant", "plant", 0.5 * margin), tree)
+        shrinking = Shrinker(runs, Failure("plant", "plant", 0.5 * margin), tree)
         nominal = tree_of([NOMINAL] * 8)
         shrinking.shrink({("stack", f"p{number}"): node_at(nominal, ("stack", f"p{number}")) for number in range(8)})
         assert shrinking.is_complete

@@ -1,0 +1,90 @@
+"""Finds the topics of `simscen explain` by their names or by the path of a key, such as `goals.pose`."""
+
+from collections.abc import Iterator, Sequence
+
+from pydantic import BaseModel
+
+from simscen.cli.catalog.json_schema import MODELS
+from simscen.cli.catalog.reference_topics import code_topics, metric_topics, signal_topics
+from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, fields_of, topics
+from simscen.loading.codes import CODES
+from simscen.loading.schema.lookup import models_at
+from simscen.spec.choice import Choice
+
+
+def all_topics() -> list[Topic]:
+    """Return all topics in the order of the overview. Problem codes, such as SC012, are not topics."""
+    return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True), *code_topics()]
+
+
+def known_names(keys: bool = False) -> list[str]:
+    """Return all names that can be explained, including problem codes; with `keys`, the paths of all keys instead."""
+    found = all_topics()
+    return keys_of_topics(found) if keys else [*dict.fromkeys(topic.name for topic in found), *CODES]
+
+
+def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
+    """Return a topic for each key that a path such as `goals.pose` or `stack.localizer.alpha1` can mean.
+
+    `known` are the topics to search. A path starts at a topic or at the top of a file; a single key is searched in all
+    topics.
+    """
+    parts = path.split(".")
+    if len(parts) == 1:
+        found = [
+            _key_topic(f"{topic.name}.{path}", field, ())
+            for topic in known
+            for field in topic.fields
+            if field.key == path
+        ]
+    else:
+        found = [topic for model, keys in _path_starts(parts, known) for topic in _keys_below(model, keys, path)]
+        name, _, key = path.rpartition(".")
+        listed = [row for topic in known if topic.name == name for row in topic.rows if row.key == key]
+        found += [_key_topic(path, row, ()) for row in listed]
+    return list({(topic.name, topic.text): topic for topic in found}.values())
+
+
+def keys_of_topics(known: Sequence[Topic]) -> list[str]:
+    """Return the paths of all keys of all topics."""
+    return [f"{topic.name}.{field.key}" for topic in known for field in topic.fields]
+
+
+def _path_starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[type[BaseModel], list[str]]]:
+    """Yield each model at which a path can start, and the keys below it. Its first parts can be the name of a topic."""
+    for length in (1, 2):
+        prefix, keys = ".".join(parts[:length]), parts[length:]
+        for topic in known:
+            if keys and topic.model is not None and prefix in (topic.name, f"{topic.group}.{topic.name}"):
+                yield topic.model, keys
+    for model in MODELS.values():
+        yield model, parts
+
+
+def _keys_below(model: type[BaseModel], keys: list[str], path: str) -> Iterator[Topic]:
+    """Yield a topic for the last of the nested `keys` below a model, with its own keys if its value is a mapping."""
+    *parents, key = keys
+    for parent in models_at(model, _with_indices(model, parents)):
+        for field in fields_of(parent):
+            if field.key == key:
+                children = models_at(parent, _with_indices(parent, [key]))
+                rows = fields_of(children[0]) if len(children) == 1 and not issubclass(children[0], Choice) else []
+                yield _key_topic(path, field, tuple(rows))
+
+
+def _with_indices(model: type[BaseModel], keys: list[str]) -> list[str | int]:
+    """Return the keys as a location in a file: a key whose value is a list is followed by the index 0."""
+    path: list[str | int] = []
+    for key in keys:
+        path.append(key)
+        if not models_at(model, path) or models_at(model, [*path, 0]) != models_at(model, path):
+            path.append(0)
+    return path
+
+
+def _key_topic(path: str, field: Field, rows: tuple[Field, ...]) -> Topic:
+    needed = (
+        "required" if not field.default else "optional" if field.default == OPTIONAL else f"default {field.default}"
+    )
+    text = f"{field.text}\n\n{field.kind} ({needed})" if field.text else f"{field.kind} ({needed})"
+    return Topic("key", path, None, text, rows=rows)

@@ -1,0 +1,112 @@
+"""Validation of scenario, world, and robot files: loads each file and checks it in its built world."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from simscen.cli.session.stacks import Stacks
+from simscen.core.errors import InvalidInput, Problem
+from simscen.core.files import collect_read_files
+from simscen.loading.builders import world_from_file
+from simscen.loading.checks.built_world import check_built_world
+from simscen.loading.checks.robot_geometry import robot_problems
+from simscen.loading.checks.scene_runner import check_in_world, world_reader_notes
+from simscen.loading.files.single_files import load_robot_file, load_world_file
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.scenario import try_variations
+from simscen.loading.stacks.choice import StackChoice
+from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
+from simscen.loading.world_cache import WorldCache
+
+
+@dataclass(frozen=True)
+class FileChecker:
+    """Loads and validates files.
+
+    root:               folder that all files must lie in
+    world_path:         further folders with worlds and models
+    lenient:            unsupported parts of SDF worlds are warnings instead of errors
+    fast:               skip the checks that need the world or the robot to be built
+    pictures:           folder for pictures of scenarios with geometric problems; None to draw none
+    requires_commands:  an external stack without a command is an error instead of a warning
+    """
+
+    root: Path
+    world_path: Sequence[Path] = ()
+    lenient: bool = False
+    fast: bool = False
+    pictures: Path | None = None
+    cache: WorldCache = field(default_factory=WorldCache)
+    stacks: Stacks = field(default_factory=Stacks)
+    requires_commands: bool = True
+
+    @property
+    def choices(self) -> Sequence[StackChoice | None]:
+        """Stacks with which each scenario is checked; None stands for the scenario's own stack."""
+        return self.stacks.chosen or (None,)
+
+    def check_scenario(
+        self, file: Path, choice: StackChoice | None = None, numbers: Sequence[int] | None = None
+    ) -> tuple[Sequence[LoadedScenario], list[Problem]]:
+        """Return the variations of a scenario and their problems. If a variation has an error, return no variations.
+
+        `choice` is one of `choices`. `numbers` are the numbers of the variations to check; None checks all.
+        """
+        loaded = try_variations(file, self.root, self.world_path, choice, numbers)
+        if isinstance(loaded, list):
+            return (), loaded
+        checked = [self.check_variation(one) for one in loaded]
+        problems = merge_problems(
+            [
+                VariationProblems(one.variation, one.set_by, found)
+                for one, (_, found) in zip(loaded, checked, strict=True)
+            ]
+        )
+        usable = [one for one, _ in checked if one is not None]
+        return (usable if len(usable) == len(checked) else ()), problems
+
+    def check_variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
+        """Return a variation with the commands of its stacks and the list of files it read, and its problems.
+
+        Return None instead of the variation if one of the problems is an error.
+        """
+        loaded, undefined = self.stacks.with_command(loaded.with_changes(lenient=self.lenient))
+        if undefined and self.requires_commands:
+            return None, [*loaded.notes, *undefined]
+        with collect_read_files() as read:
+            problems = [*loaded.notes, *([] if self.fast else world_problems(loaded, self.cache, self.pictures))]
+        problems += [replace(problem, severity="warning") for problem in undefined]
+        loaded = loaded.with_changes(read_files=tuple(sorted(read)))
+        usable = not any(problem.severity == "error" for problem in problems)
+        return (loaded if usable else None), list(dict.fromkeys(problems))
+
+    def check_world(self, file: Path) -> list[Problem]:
+        """Return the problems that are found by building a world."""
+        try:
+            source = load_world_file(file, self.root, self.world_path)
+            notes = list(source.map.notes) if source.map else []
+            if self.fast:
+                return notes
+            world = world_from_file(source, self.root, self.world_path, self.lenient)
+            return [*notes, *check_built_world(world, source), *world_reader_notes(world, source, self.root)]
+        except InvalidInput as error:
+            return error.problems
+
+    def check_robot(self, file: Path) -> list[Problem]:
+        """Return the problems that are found by building a robot."""
+        if self.fast:
+            return []
+        try:
+            return robot_problems(load_robot_file(str(file), self.root, self.world_path))
+        except InvalidInput as error:
+            return error.problems
+
+
+def world_problems(
+    scenario: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
+) -> list[Problem]:
+    """Return the problems that are found by building the world of a scenario."""
+    try:
+        return check_in_world(scenario, cache, pictures)
+    except InvalidInput as error:
+        return error.problems

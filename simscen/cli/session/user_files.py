@@ -1,0 +1,48 @@
+"""Writes files that the user has named on the command line, and reports errors as UsageError."""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from simscen.core.errors import UsageError
+from simscen.core.files import require_not_input, require_regular_file
+from simscen.loading.yaml.textfile import os_error_reason
+
+
+@contextmanager
+def create_file(file: Path, name: str) -> Iterator[None]:
+    """Create an empty file and its folder, for the body of the `with` statement to fill.
+
+    If the body fails, the file is removed. `name` is the file as the user wrote it. Raises UsageError if the file
+    exists or cannot be written.
+    """
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.open("x").close()
+    except FileExistsError:
+        raise UsageError(f"{file} already exists; choose another name") from None
+    except (OSError, ValueError) as error:
+        reason = os_error_reason(error) if isinstance(error, OSError) else "the name cannot be a path"
+        raise UsageError(f"cannot write {name!r}: {reason}") from None
+    try:
+        yield
+    except OSError as error:
+        file.unlink(missing_ok=True)
+        raise UsageError(f"cannot write {name!r}: {os_error_reason(error)}") from None
+    except BaseException:
+        file.unlink(missing_ok=True)
+        raise
+
+
+def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ()) -> None:
+    """Create or replace a file by calling `write` with its path.
+
+    Raises UsageError if that fails or if the file is one of the `inputs`.
+    """
+    try:
+        require_regular_file(path)
+        require_not_input(path, inputs)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write(path)
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror}") from error
