@@ -184,17 +184,15 @@ def _pose_with_covariance(reader: Reader) -> PoseWithCovariance:
 
 
 def _transforms(reader: Reader) -> list[Transform]:
-    (count,) = reader.take("I")
     links = []
-    for _ in range(count):
+    for _ in range(reader.count()):
         stamp, frame = _header(reader)
         links.append(Transform(stamp, frame, reader.string(), reader.take("7d")))
     return links
 
 
 def _float64_array(reader: Reader) -> array[float]:
-    (dimensions,) = reader.take("I")
-    for _ in range(dimensions):
+    for _ in range(reader.count()):
         reader.string()
         reader.take("2I")
     reader.take("I")

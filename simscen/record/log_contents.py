@@ -98,7 +98,7 @@ class NotSimscenLog(ValueError):
 
 
 class LogContents:
-    """Collects the records of a log in the order of the file. Raises ValueError, KeyError or struct.error if invalid.
+    """Collects the records of a log in the order of the file. Raises ValueError or KeyError if invalid.
 
     With `with_sensors`, also collects the messages that are not part of a Trace. With several robots, `robots` has the
     contents of each robot by name.

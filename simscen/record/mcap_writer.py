@@ -17,7 +17,7 @@ from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
-from simscen.record.messages.cdr import Slot, Template
+from simscen.record.messages.template import Slot, Template
 
 
 class MessageType(NamedTuple):

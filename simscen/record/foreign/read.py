@@ -81,7 +81,7 @@ class SensorMessageCollector:
         self._messages: list[RawMessage] = []
 
     def collect(self, messages: Iterable[RawMessage]) -> Iterator[RawMessage]:
-        """Yield the same messages. Raises struct.error or ValueError for an invalid sensor message."""
+        """Yield the same messages. Raises ValueError for an invalid sensor message."""
         for message in messages:
             if message.encoding == "cdr":
                 self._add(message)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -83,7 +82,7 @@ def _decode(decoded: DecodedMessages, role: str, message: RawMessage) -> None:
         return
     try:
         messages.append((message.time, decoders[message.type](message.data)))
-    except (struct.error, ValueError, UnicodeDecodeError, OverflowError) as error:
+    except (ValueError, OverflowError) as error:
         where = f"message {len(messages) + 1} of {message.topic}"
         raise UnusableLog(f"{where} cannot be read as {message.type}: {error}") from error
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -112,7 +111,7 @@ def _decode(raw: RawMessage, decoders: Mapping[str, Callable[[MessageReader], An
         raise UnusableLog(f"{raw.topic} is a {raw.type or 'type without a name'}, expected {' or '.join(decoders)}")
     try:
         return decode_checked(decoders[raw.type], raw.data)
-    except (struct.error, ValueError, OverflowError) as error:
+    except (ValueError, OverflowError) as error:
         raise UnusableLog(f"a message of {raw.topic} cannot be read as {raw.type}: {error}") from error
 
 

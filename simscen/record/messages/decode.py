@@ -9,12 +9,13 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.records.trace import LogLine
-from simscen.record.messages.cdr import HEADER, CdrReader
+from simscen.peer.cdr import Reader
 
 Numbers = tuple[float, ...]
 T = TypeVar("T")
@@ -27,8 +28,22 @@ _NOT_A_ROTATION = "an orientation is not a quaternion of length 1"
 NO_COVARIANCE: Numbers = (0.0,) * 6
 
 
-class MessageReader(CdrReader):
+class MessageReader(Reader):
     """Reads the fields of a message with their exact values."""
+
+    @property
+    def remaining(self) -> int:
+        """Number of bytes that have not been read."""
+        return len(self._data) - self._offset
+
+    def array(self, kind: str, shape: tuple[int, ...]) -> npt.NDArray[np.generic]:
+        """Return the next numbers in an array of this shape, without a copy.
+
+        `kind` is a numpy type without byte order, e.g. "f8". Raises ValueError if the message has fewer numbers.
+        """
+        dtype, size = np.dtype(self._byte_order + kind), math.prod(shape)
+        self._align(dtype.itemsize)
+        return np.frombuffer(self._data, dtype, size, self._skip(size * dtype.itemsize)).reshape(shape)
 
     def frame(self) -> str:
         """Return the next string, the name of a frame."""
@@ -51,15 +66,10 @@ class MessageReader(CdrReader):
 
 
 class CheckedReader(MessageReader):
-    """Reads a message of another program. Raises ValueError if the message is invalid.
+    """Reads a message of another program. Raises ValueError if a quaternion is invalid.
 
     Quaternions are normalized, and leading slashes of frames, which tf used before tf2, are removed.
     """
-
-    def __init__(self, data: bytes) -> None:
-        if len(data) < len(HEADER) or data[0] != 0 or data[1] not in (0, 1):
-            raise ValueError("a message is not plain CDR")
-        super().__init__(data)
 
     def frame(self) -> str:
         """Return the name of a frame without leading slashes."""
@@ -75,7 +85,7 @@ class CheckedReader(MessageReader):
 
 
 def decode_checked(decoder: Callable[[MessageReader], T], data: bytes) -> T:
-    """Decode a message of another program. Raises ValueError or struct.error if it does not match its type."""
+    """Decode a message of another program. Raises ValueError if it does not match its type."""
     reader = CheckedReader(data)
     message = decoder(reader)
     if reader.remaining > 3:  # up to three bytes of padding

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.clock import Stamp
-from simscen.record.messages.cdr import Template
+from simscen.record.messages.template import Template
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _TWIST = "2d24xd"

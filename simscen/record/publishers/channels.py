@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 from simscen.record.mcap_writer import MESSAGE_HEADER_BYTES, Channel, McapWriter, MessageType, load_message_types
-from simscen.record.messages.cdr import Slot, Template, compile_writer, field_names
+from simscen.record.messages.template import Slot, Template, compile_writer, field_names
 from simscen.record.topics import CLOCK, Topic, qos
 
 Write = Callable[[int, bytes], None]

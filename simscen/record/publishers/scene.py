@@ -13,7 +13,7 @@ from simscen.core.records.case import Case
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.record import frame_names, topics
 from simscen.record.frame_names import RobotFrames
-from simscen.record.messages.cdr import Template
+from simscen.record.messages.template import Template
 from simscen.record.publishers.channels import MessageSink
 
 Color = tuple[float, float, float, float]

@@ -1,20 +1,16 @@
-"""Serialization of ROS 2 messages: Common Data Representation, XCDR version 1, little endian (OMG DDSI-RTPS 10.5).
+"""Templates that serialize ROS 2 messages of fixed size in one call.
 
-Serializing field by field takes ten times as long as writing the message. Therefore, the layout of a message type is
-computed once, as a Template, and each message is then packed in one call.
+The Writer of simscen.peer.cdr serializes field by field, which takes ten times as long as writing the message to a log.
+Therefore, a Template computes the layout of a message type once, and a generated function packs each message.
 """
 
-import math
 import struct
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import groupby
 from typing import Any, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-HEADER = b"\x00\x01\x00\x00"
+from simscen.peer.cdr import HEADER
 
 
 class Slot(NamedTuple):
@@ -118,50 +114,3 @@ def _compile(parts: "tuple[bytes | Slot, ...]", method: str, leading: tuple[str,
 def field_names(parts: "Sequence[bytes | Slot]") -> list[str]:
     """Return the names of the fields in order of first appearance."""
     return list(dict.fromkeys(part.field.removeprefix("*") for part in parts if isinstance(part, Slot)))
-
-
-class CdrReader:
-    """Reads a message field by field, in the order of its definition. Raises struct.error past the end of the data."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data = data
-        self._byte_order = ">" if data[1:2] == b"\0" else "<"
-        self._offset = len(HEADER)
-
-    @property
-    def remaining(self) -> int:
-        """Number of bytes that have not been read."""
-        return len(self._data) - self._offset
-
-    def take(self, codes: str) -> tuple[float, ...]:
-        """Return the next values of one width, for example "7d"."""
-        layout = struct.Struct(self._byte_order + codes)
-        self._align(struct.calcsize("<" + codes[-1]))
-        values = layout.unpack_from(self._data, self._offset)
-        self._offset += layout.size
-        return values
-
-    def count(self) -> int:
-        """Return the length of the sequence that follows."""
-        return int(self.take("I")[0])
-
-    def string(self) -> str:
-        """Return the next string without its terminating NUL."""
-        size = self.count()
-        (encoded,) = struct.unpack_from(f"{size}s", self._data, self._offset)
-        self._offset += size
-        return str(encoded[:-1], "utf-8")
-
-    def array(self, kind: str, shape: tuple[int, ...]) -> npt.NDArray[np.generic]:
-        """Return the next numbers of a type without byte order, for example "f8", in a shape."""
-        dtype = np.dtype(self._byte_order + kind)
-        self._align(dtype.itemsize)
-        size = math.prod(shape)
-        if self._offset + size * dtype.itemsize > len(self._data):
-            raise struct.error(f"message ends before the last of {size} numbers")
-        values = np.frombuffer(self._data, dtype, size, self._offset).reshape(shape)
-        self._offset += values.nbytes
-        return values
-
-    def _align(self, width: int) -> None:
-        self._offset += -(self._offset - len(HEADER)) % width
