@@ -42,7 +42,8 @@ class MessageReader(Reader):
         `kind` is a numpy type without byte order, e.g. "f8". Raises ValueError if the message has fewer numbers.
         """
         dtype, size = np.dtype(self._byte_order + kind), math.prod(shape)
-        self._align(dtype.itemsize)
+        if size:  # an empty sequence at the end of a message has no padding
+            self._align(dtype.itemsize)
         return np.frombuffer(self._data, dtype, size, self._skip(size * dtype.itemsize)).reshape(shape)
 
     def frame(self) -> str:

@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from simscen.record.messages.decode import MessageReader
+from simscen.record.messages.decode import MessageReader, particle_cloud
 from simscen.record.messages.template import Template, compile_packer
 
 
@@ -74,3 +74,8 @@ def test_arrays_are_read_without_a_copy() -> None:
     cells = MessageReader(b"\0\1\0\0" + bytes(range(6))).array("i1", (2, 3))
     assert np.array_equal(cells, np.arange(6).reshape(2, 3))
     assert not cells.flags.owndata
+
+
+def test_an_empty_particle_cloud_is_read() -> None:
+    message = Template().put("iI", 0, 0).string("map").put("I", 0)
+    assert particle_cloud(MessageReader(bytes(message.buffer))).shape == (0, 8)
