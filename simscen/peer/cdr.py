@@ -60,7 +60,7 @@ class Writer:
 
 
 class Reader:
-    """Reads a message of either byte order field by field, in the order of its definition.
+    """Reads a message, of either byte order, field by field, in the order of its definition.
 
     Raises ValueError if the data are not CDR, or end before the field that is read.
     """
