@@ -2,7 +2,8 @@
 
 import os
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
@@ -20,7 +21,7 @@ from simscen.record.log_header import LogHeader
 from simscen.record.mcap_writer import MAGIC, Channel, McapWriter, MessageType
 from simscen.record.sensor_messages import SensorMessages
 
-LOG_READ_ERRORS = (
+_READ_ERRORS = (
     McapError,
     ZstdError,
     struct.error,
@@ -32,6 +33,24 @@ LOG_READ_ERRORS = (
     RecursionError,
 )
 """Exceptions that the libraries and the decoders raise on damaged files."""
+
+
+def invalid_log(path: Path, code: str, message: str, hint: str = "") -> InvalidInput:
+    """Return the exception for a problem with a log. `code` is the error code, such as "SC802"."""
+    return InvalidInput([Problem(str(path), 0, 0, code, message, hint)])
+
+
+@contextmanager
+def unreadable_log_as_invalid_input(path: Path) -> Iterator[None]:
+    """Context manager that raises InvalidInput, with file and reason, for the exceptions of reading a log."""
+    try:
+        yield
+    except OSError as error:
+        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror or error}") from error
+    except NotSimscenLog as error:
+        raise invalid_log(path, "SC801", f"not a log of simscen: {error}") from error
+    except _READ_ERRORS as error:
+        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +104,7 @@ def read_log(path: "str | Path", partial: bool | None = None, with_sensors: bool
     path = Path(path)
     accept_truncated = path.name.endswith(PARTIAL_SUFFIX) if partial is None else partial
     contents = LogContents(with_sensors)
-    try:
+    with unreadable_log_as_invalid_input(path):
         with open_log(path) as stream:
             complete = _read(stream, contents)
         header = contents.header()
@@ -99,12 +118,6 @@ def read_log(path: "str | Path", partial: bool | None = None, with_sensors: bool
         trace, result = contents.trace(), contents.result()
         own = contents.sensors, contents.coverage(), contents.stack
         return Log(header, trace, result, complete, robots, *own)
-    except OSError as error:
-        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror}") from error
-    except NotSimscenLog as error:
-        raise invalid_log(path, "SC801", f"not a log of simscen: {error}") from error
-    except LOG_READ_ERRORS as error:
-        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
 
 
 def _read(stream: IO[bytes], contents: LogContents) -> bool:
@@ -120,11 +133,6 @@ def _read(stream: IO[bytes], contents: LogContents) -> bool:
     return contents.end is not None and not records.is_truncated
 
 
-def invalid_log(path: Path, code: str, message: str, hint: str = "") -> InvalidInput:
-    """Return the exception for a problem with a log."""
-    return InvalidInput([Problem(str(path), 0, 0, code, message, hint)])
-
-
 def recover(path: Path) -> bool:
     """Rewrite the log of an aborted run with an index, which other tools need.
 
@@ -134,23 +142,20 @@ def recover(path: Path) -> bool:
     not MCAP, RunError of kind "output" if the new file cannot be written.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with open_log(path) as stream:
-            if _ends_with_magic(stream):
-                return False
-            with part.open("wb") as file:
-                _copy(stream, file)
-        part.replace(path)
-    except OSError as error:
-        if part.exists():
-            raise write_error(part, error) from error
-        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror}") from error
-    except NotSimscenLog as error:
-        raise invalid_log(path, "SC801", f"not a log of simscen: {error}") from error
-    except LOG_READ_ERRORS as error:
-        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
-    finally:
-        part.unlink(missing_ok=True)
+    with unreadable_log_as_invalid_input(path):
+        try:
+            with open_log(path) as stream:
+                if _ends_with_magic(stream):
+                    return False
+                with part.open("wb") as file:
+                    _copy(stream, file)
+            part.replace(path)
+        except OSError as error:
+            if part.exists():
+                raise write_error(part, error) from error
+            raise
+        finally:
+            part.unlink(missing_ok=True)
     return True
 
 

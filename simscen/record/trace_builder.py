@@ -58,13 +58,6 @@ class SignalBuffer:
         return table[:, 0].astype(np.int64), table[:, 1:]
 
 
-def yaw_from_quaternions(quaternions: Array) -> Array:
-    """Return the yaw angles in [-π, π] of quaternions (n, 4) x, y, z, w."""
-    x, y, z, w = quaternions.T.copy()
-    angles: Array = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return angles
-
-
 def exact_planar_poses(points: Array) -> Array:
     """Return poses (n, 7) for points (n, 3) x, y, yaw, equal to those of Pose3.planar to the last bit."""
     poses = np.zeros((len(points), 7))
@@ -75,8 +68,9 @@ def exact_planar_poses(points: Array) -> Array:
 
 
 def to_planar(poses: Array) -> Array:
-    """Return x, y, yaw (n, 3) of poses (n, 7) with x, y, z and a quaternion."""
-    return np.column_stack((poses[:, :2], yaw_from_quaternions(poses[:, 3:7])))
+    """Return x, y, yaw (n, 3), with yaw in [-π, π], for poses (n, 7 or more): x, y, z, and a quaternion x, y, z, w."""
+    x, y, z, w = poses[:, 3:7].T.copy()
+    return np.column_stack((poses[:, :2], np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))))
 
 
 class TraceRows:

@@ -47,7 +47,10 @@ class ForeignLogOptions:
     @property
     def frames(self) -> tuple[str, str] | None:
         """The parent and child frame if the ground truth is a transform of tf, otherwise None."""
-        if self.truth is None or self.truth.startswith("/") or ":" not in self.truth:
-            return None
-        outer, inner = self.truth.split(":", 1)
-        return outer, inner
+        return None if self.truth is None else parse_frame_pair(self.truth)
+
+
+def parse_frame_pair(name: str) -> tuple[str, str] | None:
+    """Return the parent and child frame of a name such as `map:base_link`; None if it is the name of a topic."""
+    outer, colon, inner = name.partition(":")
+    return (outer, inner) if colon and not name.startswith("/") else None

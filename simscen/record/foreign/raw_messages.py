@@ -11,7 +11,7 @@ from mcap import records
 
 from simscen.record.log_file import RecordReader, open_log
 from simscen.record.log_header import ROBOTS
-from simscen.record.log_reader import LOG_READ_ERRORS, invalid_log
+from simscen.record.log_reader import invalid_log, unreadable_log_as_invalid_input
 from simscen.record.mcap_writer import MAGIC
 
 
@@ -26,14 +26,11 @@ class UnusableLog(ValueError):
 @contextmanager
 def unusable_log_as_invalid_input(path: Path) -> Iterator[None]:
     """Context manager that raises InvalidInput, with file and reason, for a log that cannot be read or used."""
-    try:
-        yield
-    except UnusableLog as error:
-        raise invalid_log(path, "SC804", str(error), error.hint) from error
-    except OSError as error:
-        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror or error}") from error
-    except LOG_READ_ERRORS as error:
-        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
+    with unreadable_log_as_invalid_input(path):
+        try:
+            yield
+        except UnusableLog as error:
+            raise invalid_log(path, "SC804", str(error), error.hint) from error
 
 
 class RawMessage(NamedTuple):
@@ -92,29 +89,28 @@ class McapMessages:
 def is_simscen_log(path: Path) -> bool:
     """Return whether simscen recorded this file. Returns True for unreadable files, so that read_log reports them."""
     try:
-        with open_log(path) as stream:
-            for record in RecordReader(stream):
-                if isinstance(record, records.Metadata) and record.name == "simscen":
-                    return True
-                if isinstance(record, records.Message):
-                    return False
+        return _run_metadata(path) is not None
     except Exception:
         return True
-    return False
 
 
 def recorded_robots(path: Path) -> tuple[str, ...]:
     """Return the names of the robots of a log of simscen with several robots; () for all other files."""
     try:
-        with open_log(path) as stream:
-            for record in RecordReader(stream):
-                if isinstance(record, records.Metadata) and record.name == "simscen":
-                    return tuple(json.loads(record.metadata.get(ROBOTS, "[]")))
-                if isinstance(record, records.Message):
-                    return ()
+        return tuple(json.loads((_run_metadata(path) or {}).get(ROBOTS, "[]")))
     except Exception:
         return ()
-    return ()
+
+
+def _run_metadata(path: Path) -> dict[str, str] | None:
+    """Return the metadata record that simscen writes before the first message, or None if there is none."""
+    with open_log(path) as stream:
+        for record in RecordReader(stream):
+            if isinstance(record, records.Metadata) and record.name == "simscen":
+                return dict(record.metadata)
+            if isinstance(record, records.Message):
+                break
+    return None
 
 
 def _reject_ros1(profile: str) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry import Pose3
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import LogCoverage
@@ -97,7 +97,7 @@ class SensorMessageCollector:
         links = {pose.child: pose for _, poses in decoded.by_role["tf_static"] for pose in poses}
         for frame in links:
             if (mount := lidar_mount(frame, BASE_FRAME, links)) is not None:
-                self._sensors.mounts[frame] = Pose3.planar(Pose2(*mount.pose))
+                self._sensors.mounts[frame] = Pose3.planar(mount.pose)
         return self._sensors
 
     def _add(self, message: RawMessage) -> None:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.records.trace import Ticks
 from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.foreign.timebase import StampedMessages
-from simscen.record.localization_logs.rows import PlanarPose
 from simscen.record.messages.decode import StampedPose
 
 
@@ -114,7 +112,7 @@ _BASE_FRAMES = ("base_link", "base_footprint")
 class LidarMount(NamedTuple):
     """Pose x, y, yaw of a lidar on the base. If the lidar is mounted upside down, its angles have the opposite sign."""
 
-    pose: PlanarPose
+    pose: Pose2
     is_upside_down: bool
 
 
@@ -137,20 +135,12 @@ def lidar_mount(frame: str, base: str, links: Mapping[str, StampedPose]) -> Lida
 
 
 def _planar_mount(pose: Pose3) -> LidarMount:
-    qx, qy, qz, qw = pose.quaternion
-    x, y, _ = pose.position
-    yaw = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-    return LidarMount((x, y, yaw), 1 - 2 * (qx * qx + qy * qy) < 0)
+    points_down = 1 - 2 * (pose.qx * pose.qx + pose.qy * pose.qy) < 0  # the z axis
+    return LidarMount(pose.plane, points_down)
 
 
 LoggedMessage = tuple[int, int, Any]
 """Time of logging in ns, index in the log, and decoded message."""
-
-
-def parse_frame_pair(name: str) -> tuple[str, str] | None:
-    """Return the parent and child frame of a name such as `map:base_link`; None if it is the name of a topic."""
-    outer, colon, inner = name.partition(":")
-    return (outer, inner) if colon and not name.startswith("/") else None
 
 
 @dataclass

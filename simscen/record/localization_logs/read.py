@@ -14,24 +14,23 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.records.trace import Ticks
-from simscen.record.foreign.raw_messages import UnusableLog
+from simscen.record.foreign.raw_messages import UnusableLog, unusable_log_as_invalid_input
 from simscen.record.localization_logs.rosbag import read_rosbag_rows
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
     MAX_TIME_S,
     TICK_RATE_HZ,
     LocalizationRows,
-    PlanarPose,
     PoseRow,
     ScanRow,
     all_within,
 )
-from simscen.record.log_reader import LOG_READ_ERRORS, invalid_log
+from simscen.record.log_reader import invalid_log
 
 
 def read_csv_rows(path: Path) -> LocalizationRows:
     """Read a CSV log. Raises UnusableLog for an invalid row."""
-    rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), (0.0, 0.0, 0.0)
+    rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), Pose2(0.0, 0.0)
     with path.open(encoding="utf-8", newline="") as lines:
         for number, row in _numbered_rows(lines, rows.hint):
             cells = [cell.strip() for cell in row]
@@ -57,7 +56,7 @@ def _numbered_rows(lines: Iterable[str], hint: str) -> Iterator[tuple[int, list[
         raise UnusableLog(f"line {reader.line_num} is not CSV: {error}", hint) from error
 
 
-def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float], mount: PlanarPose) -> None:
+def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float], mount: Pose2) -> None:
     match kind:
         case "odom" | "truth":
             time, pose = (values or [math.nan])[0], values[1:]
@@ -79,13 +78,12 @@ def _check_time(time: float) -> None:
         raise ValueError(f"{time} is not a valid time")
 
 
-def _checked_pose(values: list[float], count: int) -> PlanarPose:
+def _checked_pose(values: list[float], count: int) -> Pose2:
     if len(values) != count or not all(math.isfinite(value) for value in values):
         raise ValueError(f"expected {count} numbers, got {values}")
     if not all_within(values, MAX_COORDINATE_M):
         raise ValueError(f"invalid coordinates {values}")
-    x, y, yaw = values
-    return x, y, yaw
+    return Pose2(*values)
 
 
 DEFAULT_MAX_RANGE_M = 81.9
@@ -122,7 +120,7 @@ def _parse_flaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
     step = math.pi / max(1, count - 1) if count % 2 else math.pi / count
     rows.odometry.append(PoseRow(time, order, _pose(rest[3:6])))
     mount = _relative_pose(_pose(rest[3:6]), _pose(rest[:3]))
-    mount = mount if math.hypot(*mount[:2]) < 1.0 else (0.0, 0.0, 0.0)  # some logs have corrected poses here
+    mount = mount if math.hypot(*mount[:2]) < 1.0 else Pose2(0.0, 0.0)  # some logs have corrected poses here
     rows.scans.append(ScanRow(time, order, ranges, (-math.pi / 2, step, 0.0, DEFAULT_MAX_RANGE_M), mount))
 
 
@@ -143,16 +141,16 @@ def _ranges(words: list[str], count: int) -> np.ndarray[tuple[int, ...], np.dtyp
     return np.array([float(word) for word in words])
 
 
-def _pose(words: list[str]) -> PlanarPose:
+def _pose(words: list[str]) -> Pose2:
     x, y, yaw = (_parse_finite(word) for word in words)
     if not all_within((x, y, yaw), MAX_COORDINATE_M):
         raise ValueError(f"invalid coordinates {x:g}, {y:g}")
-    return x, y, yaw
+    return Pose2(x, y, yaw)
 
 
-def _relative_pose(base: PlanarPose, other: PlanarPose) -> PlanarPose:
-    dx, dy, c, s = other[0] - base[0], other[1] - base[1], math.cos(base[2]), math.sin(base[2])
-    return c * dx + s * dy, c * dy - s * dx, math.remainder(other[2] - base[2], 2 * math.pi)
+def _relative_pose(base: Pose2, other: Pose2) -> Pose2:
+    dx, dy, c, s = other.x - base.x, other.y - base.y, math.cos(base.yaw), math.sin(base.yaw)
+    return Pose2(c * dx + s * dy, c * dy - s * dx, math.remainder(other.yaw - base.yaw, 2 * math.pi))
 
 
 def _time(word: str) -> float:
@@ -200,25 +198,20 @@ def read_localization_log(path: Path, odometry: str, scan: str, reference: str |
     The topics apply to ROS logs only. Without `reference`, the ground truth of simscen's logs is used. CARMEN logs have
     the reference in TRUEPOS lines, and CSV files in `truth` rows. Raises InvalidInput if the log cannot be used.
     """
-    try:
-        if path.suffix == ".csv":
-            rows = read_csv_rows(path)
-        elif path.suffix in (".log", ".clf", ".carmen"):
-            rows = read_carmen_rows(path)
-        else:
-            rows = read_rosbag_rows(path, odometry, scan, reference)
+    with unusable_log_as_invalid_input(path):
+        try:
+            if path.suffix == ".csv":
+                rows = read_csv_rows(path)
+            elif path.suffix in (".log", ".clf", ".carmen"):
+                rows = read_carmen_rows(path)
+            else:
+                rows = read_rosbag_rows(path, odometry, scan, reference)
+        except UnicodeDecodeError as error:
+            raise invalid_log(path, "SC802", "the log is not text") from error
         for kind, kind_rows in (("odometry", rows.odometry), ("scans", rows.scans)):
             if not kind_rows:
                 raise UnusableLog(f"it has no {kind}", rows.hint)
         return _to_log(rows)
-    except UnusableLog as error:
-        raise invalid_log(path, "SC804", str(error), error.hint) from error
-    except UnicodeDecodeError as error:
-        raise invalid_log(path, "SC802", "the log is not text") from error
-    except OSError as error:
-        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror or error}") from error
-    except LOG_READ_ERRORS as error:
-        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
 
 
 def _to_log(rows: LocalizationRows) -> LocalizationLog:
@@ -228,7 +221,7 @@ def _to_log(rows: LocalizationRows) -> LocalizationLog:
         return round((time - start) * TICK_RATE_HZ)
 
     ordered: list[tuple[int, int, Odometry | Scan]] = [
-        (row.order, 0, Odometry("odom", tick(row.time), Pose2(*row.pose), Twist())) for row in rows.odometry
+        (row.order, 0, Odometry("odom", tick(row.time), row.pose, Twist())) for row in rows.odometry
     ]
     ordered += [(row.order, 1, _scan(row, tick(row.time))) for row in rows.scans]
     ordered.sort(key=lambda item: item[:2])
@@ -245,7 +238,7 @@ def _initial_pose(rows: LocalizationRows) -> Pose2 | None:
         return None
     first = min(rows.initial, key=lambda row: row.order)
     nearest = min(rows.odometry, key=lambda row: abs(row.time - first.time))
-    return Pose2(*first.pose).compose(Pose2(*nearest.pose).between(Pose2(*rows.odometry[0].pose)))
+    return first.pose.compose(nearest.pose.between(rows.odometry[0].pose))
 
 
 def _check_readings(readings: Sequence[Odometry | Scan]) -> Iterator[str]:
@@ -269,4 +262,4 @@ def _check_readings(readings: Sequence[Odometry | Scan]) -> Iterator[str]:
 
 def _scan(row: ScanRow, tick: int) -> Scan:
     first, increment, range_min, range_max = row.layout
-    return Scan("lidar", tick, row.ranges, first, increment, range_min, range_max, Pose2(*row.mount))
+    return Scan("lidar", tick, row.ranges, first, increment, range_min, range_max, row.mount)

@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.clock import NS_PER_SECOND
+from simscen.core.geometry import Pose2, Pose3
 from simscen.record import topics
+from simscen.record.foreign.options import parse_frame_pair
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
 from simscen.record.foreign.transforms import (
     LidarMount,
     LoggedMessage,
     TransformMessages,
     lidar_mount,
-    parse_frame_pair,
 )
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
     LocalizationRows,
-    PlanarPose,
     PoseRow,
     ScanRow,
     all_within,
@@ -29,7 +29,6 @@ from simscen.record.localization_logs.rows import (
 from simscen.record.messages.decode import (
     POSE_DECODERS,
     MessageReader,
-    Numbers,
     StampedPose,
     decode_checked,
     laser_scan,
@@ -124,7 +123,7 @@ def _poses(topic: str, messages: Iterable[LoggedMessage], use_log_time: bool, no
     invalid = 0
     for logged, index, message in messages:
         if all_within(message.pose, MAX_COORDINATE_M):
-            yield PoseRow(_time(logged, message, use_log_time), index, planar_pose(message.pose))
+            yield PoseRow(_time(logged, message, use_log_time), index, Pose3(*message.pose).plane)
         else:
             invalid += 1
     if invalid:
@@ -144,15 +143,9 @@ def _scans(topic: str, messages: _Messages, use_log_time: bool, notes: list[str]
             if mounts[scan.frame] is None:
                 frames = f"{scan.frame!r} and {base or 'base_link'!r}"
                 notes.append(f"/tf_static does not connect {frames}; the lidar is assumed to be at the base")
-        pose, is_upside_down = mounts[scan.frame] or LidarMount((0.0, 0.0, 0.0), False)
+        pose, is_upside_down = mounts[scan.frame] or LidarMount(Pose2(0.0, 0.0), False)
         ranges = scan.ranges
         if is_upside_down:
             ranges = ranges[::-1]
             layout = (-(scan.angle_min + (len(ranges) - 1) * scan.angle_increment), *layout[1:])
         yield ScanRow(_time(logged, scan, use_log_time), index, ranges, layout, pose)
-
-
-def planar_pose(pose: Numbers) -> PlanarPose:
-    """Return x, y and yaw of x, y, z and a unit quaternion."""
-    x, y, _, qx, qy, qz, qw = pose
-    return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))

@@ -3,13 +3,11 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from simscen.core.geometry import Array
+from simscen.core.geometry import Array, Pose2
 
 TICK_RATE_HZ = 1000
 MAX_TIME_S, MAX_COORDINATE_M = 1e11, 1e6
 """Limits for valid times and coordinates. Squares of larger numbers, as from broken sensors, could overflow."""
-PlanarPose = tuple[float, float, float]
-"""Pose x, y, yaw."""
 
 
 @dataclass(frozen=True)
@@ -18,7 +16,7 @@ class PoseRow:
 
     time: float
     order: int
-    pose: PlanarPose
+    pose: Pose2
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +30,7 @@ class ScanRow:
     order: int
     ranges: Array
     layout: tuple[float, float, float, float]
-    mount: PlanarPose = (0.0, 0.0, 0.0)
+    mount: Pose2 = Pose2(0.0, 0.0)
 
 
 @dataclass

@@ -20,20 +20,11 @@ Link = tuple[str, str, Stamp, Pose3]
 """Frame, child frame, stamp, and pose of the child in the frame."""
 
 
-def planar_quaternions(headings: Array) -> Array:
-    """Return quaternions (n, 4) x, y, z, w for headings (n,) in radians."""
-    halves = headings / 2
-    quaternions = np.zeros((len(halves), 4))
-    quaternions[:, 2] = np.sin(halves)
-    quaternions[:, 3] = np.cos(halves)
-    return quaternions
-
-
 def planar_poses(points: Array) -> Array:
-    """Return positions and quaternions (n, 7) for points (n, 3) x, y, yaw."""
-    poses = np.zeros((len(points), 7))
+    """Return poses (n, 7), x, y, z and a quaternion x, y, z, w, for points (n, 3 or more) x, y, yaw."""
+    poses, halves = np.zeros((len(points), 7)), points[:, 2] / 2
     poses[:, :2] = points[:, :2]
-    poses[:, 3:] = planar_quaternions(points[:, 2])
+    poses[:, 5], poses[:, 6] = np.sin(halves), np.cos(halves)
     return poses
 
 
