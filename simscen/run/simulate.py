@@ -18,7 +18,8 @@ from simscen.judge.result_json import to_json
 from simscen.judge.run_result import combine_robots, judge_run
 from simscen.loading.files.discovery import default_root
 from simscen.loading.scenario import load_scenario
-from simscen.record.recorder import MOMENT_DELAY_S, MomentBuffer, MomentSink, Recorder
+from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer, MomentSink
+from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
 from simscen.run.assembly import assemble
 from simscen.run.external.stack import ExternalStack, robot_file

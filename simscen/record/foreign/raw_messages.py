@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from mcap import records
 
-from simscen.record.log_file import RecordReader, open_log
 from simscen.record.log_header import ROBOTS
 from simscen.record.log_reader import invalid_log, unreadable_log_as_invalid_input
+from simscen.record.mcap_reader import RecordReader, open_log
 from simscen.record.mcap_writer import MAGIC
 
 

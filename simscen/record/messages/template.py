@@ -1,7 +1,7 @@
-"""Templates that serialize ROS 2 messages of fixed size in one call.
+"""Template of a ROS 2 message of fixed size, and generated functions that pack such messages in one call.
 
 The Writer of simscen.peer.cdr serializes field by field, which takes ten times as long as writing the message to a log.
-Therefore, a Template computes the layout of a message type once, and a generated function packs each message.
+Therefore, the layout of a message is computed once, as a Template, and reused for all messages.
 """
 
 import struct
@@ -14,9 +14,9 @@ from simscen.peer.cdr import HEADER
 
 
 class Slot(NamedTuple):
-    """Space for a field of a message: format codes as in `struct`, and the name of the field.
+    """Space in a Template for the value of a field: format codes as in `struct`, and the name of the field.
 
-    The name of a field with several numbers starts with an asterisk: "*pose".
+    The name starts with an asterisk if the value is a sequence of numbers: "*pose".
     """
 
     codes: str
@@ -24,11 +24,12 @@ class Slot(NamedTuple):
 
 
 class Template:
-    """Layout of a message of fixed size with constants, and with slots for the fields that vary.
+    """Layout of a message of fixed size: constants, and slots for the fields whose values vary.
 
-    Methods append fields in the order of the message definition and return the template. Fields are aligned to their
-    own width, counted from `start` bytes before the first field. `prefix` precedes the fields and does not count for
-    the alignment: the encapsulation header. `buffer` is the message with zeros in its slots.
+    Methods append fields in the order of the message definition, and return the template so that calls can be chained.
+    Each field is aligned to its own width. For a part of a message, `start` is the number of bytes of the message
+    before this part. `prefix` does not count for the alignment: the CDR header. `buffer` is the message with zeros in
+    its slots.
     """
 
     def __init__(self, prefix: bytes = HEADER, start: int = 0) -> None:
@@ -37,14 +38,14 @@ class Template:
         self._slots: list[tuple[int, Slot]] = []
 
     def slot(self, codes: str, field: str) -> "Template":
-        """Append a slot for numbers of one width, for example "iI" or "7d". "8x" stands for eight zero bytes."""
+        """Append a slot for numbers of one width, for example "iI" or "7d". "8x" stands for eight bytes of zeros."""
         self.align(max(struct.calcsize("<" + code) for code in codes if code.isalpha()))
         self._slots.append((len(self.buffer), Slot(codes, field)))
         self.buffer += bytes(struct.calcsize("<" + codes))
         return self
 
     def put(self, codes: str, *values: float) -> "Template":
-        """Append constant numbers of one width."""
+        """Append constant numbers of one width, whose types are codes of `struct`."""
         self.align(struct.calcsize("<" + codes[-1]))
         self.buffer += struct.pack("<" + codes, *values)
         return self
@@ -57,7 +58,7 @@ class Template:
         return self
 
     def align(self, width: int) -> "Template":
-        """Pad to a multiple of `width` bytes."""
+        """Append zeros up to a multiple of `width` bytes."""
         self.buffer += bytes(-(len(self.buffer) + self._shift) % width)
         return self
 
@@ -72,19 +73,25 @@ class Template:
         return [*parts, bytes(self.buffer[end:])]
 
     def packer(self) -> Callable[..., bytes]:
-        """Return a function that packs a message from the fields of the slots, in their order."""
+        """Return a function that packs a message. Its arguments are the values of the fields, as in `field_names`."""
         return compile_packer(tuple(self.parts))
 
 
 @lru_cache(maxsize=256)
 def compile_packer(parts: "tuple[bytes | Slot, ...]") -> Callable[..., bytes]:
-    """Return a function that packs the fields into bytes. Its arguments are the fields in order of first appearance."""
+    """Return a function that packs the parts into bytes. Its arguments are the values of `field_names(parts)`.
+
+    The function is cached, because its compilation is slow.
+    """
     return _compile(parts, "pack", ())
 
 
 @lru_cache(maxsize=256)
 def compile_writer(parts: "tuple[bytes | Slot, ...]") -> Callable[..., None]:
-    """Return a function that packs the fields into a buffer. Its arguments are the buffer, an offset and the fields."""
+    """Return a function that packs the parts into a buffer.
+
+    Its arguments are the buffer, an offset in it, and the values of `field_names(parts)`.
+    """
     return _compile(parts, "pack_into", ("buffer", "offset"))
 
 
@@ -112,5 +119,8 @@ def _compile(parts: "tuple[bytes | Slot, ...]", method: str, leading: tuple[str,
 
 
 def field_names(parts: "Sequence[bytes | Slot]") -> list[str]:
-    """Return the names of the fields in order of first appearance."""
+    """Return the names of the fields in the order of their first slots, without asterisks.
+
+    Slots with the same name are one field: they get the same value.
+    """
     return list(dict.fromkeys(part.field.removeprefix("*") for part in parts if isinstance(part, Slot)))

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
-from simscen.record.mcap_writer import MESSAGE_HEADER_BYTES, Channel, McapWriter, MessageType, load_message_types
+from simscen.record.mcap_writer import MESSAGE_HEADER_BYTES, Channel, McapWriter
 from simscen.record.messages.template import Slot, Template, compile_writer, field_names
-from simscen.record.topics import CLOCK, Topic, qos
+from simscen.record.topics import CLOCK, MessageType, Topic, load_message_types, qos
 
 Write = Callable[[int, bytes], None]
 """Writes a serialized message with a time in nanoseconds."""
