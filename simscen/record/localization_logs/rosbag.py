@@ -13,12 +13,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.record import topics
 from simscen.record.foreign.options import parse_frame_pair
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
-from simscen.record.foreign.transforms import (
-    LidarMount,
-    LoggedMessage,
-    TransformMessages,
-    lidar_mount,
-)
+from simscen.record.foreign.transforms import LidarMount, TransformTree, lidar_mount
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
     LocalizationRows,
@@ -36,7 +31,35 @@ from simscen.record.messages.decode import (
 )
 
 INITIAL_POSE_TOPIC = "/initialpose"
-"""Topic on which RViz and robots send the initial pose to AMCL."""
+"""Topic on which RViz and other programs send the initial pose to AMCL."""
+
+
+LoggedMessage = tuple[int, int, Any]
+"""Time of logging in ns, index in the log, and the decoded message."""
+
+
+@dataclass
+class _TransformMessages:
+    """Transforms of a log, and the index in the log of each message by its time of logging."""
+
+    transforms: TransformTree = field(default_factory=TransformTree)
+    indices: dict[int, int] = field(default_factory=dict)
+
+    def add(self, logged: int, index: int, links: list[StampedPose], static: bool) -> None:
+        """Add the transforms of one message on /tf, or on /tf_static if `static`."""
+        self.transforms.add(logged, links, static)
+        self.indices[logged] = index
+
+    def between(self, outer: str, inner: str) -> list[LoggedMessage]:
+        """Return the poses of the frame `inner` in `outer` as messages. Raises UnusableLog if they are unknown."""
+        result = self.transforms.between(outer, inner)
+        if isinstance(result, str):
+            raise UnusableLog(result)
+        times, poses = result
+        return [
+            (logged, self.indices[logged], StampedPose(stamp, outer, tuple(pose), child=inner))
+            for logged, stamp, pose in zip(times.logged.tolist(), times.stamps.tolist(), poses.tolist(), strict=True)
+        ]
 
 
 @dataclass
@@ -48,15 +71,17 @@ class _Messages:
     truth: list[LoggedMessage] = field(default_factory=list)
     initial: list[LoggedMessage] = field(default_factory=list)
     static_transforms: dict[str, StampedPose] = field(default_factory=dict)
-    tf: TransformMessages = field(default_factory=TransformMessages)
+    tf: _TransformMessages = field(default_factory=_TransformMessages)
     topics: dict[str, str] = field(default_factory=dict)
 
 
 def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None) -> LocalizationRows:
-    """Read an MCAP file or a rosbag2 folder in the order of logging, with the times of the headers.
+    """Read an MCAP file or a rosbag2 folder. Raises UnusableLog if messages cannot be used.
 
-    `odometry` and `reference` are topics, or pairs of frames such as `odom:base_link` to read from /tf. Without
-    `reference`, the ground truth of simscen's logs is used. The mount of the lidar is read from /tf_static.
+    `scan` is a topic. `odometry` and `reference` are topics, or pairs of frames such as `odom:base_link`, whose poses
+    are read from /tf. Without `reference`, the reference poses are the ground truth in logs of simscen. The mount of
+    the lidar is read from /tf_static. Times are stamps; if all stamps of a topic are zero, times of logging are used
+    for all topics.
     """
     messages = _collect_messages(path, odometry, scan, reference or topics.TRUTH.name)
     if frames := parse_frame_pair(odometry):
@@ -119,7 +144,7 @@ def _time(logged: int, message: Any, use_log_time: bool) -> float:
 
 
 def _poses(topic: str, messages: Iterable[LoggedMessage], use_log_time: bool, notes: list[str]) -> Iterator[PoseRow]:
-    """Yield the valid poses, and note the number of invalid ones."""
+    """Yield the valid poses, and add a note with the number of invalid ones."""
     invalid = 0
     for logged, index, message in messages:
         if all_within(message.pose, MAX_COORDINATE_M):
