@@ -87,7 +87,7 @@ class ScenePublisher:
         return True
 
     def _find_zone(self, filter_: Filter, region: str) -> FilterZone | None:
-        """Return the zone that had this region at the start of the run, otherwise a new one; None if the region is unknown."""
+        """Return the zone that had this region at the start of the run, or a new one; None if it is unknown."""
         for zone in self._scenery.zones:
             if (zone.filter, zone.region, zone.robot) == (filter_, region, self._robot):
                 return zone
