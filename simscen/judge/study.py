@@ -10,7 +10,7 @@ from typing import Any
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.study import ParameterEffect, RateRow, Study
 from simscen.core.statistics import CONFIDENCE, holm, wilson_interval
-from simscen.judge.statistical_tests import anytime_limits, evaluate_claim, is_counted
+from simscen.judge.pass_rate_claims import anytime_limits, evaluate_claim, is_counted
 from simscen.model.acceptance import PassRate
 from simscen.spec.quantities import NUMBER_AND_UNIT, si_number
 

@@ -16,16 +16,10 @@ from simscen.core.records.session_events import (
 )
 from simscen.core.records.verdict import Status
 from simscen.core.statistics import bootstrap_mean_interval, sign_test
-from simscen.judge.evaluation import EXPECTED
 from simscen.judge.finding_text import sentence, violations
 from simscen.judge.metrics.catalog import METRICS
-from simscen.judge.statistical_tests import (
-    PASS_RATE,
-    PairedSample,
-    Significance,
-    signed_rank_test,
-    significant_changes,
-)
+from simscen.judge.outcome import EXPECTED
+from simscen.judge.significance import PASS_RATE, PairedSample, Significance, signed_rank_test, significant_changes
 
 COMPARED_METRICS = (
     *("time_to_goal", "path_length", "min_clearance", "mean_jerk", "time_not_moving", "replans", "recoveries"),

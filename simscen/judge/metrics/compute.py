@@ -24,6 +24,7 @@ from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed,
 from simscen.criteria.trace_signals.readers import evenly_sampled_speed
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.criteria.trace_signals.sparc_ldlj import MOVED_SPEED_M_S, ldlj, sparc
+from simscen.judge.evaluation import missing_evidence_reason, partial_evidence_reason
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.trajectory import PATH_METRICS, POSE_METRICS, Values, path_metrics, pose_metrics
 
@@ -92,11 +93,9 @@ def _or_reason(names: Sequence[str], compute: Callable[[], Values]) -> Values:
 
 
 def _missing_evidence(name: str, coverage: LogCoverage) -> str:
-    """Return which evidence of a metric the log lacks, in words; "" if it has all of it."""
+    """Return which evidence of a metric the log lacks for all or part of the run, in words; "" if it is complete."""
     required = METRICS[name].evidence
-    if missing := coverage.lacking(required):
-        return f"the log lacks {' and '.join(evidence.value for evidence in missing)}"
-    return "; ".join(dict.fromkeys(reason for evidence, reason in coverage.partial.items() if evidence in required))
+    return missing_evidence_reason(required, coverage) or partial_evidence_reason(required, coverage)
 
 
 def barn_score(success: bool, seconds: float, reference_length: float) -> float:
@@ -241,9 +240,8 @@ def add_plugin_metrics(
 def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -> float | str:
     """Return the value, or why there is none."""
     required = entry.measure.evidence
-    lacking = coverage.lacking(frozenset(Evidence) if required is None else required)
-    if lacking:
-        return f"the log lacks {' and '.join(one.value for one in lacking)}"
+    if reason := missing_evidence_reason(frozenset(Evidence) if required is None else required, coverage):
+        return reason
     try:
         found = entry.measure.measure(trace, case)
     except MissingEvidence as missing:

@@ -14,7 +14,8 @@ from simscen.core.clock import Stamp
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
 from simscen.core.messages.sensor_data import Scan
-from simscen.record.messages.template import HEADER, Template
+from simscen.peer.cdr import HEADER
+from simscen.record.messages.template import Template
 
 Link = tuple[str, str, Stamp, Pose3]
 """Frame, child frame, stamp, and pose of the child in the frame."""

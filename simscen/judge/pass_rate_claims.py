@@ -6,13 +6,10 @@ the stated error rates whatever the true rate is: a robot below `min` is accepte
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 from simscen.core.records.run_result import Outcome, RunResult
-from simscen.core.records.session_events import ScenarioChange
 from simscen.core.records.study import ClaimResult, ClaimStatus
-from simscen.core.statistics import holm, sign_test
 from simscen.model.acceptance import PassRate
 
 
@@ -139,69 +136,3 @@ def _is_compatible(rate: float, passed: int, runs: int, confidence: float) -> bo
     """Return whether (runs + 1) · P(passed | runs, rate) > 1 - confidence. 0 < rate < 1."""
     log_count = math.lgamma(runs + 2) - math.lgamma(passed + 1) - math.lgamma(runs - passed + 1)
     return log_count + passed * math.log(rate) + (runs - passed) * math.log1p(-rate) > math.log(1 - confidence)
-
-
-PASS_RATE = "pass rate"
-"""Name of the sample with 1 for a passed and 0 for a failed run."""
-
-
-@dataclass(frozen=True)
-class Significance:
-    """Conditions under which a change is significant.
-
-    alpha:       largest p-value, after Holm's correction for the number of tests
-    min_effect:  smallest change of a mean, relative to that of the baseline; smaller ones do not matter
-    """
-
-    alpha: float = 0.05
-    min_effect: float = 0.05
-
-
-@dataclass(frozen=True)
-class PairedSample:
-    """Values of the pass rate or of a metric in pairs of runs (baseline, other) of one scenario, or of all."""
-
-    scenario: str
-    what: str
-    unit: str
-    pairs: Sequence[tuple[float, float]]
-    higher_is_better: bool | None
-
-    def p_value(self) -> float:
-        """Return the p-value of McNemar's exact test for the pass rate, of the signed-rank test for a metric."""
-        if self.what == PASS_RATE:
-            return sign_test(self.pairs.count((0.0, 1.0)), self.pairs.count((1.0, 0.0)))
-        return signed_rank_test([two - one for one, two in self.pairs])
-
-
-def significant_changes(samples: Iterable[PairedSample], significance: Significance) -> tuple[ScenarioChange, ...]:
-    """Return the changes that are significant and large enough, with adjusted p-values.
-
-    If nothing has changed, any change is found with a probability of at most `alpha`. Samples without any difference
-    cannot be significant and do not count in the correction.
-    """
-    tested = [sample for sample in samples if any(one != two for one, two in sample.pairs)]
-    found = []
-    for sample, p in zip(tested, holm([sample.p_value() for sample in tested]), strict=True):
-        baseline, value = (sum(side) / len(sample.pairs) for side in zip(*sample.pairs, strict=True))
-        if p <= significance.alpha and abs(value - baseline) >= significance.min_effect * abs(baseline):
-            is_worse = None if sample.higher_is_better is None else (value < baseline) == sample.higher_is_better
-            found.append(
-                ScenarioChange(
-                    sample.scenario, sample.what, sample.unit, len(sample.pairs), baseline, value, p, is_worse
-                )
-            )
-    return tuple(found)
-
-
-def signed_rank_test(differences: Sequence[float]) -> float:
-    """Return the p-value of Wilcoxon's two-sided signed-rank test of paired differences, by scipy.
-
-    Pairs without a difference do not count; 1 if there is no difference at all. (Wilcoxon: Individual Comparisons by
-    Ranking Methods, 1945.)
-    """
-    if not any(differences):
-        return 1.0
-    from scipy.stats import wilcoxon  # the import takes half a second
-
-    return float(wilcoxon(differences).pvalue)
