@@ -1,4 +1,4 @@
-"""Evaluates all criteria of a run, each independently of the others."""
+"""Evaluation of the criteria of a run, each independently of the others."""
 
 import math
 from collections.abc import Sequence, Set
@@ -28,9 +28,10 @@ def judge(
 ) -> tuple[Verdict, ...]:
     """Return one verdict for each criterion, in order.
 
-    A criterion that raises an exception gets the status error; the others are not affected. A criterion whose evidence
-    is missing is inconclusive. Nothing passes on a truncated log, on an empty one, or with evidence that
-    covers only a part of the run, because the rest might have failed.
+    If a criterion raises an exception, its verdict is an error, and the others are not affected. The verdict is
+    inconclusive if the log lacks the evidence that the criterion needs. It is also inconclusive instead of a pass if
+    the log is truncated or empty, or if the evidence covers only a part of the run: the criterion might have failed in
+    the rest.
     """
     return tuple(
         Verdict(entry.kind, name, entry.severity, _findings(entry, trace, case, coverage))
@@ -39,7 +40,7 @@ def judge(
 
 
 def required_evidence(entry: AnyCriterion) -> frozenset[Evidence]:
-    """Return the evidence that a criterion needs; all evidence if it does not declare any."""
+    """Return the evidence that a criterion needs; all kinds of evidence if it does not declare any."""
     own = getattr(entry.chosen, "evidence", None)
     return frozenset(Evidence) if own is None else frozenset(own)
 
@@ -58,7 +59,8 @@ def partial_evidence_reason(required: Set[Evidence], coverage: LogCoverage) -> s
 def findings_defect(findings: object) -> str:
     """Return what is wrong with the findings that a criterion returned; "" if they are valid.
 
-    A plugin can return a margin that is not a number or contradicts the status, which must not become a verdict.
+    The criterion of a plugin could return no findings, or a margin that is not a number or contradicts the status. This
+    must not become a verdict.
     """
     if not isinstance(findings, Sequence) or not findings:
         return "it checked nothing"
@@ -88,12 +90,12 @@ def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCovera
 
 
 def _error(entry: AnyCriterion, what: str) -> Finding:
-    """Return the finding of a criterion that could not judge; a plugin is named with its package."""
+    """Return the finding of a criterion that could not judge. It names the package of a plugin."""
     return Finding(Status.ERROR, entry.kind, f"{what}{entry.added_by}", "a judgment")
 
 
 def _without_pass(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:
-    """Return the findings with each pass turned into inconclusive."""
+    """Return the findings with each pass turned into inconclusive, and with the reason after the measured value."""
     return tuple(
         replace(finding, status=Status.INCONCLUSIVE, measured=f"{finding.measured} {because}")
         if finding.status is Status.PASS

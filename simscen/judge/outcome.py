@@ -21,19 +21,19 @@ def outcome_of_verdicts(verdicts: Sequence[Verdict]) -> Outcome:
 
 
 EXPECTED = "expected"
-"""Name of the verdict on an expected failure."""
+"""Criterion name of the verdict that states whether an expected failure took place."""
 
 
 def apply_expectation(
     expected: ExpectedFailure | None, verdicts: Sequence[Verdict], outcome: Outcome, is_complete: bool
 ) -> tuple[Outcome, Verdict | None]:
-    """Return the outcome of a run that is `expected` to fail, and the verdict on this expectation.
+    """Return the outcome of a run that is `expected` to fail, and a verdict on this expectation.
 
-    Without an expectation, this is the `outcome` of the run and None.
+    `verdicts` and `outcome` are those of the run without the expectation. Without an expectation, or if the outcome is
+    an error or the log is not complete, return the `outcome` unchanged and None.
 
-    This is strict like pytest's `xfail(strict=True)`: an expected failure that passes is a failure, and so is any other
-    failed criterion. A run that could not be completed, or whose log is truncated, is never as expected. A missing
-    disturbance is only expected if its name is listed.
+    This is strict like pytest's `xfail(strict=True)`: the run fails if nothing fails, if a listed criterion passes, and
+    if a criterion that is not listed does not pass. A missing disturbance is only expected if its name is listed.
     """
     if expected is None or outcome is Outcome.ERROR or not is_complete:
         return outcome, None

@@ -1,8 +1,8 @@
-"""Statistical tests: of the claim that a robot passes at least a share of all runs, and of changes between paired runs.
+"""Statistical tests of a claim: that a robot passes at least the share `min` of all runs.
 
-The runs must be independent: each has its own seed, and its own random values if the scenario is varied. Each test has
-the stated error rates whatever the true rate is: a robot below `min` is accepted with a probability of at most
-1 - `confidence`.
+The runs must be independent: each has its own seed, and its own random values if the scenario is varied. Whatever the
+true pass rate is, each test keeps the stated error rate: if the rate is below `min`, the claim is held with a
+probability of at most 1 - `confidence`.
 """
 
 import math
@@ -14,10 +14,10 @@ from simscen.model.acceptance import PassRate
 
 
 def evaluate_claim(claim: PassRate, results: Sequence[RunResult]) -> ClaimResult:
-    """Return the result of the claim after these runs, in the order of their seeds.
+    """Return the result of a claim after these runs, which must be in the order of their seeds.
 
-    A sequential test is decided at the first run that decides it; later runs do not count. A crash or time-out of the
-    stack under test counts as a failure. Any other error blocks the claim.
+    A sequential test ends at the first run that decides it; later runs do not count. A crash or time-out of the stack
+    under test counts as a failed run. Any other error blocks the claim.
     """
     outcomes = [result.outcome is Outcome.PASSED for result in results if is_counted(result)]
     errors = len(results) - len(outcomes)
@@ -44,9 +44,10 @@ def is_counted(result: RunResult) -> bool:
 
 
 def decide(claim: PassRate, outcomes: Sequence[bool]) -> tuple[int, ClaimStatus]:
-    """Return the number of runs that decide the claim, and the decision; all runs if it is undecided.
+    """Return the number of runs after which the claim is decided, and the decision.
 
-    `outcomes` are True for passed runs, in order, at most `max_runs` of them.
+    If it is undecided, this is the number of all runs. `outcomes` are True for passed runs, in order; there are at most
+    `claim.max_runs`.
     """
     if claim.method == "fixed":
         runs = len(outcomes)
@@ -70,14 +71,14 @@ def _by_limits(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
 
 
 def _by_mixture(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
-    """Decide as soon as `min` is outside of the `anytime_limits`."""
+    """Return the decision of the method `anytime`: the claim is decided when `min` is outside the `anytime_limits`."""
     if _is_compatible(claim.min, passed, runs, claim.confidence):
         return ClaimStatus.UNDECIDED
     return ClaimStatus.HELD if passed > claim.min * runs else ClaimStatus.REFUTED
 
 
 def _by_likelihood_ratio(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
-    """Compare the likelihoods of `target` and `min`.
+    """Return the decision of the method `sprt`, which compares the likelihoods of the rates `target` and `min`.
 
     The limits 1 / alpha and beta are those of Wald's inequalities: they bound each error rate, while Wald's usual
     approximation (1 - beta) / alpha only bounds their sum. (Wald: Sequential Tests of Statistical Hypotheses, 1945.)
@@ -91,7 +92,7 @@ def _by_likelihood_ratio(claim: PassRate, passed: int, runs: int) -> ClaimStatus
 
 
 def confidence_limits(claim: PassRate, passed: int, runs: int) -> tuple[float, float] | None:
-    """Return the lower and the upper confidence limit of the pass rate; None for `sprt`."""
+    """Return the lower and the upper confidence limit of the pass rate by the method of the claim; None for `sprt`."""
     if claim.method == "sprt":
         return None
     limits = anytime_limits if claim.method == "anytime" else clopper_pearson_limits
@@ -99,7 +100,7 @@ def confidence_limits(claim: PassRate, passed: int, runs: int) -> tuple[float, f
 
 
 def clopper_pearson_limits(passed: int, runs: int, confidence: float) -> tuple[float, float]:
-    """Return the exact one-sided limits of a rate, each with the probability `confidence`.
+    """Return the exact lower and upper limit of a rate; each of them holds with the probability `confidence`.
 
     (Clopper and Pearson: The Use of Confidence or Fiducial Limits Illustrated in the Case of the Binomial, 1934.)
     """
@@ -111,10 +112,11 @@ def clopper_pearson_limits(passed: int, runs: int, confidence: float) -> tuple[f
 
 
 def anytime_limits(passed: int, runs: int, confidence: float) -> tuple[float, float]:
-    """Return limits of a rate that are valid after every run at the same time, with the probability `confidence`.
+    """Return a lower and an upper limit of a rate, computed after any run of a sequence of runs.
 
-    They contain the rates p with (runs + 1) · P(passed | runs, p) > 1 - confidence: the beta-binomial mixture with a
-    uniform prior. (Robbins: Statistical Methods Related to the Law of the Iterated Logarithm, 1970.)
+    With the probability `confidence`, the limits after all of these runs are valid at the same time. They contain the
+    rates p with (runs + 1) · P(passed | runs, p) > 1 - confidence: the beta-binomial mixture with a uniform prior.
+    (Robbins: Statistical Methods Related to the Law of the Iterated Logarithm, 1970.)
     """
     rate = passed / runs
     low = _boundary(passed, runs, confidence, inside=rate, outside=0.0) if passed else 0.0
@@ -123,7 +125,10 @@ def anytime_limits(passed: int, runs: int, confidence: float) -> tuple[float, fl
 
 
 def _boundary(passed: int, runs: int, confidence: float, inside: float, outside: float) -> float:
-    """Return the boundary between a compatible rate `inside` and an incompatible rate `outside`, by bisection."""
+    """Return the boundary between a compatible rate `inside` and an incompatible rate `outside`, by bisection.
+
+    Which rates are compatible is defined by `_is_compatible`.
+    """
     while (middle := (inside + outside) / 2) not in (inside, outside):
         if _is_compatible(middle, passed, runs, confidence):
             inside = middle

@@ -1,4 +1,4 @@
-"""Judges a run: verdicts, metrics, disturbances, and the outcome."""
+"""Judgment of the run of one robot: combines verdicts, disturbances, and metrics to the result of the run."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -32,10 +32,12 @@ def judge_run(
 ) -> RunResult:
     """Return the result of a run.
 
-    `path` is the scenario file, `lines` the line of each criterion in it; () if the criteria are not in this file.
-    `metrics` are those of plugins, computed in addition to those of every run. `expected` is set if the run is expected
-    to fail. A disturbance that did not happen gets a verdict of its own, before the others, because it often explains
-    them. A log passes only if its signals cover the whole run (`time_gaps`).
+    `path` is the scenario file. `lines` has the line of each criterion in this file; () if the criteria are elsewhere.
+    `coverage` states which evidence the log lacks. `metrics` are those of plugins, which are computed in addition to
+    those of every run. `expected` is set if the run is expected to fail.
+
+    A required disturbance that did not happen gets a failing verdict, before the others, because it often explains
+    them. No criterion passes if the signals that it needs have gaps (`time_gaps`).
     """
     coverage = coverage.with_gaps(time_gaps(trace))
     verdicts = explain_failures(judge(criteria, trace, case, coverage), trace, case)

@@ -1,4 +1,4 @@
-"""Combination of the results of several robots to the result of their run."""
+"""Combination of the results of the robots of a run to one result."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -15,17 +15,19 @@ from simscen.judge.outcome import apply_expectation
 
 T = TypeVar("T")
 SUCCESS = "success"
+"""Metric that the run has as well as each robot."""
 WORLD_EVENT_PREFIXES = ("object.", "pedestrian.", "event.", "mark", "run.")
-"""Prefixes of the kinds of world events, which the log of each robot contains."""
+"""Prefixes of the kinds of events of the world. The trace of each robot contains these events."""
 
 
 def combine_robots(
     results: Mapping[str, RunResult], traces: Mapping[str, Trace], expected: ExpectedFailure | None = None
 ) -> RunResult:
-    """Return the combined result of several robots, which passes if all robots pass.
+    """Return the result of a run from the results and traces of its robots, both by the name of the robot.
 
-    Verdicts, metrics and faults get the name `robot/name`. Events of the world have no robot and are listed once. The
-    metric `success` also exists for the run. `expected` is set if the run is expected to fail.
+    The run passes if all robots pass. Verdicts, metrics and faults of a robot get the name `robot/name`. Events of the
+    world, and verdicts on them, are listed once and without a robot. The metric `success` also exists for the run: the
+    smallest of the robots. `expected` is set if the run is expected to fail.
     """
     first = next(iter(results.values()))
     shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
@@ -61,7 +63,7 @@ def _verdicts_with_lines(result: RunResult) -> list[tuple[Verdict, int]]:
 
 
 def _with_robot_name(verdict: Verdict, robot: str) -> Verdict:
-    """Return the verdict with the name of the robot. For a missing fault, the finding contains the fault's name."""
+    """Return the verdict with the name of the robot in its ID, and in the text on a missing fault."""
     findings = verdict.findings
     if verdict.criterion == DISTURBANCE:
         findings = tuple(replace(finding, measured=f"{robot}/{finding.measured}") for finding in findings)
@@ -69,7 +71,7 @@ def _with_robot_name(verdict: Verdict, robot: str) -> Verdict:
 
 
 def _is_about_world(verdict: Verdict, events: set[str]) -> bool:
-    """Return whether the verdict is about a missing event of the scenario."""
+    """Return whether the verdict is on a missing event of the scenario. `events` are the names of all events."""
     return verdict.criterion == DISTURBANCE and not events.isdisjoint((verdict.id, verdict.id.rpartition("#")[0]))
 
 
@@ -83,7 +85,7 @@ def _with_robot_names(parts: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
 
 
 def _events(traces: Mapping[str, Trace]) -> dict[str, int]:
-    """Return the number of events by kind. Events of the world count once, and spawned robots do not count."""
+    """Return the number of events by kind. Events of the world count once, but not those of the other robots."""
     first = next(iter(traces.values()))
     counts = Counter(str(event.kind) for event in first.events if _is_world_event(event) and event.name not in traces)
     for trace in traces.values():

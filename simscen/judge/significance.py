@@ -1,4 +1,4 @@
-"""Significance of changes between paired runs of a baseline and another stack or session."""
+"""Tests of which changes between a baseline and another stack or session are significant, from paired runs."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -7,15 +7,16 @@ from simscen.core.records.session_events import ScenarioChange
 from simscen.core.statistics import holm, sign_test
 
 PASS_RATE = "pass rate"
-"""Name of the sample with 1 for a passed and 0 for a failed run."""
+"""`what` of a PairedSample whose values are 1 for a passed and 0 for a failed run."""
 
 
 @dataclass(frozen=True)
 class Significance:
     """Conditions under which a change is significant.
 
-    alpha:       largest p-value, after Holm's correction for the number of tests
-    min_effect:  smallest change of a mean, relative to that of the baseline; smaller ones do not matter
+    Attributes:
+        alpha: Largest p-value, after Holm's correction for the number of tests.
+        min_effect: Smallest change of the mean that matters, relative to the mean of the baseline.
     """
 
     alpha: float = 0.05
@@ -24,7 +25,11 @@ class Significance:
 
 @dataclass(frozen=True)
 class PairedSample:
-    """Values of the pass rate or of a metric in pairs of runs (baseline, other) of one scenario, or of all."""
+    """Values of one quantity in pairs of runs (baseline, other).
+
+    `what` is PASS_RATE or the name of a metric, and `scenario` a scenario or all of them. `higher_is_better` is None if
+    neither direction is better.
+    """
 
     scenario: str
     what: str
@@ -40,10 +45,10 @@ class PairedSample:
 
 
 def significant_changes(samples: Iterable[PairedSample], significance: Significance) -> tuple[ScenarioChange, ...]:
-    """Return the changes that are significant and large enough, with adjusted p-values.
+    """Return the changes that are significant and large enough, with p-values adjusted by Holm's correction.
 
-    If nothing has changed, any change is found with a probability of at most `alpha`. Samples without any difference
-    cannot be significant and do not count in the correction.
+    If nothing has changed, the probability of finding any change is at most `alpha`. Samples without any difference
+    cannot be significant, and do not count in the correction.
     """
     tested = [sample for sample in samples if any(one != two for one, two in sample.pairs)]
     found = []
@@ -60,10 +65,10 @@ def significant_changes(samples: Iterable[PairedSample], significance: Significa
 
 
 def signed_rank_test(differences: Sequence[float]) -> float:
-    """Return the p-value of Wilcoxon's two-sided signed-rank test of paired differences, by scipy.
+    """Return the p-value of Wilcoxon's two-sided signed-rank test of paired differences.
 
-    Pairs without a difference do not count; 1 if there is no difference at all. (Wilcoxon: Individual Comparisons by
-    Ranking Methods, 1945.)
+    Pairs without a difference do not count. The p-value is 1 if there is no difference at all.
+    (Wilcoxon: Individual Comparisons by Ranking Methods, 1945.)
     """
     if not any(differences):
         return 1.0

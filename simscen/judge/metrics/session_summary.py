@@ -1,4 +1,4 @@
-"""Statistics of a session as in publications of navigation benchmarks, each with its number of runs."""
+"""Statistics of all runs of a session, as in publications of navigation benchmarks: success rate, SPL, collisions."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -9,12 +9,21 @@ from simscen.core.statistics import wilson_interval
 
 @dataclass(frozen=True)
 class SessionSummary:
-    """Statistics of a session.
+    """Statistics of a session. A value is None if there are no runs to compute it from.
 
-    `success_rate` refers to all `runs`, including those with errors, with its 95 % Wilson interval. `spl` and
-    `soft_spl` are means over the `spl_runs` with a shortest path. Collisions are counted over the `kilometers` driven
-    and `hours` simulated in the `measured_runs`; a rate is None if nothing was driven. Each robot of a run counts like
-    a run, except in `runs` and successes: a run succeeds if all robots succeed.
+    Each robot of a run counts like a run, except in `runs`, `measured_runs`, and successes.
+
+    Attributes:
+        runs: Number of runs that were not skipped.
+        success_rate: Share of the `runs`, including those with errors, in which all robots succeeded.
+        success_interval: 95 % Wilson interval of the success rate.
+        spl: Mean of the metric `spl` over the `spl_runs`.
+        soft_spl: Mean of the metric `soft_spl`.
+        spl_runs: Number of runs that have the metric `spl`.
+        collisions: Number of collisions in the `measured_runs`.
+        kilometers: Distance driven in the `measured_runs`.
+        hours: Simulated time of the robots in the `measured_runs`.
+        measured_runs: Number of runs that have metrics.
     """
 
     runs: int
@@ -30,27 +39,27 @@ class SessionSummary:
 
     @property
     def collisions_per_km(self) -> float | None:
-        """Collisions per km, or None if no robot drove."""
+        """Collisions per kilometer; None if no robot drove."""
         return self.collisions / self.kilometers if self.kilometers > 0 else None
 
     @property
     def collisions_per_hour(self) -> float | None:
-        """Collisions per hour, or None without simulated time."""
+        """Collisions per hour; None without simulated time."""
         return self.collisions / self.hours if self.hours > 0 else None
 
 
 class SessionFigures:
-    """Collects the numbers of each run that the statistics of a session need."""
+    """Collector of the numbers of each run that the statistics of a session need."""
 
     def __init__(self) -> None:
         self._runs: list[tuple[tuple[str, str, int, str], RunFigures | None]] = []
 
     def add(self, result: RunResult) -> None:
-        """Add a run. Skipped runs do not count."""
+        """Add a run. A skipped run does not count."""
         if result.outcome is not Outcome.SKIPPED:
             key = result.key
             order = key.scenario, key.variation, key.seed, key.stack_name
-            self._runs.append((order, RunFigures.of(result) if result.metrics else None))
+            self._runs.append((order, RunFigures.from_result(result) if result.metrics else None))
 
     def summary(self) -> SessionSummary:
         """Return the statistics. The order in which runs were added does not matter."""
@@ -74,7 +83,10 @@ class SessionFigures:
 
 
 class RunFigures(NamedTuple):
-    """Numbers of a run for the statistics; tuples have one value for each robot."""
+    """Numbers of a run for the statistics of a session.
+
+    The tuples have one value for each robot that has the metric. `robot_seconds` is the simulated time of all robots.
+    """
 
     success: bool
     spl: tuple[float, ...]
@@ -84,8 +96,8 @@ class RunFigures(NamedTuple):
     robot_seconds: float
 
     @classmethod
-    def of(cls, run: RunResult) -> "RunFigures":
-        """Return the figures of a run."""
+    def from_result(cls, run: RunResult) -> "RunFigures":
+        """Return the numbers from the metrics of a run."""
         robots = max(1, sum(_is_metric(metric, "path_length") for metric in run.metrics))
         return cls(
             run.metrics.get("success") == 1.0,
@@ -98,7 +110,7 @@ class RunFigures(NamedTuple):
 
 
 def session_summary_data(figures: SessionSummary) -> dict[str, float | list[float] | None]:
-    """Return the statistics as in results.json."""
+    """Return the statistics as JSON data for results.json."""
     interval = figures.success_interval
     return {
         "runs": figures.runs,
@@ -137,11 +149,12 @@ def _runs(number: int) -> str:
 
 
 def _known(run: RunResult, name: str) -> tuple[float, ...]:
-    """Return the values of a metric, including those of each of several robots (`a/collisions`)."""
+    """Return the defined values of a metric, of the only robot or of each robot (`a/collisions`)."""
     return tuple(value for metric, value in run.metrics.items() if _is_metric(metric, name) and value is not None)
 
 
 def _is_metric(metric: str, name: str) -> bool:
+    """Return whether `metric` is the metric `name` of any robot."""
     return metric.rpartition("/")[2] == name
 
 
