@@ -67,6 +67,7 @@ def _with_entries(disturbances: Sequence[Disturbance]) -> Iterator[tuple[int, Di
 
 
 def _finding(trace: Trace, one: DisturbanceOutcome) -> Finding:
+    """Return the finding on a missing disturbance: a failure, or inconclusive if the log is truncated."""
     text = f"{one.disturbance.name} ({one.disturbance.trigger})"
     if not has_ended(trace):
         because = f"{text}, until the log stops at t = {trace.seconds(trace.end):.2f} s"
@@ -149,8 +150,10 @@ def _fault_outcome(trace: Trace, disturbance: Disturbance, entry: int) -> Distur
 
 
 def _never_began(trace: Trace) -> str:
+    """Return the text for a disturbance whose trigger never fired."""
     return f"it never began; the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
 
 
 def _too_late(trace: Trace) -> str:
+    """Return the text for a disturbance whose trigger fired only at the end of the run."""
     return f"it began only when the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"

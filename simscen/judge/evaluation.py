@@ -68,6 +68,7 @@ def findings_defect(findings: object) -> str:
 
 
 def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCoverage) -> tuple[Finding, ...]:
+    """Return the findings of one criterion, or one finding with the reason why it cannot be judged."""
     criterion, required = entry.chosen, required_evidence(entry)
     assert isinstance(criterion, Criterion)
     try:
@@ -111,6 +112,7 @@ def _is_empty(trace: Trace) -> bool:
 
 
 def _defect(finding: object) -> str:
+    """Return what is wrong with one finding; "" if it is valid."""
     if not isinstance(finding, Finding) or finding.status not in _STATUSES:
         return f"it returned an invalid finding of type {type(finding).__name__}"
     if not all(isinstance(text, str) for text in (finding.what, finding.measured, finding.limit, finding.unit)):

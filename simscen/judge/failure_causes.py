@@ -111,7 +111,7 @@ def _events(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
 OBJECT_MOVING_SPEED_M_S = 0.0625
 """Speed in m/s above which an object is said to move."""
 OBJECT_SPEED_WINDOW_S = 0.25
-"""Time in s over which the speed is measured."""
+"""Time in s before a collision over which the speed of an object is averaged."""
 
 
 def diagnose_collision(trace: Trace, tick: int) -> tuple[list[str], set[str]]:
@@ -126,6 +126,7 @@ def diagnose_collision(trace: Trace, tick: int) -> tuple[list[str], set[str]]:
 
 
 def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
+    """Return a sentence on how an object came into contact with the robot; "" if it simply stood there."""
     ago = f"{trace.seconds(hit.tick - touched.since):.2f} s before"
     parts = []
     if touched.event:
@@ -147,6 +148,7 @@ def _initial_distance(trace: Trace, spawned: MovableObject) -> float:
 
 
 def _speed(trace: Trace, name: str, tick: int) -> float:
+    """Return the speed of an object in m/s until a tick."""
     samples = trace.objects.get(name)
     if samples is None:
         return 0.0
@@ -192,6 +194,7 @@ def diagnose_localization(trace: Trace, tick: int, error_is_reported: bool) -> t
 
 
 def _position_error(trace: Trace, tick: int) -> float:
+    """Return the distance in m between the estimated and the true position; nan if one of them is unknown."""
     if not len(trace.belief) or not len(trace.truth):
         return math.nan
     bx, by = trace.belief.at(np.array([tick]))[0, :2].tolist()

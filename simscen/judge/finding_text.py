@@ -46,7 +46,7 @@ def subject(verdict: Verdict, finding: Finding) -> str:
 
 
 def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
-    """Return the line for a finding: "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.8 s, (2.10, 3.41)"."""
+    """Return the line for a finding, e.g. "stuck: 8.00 s > 5.00 s, at t = 10.84 s, (2.10, 3.41)"."""
     parts = (f"{subject(verdict, finding)}: {comparison(finding)}", time_and_place(finding, tick_rate))
     return ", ".join(part for part in parts if part)
 
@@ -59,7 +59,7 @@ def disturbance_times(one: DisturbanceOutcome, tick_rate: int) -> str:
 
 
 def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
-    """Return the line for a disturbance: "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
+    """Return the line for a disturbance, e.g. "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
     parts = (
         disturbance_times(one, tick_rate) if one.fired else "",
         one.effect,

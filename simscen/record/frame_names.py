@@ -41,5 +41,5 @@ def object_frame(name: str) -> str:
 
 
 def object_in_frame(frame: str) -> str | None:
-    """Return the name of the moving object that a frame belongs to, or None for other frames."""
+    """Return the name of the moving object whose frame this is; None for other frames."""
     return frame[len(_OBJECT_PREFIX) :] if frame.startswith(_OBJECT_PREFIX) else None

@@ -20,9 +20,10 @@ from simscen.record.sensor_messages import SensorMessages
 from simscen.record.trace_builder import TraceRows
 
 _MERGED = "; a log that was merged from several cannot be judged"
+"""End of the message about a record that exists twice."""
 
 Handler = Callable[[int, bytes], None]
-"""Processes a serialized message that was logged at a tick."""
+"""Function that processes a message. Its arguments are the tick of logging, and the serialized message."""
 
 
 class NotSimscenLog(ValueError):
@@ -104,6 +105,7 @@ class LogContents:
         )
 
     def _joint_header(self, robots: dict[str, LogHeader]) -> LogHeader:
+        """Return the header of a log of several robots, from the headers of the robots."""
         first = next(iter(robots.values()))
         text = str(self._files.get(log_header.SCENARIO, b""), "utf-8")
         headers = {name: replace(header, scenario=text) for name, header in robots.items()}

@@ -23,7 +23,7 @@ STACK_RECORD = "simscen.stack"
 _FACT_PREFIX = "fact."
 STACK_FACT, STACK_NAME_FACT, VARIATION_FACT = "stack", "variation", "varied"
 """Keys of `LogHeader.facts`: the value of --stack that replaced the scenario's stack, the name of the stack if several
-are compared, and the variation of the scenario. The names are historical."""
+are compared, and the variation of the scenario. The keys differ from these terms because older logs use them."""
 ROBOTS, RESOLUTION, ORIGIN = "robots", "map.resolution", "map.origin"
 """Keys of the metadata record "simscen": the names of several robots, and the resolution and origin of a map."""
 END, COUNT_PREFIX = "simscen.end", "messages:"

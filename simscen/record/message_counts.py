@@ -11,6 +11,7 @@ NO_COUNTS = "the log has no message counts: an older simscen wrote it, or its en
 _EVENTS = frozenset(
     {Evidence.CONTACTS, Evidence.NAVIGATION, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES}
 ) | {Evidence.DISTURBANCES, Evidence.OBJECTS}
+"""Evidence that is in the events."""
 _EVIDENCE: dict[str, frozenset[Evidence]] = {
     topics.TRUTH.name: frozenset({Evidence.TRUTH, Evidence.VELOCITY}),
     topics.CLEARANCE.name: frozenset({Evidence.CLEARANCE}),

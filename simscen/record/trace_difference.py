@@ -15,6 +15,7 @@ _COLUMNS = {
     "odometry": _POSE,
     "command": ("vx", "vy", "wz"),
 }
+"""Names of the columns of each signal; other signals are poses."""
 
 Difference = tuple[int, str]
 """Tick and description of a difference."""
@@ -36,6 +37,7 @@ def first_difference(first: Trace, second: Trace) -> str | None:
 
 
 def _differences(first: Trace, second: Trace) -> Iterator[Difference]:
+    """Yield the first difference of each signal, all differences of plans and events, and that of the end."""
     for name in ("truth", "velocity", "clearance", "odometry"):
         yield from _in_samples(name, getattr(first, name), getattr(second, name))
     empty = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
@@ -90,7 +92,7 @@ POSE_TOLERANCE_M_RAD = 1e-5
 """Tolerance for true poses in m and rad, far above the differences between processors with different arithmetic."""
 
 
-def first_disagreement(first: Trace, second: Trace) -> str | None:
+def first_pose_difference(first: Trace, second: Trace) -> str | None:
     """Return a description of the first difference of the true poses above POSE_TOLERANCE_M_RAD; None without one.
 
     This is for runs on different processors, whose traces need not be equal to the bit.

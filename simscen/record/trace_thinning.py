@@ -96,7 +96,7 @@ class Thinning:
 
 
 class Throttle:
-    """Limits messages to `rate` messages per second of simulated time."""
+    """Limiter of a topic to `rate` messages per second of simulated time."""
 
     def __init__(self, ticks_per_second: int, rate: int) -> None:
         self._period = max(1, ticks_per_second // rate)

@@ -26,7 +26,7 @@ _GOALS = frozenset({Evidence.NAVIGATION})
 _SUCCESS = POSITION | _GOALS | {Evidence.CONTACTS}
 _BELIEF = POSITION | {Evidence.BELIEF}
 _PEOPLE = POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT}
-
+"""Evidence that several metrics need."""
 
 _ERRORS = {
     "rmse": "root mean square",

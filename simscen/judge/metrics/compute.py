@@ -48,11 +48,12 @@ _MOTION = ("max_speed", "time_not_moving", "mean_jerk", "max_jerk", *_SMOOTHNESS
 _CLEARANCE = ("min_clearance", "mean_clearance")
 _PEOPLE = ("min_person_distance", *(f"intrusion_{zone}" for zone in ZONES))
 _EVENTS = ("collisions", "contact_time", "replans", "recoveries")
+"""Names of metrics that are computed together."""
 
 
 @dataclass(frozen=True)
 class MetricValues:
-    """Metrics by name in SI units. Undefined metrics are None, with the reason in `undefined`."""
+    """Values of metrics by name, in SI units. An undefined metric is None, and `undefined` has the reason by name."""
 
     values: Mapping[str, float | None]
     undefined: Mapping[str, str]

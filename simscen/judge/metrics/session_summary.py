@@ -109,37 +109,37 @@ class RunFigures(NamedTuple):
         )
 
 
-def session_summary_data(figures: SessionSummary) -> dict[str, float | list[float] | None]:
+def session_summary_data(summary: SessionSummary) -> dict[str, float | list[float] | None]:
     """Return the statistics as JSON data for results.json."""
-    interval = figures.success_interval
+    interval = summary.success_interval
     return {
-        "runs": figures.runs,
-        "success_rate": figures.success_rate,
+        "runs": summary.runs,
+        "success_rate": summary.success_rate,
         "success_interval": None if interval is None else list(interval),
-        "spl": figures.spl,
-        "soft_spl": figures.soft_spl,
-        "spl_runs": figures.spl_runs,
-        "collisions": figures.collisions,
-        "collisions_per_km": figures.collisions_per_km,
-        "collisions_per_hour": figures.collisions_per_hour,
-        "kilometres": figures.kilometers,
-        "hours": figures.hours,
-        "measured_runs": figures.measured_runs,
+        "spl": summary.spl,
+        "soft_spl": summary.soft_spl,
+        "spl_runs": summary.spl_runs,
+        "collisions": summary.collisions,
+        "collisions_per_km": summary.collisions_per_km,
+        "collisions_per_hour": summary.collisions_per_hour,
+        "kilometres": summary.kilometers,
+        "hours": summary.hours,
+        "measured_runs": summary.measured_runs,
     }
 
 
-def session_summary_line(figures: SessionSummary) -> str:
+def session_summary_line(summary: SessionSummary) -> str:
     """Return one line: "success 93% of 14 runs (69% … 99%) · SPL 0.81 of 12 runs · 0.8 collisions/km, 1.9/h in …"."""
     parts = []
-    if figures.success_interval is not None:
-        assert figures.success_rate is not None
-        low, high = figures.success_interval
-        parts.append(f"success {figures.success_rate:.0%} of {_runs(figures.runs)} ({low:.0%} … {high:.0%})")
-    if figures.spl is not None:
-        parts.append(f"SPL {figures.spl:.2f} of {_runs(figures.spl_runs)}")
-    per_km, per_hour = figures.collisions_per_km, figures.collisions_per_hour
+    if summary.success_interval is not None:
+        assert summary.success_rate is not None
+        low, high = summary.success_interval
+        parts.append(f"success {summary.success_rate:.0%} of {_runs(summary.runs)} ({low:.0%} … {high:.0%})")
+    if summary.spl is not None:
+        parts.append(f"SPL {summary.spl:.2f} of {_runs(summary.spl_runs)}")
+    per_km, per_hour = summary.collisions_per_km, summary.collisions_per_hour
     if per_km is not None and per_hour is not None:
-        total = f"{figures.kilometers:.2f} km, {figures.hours:.2f} h of {_runs(figures.measured_runs)}"
+        total = f"{summary.kilometers:.2f} km, {summary.hours:.2f} h of {_runs(summary.measured_runs)}"
         parts.append(f"{per_km:.1f} collisions/km, {per_hour:.1f}/h in {total}")
     return " · ".join(parts)
 

@@ -127,7 +127,10 @@ def _statistics(name: str, errors: Array) -> Values:
 
 
 def _relative_errors(trace: Trace) -> Values:
-    """Return (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) of truth Q and belief P for pairs i, j RPE_DELTA_M of driving apart."""
+    """Return the RPE metrics, from (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) with truth Q and belief P.
+
+    The samples i and j are RPE_DELTA_M of driving apart.
+    """
     believed, true = trace.belief.values, _truth_at_beliefs(trace)
     i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))
     if not len(i):
@@ -145,7 +148,10 @@ def _relative_errors(trace: Trace) -> Values:
 
 
 def _pairs(steps: Array) -> tuple[list[int], list[int]]:
-    """Return consecutive samples between which the steps add up to RPE_DELTA_M (filter_pairs_by_path of evo)."""
+    """Return the first and the second index of pairs of samples between which the steps add up to RPE_DELTA_M.
+
+    `steps` are the distances in m between consecutive samples. evo calls this filter_pairs_by_path.
+    """
     ids, length = [0], 0.0
     for k, step in enumerate(steps.tolist(), start=1):
         length += step
@@ -185,3 +191,4 @@ POSE_METRICS = (
     "ape_trans_final",
     "nees",
 )
+"""Metrics that `pose_metrics` returns."""
