@@ -56,8 +56,8 @@ def topic_roles(options: ForeignLogOptions) -> dict[str, list[str]]:
 def decode_messages(raw: Iterable[RawMessage], roles: Mapping[str, Sequence[str]]) -> DecodedMessages:
     """Decode the messages of all topics that have a role.
 
-    Raises UnusableLog for a message that does not match its type. A wrong type or encoding is only a problem of the
-    role.
+    A topic with another message type or encoding than its role requires is recorded in `problems`. Raises UnusableLog
+    for a message that does not match its type.
     """
     decoded = DecodedMessages()
     for message in raw:

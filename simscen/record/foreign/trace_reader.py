@@ -96,6 +96,7 @@ _ALWAYS_MISSING: dict[Evidence, str] = {
 """Evidence that the messages of a real log never contain, with the reason."""
 
 _EVIDENCE_OF_ROLE = {"cmd_vel": Evidence.COMMANDS, "scan": Evidence.SCANS, "plan": Evidence.PLANS}
+"""Evidence by the role of the topic that contains it."""
 
 
 class ForeignTraceReader:
@@ -149,6 +150,7 @@ class ForeignTraceReader:
         return None
 
     def _reason_missing(self, role: str, topic: str) -> str:
+        """Return why there are no messages with a role, and other topics that might have it."""
         if role in self._decoded.problems:
             return self._decoded.problems[role]
         if topic in self._topics:
@@ -162,7 +164,7 @@ class ForeignTraceReader:
     def _timebase(self, *tracks: Track | None) -> Timebase:
         """Return the timebase of all decoded messages.
 
-        Its anchor is the first with stamps of: the `tracks` in order, the odometry, and the scans.
+        Its anchor is the first topic with stamps among the `tracks`, the odometry, and the scans.
         """
         logged = [
             np.array([time for time, _ in messages], dtype=np.int64)

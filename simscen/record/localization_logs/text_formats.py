@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +33,7 @@ def read_csv_rows(path: Path) -> LocalizationRows:
             try:
                 values = [float(cell) for cell in cells[1:] if cell]
                 if cells[0] == "mount":
-                    mount = _checked_pose(values, 3)
+                    mount = _checked_pose(values)
                 else:
                     _add_row(rows, cells[0], number, values, mount)
             except ValueError as error:
@@ -51,12 +51,13 @@ def _numbered_rows(lines: Iterable[str], hint: str) -> Iterator[tuple[int, list[
 
 
 def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float], mount: Pose2) -> None:
+    """Add a row of the CSV file to `rows`. `order` is its number, and `mount` the last pose of the lidar."""
     match kind:
         case "odom" | "truth":
             time, pose = (values or [math.nan])[0], values[1:]
             target = rows.odometry if kind == "odom" else rows.truth
             _check_time(time)
-            target.append(PoseRow(time, order, _checked_pose(pose, 3)))
+            target.append(PoseRow(time, order, _checked_pose(pose)))
         case "scan":
             if len(values) < 6 or not all(math.isfinite(value) for value in values[:5]):
                 raise ValueError("a scan needs TIME, ANGLE_MIN, ANGLE_INCREMENT, RANGE_MIN, RANGE_MAX and ranges")
@@ -72,9 +73,10 @@ def _check_time(time: float) -> None:
         raise ValueError(f"{time} is not a valid time")
 
 
-def _checked_pose(values: list[float], count: int) -> Pose2:
-    if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise ValueError(f"expected {count} numbers, got {values}")
+def _checked_pose(values: list[float]) -> Pose2:
+    """Return the pose x, y, yaw. Raises ValueError unless these are three valid numbers."""
+    if len(values) != 3 or not all(math.isfinite(value) for value in values):
+        raise ValueError(f"expected 3 numbers, got {values}")
     if not all_within(values, MAX_COORDINATE_M):
         raise ValueError(f"invalid coordinates {values}")
     return Pose2(*values)
@@ -150,6 +152,7 @@ def _pose(words: list[str]) -> Pose2:
 
 
 def _relative_pose(base: Pose2, other: Pose2) -> Pose2:
+    """Return the pose `other` in the frame of `base`. Pose2.between rounds differently."""
     dx, dy, c, s = other.x - base.x, other.y - base.y, math.cos(base.yaw), math.sin(base.yaw)
     return Pose2(c * dx + s * dy, c * dy - s * dx, math.remainder(other.yaw - base.yaw, 2 * math.pi))
 
@@ -166,9 +169,13 @@ def _parse_finite(word: str) -> float:
     return value
 
 
-_LINE_PARSERS = {
+_LINE_PARSERS: dict[str, Callable[[LocalizationRows, int, list[str]], None]] = {
     "ODOM": _parse_odom,
     "FLASER": _parse_flaser,
     "ROBOTLASER1": _parse_robotlaser,
     "TRUEPOS": _parse_truepos,
 }
+"""Functions that add a line of a CARMEN log to the rows, by the first word of the line.
+
+Their arguments are the rows, the number of the line, and its words.
+"""
