@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import messages, wire
 from .goals import Goal, Goals
-from .wire import Connection, Disconnected, Refused
+from .wire import Connection, Refused
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -60,7 +60,7 @@ class Step:
 
     @property
     def command_due(self) -> bool:
-        """Whether the answer must contain a command. If `drive` is not called, the previous command is repeated."""
+        """True if the answer must contain a command. If `drive` is not called, the previous command is repeated."""
         return bool(self._header.flags & wire.COMMAND_DUE)
 
     def get(self, topic: str) -> Any:
@@ -97,6 +97,9 @@ class Peer:
     for each command, with the messages since the last step. `modes` are the Nav2 actions that the stack supports: a
     stack with navigate_through_poses passes goals with `via` without stopping. `connection` is by default the socket
     that simscen passes to the processes that it starts.
+
+    `hello` and `task` are the contents of the frames HELLO and GOAL. `goals` is the queue of goals, and `command` the
+    last velocity vx, vy, wz. `accepted_topics` has the numbers of the topics that simscen accepts, by name.
 
     Raises wire.Malformed if a frame is invalid, Refused if simscen reports an error of this stack, and Disconnected if
     simscen closes the connection.
@@ -197,6 +200,3 @@ class Peer:
         if received_kind != kind:
             raise wire.Malformed(f"a frame of kind {received_kind} instead of {wire.KIND_NAMES[kind]}")
         return wire.from_json(body)
-
-
-__all__ = ["Connection", "Disconnected", "Goal", "Goals", "Message", "Peer", "Refused", "Step"]
