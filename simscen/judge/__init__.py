@@ -1,1 +1,1 @@
-"""Judges a run by its log: evaluates criteria, computes metrics, and builds the result. Needs no simulator."""
+"""Judgment of a run by its trace: verdicts of criteria, metrics, likely causes, and the result. Needs no simulator."""

@@ -1,4 +1,4 @@
-"""Verdicts on events and faults that did not take effect: a run does not pass without its disturbances.
+"""Outcomes of disturbances, and failing verdicts on required disturbances that had no effect.
 
 A trigger that fires is not enough. An action can find no object to act on, a fault can end before its sensor sends a
 message, and a disturbance in the last step of a run disturbs nothing.
@@ -16,10 +16,11 @@ from simscen.criteria.timeline import end_reason, has_ended
 from simscen.judge.finding_text import DISTURBANCE
 
 FINDING_NAME = "disturbance did not happen"
+"""`what` of the finding on a missing disturbance."""
 
 
 def disturbance_outcomes(trace: Trace, case: Case) -> tuple[DisturbanceOutcome, ...]:
-    """Return the outcome of each disturbance of the scenario in order: events, then faults."""
+    """Return the outcome of each disturbance of the scenario, in the order of `case.disturbances`."""
     return tuple(
         _event_outcome(trace, case, disturbance, entry)
         if disturbance.kind == "event"
@@ -33,8 +34,9 @@ def missing_disturbances(
 ) -> tuple[tuple[Verdict, int], ...]:
     """Return a verdict for each required disturbance that did not happen, with its line in the scenario.
 
-    It is inconclusive if the log is truncated, because the disturbance might have happened later. Of a sequence, only
-    the first missing step gets a verdict. A name that is already used, also by `others`, gets a number.
+    The verdict is inconclusive if the log is truncated, because the disturbance might have happened later. Of a
+    sequence, only the first missing step gets a verdict. The ID of the verdict is the name of the disturbance, with a
+    number if another verdict, also one of `others`, has this name.
     """
     missing = [one for one in outcomes if one.missing and not _is_reported_earlier(one, outcomes)]
     seen = Counter(verdict.id for verdict in others)
@@ -48,7 +50,7 @@ def missing_disturbances(
 
 
 def _is_reported_earlier(one: DisturbanceOutcome, outcomes: Sequence[DisturbanceOutcome]) -> bool:
-    """Return whether the step waited for an earlier step of its sequence that already has a verdict."""
+    """Return whether a step could not happen because an earlier step, which has the verdict, did not happen."""
     after = one.disturbance.after
     if after is None or one.fired:
         return False
@@ -57,7 +59,7 @@ def _is_reported_earlier(one: DisturbanceOutcome, outcomes: Sequence[Disturbance
 
 
 def _with_entries(disturbances: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
-    """Yield each disturbance with its number among those of its kind: the `entry` of its events in the log."""
+    """Yield each disturbance with its number among those of its kind, which is the `entry` of its events in the log."""
     counts = {"event": 0, "fault": 0}
     for one in disturbances:
         yield counts[one.kind], one
@@ -65,6 +67,7 @@ def _with_entries(disturbances: Sequence[Disturbance]) -> Iterator[tuple[int, Di
 
 
 def _finding(trace: Trace, one: DisturbanceOutcome) -> Finding:
+    """Return the finding on a missing disturbance: a failure, or inconclusive if the log is truncated."""
     text = f"{one.disturbance.name} ({one.disturbance.trigger})"
     if not has_ended(trace):
         because = f"{text}, until the log stops at t = {trace.seconds(trace.end):.2f} s"
@@ -77,7 +80,7 @@ def _events_of_entry(trace: Trace, kind: EventKind, entry: int) -> list[Event]:
 
 
 def _event_outcome(trace: Trace, case: Case, disturbance: Disturbance, entry: int) -> DisturbanceOutcome:
-    """Return the outcome of an event. Each action must take effect once, and the run must continue after that."""
+    """Return the outcome of an event. It happened if each of its actions took effect before the end of the run."""
     started = _events_of_entry(trace, EventKind.EVENT_STARTED, entry)
     fired = tuple(event.tick for event in started)
     ended = _events_of_entry(trace, EventKind.EVENT_ENDED, entry)
@@ -100,7 +103,10 @@ def _event_outcome(trace: Trace, case: Case, disturbance: Disturbance, entry: in
 
 
 def _sequence_state(trace: Trace, case: Case, disturbance: Disturbance) -> str:
-    """Return since when a missing step of a sequence was due, or which earlier step was missing."""
+    """Return since when a missing step of a sequence was due, or which earlier step was missing, as text.
+
+    Returns "" if the event is not a later step of a sequence.
+    """
     if disturbance.after is None:
         return ""
     events = [one for one in case.disturbances if one.kind == "event"]
@@ -114,13 +120,14 @@ def _sequence_state(trace: Trace, case: Case, disturbance: Disturbance) -> str:
 
 
 def _effects(ended: Event) -> list[tuple[bool, str]]:
-    """Return, for each action of an event, whether it took effect, and a description."""
+    """Return, for each action of an event, whether it took effect, and a description of the effect or the reason."""
     effects = ended.data.get("effects")
     assert isinstance(effects, list)
     return [(bool(one["happened"]), str(one["what"])) for one in effects if isinstance(one, dict)]
 
 
 def _fault_outcome(trace: Trace, disturbance: Disturbance, entry: int) -> DisturbanceOutcome:
+    """Return the outcome of a fault. It happened if it changed a message or command before the end of the run."""
     started = _events_of_entry(trace, EventKind.FAULT_STARTED, entry)
     fired = tuple(event.tick for event in started)
     if not started:
@@ -143,8 +150,10 @@ def _fault_outcome(trace: Trace, disturbance: Disturbance, entry: int) -> Distur
 
 
 def _never_began(trace: Trace) -> str:
+    """Return the text for a disturbance whose trigger never fired."""
     return f"it never began; the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
 
 
 def _too_late(trace: Trace) -> str:
+    """Return the text for a disturbance whose trigger fired only at the end of the run."""
     return f"it began only when the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"

@@ -1,27 +1,24 @@
-"""Evaluates all criteria of a run, each independently of the others."""
+"""Evaluation of the criteria of a run, each independently of the others."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 from simscen.core.records.case import Case
 from simscen.core.records.events import EventKind
-from simscen.core.records.run_result import Outcome
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import (
     COMPLETE_COVERAGE,
     Evidence,
-    ExpectedFailure,
     Finding,
     LogCoverage,
     Status,
     Verdict,
 )
 from simscen.criteria.base import Criterion
-from simscen.criteria.findings import MissingEvidence, held, missed, undecided
+from simscen.criteria.findings import MissingEvidence, undecided
 from simscen.criteria.registry import AnyCriterion, verdict_names
 from simscen.criteria.timeline import has_ended
-from simscen.judge.finding_text import DISTURBANCE
 
 _STATUSES = (Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR)
 
@@ -31,9 +28,10 @@ def judge(
 ) -> tuple[Verdict, ...]:
     """Return one verdict for each criterion, in order.
 
-    A criterion that raises an exception gets the status error; the others are not affected. A criterion whose evidence
-    is missing is inconclusive. Nothing passes on a truncated log, on an empty one, or with evidence that
-    covers only a part of the run, because the rest might have failed.
+    If a criterion raises an exception, its verdict is an error, and the others are not affected. The verdict is
+    inconclusive if the log lacks the evidence that the criterion needs. It is also inconclusive instead of a pass if
+    the log is truncated or empty, or if the evidence covers only a part of the run: the criterion might have failed in
+    the rest.
     """
     return tuple(
         Verdict(entry.kind, name, entry.severity, _findings(entry, trace, case, coverage))
@@ -41,44 +39,28 @@ def judge(
     )
 
 
-def outcome_of_verdicts(verdicts: Sequence[Verdict]) -> Outcome:
-    """Return the outcome of a completed run.
-
-    Only verdicts of severity `fail` can fail the run, and inconclusive counts as failed. An error of any criterion,
-    whatever its severity, makes the run an error; so does a run without any verdict.
-    """
-    if not verdicts or any(verdict.status is Status.ERROR for verdict in verdicts):
-        return Outcome.ERROR
-    decisive = [verdict for verdict in verdicts if verdict.severity == "fail"]
-    return Outcome.PASSED if all(verdict.status is Status.PASS for verdict in decisive) else Outcome.FAILED
-
-
 def required_evidence(entry: AnyCriterion) -> frozenset[Evidence]:
-    """Return the evidence that a criterion needs; all evidence if it does not declare any."""
+    """Return the evidence that a criterion needs; all kinds of evidence if it does not declare any."""
     own = getattr(entry.chosen, "evidence", None)
     return frozenset(Evidence) if own is None else frozenset(own)
 
 
-def missing_evidence_finding(entry: AnyCriterion, coverage: LogCoverage) -> Finding | None:
-    """Return the finding of a criterion whose evidence is missing; None if it can be judged."""
-    missing = coverage.lacking(required_evidence(entry))
-    if not missing:
-        return None
-    because = f"the log lacks {' and '.join(evidence.value for evidence in missing)}"
-    reasons = dict.fromkeys(reason for evidence in missing if (reason := coverage.missing[evidence]))
-    return Finding(Status.INCONCLUSIVE, entry.kind, because, "", detail=tuple(reasons))
+def missing_evidence_reason(required: Set[Evidence], coverage: LogCoverage) -> str:
+    """Return which of the required evidence the log lacks, in words; "" if it has all of it."""
+    missing = coverage.lacking(required)
+    return f"the log lacks {' and '.join(evidence.value for evidence in missing)}" if missing else ""
 
 
-def partial_evidence_reason(entry: AnyCriterion, coverage: LogCoverage) -> str:
-    """Return why a pass is not proven: its evidence covers only a part of the run; "" if it is complete."""
-    required = required_evidence(entry)
+def partial_evidence_reason(required: Set[Evidence], coverage: LogCoverage) -> str:
+    """Return why the required evidence covers only a part of the run; "" if it covers the whole run."""
     return "; ".join(dict.fromkeys(reason for evidence, reason in coverage.partial.items() if evidence in required))
 
 
 def findings_defect(findings: object) -> str:
     """Return what is wrong with the findings that a criterion returned; "" if they are valid.
 
-    A plugin can return a margin that is not a number or contradicts the status, which must not become a verdict.
+    The criterion of a plugin could return no findings, or a margin that is not a number or contradicts the status. This
+    must not become a verdict.
     """
     if not isinstance(findings, Sequence) or not findings:
         return "it checked nothing"
@@ -86,11 +68,14 @@ def findings_defect(findings: object) -> str:
 
 
 def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCoverage) -> tuple[Finding, ...]:
-    criterion = entry.chosen
+    """Return the findings of one criterion, or one finding with the reason why it cannot be judged."""
+    criterion, required = entry.chosen, required_evidence(entry)
     assert isinstance(criterion, Criterion)
     try:
-        if (missing := missing_evidence_finding(entry, coverage)) is not None:
-            return (missing,)
+        if reason := missing_evidence_reason(required, coverage):
+            causes = dict.fromkeys(coverage.missing[evidence] for evidence in coverage.lacking(required))
+            detail = tuple(cause for cause in causes if cause)
+            return (Finding(Status.INCONCLUSIVE, entry.kind, reason, "", detail=detail),)
         findings = criterion.judge(trace, case)
     except MissingEvidence as missing_evidence:
         return (undecided(entry.kind, str(missing_evidence)),)
@@ -100,18 +85,18 @@ def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCovera
         return (_error(entry, defect),)
     if not has_ended(trace):
         return _without_pass(findings, f"so far, but the log stops at t = {trace.seconds(trace.end):.2f} s")
-    if reason := partial_evidence_reason(entry, coverage):
+    if reason := partial_evidence_reason(required, coverage):
         return _without_pass(findings, f"so far, but {reason}")
     return _without_pass(findings, "in an empty log") if _is_empty(trace) else tuple(findings)
 
 
 def _error(entry: AnyCriterion, what: str) -> Finding:
-    """Return the finding of a criterion that could not judge; a plugin is named with its package."""
+    """Return the finding of a criterion that could not judge. It names the package of a plugin."""
     return Finding(Status.ERROR, entry.kind, f"{what}{entry.added_by}", "a judgment")
 
 
 def _without_pass(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:
-    """Return the findings with each pass turned into inconclusive."""
+    """Return the findings with each pass turned into inconclusive, and with the reason after the measured value."""
     return tuple(
         replace(finding, status=Status.INCONCLUSIVE, measured=f"{finding.measured} {because}")
         if finding.status is Status.PASS
@@ -127,6 +112,7 @@ def _is_empty(trace: Trace) -> bool:
 
 
 def _defect(finding: object) -> str:
+    """Return what is wrong with one finding; "" if it is valid."""
     if not isinstance(finding, Finding) or finding.status not in _STATUSES:
         return f"it returned an invalid finding of type {type(finding).__name__}"
     if not all(isinstance(text, str) for text in (finding.what, finding.measured, finding.limit, finding.unit)):
@@ -146,48 +132,3 @@ def _defect(finding: object) -> str:
     if math.isinf(margin) and (finding.value is None or math.isfinite(finding.value)):
         return f"the margin of {what} is infinite, so its limit is not finite"
     return ""
-
-
-EXPECTED = "expected"
-"""Name of the verdict on an expected failure."""
-
-
-def apply_expectation(
-    expected: ExpectedFailure | None, verdicts: Sequence[Verdict], outcome: Outcome, is_complete: bool
-) -> tuple[Outcome, Verdict | None]:
-    """Return the outcome of a run that is `expected` to fail, and the verdict on this expectation.
-
-    Without an expectation, this is the `outcome` of the run and None.
-
-    This is strict like pytest's `xfail(strict=True)`: an expected failure that passes is a failure, and so is any other
-    failed criterion. A run that could not be completed, or whose log is truncated, is never as expected. A missing
-    disturbance is only expected if its name is listed.
-    """
-    if expected is None or outcome is Outcome.ERROR or not is_complete:
-        return outcome, None
-    decisive = [verdict for verdict in verdicts if verdict.severity == "fail"]
-    covered = [verdict for verdict in decisive if _is_expected_to_fail(verdict, expected)]
-    failed = [verdict for verdict in covered if verdict.status is Status.FAIL]
-    excused = [verdict for verdict in covered if verdict.status is not Status.PASS]
-    unexpected = [verdict for verdict in covered if verdict.status is Status.PASS] if expected.criteria else []
-    limit = f"a failure: {expected.reason}"
-    name = EXPECTED if all(verdict.id != EXPECTED for verdict in verdicts) else f"{EXPECTED}#2"
-    if unexpected or not failed:
-        measured = f"{_names(unexpected)} passed" if unexpected else _nothing_failed(covered)
-        return Outcome.FAILED, Verdict(EXPECTED, name, "fail", (missed(EXPECTED, measured, limit),))
-    others = [verdict for verdict in decisive if verdict.status is not Status.PASS and verdict not in excused]
-    verdict = Verdict(EXPECTED, name, "fail", (held(EXPECTED, f"{_names(failed)} failed", limit),))
-    return (Outcome.FAILED if others else Outcome.FAILED_AS_EXPECTED), verdict
-
-
-def _is_expected_to_fail(verdict: Verdict, expected: ExpectedFailure) -> bool:
-    return verdict.id in expected.criteria if expected.criteria else verdict.criterion != DISTURBANCE
-
-
-def _nothing_failed(verdicts: Sequence[Verdict]) -> str:
-    undecided_verdicts = [verdict for verdict in verdicts if verdict.status is not Status.PASS]
-    return f"nothing failed, {_names(undecided_verdicts)} undecided" if undecided_verdicts else "everything passed"
-
-
-def _names(verdicts: Sequence[Verdict]) -> str:
-    return ", ".join(verdict.id for verdict in verdicts)

@@ -1,8 +1,8 @@
-"""Likely causes of a failed finding, from the trace and the case.
+"""Likely causes of failed findings, found in the trace of the run and added to the findings as lines of text.
 
 Lines with "why" follow from geometry or physics: an object that blocks the path, an object that was spawned in front of
-the robot, a robot that was kidnapped. Lines with "meanwhile" list faults and events that were active and may be the
-cause. Without evidence there are no lines.
+the robot, a robot that was kidnapped. Lines with "meanwhile" list other faults and events that were active and may be
+the cause. There are no lines without evidence.
 """
 
 import math
@@ -12,21 +12,21 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.records.case import Case
-from simscen.core.records.events import Event, EventKind
+from simscen.core.records.events import BELIEF, WHEELS, Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.goal_failure_causes import MovableObject, diagnose_goal_failure, movable_objects
 
 GOAL_CRITERIA = frozenset({"goals_reached", "result", "error_code", "time_to_goal", "stuck"})
-"""Criteria that fail if something blocks the robot."""
+"""Criteria that can fail because something blocks the robot."""
 LOCALIZATION_CRITERIA = frozenset({"localization_error", "relocalized_within", "no_false_success", *GOAL_CRITERIA})
-"""Criteria that fail if localization is wrong."""
+"""Criteria that can fail because the estimated pose is wrong."""
 MAX_LINES = 6
-"""Maximum number of lines for a finding."""
+"""Maximum number of lines for a finding, so that a report remains readable."""
 
 
 def explain_failures(verdicts: Sequence[Verdict], trace: Trace, case: Case) -> tuple[Verdict, ...]:
-    """Return the verdicts with the likely causes inserted before the details of each failed finding."""
+    """Return the verdicts, with lines about likely causes inserted before the other details of each failed finding."""
     return tuple(
         replace(
             verdict, findings=tuple(_with_causes(verdict.criterion, each, trace, case) for each in verdict.findings)
@@ -43,13 +43,13 @@ def _with_causes(criterion: str, finding: Finding, trace: Trace, case: Case) -> 
 
 
 def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
-    """Return lines about the likely causes of a failure of a criterion at a tick."""
+    """Return lines about the likely causes if a criterion failed at a tick; at most MAX_LINES."""
     lines: list[str] = []
     named: set[str] = set()
     diagnoses = [
         diagnose_goal_failure(trace, case, tick) if criterion in GOAL_CRITERIA else ([], set()),
         diagnose_collision(trace, tick) if criterion == "collisions" else ([], set()),
-        diagnose_localization(trace, tick, known=criterion not in GOAL_CRITERIA)
+        diagnose_localization(trace, tick, error_is_reported=criterion not in GOAL_CRITERIA)
         if criterion in LOCALIZATION_CRITERIA
         else ([], set()),
     ]
@@ -61,15 +61,19 @@ def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
 
 
 RECENT_FAULT_S, RECENT_EVENT_S = 3.0, 5.0
-"""Time in s after the end of a fault, and after an event, in which it is still listed."""
+"""Time in s for which a fault is listed after its end, and an event after it happened."""
 
 
-def concurrent_disturbances(trace: Trace, tick: int, known: Set[str] = frozenset()) -> list[str]:
-    """Return sentences on faults, then events, in the order of their start, without those that are `known`."""
-    return [text for name, text in (*_faults(trace, tick), *_events(trace, tick)) if name not in known]
+def concurrent_disturbances(trace: Trace, tick: int, excluded: Set[str] = frozenset()) -> list[str]:
+    """Return sentences on the faults, then on the events, at or shortly before a tick, in the order of their start.
+
+    `excluded` are names of disturbances that other lines already mention.
+    """
+    return [text for name, text in (*_faults(trace, tick), *_events(trace, tick)) if name not in excluded]
 
 
 def _faults(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
+    """Yield the name of each fault that was active and had an effect until the tick, and a sentence on it."""
     effects = [event for event in trace.of_kind(EventKind.FAULT_TOOK_EFFECT) if event.tick <= tick]
     for start in trace.of_kind(EventKind.FAULT_STARTED):
         end = _end_tick(trace, start)
@@ -93,6 +97,7 @@ def _is_same_entry(one: Event, other: Event) -> bool:
 
 
 def _events(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
+    """Yield the name of each event that changed something shortly before the tick, and a sentence on it."""
     for event in trace.of_kind(EventKind.EVENT_ENDED):
         ago = trace.seconds(tick - event.tick)
         effects = event.data.get("effects")
@@ -104,13 +109,16 @@ def _events(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
 
 
 OBJECT_MOVING_SPEED_M_S = 0.0625
-"""Minimum speed in m/s of a moving object."""
+"""Speed in m/s above which an object is said to move."""
 OBJECT_SPEED_WINDOW_S = 0.25
-"""Time in s over which the speed is measured."""
+"""Time in s before a collision over which the speed of an object is averaged."""
 
 
 def diagnose_collision(trace: Trace, tick: int) -> tuple[list[str], set[str]]:
-    """Return a sentence for each movable object touched at `tick`, and the names of the events that placed it there."""
+    """Return sentences on the movable objects that the robot began to touch at `tick`.
+
+    Also returns the names of the events that spawned or moved these objects.
+    """
     hits = {hit.name: hit for hit in trace.of_kind(EventKind.COLLISION_STARTED) if hit.tick == tick}
     touched = [each for each in movable_objects(trace, tick) if each.name in hits]
     described = [(each, _describe_hit(trace, each, hits[each.name])) for each in touched]
@@ -118,10 +126,11 @@ def diagnose_collision(trace: Trace, tick: int) -> tuple[list[str], set[str]]:
 
 
 def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
+    """Return a sentence on how an object came into contact with the robot; "" if it simply stood there."""
     ago = f"{trace.seconds(hit.tick - touched.since):.2f} s before"
     parts = []
     if touched.event:
-        if touched.moved:
+        if touched.was_moved:
             change = "moved it"
         else:
             change = f"spawned it {_initial_distance(trace, touched):.2f} m from the robot's center"
@@ -139,6 +148,7 @@ def _initial_distance(trace: Trace, spawned: MovableObject) -> float:
 
 
 def _speed(trace: Trace, name: str, tick: int) -> float:
+    """Return the speed of an object in m/s until a tick."""
     samples = trace.objects.get(name)
     if samples is None:
         return 0.0
@@ -148,19 +158,22 @@ def _speed(trace: Trace, name: str, tick: int) -> float:
 
 
 ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
-"""Faults whose error remains in the odometry after their end."""
-WHEELS, BELIEF = frozenset({"Odometry", "Wheels"}), "Belief"
-"""Targets of these faults, and of faults between localizer and navigator."""
+"""Faults whose error remains in the odometry after their end, if they affect ODOMETRY_TARGETS."""
+ODOMETRY_TARGETS = frozenset({"Odometry", WHEELS})
+"""Values of `affects` of faults of the odometry."""
 LOST_DISTANCE_M = 0.5
-"""Localization error in m above which a robot is lost: the diameter of a small robot."""
+"""Localization error in m from which a robot counts as lost: the diameter of a small robot."""
 
 
-def diagnose_localization(trace: Trace, tick: int, known: bool = False) -> tuple[list[str], set[str]]:
-    """Return sentences on the localization error and its cause, and the names of the responsible events and faults."""
+def diagnose_localization(trace: Trace, tick: int, error_is_reported: bool) -> tuple[list[str], set[str]]:
+    """Return sentences on a large localization error and its causes, and the names of these events and faults.
+
+    With `error_is_reported`, the failed finding itself states the error, and only the causes are returned.
+    """
     error = _position_error(trace, tick)
     if not error >= LOST_DISTANCE_M:  # also for nan: unknown
         return [], set()
-    lines = [] if known else [f"its estimated position was {error:.2f} m from the true one"]
+    lines = [] if error_is_reported else [f"its estimated position was {error:.2f} m from the true one"]
     named: set[str] = set()
     current_event = ""
     for event in trace.events:
@@ -181,6 +194,7 @@ def diagnose_localization(trace: Trace, tick: int, known: bool = False) -> tuple
 
 
 def _position_error(trace: Trace, tick: int) -> float:
+    """Return the distance in m between the estimated and the true position; nan if one of them is unknown."""
     if not len(trace.belief) or not len(trace.truth):
         return math.nan
     bx, by = trace.belief.at(np.array([tick]))[0, :2].tolist()
@@ -189,11 +203,11 @@ def _position_error(trace: Trace, tick: int) -> float:
 
 
 def _falsified(trace: Trace, label: str) -> str:
-    """Return which pose information of the robot a fault falsified, or ""."""
+    """Return what a fault falsified: "its belief", "its odometry", or "" for other faults."""
     starts = [event.data for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == label]
     if not starts:
         return ""
     affects = starts[0].get("affects", "Odometry")  # older logs lack it
     if affects == BELIEF:
         return "its belief"
-    return "its odometry" if affects in WHEELS and starts[0].get("fault") in ODOMETRY_FAULTS else ""
+    return "its odometry" if affects in ODOMETRY_TARGETS and starts[0].get("fault") in ODOMETRY_FAULTS else ""

@@ -1,4 +1,4 @@
-"""Texts of findings and disturbances for the console, JUnit, JSON, and pictures."""
+"""Texts of findings and disturbances for all reports, and margins relative to their limits."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -12,12 +12,13 @@ DISTURBANCE = "disturbance"
 ARRIVAL = "goals_reached"
 """Name of the criterion on the distance from a goal."""
 MAX_TIMES_SHOWN = 5
-"""Number of times that are listed for a repeated disturbance."""
+"""Maximum number of times that are listed for a repeated disturbance."""
 _RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ "), "> ": ("> ", "≤ ")}
+"""Relation of the measured value to the limit, if the limit holds and if it is violated, by the start of the limit."""
 
 
 def comparison(finding: Finding) -> str:
-    """Return the measured value and the limit, e.g. "0.84 s > 0.50 s after lidar.off"."""
+    """Return the comparison of the measured value with the limit, e.g. "0.84 s > 0.50 s after lidar.off"."""
     if finding.status in (Status.INCONCLUSIVE, Status.ERROR):
         return f"{finding.status.value}: {finding.measured}"
     holds, violated = _RELATIONS.get(finding.limit[:2], ("", ""))
@@ -29,7 +30,7 @@ def comparison(finding: Finding) -> str:
 
 
 def time_and_place(finding: Finding, tick_rate: int) -> str:
-    """Return time and place, e.g. "at t = 10.84 s, (2.10, 3.41)", or "" if unknown."""
+    """Return the time and place of a finding, e.g. "at t = 10.84 s, (2.10, 3.41)"; "" if its time is unknown."""
     if finding.tick is None:
         return ""
     time = f"at t = {finding.tick / tick_rate:.2f} s"
@@ -38,16 +39,14 @@ def time_and_place(finding: Finding, tick_rate: int) -> str:
 
 def subject(verdict: Verdict, finding: Finding) -> str:
     """Return the criterion and the item that it checks, e.g. "goals_reached: goal shelf"."""
-    if (
-        verdict.criterion == DISTURBANCE
-    ):  # its ID is the name of an event or fault, which could be mistaken for a criterion
+    if verdict.criterion == DISTURBANCE:  # its ID, the name of an event or fault, could be mistaken for a criterion
         return finding.what
     rest = finding.what.removeprefix(verdict.criterion).removeprefix(":").strip()
     return f"{verdict.id}: {rest}" if rest else verdict.id
 
 
 def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
-    """Return the complete line: "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"."""
+    """Return the line for a finding, e.g. "stuck: 8.00 s > 5.00 s, at t = 10.84 s, (2.10, 3.41)"."""
     parts = (f"{subject(verdict, finding)}: {comparison(finding)}", time_and_place(finding, tick_rate))
     return ", ".join(part for part in parts if part)
 
@@ -60,7 +59,7 @@ def disturbance_times(one: DisturbanceOutcome, tick_rate: int) -> str:
 
 
 def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
-    """Return the complete line: "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
+    """Return the line for a disturbance, e.g. "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
     parts = (
         disturbance_times(one, tick_rate) if one.fired else "",
         one.effect,
@@ -70,15 +69,15 @@ def disturbance_line(one: DisturbanceOutcome, tick_rate: int) -> str:
 
 
 def violations(verdict: Verdict) -> tuple[Finding, ...]:
-    """Return the findings that keep the verdict from passing, in order."""
+    """Return the findings that prevent the verdict from being a pass, in order."""
     return tuple(finding for finding in verdict.findings if finding.status is not Status.PASS)
 
 
 def tightest_margin(verdicts: Sequence[Verdict]) -> str:
-    """Return the smallest relative margin, e.g. "path_length +0.14 m, 1 % of its limit"; "" if there is none.
+    """Return the smallest relative margin of a pass, e.g. "path_length +0.14 m, 1 % of its limit"; "" if there is none.
 
-    Counts of events are left out. So are the distance from a goal and the waiting time there, because a robot stops as
-    soon as it is close enough, so that both are always near their limits.
+    Counts of events are left out, because they have no unit. The distance from a goal and the waiting time there are
+    left out as well: they are always near their limits, because a robot stops as soon as it is close enough.
     """
     tightest = _tightest_finding(verdicts)
     if tightest is None:
@@ -89,9 +88,9 @@ def tightest_margin(verdicts: Sequence[Verdict]) -> str:
 
 
 def run_margin(result: RunResult) -> float:
-    """Return the smallest margin of a run relative to its limit; negative if the run failed.
+    """Return the smallest margin of a run relative to its limit, from -1; negative unless the run passed.
 
-    It is -1 for a failure without a margin, and 1 for a run that passed without a margin.
+    It is 1 for a run that passed and has no margin, and -1 for a run that did not pass and has no negative margin.
     """
     if result.outcome is Outcome.PASSED:
         tightest = _tightest_finding(result.verdicts)

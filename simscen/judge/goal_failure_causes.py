@@ -1,4 +1,8 @@
-"""Causes of a missed goal: a blocked passage, an occupied goal, an object in front of the robot."""
+"""Causes of a missed goal: a blocked passage, an occupied goal, an object in front of the robot.
+
+The functions return sentences, and some of them also the names of the events that spawned or moved the objects in these
+sentences, or "" for objects that were there from the start.
+"""
 
 import math
 from collections import Counter
@@ -19,23 +23,27 @@ from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes, outcome_s
 
 @dataclass(frozen=True)
 class MovableObject:
-    """Movable object at a tick.
+    """Movable object at a certain tick.
 
-    `outlines` (n, 2) are its outlines in the world. `since` is the tick at which the `event` (its name, or "") spawned
-    the object or, if `moved`, last moved it.
+    Attributes:
+        name: Name of the object.
+        outlines: Outlines of its parts in the world, each with corners (n, 2).
+        event: Name of the event that spawned the object or last moved it; "" if no event did.
+        since: Tick at which it was spawned or last moved.
+        was_moved: True if it was moved after it was spawned.
     """
 
     name: str
     outlines: tuple[Array, ...]
     event: str
     since: int
-    moved: bool
+    was_moved: bool
 
     def describe(self, trace: Trace) -> str:
-        """Return name and origin, e.g. "crate (spawned by event `crate falls` at t = 1.00 s)"."""
+        """Return the name, and how the object came here: "crate (spawned by event `crate falls` at t = 1.00 s)"."""
         if not self.event:
             return self.name
-        verb = "moved" if self.moved else "spawned"
+        verb = "moved" if self.was_moved else "spawned"
         return f"{self.name} ({verb} by event `{self.event}` at t = {trace.seconds(self.since):.2f} s)"
 
     def distance(self, points: Array) -> Array:
@@ -45,7 +53,7 @@ class MovableObject:
 
 
 def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
-    """Return all movable objects at `tick`, in the order of their appearance."""
+    """Return the movable objects that exist at `tick`, in the order in which they were spawned."""
     spawned: dict[str, Event] = {}
     last: dict[str, tuple[str, Event]] = {}
     current_event = ""
@@ -69,7 +77,7 @@ def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
 
 
 def pose_at(trace: Trace, spawned: Event, tick: int) -> Pose2:
-    """Return the pose of a spawned object at `tick`."""
+    """Return the pose at `tick` of the object that the event `spawned`."""
     x, y, yaw = (spawned.data.get(key) for key in ("x", "y", "yaw"))
     samples = trace.objects.get(spawned.name)
     if samples is not None:
@@ -107,7 +115,10 @@ NEAR_ROBOT_M = 0.3
 
 
 def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
-    """Return sentences on what blocks the current goal at `tick`, and the events that caused it."""
+    """Return sentences on what prevents the robot from reaching its current goal at `tick`, and the events behind it.
+
+    Both are empty if no goal is current.
+    """
     outcome = _current_goal(trace, case, tick)
     if outcome is None:
         return [], set()
@@ -125,7 +136,7 @@ def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> tuple[list[str
 
 
 def _current_goal(trace: Trace, case: Case, tick: int) -> GoalOutcome | None:
-    """Return the outcome of the last goal accepted up to `tick`, or None if it is not required."""
+    """Return the outcome of the last goal accepted up to `tick`; None if there is none, or if it is over."""
     started = [outcome for outcome in goal_outcomes(trace, case) if outcome_start(outcome) <= tick]
     return started[-1] if started and not _is_over(started[-1], tick) else None
 
@@ -138,7 +149,7 @@ def _is_over(outcome: GoalOutcome, tick: int) -> bool:
 
 
 def _unreachable(case: Case, goal: Goal) -> list[str]:
-    """Return whether the static world alone has no path to the goal, as a sentence."""
+    """Return a sentence if even the static world has no path to the goal."""
     if case.shortest.get(goal.name) != math.inf:
         return []
     needed = 2 * case.inscribed_radius
@@ -148,7 +159,7 @@ def _unreachable(case: Case, goal: Goal) -> list[str]:
 
 
 def _stopped(trace: Trace, tick: int) -> list[str]:
-    """Return the reason that the stack last reported for stopping the robot, unless it was released since."""
+    """Return a sentence with the reason that the stack reported for holding the robot, unless it has been released."""
     last = [
         event
         for event in trace.of_kind(EventKind.ROBOT_HELD, EventKind.ROBOT_RELEASED)
@@ -163,7 +174,7 @@ def _stopped(trace: Trace, tick: int) -> list[str]:
 
 
 def _gave_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
-    """Return what the stack reported when it gave up the goal, and the recoveries that it had tried."""
+    """Return a sentence on what the stack reported when it gave up the goal, and which recoveries it had tried."""
     end = outcome.end
     if end is None or end.tick > tick or code_of(end) == ErrorCode.NAVIGATE_TIMEOUT.name:  # it has no reason
         return []
@@ -175,7 +186,7 @@ def _gave_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
 
 
 def _failed_recoveries(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
-    """Return the recovery behaviors that failed on the way to this goal, with their codes."""
+    """Return a sentence on the recovery behaviors that failed on the way to this goal, with their error codes."""
     ended = [e for e in trace.of_kind(EventKind.RECOVERY_ENDED) if outcome_start(outcome) <= e.tick <= tick]
     failed = Counter(f"{e.name} with {code_of(e)}" for e in ended if e.data.get("outcome") == "failed")
     counted = (what if times == 1 else f"{what} {times} times" for what, times in failed.items())
@@ -194,7 +205,7 @@ def _touching(trace: Trace, tick: int) -> list[str]:
 
 
 def _occupied(trace: Trace, case: Case, goal: Goal, objects: list[MovableObject]) -> tuple[list[str], set[str]]:
-    """Return a sentence on the object on the goal, and the event that placed it."""
+    """Return a sentence on the object that occupies the goal, and the event that put it there."""
     place = np.array([[goal.pose.x, goal.pose.y]])
     for each in objects:
         distance = float(each.distance(place)[0])
@@ -205,7 +216,7 @@ def _occupied(trace: Trace, case: Case, goal: Goal, objects: list[MovableObject]
 
 
 def _nearby(trace: Trace, case: Case, tick: int, objects: list[MovableObject]) -> tuple[list[str], set[str]]:
-    """Return a sentence on the object nearest to the robot, if it is very close, and the event that placed it."""
+    """Return a sentence on the object nearest to the robot, if it is very close, and the event that put it there."""
     if not objects or not len(trace.truth):
         return [], set()
     place = np.array([trace.place(tick)])
@@ -217,19 +228,20 @@ def _nearby(trace: Trace, case: Case, tick: int, objects: list[MovableObject]) -
 
 
 SEARCH_STEP_M = 0.005
-"""Distance in m between the tested points of a passage."""
+"""Distance in m between the points of a passage at which its free width is measured."""
 NEGLIGIBLE_WIDTH_M = 0.02
-"""Resolution in m of the width of passages."""
+"""Width in m that is negligible, both as the free width of a passage and as a change of its width."""
 ON_PATH_DISTANCE_M = 0.5
-"""Maximum distance in m from a passage to a robot on its path. Passages are 0.25 m apart."""
+"""Maximum distance in m from the nearest passage for a robot on the path. Passages are 0.25 m apart."""
 
 
 def diagnose_blocked_path(
     trace: Trace, case: Case, goal: str, tick: int, objects: Sequence[MovableObject]
 ) -> tuple[list[str], set[str]]:
-    """Return a sentence on the objects that block or narrow the path to `goal`, and the events that placed them.
+    """Return a sentence on the objects that close or narrow the shortest path to `goal` most, and their events.
 
-    Passages are only listed if not even the inscribed disc of the robot can cross them.
+    An object closes a passage if not even the inscribed circle of the robot can pass, and narrows it if the robot
+    cannot turn there.
     """
     needed, turning = 2 * case.inscribed_radius, 2 * _circumscribed_radius(case)
     widths = [(free_width(passage, objects), passage) for passage in _remaining_passages(trace, case, goal, tick)]
@@ -248,7 +260,7 @@ def diagnose_blocked_path(
 
 
 def free_width(passage: Passage, objects: Sequence[MovableObject]) -> float:
-    """Return the diameter in m of the largest disc that can pass between the ends of the passage and the objects."""
+    """Return the diameter in m of the largest circle that can pass between the ends of a passage and the objects."""
     ends = np.array(passage.ends)
     share = np.linspace(0.0, 1.0, 2 + round(passage.width / SEARCH_STEP_M))[:, None]
     centers = ends[0] + share * (ends[1] - ends[0])
@@ -258,13 +270,13 @@ def free_width(passage: Passage, objects: Sequence[MovableObject]) -> float:
 
 
 def _blocking_objects(passage: Passage, objects: Sequence[MovableObject], needed: float) -> list[MovableObject]:
-    """Return the single object that blocks the passage, or all objects that contribute."""
+    """Return the last object that alone leaves less than `needed`; otherwise, all objects that narrow the passage."""
     single = [each for each in objects if free_width(passage, [each]) < needed]
     return single[-1:] or [each for each in objects if free_width(passage, [each]) < passage.width - NEGLIGIBLE_WIDTH_M]
 
 
 def _remaining_passages(trace: Trace, case: Case, goal: str, tick: int) -> list[Passage]:
-    """Return the passages that the robot still has to cross; all of them if it is not on the path."""
+    """Return the passages on the path to `goal` that the robot still has to cross; all if it is not on this path."""
     found = [passage for passage in case.passages if passage.goal == goal]
     if not found or not len(trace.truth):
         return found

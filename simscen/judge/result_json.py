@@ -1,4 +1,4 @@
-"""Reads and writes result.json, which does not depend on the wall clock, the host, or the process."""
+"""Conversion of the result of a run to result.json and back. The file depends only on the run, not on the machine."""
 
 import json
 import math
@@ -13,15 +13,16 @@ from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.finding_text import sentence
 
 FORMAT = 2
+"""Version of the format; other versions are rejected."""
 
 
 def to_json(result: RunResult) -> str:
-    """Return sorted, indented JSON with a final newline. The same result gives the same bytes."""
+    """Return the content of result.json: sorted, indented JSON. Equal results give equal text."""
     return json.dumps(result_data(result), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def result_data(result: RunResult) -> dict[str, Any]:
-    """Return a result as plain data, for results.json and other files with several results."""
+    """Return a result as JSON data, for result.json and for files with several results."""
     lines = result.lines or (0,) * len(result.verdicts)
     error = result.error
     return {
@@ -40,7 +41,7 @@ def result_data(result: RunResult) -> dict[str, Any]:
         "again": result.again,
         "events": dict(result.events),
         "disturbances": [_disturbance_data(one, result.tick_rate) for one in result.disturbances],
-        "metrics": {name: number(value) for name, value in result.metrics.items()},
+        "metrics": {name: _finite_or_none(value) for name, value in result.metrics.items()},
         "undefined": dict(result.undefined),
         "verdicts": [verdict_data(v, line, result.tick_rate) for v, line in zip(result.verdicts, lines, strict=True)],
         "error": None if error is None else _error_data(error),
@@ -48,7 +49,7 @@ def result_data(result: RunResult) -> dict[str, Any]:
 
 
 def from_json(text: str) -> RunResult:
-    """Read a result that `to_json` wrote. Raises ValueError for other content or another format."""
+    """Parse the text that `to_json` returned. Raises ValueError for other content or another format."""
     try:
         return from_data(json.loads(text))
     except (KeyError, TypeError) as error:
@@ -56,19 +57,22 @@ def from_json(text: str) -> RunResult:
 
 
 def read_result(path: Path) -> RunResult:
-    """Read a result.json. Raises OSError or ValueError."""
+    """Read a result.json file. Raises OSError if it cannot be read, and ValueError for other content."""
     return from_json(path.read_text(encoding="utf-8"))
 
 
 def from_data(data: dict[str, Any]) -> RunResult:
-    """Convert plain data of `result_data` to a result."""
+    """Return the result from the JSON data that `result_data` returned.
+
+    Raises ValueError, KeyError or TypeError for other content.
+    """
     if data["format"] != FORMAT:
         raise ValueError(f"a result of format {data['format']}; this version reads {FORMAT}")
     return RunResult(
         key=read_key(data),
         path=data["path"],
         outcome=Outcome(data["outcome"]),
-        verdicts=tuple(read_verdict(verdict) for verdict in data["verdicts"]),
+        verdicts=tuple(_read_verdict(verdict) for verdict in data["verdicts"]),
         lines=tuple(verdict["line"] for verdict in data["verdicts"]),
         metrics=data["metrics"],
         undefined=data["undefined"],
@@ -84,7 +88,7 @@ def from_data(data: dict[str, Any]) -> RunResult:
 
 
 def read_key(data: dict[str, Any]) -> RunKey:
-    """Convert plain data to the key of a run. In simscen 0.1, `variation` was the name of the stack."""
+    """Return the key of a run from the JSON data of its result. In old files, `variation` is the name of the stack."""
     variation, stack_name = (data["variation"], data["stack_name"]) if "stack_name" in data else ("", data["variation"])
     return RunKey(intern(data["scenario"]), data["seed"], variation, intern(stack_name))
 
@@ -111,7 +115,7 @@ def _read_disturbance(data: dict[str, Any]) -> DisturbanceOutcome:
 
 
 def verdict_data(verdict: Verdict, line: int, tick_rate: int) -> dict[str, Any]:
-    """Return a verdict with its findings as plain data. `line` is the line of the criterion; 0 = unknown."""
+    """Return a verdict with its findings as JSON data. `line` is the line of the criterion, 0 if unknown."""
     return {
         "criterion": verdict.criterion,
         "id": verdict.id,
@@ -122,14 +126,13 @@ def verdict_data(verdict: Verdict, line: int, tick_rate: int) -> dict[str, Any]:
     }
 
 
-def read_verdict(data: dict[str, Any]) -> Verdict:
-    """Convert plain data of `verdict_data` to a verdict. Raises KeyError or ValueError for other content."""
+def _read_verdict(data: dict[str, Any]) -> Verdict:
     findings = tuple(_read_finding(finding) for finding in data["findings"])
     return Verdict(data["criterion"], data["id"], data["severity"], findings)
 
 
-def number(value: float | None) -> float | None:
-    """Return the number, or None for nan and infinity, which JSON does not have."""
+def _finite_or_none(value: float | None) -> float | None:
+    """Return the number, or None for nan and infinity, which JSON cannot represent."""
     return value if value is not None and math.isfinite(value) else None
 
 
@@ -139,8 +142,8 @@ def _finding_data(verdict: Verdict, finding: Finding, tick_rate: int) -> dict[st
         "what": finding.what,
         "measured": finding.measured,
         "limit": finding.limit,
-        "margin": number(finding.margin),
-        "value": number(finding.value),
+        "margin": _finite_or_none(finding.margin),
+        "value": _finite_or_none(finding.value),
         "unit": finding.unit,
         "tick": finding.tick,
         "time": None if finding.tick is None else finding.tick / tick_rate,

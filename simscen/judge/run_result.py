@@ -1,12 +1,9 @@
-"""Judges a run: verdicts, metrics, disturbances, and the outcome."""
+"""Judgment of the run of one robot: combines verdicts, disturbances, and metrics to the result of the run."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TypeVar
+from collections.abc import Sequence
 
 from simscen.core.records.case import Case
-from simscen.core.records.events import DisturbanceOutcome, Event
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import COMPLETE_COVERAGE, ExpectedFailure, LogCoverage, Status, Verdict
@@ -16,10 +13,10 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.trace_checks import check_recorded_signals, time_gaps
 from simscen.judge.disturbances import disturbance_outcomes, missing_disturbances
-from simscen.judge.evaluation import apply_expectation, judge, outcome_of_verdicts
+from simscen.judge.evaluation import judge
 from simscen.judge.failure_causes import explain_failures
-from simscen.judge.finding_text import DISTURBANCE
 from simscen.judge.metrics.compute import add_plugin_metrics, compute_metrics
+from simscen.judge.outcome import apply_expectation, outcome_of_verdicts
 
 
 def judge_run(
@@ -35,10 +32,12 @@ def judge_run(
 ) -> RunResult:
     """Return the result of a run.
 
-    `path` is the scenario file, `lines` the line of each criterion in it; () if the criteria are not in this file.
-    `metrics` are those of plugins, computed in addition to those of every run. `expected` is set if the run is expected
-    to fail. A disturbance that did not happen gets a verdict of its own, before the others, because it often explains
-    them. A log passes only if its signals cover the whole run (`time_gaps`).
+    `path` is the scenario file. `lines` has the line of each criterion in this file; () if the criteria are elsewhere.
+    `coverage` states which evidence the log lacks. `metrics` are those of plugins, which are computed in addition to
+    those of every run. `expected` is set if the run is expected to fail.
+
+    A required disturbance that did not happen gets a failing verdict, before the others, because it often explains
+    them. No criterion passes if the signals that it needs have gaps (`time_gaps`).
     """
     coverage = coverage.with_gaps(time_gaps(trace))
     verdicts = explain_failures(judge(criteria, trace, case, coverage), trace, case)
@@ -78,101 +77,3 @@ def judge_run(
 def _judging_failure(verdicts: tuple[Verdict, ...]) -> RunFailure:
     broken = [f"{v.id}: {v.tightest.measured}" for v in verdicts if v.status is Status.ERROR and v.tightest]
     return RunFailure("invalid", "; ".join(broken) or "no criterion judged this run")
-
-
-T = TypeVar("T")
-SUCCESS = "success"
-WORLD_EVENT_PREFIXES = ("object.", "pedestrian.", "event.", "mark", "run.")
-"""Prefixes of the kinds of world events, which the log of each robot contains."""
-
-
-def combine_robots(
-    results: Mapping[str, RunResult], traces: Mapping[str, Trace], expected: ExpectedFailure | None = None
-) -> RunResult:
-    """Return the combined result of several robots, which passes if all robots pass.
-
-    Verdicts, metrics and faults get the name `robot/name`. Events of the world have no robot and are listed once. The
-    metric `success` also exists for the run. `expected` is set if the run is expected to fail.
-    """
-    first = next(iter(results.values()))
-    shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
-    judged = [(verdict, line) for verdict, line in _verdicts_with_lines(first) if _is_about_world(verdict, shared)]
-    for name, result in results.items():
-        own = (
-            (verdict, line) for verdict, line in _verdicts_with_lines(result) if not _is_about_world(verdict, shared)
-        )
-        judged += [(_with_robot_name(verdict, name), line) for verdict, line in own]
-    verdicts = tuple(verdict for verdict, _ in judged)
-    outcome, expectation = apply_expectation(expected, verdicts, _worst(results), all(map(has_ended, traces.values())))
-    if expected is not None and expectation is not None:
-        judged.append((expectation, expected.line))
-    errors = [(name, result.error) for name, result in results.items() if result.error is not None]
-    successes = [result.metrics.get(SUCCESS) for result in results.values()]
-    success = None if None in successes else min(value for value in successes if value is not None)
-    return replace(
-        first,
-        outcome=outcome,
-        verdicts=tuple(verdict for verdict, _ in judged),
-        lines=tuple(line for _, line in judged) if first.lines else (),
-        metrics={SUCCESS: success, **_with_robot_names({name: result.metrics for name, result in results.items()})},
-        undefined=_with_robot_names({name: result.undefined for name, result in results.items()}),
-        events=_events(traces),
-        disturbances=(*_disturbances(first, "event"), *_faults(results)),
-        error=_prefixed_failure(errors[0][0], errors[0][1]) if errors else None,
-        reason="" if expected is None else expected.reason,
-    )
-
-
-def _verdicts_with_lines(result: RunResult) -> list[tuple[Verdict, int]]:
-    return list(zip(result.verdicts, result.lines or (0,) * len(result.verdicts), strict=True))
-
-
-def _with_robot_name(verdict: Verdict, robot: str) -> Verdict:
-    """Return the verdict with the name of the robot. For a missing fault, the finding contains the fault's name."""
-    findings = verdict.findings
-    if verdict.criterion == DISTURBANCE:
-        findings = tuple(replace(finding, measured=f"{robot}/{finding.measured}") for finding in findings)
-    return replace(verdict, id=f"{robot}/{verdict.id}", findings=findings)
-
-
-def _is_about_world(verdict: Verdict, events: set[str]) -> bool:
-    """Return whether the verdict is about a missing event of the scenario."""
-    return verdict.criterion == DISTURBANCE and not events.isdisjoint((verdict.id, verdict.id.rpartition("#")[0]))
-
-
-def _worst(results: Mapping[str, RunResult]) -> Outcome:
-    outcomes = [result.outcome for result in results.values()]
-    return next((worst for worst in (Outcome.ERROR, Outcome.FAILED) if worst in outcomes), Outcome.PASSED)
-
-
-def _with_robot_names(parts: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
-    return {f"{name}/{key}": value for name, part in parts.items() for key, value in part.items()}
-
-
-def _events(traces: Mapping[str, Trace]) -> dict[str, int]:
-    """Return the number of events by kind. Events of the world count once, and spawned robots do not count."""
-    first = next(iter(traces.values()))
-    counts = Counter(str(event.kind) for event in first.events if _is_world_event(event) and event.name not in traces)
-    for trace in traces.values():
-        counts.update(str(event.kind) for event in trace.events if not _is_world_event(event))
-    return dict(sorted(counts.items()))
-
-
-def _is_world_event(event: Event) -> bool:
-    return str(event.kind).startswith(WORLD_EVENT_PREFIXES)
-
-
-def _disturbances(result: RunResult, kind: str) -> list[DisturbanceOutcome]:
-    return [one for one in result.disturbances if one.disturbance.kind == kind]
-
-
-def _faults(results: Mapping[str, RunResult]) -> list[DisturbanceOutcome]:
-    return [
-        replace(one, disturbance=replace(one.disturbance, name=f"{name}/{one.disturbance.name}"))
-        for name, result in results.items()
-        for one in _disturbances(result, "fault")
-    ]
-
-
-def _prefixed_failure(name: str, error: RunFailure | None) -> RunFailure | None:
-    return error and replace(error, message=f"{name}: {error.message}")

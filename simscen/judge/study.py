@@ -1,4 +1,4 @@
-"""Evaluation of a study: claim, pass rates by parameter, effects on margins, and coverage."""
+"""Evaluation of a study: its claim, pass rates by parameter, and effects of parameters on margins."""
 
 import math
 from collections import defaultdict
@@ -10,25 +10,30 @@ from typing import Any
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.study import ParameterEffect, RateRow, Study
 from simscen.core.statistics import CONFIDENCE, holm, wilson_interval
-from simscen.judge.statistical_tests import anytime_limits, evaluate_claim, is_counted
+from simscen.judge.pass_rate_claims import anytime_limits, evaluate_claim, is_counted
 from simscen.model.acceptance import PassRate
 from simscen.spec.quantities import NUMBER_AND_UNIT, si_number
 
 MIN_RUNS_FOR_EFFECTS = 8
-"""Minimum number of runs for effects: with fewer, no rank correlation of several parameters is significant."""
+"""Minimum number of runs for effects. With fewer, no rank correlation of several parameters is significant."""
 RANGE_COUNT = 4
-"""Number of ranges, with equal numbers of runs, into which many different numbers are divided."""
+"""Number of ranges, each with about the same number of runs, into which many different numbers are divided."""
 MAX_LISTED_VALUES = 10
 """Maximum number of different values of a parameter that are listed individually."""
 
 
 @dataclass(frozen=True)
 class StudyPlan:
-    """How the runs of a study were chosen, and its claim.
+    """Plan of a study: how its runs are chosen, and its claim.
 
-    `is_random` tells that each run has its own seed and random values. `values` are the varied values by run; `drawn`
-    is the number of draws that were needed to meet `require`, 0 without conditions. `stops_early` tells that a search
-    ended when it had found enough failures.
+    Attributes:
+        scenario: ID of the scenario.
+        is_random: True if each run has its own seed and random values.
+        claim: Claim about the pass rate; None if the scenario has no `acceptance`.
+        values: Values of the varied parameters by run, each by the path of the parameter in the scenario.
+        is_designed_in_pairs: True if the values are chosen so that all pairs of values of two parameters occur.
+        drawn: Number of draws that were needed to get values that meet `require`; 0 without `require`.
+        stops_early: True if the study ends when it has found enough failures.
     """
 
     scenario: str
@@ -41,7 +46,7 @@ class StudyPlan:
 
     @property
     def has_fixed_runs(self) -> bool:
-        """Whether the number of runs does not depend on their outcomes."""
+        """True if the number of runs does not depend on their outcomes."""
         return not self.stops_early and (self.claim is None or self.claim.method == "fixed")
 
 
@@ -76,12 +81,12 @@ def evaluate_study(plan: StudyPlan, results: Iterable[RunResult]) -> Study:
 
 
 def in_seed_order(results: Iterable[RunResult]) -> list[RunResult]:
-    """Return results in the order in which a study made its runs."""
+    """Return the results in the order of their seeds, in which a study makes its runs."""
     return sorted(results, key=lambda result: (result.key.seed, result.key))
 
 
 def _margins(result: RunResult) -> dict[str, tuple[float, str]]:
-    """Return the smallest margin of each criterion, with its unit, by the id of the criterion."""
+    """Return the smallest margin of each criterion and its unit, by the ID of the verdict."""
     found: dict[str, tuple[float, str]] = {}
     for verdict in result.verdicts:
         margins = [(one.margin, one.unit) for one in verdict.findings if one.margin is not None]
@@ -91,6 +96,7 @@ def _margins(result: RunResult) -> dict[str, tuple[float, str]]:
 
 
 def _worst(margins: Mapping[RunKey, Mapping[str, tuple[float, str]]]) -> dict[str, tuple[RunKey, float, str]]:
+    """Return the run with the smallest margin, this margin, and its unit, for each criterion."""
     worst: dict[str, tuple[RunKey, float, str]] = {}
     for key, own in margins.items():
         for criterion, (margin, unit) in own.items():
@@ -102,7 +108,7 @@ def _worst(margins: Mapping[RunKey, Mapping[str, tuple[float, str]]]) -> dict[st
 def _rates(plan: StudyPlan, results: Sequence[RunResult]) -> Iterable[RateRow]:
     """Yield the pass rate for each value, or range of values, of each parameter.
 
-    There are no limits if the runs are not random, or if their number depends on their outcomes.
+    The rates have no confidence limits if the runs are not random, or if their number depends on their outcomes.
     """
     has_limits = plan.is_random and plan.has_fixed_runs
     for path in _paths(plan):
@@ -117,7 +123,7 @@ def _rates(plan: StudyPlan, results: Sequence[RunResult]) -> Iterable[RateRow]:
 
 
 def _label_order(labels: Sequence[str], plan: StudyPlan, path: str, results: Sequence[RunResult]) -> Any:
-    """Return a sort key that orders labels by the smallest value that they represent."""
+    """Return a key function that sorts labels by the smallest value that they stand for, texts after numbers."""
     least: dict[str, tuple[int, float, str]] = {}
     for label, result in zip(labels, results, strict=True):
         value = si_number(plan.values.get(result.key, {}).get(path))
@@ -127,7 +133,7 @@ def _label_order(labels: Sequence[str], plan: StudyPlan, path: str, results: Seq
 
 
 def _labels(values: Sequence[Any]) -> list[str]:
-    """Return for each value its text, or its range if there are many different numbers."""
+    """Return the label of each value: its text, or the range that it is in if there are many different numbers."""
     texts = [value_text(value) for value in values]
     numbers = [si_number(value) for value in values]
     if len(set(texts)) <= MAX_LISTED_VALUES or not all(map(_is_number, numbers)):
@@ -149,7 +155,7 @@ def _short(value: Any) -> str:
 
 
 def value_text(value: Any) -> str:
-    """Return a value of a parameter in one line."""
+    """Return a value of a parameter as one line of text. None means that the scenario's own value is used."""
     match value:
         case None:
             return "unchanged"
@@ -167,7 +173,10 @@ def value_text(value: Any) -> str:
 def _effects(
     plan: StudyPlan, results: Sequence[RunResult], margins: Mapping[RunKey, Mapping[str, tuple[float, str]]]
 ) -> tuple[ParameterEffect, ...]:
-    """Return the effects of all parameters on all margins, strongest first, with corrected p-values."""
+    """Return the effects of all parameters on the margins of all criteria, most significant first.
+
+    The p-values are adjusted by Holm's correction.
+    """
     found = []
     for path in _paths(plan):
         for criterion in sorted({criterion for own in margins.values() for criterion in own}):
@@ -185,9 +194,10 @@ def _effects(
 
 
 def _effect(values: Sequence[Any], margins: Sequence[float]) -> tuple[float, float, bool] | None:
-    """Return effect, p-value, and whether the values are ordered; None if there are too few or equal values.
+    """Return the effect of a parameter on a margin, its p-value, and whether the values are numbers.
 
-    Numbers: Spearman's rank correlation. Other values: the Kruskal-Wallis test, with epsilon squared as its effect.
+    For numbers, the effect is Spearman's rank correlation. For other values, it is epsilon squared of the
+    Kruskal-Wallis test. Returns None if there are too few runs, or if all values or all margins are equal.
     """
     texts = [value_text(value) for value in values]
     if len(margins) < MIN_RUNS_FOR_EFFECTS or len(set(texts)) < 2 or len(set(margins)) < 2:
@@ -212,11 +222,15 @@ def _is_number(value: Any) -> bool:
 
 
 def _paths(plan: StudyPlan) -> list[str]:
+    """Return the paths of all varied parameters."""
     return sorted({path for values in plan.values.values() for path in values})
 
 
 def _pair_coverage(plan: StudyPlan, results: Sequence[RunResult]) -> float | None:
-    """Return the share of the pairs of values of two parameters that occurred; None for random values."""
+    """Return the share of all pairs of values of two parameters that occurred in a run.
+
+    Returns None if the values are not designed in pairs.
+    """
     paths = _paths(plan)
     if not plan.is_designed_in_pairs or len(paths) < 2:
         return None
@@ -229,7 +243,7 @@ def _pair_coverage(plan: StudyPlan, results: Sequence[RunResult]) -> float | Non
 
 
 def study_data(study: Study) -> dict[str, Any]:
-    """Return the result of a study as in results.json. Limits are [lower, upper]."""
+    """Return the result of a study as JSON data for results.json. Limits are [lower, upper]."""
     claim = study.claim
     return {
         "scenario": study.scenario,

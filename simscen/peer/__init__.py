@@ -11,8 +11,8 @@ It needs Python 3.8 or later and nothing else, neither numpy nor simscen. A mini
         ...
         step.drive(0.2, 0.0)
 
-If simscen is not installed in its environment, `sys.path.append(os.environ["SIMSCEN_PEER_PATH"])` and
-`import simscen_peer` do the same; simscen sets that variable. docs/reference/stack-protocol.md defines the protocol.
+If simscen is not installed in the stack's environment, use `sys.path.append(os.environ["SIMSCEN_PEER_PATH"])` and
+`import simscen_peer` instead; simscen sets this variable. docs/reference/stack-protocol.md defines the protocol.
 """
 
 from .client import Message, Peer, Step

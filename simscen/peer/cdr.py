@@ -1,6 +1,7 @@
-"""Common Data Representation as ROS 2 writes it (XCDR version 1, little endian), with nothing but the standard library.
+"""Writer and reader of messages in the serialization of ROS 2 (CDR), with nothing but the standard library.
 
-Fields are aligned to their own width, counted from the end of the four bytes of the encapsulation header.
+This is Common Data Representation, XCDR version 1 (OMG DDSI-RTPS 10.5): a header of four bytes, then the fields. Each
+field is aligned to its own width, counted from the end of the header.
 """
 
 from __future__ import annotations
@@ -14,29 +15,33 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 HEADER = b"\x00\x01\x00\x00"
+"""Header of a little-endian message."""
+_BYTE_ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
+"""Byte order, as in `struct`, by the first two bytes of a message."""
+_TOO_SHORT = "the message ends before its type does"
 
 
 class Writer:
-    """Serializes a message field by field, in the order of its definition."""
+    """Serializes a little-endian message field by field, in the order of its definition."""
 
     def __init__(self) -> None:
         self._data = bytearray(HEADER)
 
     def put(self, codes: str, *values: Any) -> Writer:
-        """Append values of one width, e.g. "iI" or "7d"."""
+        """Append values of one width, whose types are codes of `struct`, e.g. "iI" or "7d"."""
         self._align(struct.calcsize("<" + codes[-1]))
         self._data += struct.pack("<" + codes, *values)
         return self
 
     def string(self, text: str) -> Writer:
-        """Append a string: its length with the closing NUL, then its UTF-8 bytes."""
+        """Append a string: its length with the terminating NUL, then its UTF-8 bytes."""
         encoded = text.encode() + b"\0"
         self.put("I", len(encoded))
         self._data += encoded
         return self
 
     def numbers(self, code: str, values: Sequence[float]) -> Writer:
-        """Append a sequence: the number of elements, then the elements."""
+        """Append a sequence: its length, then its numbers, whose type is a code of `array`, e.g. "f"."""
         numbers = array(code, values)
         if sys.byteorder == "big":
             numbers.byteswap()
@@ -47,7 +52,7 @@ class Writer:
         return self
 
     def done(self) -> bytes:
-        """Return the message."""
+        """Return the bytes of the message."""
         return bytes(self._data)
 
     def _align(self, width: int) -> None:
@@ -55,47 +60,56 @@ class Writer:
 
 
 class Reader:
-    """Reads a message field by field, in the order of its definition. Raises ValueError if the message is too short."""
+    """Reads a message, of either byte order, field by field, in the order of its definition.
+
+    Raises ValueError if the data are not CDR, or end before the field that is read.
+    """
 
     def __init__(self, data: bytes) -> None:
-        if data[:2] != HEADER[:2]:
-            raise ValueError("not plain CDR, little endian")
-        self._data, self._offset = data, len(HEADER)
+        if len(data) < len(HEADER) or data[:2] not in _BYTE_ORDERS:
+            raise ValueError("a message is not plain CDR")
+        self._data, self._byte_order, self._offset = data, _BYTE_ORDERS[data[:2]], len(HEADER)
 
     def take(self, codes: str) -> tuple[Any, ...]:
-        """Return the next values of one width, e.g. "7d"."""
-        layout = struct.Struct("<" + codes)
+        """Return the next values of one width, whose types are codes of `struct`, e.g. "iI" or "7d"."""
+        layout = struct.Struct(self._byte_order + codes)
         self._align(struct.calcsize("<" + codes[-1]))
-        self._require(layout.size)
-        values = layout.unpack_from(self._data, self._offset)
+        try:
+            values = layout.unpack_from(self._data, self._offset)
+        except struct.error:
+            raise ValueError(_TOO_SHORT) from None
         self._offset += layout.size
         return values
 
+    def count(self) -> int:
+        """Return the length of the sequence that follows."""
+        return int(self.take("I")[0])
+
     def string(self) -> str:
-        """Return the next string, without its closing NUL."""
-        (size,) = self.take("I")
-        return self.blob(size)[:-1].decode()
+        """Return the next string, without its terminating NUL."""
+        return self.blob(self.count())[:-1].decode()
 
     def blob(self, size: int) -> bytes:
-        """Return the next bytes."""
-        self._require(size)
-        self._offset += size
-        return self._data[self._offset - size : self._offset]
+        """Return the next `size` bytes."""
+        start = self._skip(size)
+        return self._data[start : self._offset]
 
     def numbers(self, code: str) -> array[Any]:
-        """Return the next sequence of numbers, e.g. of code "f"."""
-        (count,) = self.take("I")
+        """Return the next sequence of numbers, whose type is a code of `array`, e.g. "f"."""
         values: array[Any] = array(code)
-        if count:
+        if count := self.count():
             self._align(values.itemsize)
             values.frombytes(self.blob(count * values.itemsize))
-        if sys.byteorder == "big":
+        if (self._byte_order == ">") is not (sys.byteorder == "big"):
             values.byteswap()
         return values
 
     def _align(self, width: int) -> None:
         self._offset += -(self._offset - len(HEADER)) % width
 
-    def _require(self, size: int) -> None:
-        if self._offset + size > len(self._data):
-            raise ValueError("the message ends before its type does")
+    def _skip(self, size: int) -> int:
+        """Skip `size` bytes, and return the offset of the first one."""
+        start, self._offset = self._offset, self._offset + size
+        if self._offset > len(self._data):
+            raise ValueError(_TOO_SHORT)
+        return start

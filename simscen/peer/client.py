@@ -1,4 +1,4 @@
-"""The stack's side of the protocol: the handshake, then answers to steps until simscen ends the run."""
+"""Python client for a stack: connects to simscen, yields the steps of a run, and sends the stack's answers."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import messages, wire
 from .goals import Goal, Goals
-from .wire import Connection, Disconnected, Refused
+from .wire import Connection, Refused
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 COMMAND, EVENTS, LOG = "/cmd_vel", "/simscen/events", "/rosout"
+"""Topics of the velocity command, of events about goals, and of log lines."""
 
 
 class Message(NamedTuple):
-    """A message on a topic: CDR bytes, and their content."""
+    """A serialized message on a topic: `type` is its ROS type, `raw` its bytes (CDR)."""
 
     topic: str
     type: str
@@ -24,14 +25,15 @@ class Message(NamedTuple):
 
     @property
     def content(self) -> Any:
-        """The message as a class of simscen.peer.messages."""
+        """The deserialized message: an object of a class of simscen.peer.messages, or a plain Python value."""
         return messages.read(self.type, self.raw)
 
 
 class Step:
-    """One step: the sensor messages, and the answer, which is sent when the loop continues.
+    """One step of the run: the messages that the stack receives, and its answer.
 
-    `messages` are the messages since the last step. `canceled` is true if simscen has canceled a goal since then.
+    The answer is collected by `drive`, `publish` and `log`, and is sent when the loop over the Peer continues.
+    `messages` are the messages since the last step. `canceled` is True if simscen has canceled a goal since then.
     """
 
     def __init__(self, peer: Peer, header: wire.StepHeader, received: list[Message], canceled: bool) -> None:
@@ -43,26 +45,26 @@ class Step:
 
     @property
     def tick(self) -> int:
-        """Physics ticks since the start."""
+        """Number of physics ticks since the start of the run."""
         return self._header.tick
 
     @property
     def seconds(self) -> float:
-        """Simulated time."""
+        """Simulated time in seconds."""
         return self._header.sec + self._header.nanosec * 1e-9
 
     @property
     def stamp(self) -> messages.Stamp:
-        """Simulated time as a ROS stamp."""
+        """Simulated time as a ROS stamp: seconds and nanoseconds."""
         return self._header.sec, self._header.nanosec
 
     @property
     def command_due(self) -> bool:
-        """Whether a command is required."""
+        """True if the answer must contain a command. If `drive` is not called, the previous command is repeated."""
         return bool(self._header.flags & wire.COMMAND_DUE)
 
     def get(self, topic: str) -> Any:
-        """Return the content of the newest message on a topic; None if there is none in this step."""
+        """Return the content of the newest message on a topic; None if this step has none."""
         found = [message for message in self.messages if message.topic == topic]
         return found[-1].content if found else None
 
@@ -72,11 +74,11 @@ class Step:
         self._commanded = True
 
     def publish(self, topic: str, data: bytes) -> None:
-        """Publish a message on a topic that simscen accepts; see simscen.peer.messages. Raises KeyError for others."""
+        """Publish a message that simscen.peer.messages packed. Raises KeyError if simscen does not accept the topic."""
         self._published.append((self._peer.accepted_topics[topic], data))
 
     def log(self, text: str, level: int = 20) -> None:
-        """Write a line to /rosout of the run's log; 10 debug, 20 info, 30 warning, 40 error."""
+        """Write a line to /rosout of the run's log. `level` is 10 debug, 20 info, 30 warning, or 40 error."""
         self.publish(LOG, messages.log(self.stamp, level, self._peer.name, text))
 
     def _answer(self) -> bytes:
@@ -88,14 +90,19 @@ class Step:
 
 
 class Peer:
-    """Connection of a stack to simscen. Iterating gives one Step after another until the run ends.
+    """Connection of a stack to simscen. Iteration yields one Step after another until the run ends.
 
-    `topics` are the topics to receive, None = all. With `every_beat` there is a step whenever a sensor publishes;
-    otherwise there is one for each command, with the readings since the last step. `modes` are the supported ways to
-    take goals, by the names of Nav2's actions; a stack with navigate_through_poses passes goals with `via` without
-    stopping. `about` is kept in the run's log.
+    `name`, `version` and `about` (any JSON data) describe the stack in the log of the run. `topics` are the topics to
+    receive; None means all. With `every_beat`, there is a step whenever a sensor publishes. Otherwise, there is a step
+    for each command, with the messages since the last step. `modes` are the Nav2 actions that the stack supports: a
+    stack with navigate_through_poses passes goals with `via` without stopping. `connection` is by default the socket
+    that simscen passes to the processes that it starts.
 
-    Raises wire.Malformed or Refused for protocol errors, Disconnected when simscen closes the connection.
+    `hello` and `task` are the contents of the frames HELLO and GOAL. `goals` is the queue of goals, and `command` the
+    last velocity vx, vy, wz. `accepted_topics` has the numbers of the topics that simscen accepts, by name.
+
+    Raises wire.Malformed if a frame is invalid, Refused if simscen reports an error of this stack, and Disconnected if
+    simscen closes the connection.
     """
 
     def __init__(
@@ -135,18 +142,18 @@ class Peer:
 
     @property
     def robot(self) -> dict[str, Any]:
-        """Properties of the robot, see HELLO in the protocol."""
+        """Properties of the robot: the object `robot` of the frame HELLO in docs/reference/stack-protocol.md."""
         robot: dict[str, Any] = self.hello["robot"]
         return robot
 
     @property
     def robot_name(self) -> str:
-        """The robot's name if the scenario has several robots, else ""."""
+        """The name of the robot if the scenario has several robots, otherwise ""."""
         name: str = self.hello.get("robot_name", "")
         return name
 
     def __iter__(self) -> Iterator[Step]:
-        """Yield steps until the run ends; each is answered when the next one is requested."""
+        """Yield steps until the run ends. The answer to a step is sent when the next step is requested."""
         while True:
             kind, body = self._connection.receive()
             if kind == wire.STEP:
@@ -176,12 +183,12 @@ class Peer:
     def _process_frame(self, kind: int, content: dict[str, Any]) -> None:
         if kind == wire.GOAL:
             self.task = content
-            self.goals.start([Goal.of(goal) for goal in content["goals"]])
+            self.goals.start([Goal.from_content(goal) for goal in content["goals"]])
         elif kind == wire.PREEMPT:
-            self.goals.preempted(Goal.of(content["goal"]))
+            self.goals.preempt(Goal.from_content(content["goal"]))
         elif kind == wire.CANCEL:
             self._canceled = True
-            self.goals.canceled(content["all"])
+            self.goals.cancel(content["all"])
         else:
             raise wire.Malformed(f"a stack cannot receive a frame of kind {kind}")
 
@@ -193,6 +200,3 @@ class Peer:
         if received_kind != kind:
             raise wire.Malformed(f"a frame of kind {received_kind} instead of {wire.KIND_NAMES[kind]}")
         return wire.from_json(body)
-
-
-__all__ = ["Connection", "Disconnected", "Goal", "Goals", "Message", "Peer", "Refused", "Step"]

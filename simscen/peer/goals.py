@@ -1,4 +1,4 @@
-"""Goals of a stack in their order, and the events that it reports about them."""
+"""Goal queue of a stack: takes the goals that simscen sends, and collects the events that report their progress."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ ROUNDING_S = 1e-8
 
 
 class Goal(NamedTuple):
-    """A pose to reach in the map, within tolerances (m, rad), in at most `timeout` simulated seconds (None = any).
+    """A pose in the map to reach within tolerances (m, rad).
 
-    `via`: pass without stopping, with any heading, in one drive with the next goal. `wait`: simulated seconds to stay
-    at the goal.
+    `timeout` is the limit in simulated seconds, None without a limit. The robot passes a goal with `via` without
+    stopping and with any heading, in one drive with the next goal. It stays at the goal for `wait` simulated seconds.
     """
 
     name: str
@@ -30,39 +30,46 @@ class Goal(NamedTuple):
     wait: float = 0.0
 
     @classmethod
-    def of(cls, content: dict[str, Any]) -> Goal:
-        """Return the goal from the content of GOAL or PREEMPT."""
+    def from_content(cls, content: dict[str, Any]) -> Goal:
+        """Return the goal from its JSON object in a GOAL or PREEMPT frame."""
         fields = {"via": False, "wait": 0.0, **content}
         return cls(*(fields[name] for name in cls._fields))
 
 
 class Goals:
-    """The list of goals, and the events for the next answer.
+    """Queue of goals, and the events to send with the next answer.
 
-    A goal that simscen cancels or preempts is dropped and reported as canceled.
+    `current` is the accepted goal, None if there is none; `waiting` are the goals after it. When simscen cancels or
+    preempts the current goal, it is dropped and reported as canceled.
     """
 
     def __init__(self) -> None:
         self.current: Goal | None = None
         self.waiting: list[Goal] = []
         self.now = 0.0
-        """Simulated seconds; updated by the caller at every step."""
+        """Simulated time in seconds; the caller updates it at every step."""
         self._wait_until = 0.0
         self._events: list[dict[str, Any]] = []
 
     def start(self, goals: Sequence[Goal]) -> None:
-        """Replace all goals by `goals`, to be driven to in this order."""
+        """Replace all goals by `goals`, in the order in which the robot drives to them."""
         self.current, self.waiting, self._wait_until = None, list(goals), 0.0
 
     def accept(self) -> Goal | None:
-        """Accept the next goal unless there is a current one; return the current goal, None if there is none yet."""
+        """Accept the next goal if no goal is current, and return the current goal.
+
+        Returns None if there is no goal, or while the robot waits at the previous one.
+        """
         if self.current is None and self.waiting and self.now >= self._wait_until - ROUNDING_S:
             self.current = self.waiting.pop(0)
             self.report("goal.accepted", self.current.name)
         return self.current
 
     def reached(self) -> None:
-        """Report the current goal as reached, or as passed for `via`; then wait for the time given by its `wait`."""
+        """Report the current goal as reached, or as passed if it has `via`, and start its `wait`.
+
+        Raises ValueError without a current goal.
+        """
         goal = self.current
         self._end("goal.passed" if goal is not None and goal.via else "goal.reached")
         if goal is not None and goal.wait:
@@ -70,7 +77,7 @@ class Goals:
 
     @property
     def ahead(self) -> list[Goal]:
-        """The goals that follow the current one in the same drive."""
+        """The goals that follow the current one in the same drive: up to the first without `via`."""
         if self.current is None or not self.current.via:
             return []
         stop = next((k for k, goal in enumerate(self.waiting) if not goal.via), len(self.waiting) - 1)
@@ -79,28 +86,29 @@ class Goals:
     def failed(self, error_code: int | str, message: str = "", go_on: bool = False) -> None:
         """Report the current goal as failed, with one of Nav2's error codes by number or name.
 
-        Without `go_on` all other goals are dropped, as FollowWaypoints does with stop_on_failure.
+        With `go_on`, keep the goals of later drives. Otherwise, drop all goals, as FollowWaypoints does with
+        stop_on_failure. Raises ValueError without a current goal.
         """
         self._drop("goal.failed", error_code=error_code, message=message)
         if not go_on:
             self.waiting = []
 
-    def preempted(self, goal: Goal) -> None:
-        """Cancel the current goal and put another one first."""
+    def preempt(self, goal: Goal) -> None:
+        """Cancel the current goal, and put another one before all waiting goals."""
         if self.current is not None:
             self._drop("goal.canceled")
         self._wait_until = 0.0
         self.waiting.insert(0, goal)
 
-    def canceled(self, everything: bool) -> None:
-        """Cancel the current goal; with `everything`, also all after it."""
+    def cancel(self, everything: bool) -> None:
+        """Cancel the current goal; with `everything`, also drop all waiting goals."""
         if self.current is not None:
             self._drop("goal.canceled")
         if everything:
             self.waiting = []
 
     def report(self, kind: str, name: str = "", **data: Any) -> None:
-        """Report an event with the next answer, e.g. `report("recovery.started", "spin")`."""
+        """Add an event to the next answer, e.g. `report("recovery.started", "spin")`."""
         self._events.append({"kind": kind, "name": name, "data": data})
 
     def take_events(self) -> list[dict[str, Any]]:
@@ -109,7 +117,7 @@ class Goals:
         return events
 
     def _drop(self, kind: str, **data: Any) -> None:
-        """End the current goal, and drop the goals that follow it in the same drive."""
+        """End the current goal with an event of this kind, and drop the goals that follow it in the same drive."""
         ahead = len(self.ahead)
         self._end(kind, **data)
         self.waiting = self.waiting[ahead:]

@@ -1,7 +1,8 @@
-"""ROS 2 messages of the stack protocol as plain Python classes, and functions that read and serialize them.
+"""Classes for the ROS 2 messages of the stack protocol, and functions that read and serialize them.
 
-Definitions: common_interfaces, nav2_msgs and tf2_msgs of ROS 2 Humble. Planar poses are x, y and yaw. A
-function that returns bytes returns a message in the serialization of ROS 2 (CDR).
+`read` deserializes a message that a stack receives. The functions that return bytes serialize messages (CDR) that a
+stack sends. The messages are those of common_interfaces, nav2_msgs and tf2_msgs of ROS 2 Humble. Only the planar part
+of most poses and velocities is used: x, y, yaw (m, rad) and vx, vy, wz (m/s, rad/s).
 """
 
 from __future__ import annotations
@@ -45,9 +46,9 @@ class LaserScan(NamedTuple):
 
 
 class Odometry(NamedTuple):
-    """nav_msgs/msg/Odometry in the plane: the pose of `child` in `frame`, and its velocity in its own frame.
+    """nav_msgs/msg/Odometry in the plane: the pose of the frame `child` in `frame`, and its velocity in `child`.
 
-    The covariances have 36 numbers each.
+    The covariances are 6 x 6, row by row, as in the message.
     """
 
     stamp: Stamp
@@ -64,7 +65,7 @@ class Odometry(NamedTuple):
 class Imu(NamedTuple):
     """sensor_msgs/msg/Imu: angular velocity about x, y, z in rad/s, and acceleration along x, y, z in m/s².
 
-    The covariances have nine numbers each.
+    The covariances are 3 x 3, row by row.
     """
 
     stamp: Stamp
@@ -76,7 +77,7 @@ class Imu(NamedTuple):
 
 
 class Image(NamedTuple):
-    """sensor_msgs/msg/Image."""
+    """sensor_msgs/msg/Image: `data` has `height` rows of `step` bytes. Encodings: rgb8, 32FC1 (depth in m)."""
 
     stamp: Stamp
     frame: str
@@ -88,7 +89,10 @@ class Image(NamedTuple):
 
 
 class OccupancyGrid(NamedTuple):
-    """nav_msgs/msg/OccupancyGrid: cell (column, row) is `data[row * width + column]`, 0 … 100, or -1 = unknown."""
+    """nav_msgs/msg/OccupancyGrid: cell (column, row) is `data[row * width + column]`, 0 … 100, or -1 if unknown.
+
+    `resolution` is the size of a cell in m. `origin` is the pose of the outer corner of cell (0, 0).
+    """
 
     stamp: Stamp
     frame: str
@@ -100,7 +104,7 @@ class OccupancyGrid(NamedTuple):
 
 
 class PoseWithCovariance(NamedTuple):
-    """geometry_msgs/msg/PoseWithCovarianceStamped in the plane; the covariance has 36 numbers."""
+    """geometry_msgs/msg/PoseWithCovarianceStamped in the plane. The covariance is 6 x 6, row by row."""
 
     stamp: Stamp
     frame: str
@@ -109,7 +113,7 @@ class PoseWithCovariance(NamedTuple):
 
 
 class Transform(NamedTuple):
-    """A transform of tf2_msgs/msg/TFMessage: the pose of `child` in `frame`, x, y, z and a quaternion."""
+    """A transform of tf2_msgs/msg/TFMessage: the pose of `child` in `frame`, x, y, z and a quaternion x, y, z, w."""
 
     stamp: Stamp
     frame: str
@@ -118,12 +122,12 @@ class Transform(NamedTuple):
 
     @property
     def pose2d(self) -> Pose2D:
-        """The planar pose."""
+        """The planar part of the pose."""
         return _planar(self.pose)
 
 
 def quaternion(yaw: float) -> tuple[float, float, float, float]:
-    """Return x, y, z, w of the quaternion of a yaw angle."""
+    """Return the quaternion x, y, z, w of a rotation by `yaw` about the z axis."""
     return 0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)
 
 
@@ -184,17 +188,15 @@ def _pose_with_covariance(reader: Reader) -> PoseWithCovariance:
 
 
 def _transforms(reader: Reader) -> list[Transform]:
-    (count,) = reader.take("I")
     links = []
-    for _ in range(count):
+    for _ in range(reader.count()):
         stamp, frame = _header(reader)
         links.append(Transform(stamp, frame, reader.string(), reader.take("7d")))
     return links
 
 
 def _float64_array(reader: Reader) -> array[float]:
-    (dimensions,) = reader.take("I")
-    for _ in range(dimensions):
+    for _ in range(reader.count()):
         reader.string()
         reader.take("2I")
     reader.take("I")
@@ -214,11 +216,14 @@ READERS: dict[str, Callable[[Reader], Any]] = {
     "geometry_msgs/msg/Pose2D": lambda reader: Pose2D(*reader.take("3d")),
     "tf2_msgs/msg/TFMessage": _transforms,
 }
-"""Reader functions by type."""
+"""Functions that read a message, by its type."""
 
 
 def read(kind: str, data: bytes) -> Any:
-    """Return a message of a type in `READERS`. Raises ValueError if the data are too short."""
+    """Return a message of a type in `READERS`: an object of a class above, or a plain Python value, e.g. for Bool.
+
+    Raises ValueError if the data are not such a message.
+    """
     return READERS[kind](Reader(data))
 
 
@@ -238,14 +243,14 @@ def pose2d(x: float, y: float, yaw: float) -> bytes:
 
 
 def float64_array(values: Sequence[float]) -> bytes:
-    """Return a std_msgs/msg/Float64MultiArray without a layout."""
+    """Return a std_msgs/msg/Float64MultiArray whose layout has no dimensions."""
     return Writer().put("2I", 0, 0).numbers("d", values).done()
 
 
 def pose_with_covariance(stamp: Stamp, pose: Sequence[float], covariance: Sequence[float]) -> bytes:
     """Return a geometry_msgs/msg/PoseWithCovarianceStamped in the map frame.
 
-    `covariance` has 36 numbers, or 9 for x, y, yaw.
+    `pose` is x, y, yaw. `covariance` is 3 x 3 for x, y, yaw, or 6 x 6 as in the message, row by row.
     """
     if len(covariance) == 9:
         c, full = covariance, [0.0] * 36
@@ -261,7 +266,10 @@ def pose_with_covariance(stamp: Stamp, pose: Sequence[float], covariance: Sequen
 def odometry(
     stamp: Stamp, pose: Sequence[float], twist: Sequence[float], variances: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> bytes:
-    """Return a nav_msgs/msg/Odometry of base_link in the odom frame: x, y, yaw; vx, vy, wz and their variances."""
+    """Return a nav_msgs/msg/Odometry of base_link in the odom frame.
+
+    `pose` is x, y, yaw, `twist` is vx, vy, wz, and `variances` are those of the twist.
+    """
     (x, y, yaw), (vx, vy, wz), twist_covariance = pose, twist, [0.0] * 36
     twist_covariance[0], twist_covariance[7], twist_covariance[35] = variances
     message = Writer().put("iI", *stamp).string("odom").string("base_link")
@@ -280,9 +288,10 @@ def path(stamp: Stamp, poses: Sequence[Sequence[float]]) -> bytes:
 def occupancy_grid(
     stamp: Stamp, frame: str, resolution: float, width: int, origin: Sequence[float], cells: Sequence[int]
 ) -> bytes:
-    """Return a nav_msgs/msg/OccupancyGrid of rows of `width` cells, 0 … 100 or -1, lowest y first.
+    """Return a nav_msgs/msg/OccupancyGrid.
 
-    `origin` is x, y, yaw.
+    `cells` are rows of `width` cells, the row with the lowest y first; a cell is 0 … 100, or -1 if unknown.
+    `resolution` is the size of a cell in m, `origin` the pose x, y, yaw of the outer corner of the first cell.
     """
     x, y, yaw = origin
     message = Writer().put("iI", *stamp).string(frame).put("iI", *stamp).put("f", resolution)
@@ -291,7 +300,7 @@ def occupancy_grid(
 
 
 def transforms(links: Sequence[tuple[Stamp, str, str, Sequence[float]]]) -> bytes:
-    """Return a tf2_msgs/msg/TFMessage; a link is stamp, frame, child frame, and the child's x, y, yaw."""
+    """Return a tf2_msgs/msg/TFMessage. A link is the stamp, frame, child frame, and pose x, y, yaw of the child."""
     message = Writer().put("I", len(links))
     for stamp, frame, child, (x, y, yaw) in links:
         message.put("iI", *stamp).string(frame).string(child).put("7d", x, y, 0.0, *quaternion(yaw))
@@ -299,7 +308,7 @@ def transforms(links: Sequence[tuple[Stamp, str, str, Sequence[float]]]) -> byte
 
 
 def particle_cloud(stamp: Stamp, particles: Sequence[Sequence[float]]) -> bytes:
-    """Return a nav2_msgs/msg/ParticleCloud in the map frame; each particle is x, y, yaw, weight."""
+    """Return a nav2_msgs/msg/ParticleCloud in the map frame. A particle is x, y, yaw, weight."""
     message = Writer().put("iI", *stamp).string("map").put("I", len(particles))
     for x, y, yaw, weight in particles:
         message.put("8d", x, y, 0.0, *quaternion(yaw), weight)
@@ -307,7 +316,7 @@ def particle_cloud(stamp: Stamp, particles: Sequence[Sequence[float]]) -> bytes:
 
 
 BEHAVIOR_TREE_LOGGER = "behavior_tree"
-"""Logger of the lines that `tree_change` returns."""
+"""Name of the logger of the lines that `tree_change` returns."""
 
 
 def tree_change(node: str, before: str, after: str) -> str:

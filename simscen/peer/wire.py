@@ -1,6 +1,7 @@
-"""Frames of the stack protocol between simscen and a stack in a process of its own.
+"""Wire format of the stack protocol: packs, unpacks, sends and receives the frames between simscen and a stack.
 
-docs/reference/stack-protocol.md defines the protocol. Both sides use this module, on Python 3.8 and later.
+docs/reference/stack-protocol.md defines the protocol. Both simscen and the client use this module, so that it must run
+on Python 3.8.
 """
 
 from __future__ import annotations
@@ -17,24 +18,28 @@ SOCKET_FD_VARIABLE = "SIMSCEN_STACK_FD"
 """Environment variable with the file descriptor of the inherited socket."""
 
 HELLO, WELCOME, GOAL, STEP, ANSWER, PREEMPT, CANCEL, END, ERROR, BYE = range(1, 11)
-"""Kinds of frames."""
+"""Kinds of frames, in the first byte after the size."""
 KIND_NAMES = ("", "HELLO", "WELCOME", "GOAL", "STEP", "ANSWER", "PREEMPT", "CANCEL", "END", "ERROR", "BYE")
 
 COMMAND_DUE = 1
 """Flag of a STEP: its answer must contain a command."""
 MAX_FRAME_BYTES = 256 << 20
-"""Largest frame in bytes."""
+"""Largest frame in bytes, so that a wrong size is an error and does not exhaust the memory."""
 
 MAX_JSON_DEPTH = 32
 """Largest nesting depth of JSON."""
 
 SIZE = struct.Struct("<I")
+"""Size of the rest of the frame in bytes, with which each frame starts."""
 _STEP = struct.Struct("<QiIIII")
+"""The fields of StepHeader, and the number of messages."""
 _ANSWER = struct.Struct("<QI")
+"""Tick, and number of messages."""
 _MESSAGE = struct.Struct("<II")
+"""Number of the topic, and size of the message in bytes."""
 
 if TYPE_CHECKING:
-    Messages = list[tuple[int, bytes]]  # numbers of topics, each with one message as CDR
+    Messages = list[tuple[int, bytes]]  # each message is the number of its topic, and its bytes (CDR)
 
 
 class Malformed(ValueError):
@@ -42,9 +47,9 @@ class Malformed(ValueError):
 
 
 class StepHeader(NamedTuple):
-    """Time of a step: the tick, and the simulated time in whole seconds and nanoseconds.
+    """Header of a STEP: the tick, and the simulated time `sec` + `nanosec`.
 
-    `deadline` is the wall time in milliseconds that the answer may take; `flags` is 0 or COMMAND_DUE.
+    `deadline` is the wall time in milliseconds that the answer may take. `flags` is 0 or COMMAND_DUE.
     """
 
     tick: int
@@ -55,17 +60,17 @@ class StepHeader(NamedTuple):
 
 
 def frame(kind: int, body: bytes) -> bytes:
-    """Return a frame: size, kind, body."""
+    """Return the bytes of a frame: its size, its kind, and its body."""
     return SIZE.pack(len(body) + 1) + bytes((kind,)) + body
 
 
 def json_frame(kind: int, content: dict[str, Any]) -> bytes:
-    """Return a frame with a JSON object."""
+    """Return a frame whose body is a JSON object."""
     return frame(kind, json.dumps(content, separators=(",", ":"), allow_nan=False).encode())
 
 
 def from_json(body: bytes) -> dict[str, Any]:
-    """Return the object of a JSON frame. Raises Malformed for invalid or too deeply nested JSON."""
+    """Return the JSON object in the body of a frame. Raises Malformed for invalid or too deeply nested JSON."""
     try:
         content = json.loads(body.decode(), parse_constant=_reject_constant)
         json.dumps(content, ensure_ascii=False).encode()
@@ -88,23 +93,23 @@ def _is_nested_deeper(content: Any, remaining: int) -> bool:
 
 
 def step_frame(header: StepHeader, messages: Messages) -> bytes:
-    """Return a STEP."""
+    """Return a STEP frame."""
     return frame(STEP, _STEP.pack(*header, len(messages)) + _pack_messages(messages))
 
 
 def answer_frame(tick: int, messages: Messages) -> bytes:
-    """Return an ANSWER to the STEP of that tick."""
+    """Return an ANSWER frame to the STEP of this tick."""
     return frame(ANSWER, _ANSWER.pack(tick, len(messages)) + _pack_messages(messages))
 
 
 def from_step(body: bytes) -> tuple[StepHeader, Messages]:
-    """Return header and messages of a STEP. Raises Malformed."""
+    """Return the header and the messages of a STEP. Raises Malformed if the body is invalid."""
     *header, count = _unpack_struct(_STEP, body, 0)
     return StepHeader(*header), _unpack_messages(body, _STEP.size, count)
 
 
 def from_answer(body: bytes) -> tuple[int, Messages]:
-    """Return tick and messages of an ANSWER. Raises Malformed."""
+    """Return the tick and the messages of an ANSWER. Raises Malformed if the body is invalid."""
     tick, count = _unpack_struct(_ANSWER, body, 0)
     return tick, _unpack_messages(body, _ANSWER.size, count)
 
@@ -137,11 +142,11 @@ class Disconnected(ConnectionError):
 
 
 class Refused(RuntimeError):
-    """simscen ends the run because of something that this stack sent; the message gives the reason."""
+    """simscen has sent ERROR, or the stack has given up: the run ends. The message states the reason."""
 
 
 class Connection:
-    """A stream socket for frames of the protocol. It blocks, because the simulation waits for the answer anyway."""
+    """Stream socket that sends and receives frames. It blocks, because the simulation waits for the answer anyway."""
 
     def __init__(self, stream: socket.socket) -> None:
         self._stream = stream
@@ -158,18 +163,21 @@ class Connection:
         return cls(socket.socket(fileno=int(number)))
 
     def send(self, frame: bytes) -> None:
-        """Send a frame. Raises Disconnected."""
+        """Send the bytes of a frame. Raises Disconnected if the socket is closed."""
         try:
             self._stream.sendall(frame)
         except OSError as error:
             raise Disconnected(str(error)) from error
 
     def send_json(self, kind: int, content: dict[str, Any]) -> None:
-        """Send a frame with a JSON object."""
+        """Send a frame whose body is a JSON object. Raises Disconnected if the socket is closed."""
         self.send(json_frame(kind, content))
 
     def receive(self) -> tuple[int, bytes]:
-        """Return kind and body of the next frame. Raises Disconnected, and Refused for an ERROR."""
+        """Return the kind and the body of the next frame.
+
+        Raises Refused for an ERROR frame, Malformed for an invalid size, and Disconnected if the socket is closed.
+        """
         (size,) = SIZE.unpack(self._receive_exactly(SIZE.size))
         if not 1 <= size <= MAX_FRAME_BYTES:
             raise Malformed(f"a frame of {size} bytes")

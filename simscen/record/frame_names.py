@@ -1,13 +1,14 @@
 """Names of the coordinate frames in a log (ROS REP 105)."""
 
 MAP, ODOM, BASE, TRUTH = "map", "odom", "base_link", "base_link_truth"
+"""The frames of REP 105, and the true pose of the base, which only the log contains."""
 _OBJECT_PREFIX = "object/"
 
 
 class RobotFrames:
-    """Frame names of one robot.
+    """Names that the frames of one robot have in the log.
 
-    With several robots, each frame is prefixed with the robot's name, so that all robots share one tf tree. The frame
+    With several robots, each frame has the robot's name as a prefix, so that all robots are in one tf tree. The frame
     `map` and the frames of moving objects have no prefix.
     """
 
@@ -17,28 +18,28 @@ class RobotFrames:
         self.odom, self.base, self.truth = self.log_frame(ODOM), self.log_frame(BASE), self.log_frame(TRUTH)
 
     def log_frame(self, frame: str) -> str:
-        """Return the name in the log of a frame of the robot's stack."""
+        """Return the name in the log for a frame of the robot's stack."""
         return frame if frame == MAP else f"{self._prefix}{frame}"
 
     def sensor_frame(self, sensor: str) -> str:
-        """Return the name in the log of a sensor's frame."""
+        """Return the name in the log for the frame of a sensor."""
         return self.log_frame(sensor_frame(sensor))
 
     def stack_frame(self, frame: str) -> str:
-        """Return a frame of the log without the robot's prefix. Logs of older versions have no prefix."""
+        """Return the name in the stack for a frame of the log: without the prefix, which older logs do not have."""
         return frame.removeprefix(self._prefix)
 
 
 def sensor_frame(sensor: str) -> str:
-    """Return the frame of a sensor: the sensor's name, changed if the name is that of another frame."""
+    """Return the name of a sensor's frame: the name of the sensor, with `_link` if another frame has this name."""
     return f"{sensor}_link" if sensor in (MAP, ODOM, BASE, TRUTH) else sensor
 
 
 def object_frame(name: str) -> str:
-    """Return the frame of a moving object."""
+    """Return the name of the frame of a moving object."""
     return f"{_OBJECT_PREFIX}{name}"
 
 
 def object_in_frame(frame: str) -> str | None:
-    """Return the name of the moving object that a frame belongs to, or None for other frames."""
+    """Return the name of the moving object whose frame this is; None for other frames."""
     return frame[len(_OBJECT_PREFIX) :] if frame.startswith(_OBJECT_PREFIX) else None

@@ -1,7 +1,7 @@
-"""Processing of the MCAP records of a log: header, trace, sensor messages and result."""
+"""Conversion of the MCAP records of a log to its contents: header, trace, sensor messages and result."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
 from mcap import records
@@ -10,87 +10,20 @@ from simscen.core.clock import SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.records.trace import Trace
-from simscen.core.records.verdict import Evidence, LogCoverage
+from simscen.core.records.verdict import LogCoverage
 from simscen.record import frame_names, log_header, topics
 from simscen.record.log_header import LogHeader
+from simscen.record.message_counts import MessageCounts
 from simscen.record.messages import decode, event_text
 from simscen.record.messages.decode import MessageReader
 from simscen.record.sensor_messages import SensorMessages
 from simscen.record.trace_builder import TraceRows
 
-NO_COUNTS = "the log has no message counts: an older simscen wrote it, or its end was edited"
 _MERGED = "; a log that was merged from several cannot be judged"
-
-_EVENTS = frozenset(
-    {Evidence.CONTACTS, Evidence.NAVIGATION, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES}
-) | {Evidence.DISTURBANCES, Evidence.OBJECTS}
-_EVIDENCE: dict[str, frozenset[Evidence]] = {
-    topics.TRUTH.name: frozenset({Evidence.TRUTH, Evidence.VELOCITY}),
-    topics.CLEARANCE.name: frozenset({Evidence.CLEARANCE}),
-    topics.BELIEF.name: frozenset({Evidence.BELIEF, Evidence.COVARIANCE}),
-    topics.COMMAND.name: frozenset({Evidence.COMMANDS}),
-    topics.PLAN.name: frozenset({Evidence.PLANS}),
-    topics.EVENTS.name: _EVENTS,
-    topics.TF.name: frozenset({Evidence.OBJECTS}),
-}
-
-
-class MessageCounts:
-    """Counts the messages of each topic, checks the order of their times, and compares the counts with the log's."""
-
-    def __init__(self) -> None:
-        self._topics: dict[int, str] = {}
-        self._scans: set[str] = set()
-        self._found: dict[str, int] = {}
-        self._newest: dict[str, int] = {}
-        self._expected: dict[str, int] | None = None
-
-    def add_channel(self, channel: int, topic: str, message_type: str) -> None:
-        """Add a channel of the log, by its number. Several channels may have the same topic."""
-        self._topics[channel] = topic
-        if message_type == topics.SCAN_TYPE:
-            self._scans.add(topic)
-
-    def add_message(self, channel: int, time: int) -> None:
-        """Count a message. Raises ValueError if an earlier message of its topic has a later time."""
-        topic = self._topics.get(channel, "")
-        if time < self._newest.get(topic, time):
-            raise ValueError(f"the messages of {topic or 'a topic'} are not in the order of time")
-        self._newest[topic] = time
-        self._found[topic] = self._found.get(topic, 0) + 1
-
-    def set_expected(self, end: Mapping[str, str], robot: str = "") -> None:
-        """Read the counts from the end record. With `robot`, use only the topics in its namespace."""
-        prefix = log_header.COUNT_PREFIX + (f"/{robot}" if robot else "")
-        counts = {name: int(count) for name, count in end.items() if name.startswith(log_header.COUNT_PREFIX)}
-        if counts:
-            self._expected = {
-                name.removeprefix(prefix): count for name, count in counts.items() if name.startswith(f"{prefix}/")
-            }
-
-    def coverage(self) -> LogCoverage:
-        """Return which evidence the log lacks because it holds fewer messages than were recorded.
-
-        Evidence is missing if all messages of its topic are lost, and partial if some of them are. The reason states
-        both counts. Without recorded counts, all evidence is partial.
-        """
-        if self._expected is None:
-            return LogCoverage(partial=dict.fromkeys(Evidence, NO_COUNTS))
-        missing: dict[Evidence, str] = {}
-        partial: dict[Evidence, str] = {}
-        for topic, count in self._expected.items():
-            number = self._found.get(topic, 0)
-            if number == count:
-                continue
-            is_scan = topic in self._scans or topic.endswith("scan")  # the type of a removed topic is unknown
-            evidence = _EVIDENCE.get(topic, frozenset({Evidence.SCANS} if is_scan else ()))
-            reasons = dict.fromkeys(evidence, f"{topic} holds {number} of {count} recorded messages")
-            (partial if number else missing).update(reasons)
-        return LogCoverage(missing, partial)
-
+"""End of the message about a record that exists twice."""
 
 Handler = Callable[[int, bytes], None]
-"""Processes a serialized message that was logged at a tick."""
+"""Function that processes a message. Its arguments are the tick of logging, and the serialized message."""
 
 
 class NotSimscenLog(ValueError):
@@ -98,10 +31,10 @@ class NotSimscenLog(ValueError):
 
 
 class LogContents:
-    """Collects the records of a log in the order of the file. Raises ValueError, KeyError or struct.error if invalid.
+    """Collects the records of a log, which must be added in the order of the file.
 
     With `with_sensors`, also collects the messages that are not part of a Trace. With several robots, `robots` has the
-    contents of each robot by name.
+    contents of the log of each robot, by name. The methods raise ValueError or KeyError if the log is damaged.
     """
 
     def __init__(self, with_sensors: bool = False) -> None:
@@ -109,7 +42,7 @@ class LogContents:
         """Tick of the end of the run; None if the log has no end record."""
         self.sensors = SensorMessages()
         self.stack: dict[str, str] = {}
-        """Facts about the external stacks."""
+        """Facts about the external stack, as in stack.json. With several robots, the keys have the robot's name."""
         self._with_sensors = with_sensors
         self._facts: dict[str, str] = {}
         self._files: dict[str, bytes] = {}
@@ -152,7 +85,7 @@ class LogContents:
                 pass  # indexes and statistics
 
     def header(self) -> LogHeader:
-        """Return the description of the run. Raises NotSimscenLog if the log has none."""
+        """Return the header of the log. Raises NotSimscenLog if the log has none."""
         if self.robots:
             if unknown := [name for name in self._files if name.endswith(f"/{log_header.CASE}")]:
                 raise ValueError(f"it has {unknown[0]}, but its list of robots is {', '.join(self.robots)}")
@@ -172,6 +105,7 @@ class LogContents:
         )
 
     def _joint_header(self, robots: dict[str, LogHeader]) -> LogHeader:
+        """Return the header of a log of several robots, from the headers of the robots."""
         first = next(iter(robots.values()))
         text = str(self._files.get(log_header.SCENARIO, b""), "utf-8")
         headers = {name: replace(header, scenario=text) for name, header in robots.items()}
@@ -181,7 +115,10 @@ class LogContents:
         return {name: data for name, data in self._files.items() if name not in log_header.OWN_FILES}
 
     def trace(self) -> Trace:
-        """Return the Trace until the end of the run, or else the last message. With several robots, of the first."""
+        """Return the Trace until the end of the run, or until the last message if the run was aborted.
+
+        With several robots, this is the Trace of the first robot.
+        """
         if self.robots:
             return self.traces()[next(iter(self.robots))]
         trace = self._rows.trace(self._time.rate, self._last_tick if self.end is None else self.end)
@@ -190,13 +127,13 @@ class LogContents:
         return trace
 
     def traces(self) -> dict[str, Trace]:
-        """Return the Trace of each of several robots by name."""
+        """Return the Trace of each robot by name; empty for a single robot."""
         for contents in self.robots.values():
             contents.end, contents._last_tick = self.end, max(self._last_tick, contents._last_tick)
         return {name: contents.trace() for name, contents in self.robots.items()}
 
     def coverage(self) -> LogCoverage:
-        """Return the evidence that is missing because the log has fewer messages than were recorded."""
+        """Return the evidence that the log lacks because messages were removed; none for an aborted run."""
         return LogCoverage() if self.end is None else self._counts.coverage()
 
     def result(self) -> str:

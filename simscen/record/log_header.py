@@ -1,4 +1,4 @@
-"""Metadata and attachments of a log: everything except the messages that is needed to judge or repeat the run."""
+"""Header of a log: the metadata and attachments that are needed to judge or repeat the run, besides the messages."""
 
 import json
 import math
@@ -17,17 +17,19 @@ from simscen.core.records.case import Case
 from simscen.core.records.run_result import RunKey
 
 FORMAT = "1"
+"""Version of the log format. Logs of another version are rejected."""
 STACK_RECORD = "simscen.stack"
 """Metadata record that describes the external stacks. Written at the end of the log, when all facts are known."""
 _FACT_PREFIX = "fact."
 STACK_FACT, STACK_NAME_FACT, VARIATION_FACT = "stack", "variation", "varied"
-"""Names of facts: the --stack NAME=VALUE that replaced the scenario's stack, the name of the stack if several are
-compared, and the scenario's variation."""
+"""Keys of `LogHeader.facts`: the value of --stack that replaced the scenario's stack, the name of the stack if several
+are compared, and the variation of the scenario. The keys differ from these terms because older logs use them."""
 ROBOTS, RESOLUTION, ORIGIN = "robots", "map.resolution", "map.origin"
-"""Keys of the metadata record: the names of several robots, and the resolution and origin of a robot's map."""
+"""Keys of the metadata record "simscen": the names of several robots, and the resolution and origin of a map."""
 END, COUNT_PREFIX = "simscen.end", "messages:"
-"""Metadata record at the end of a complete log, and the prefix of its message counts by topic."""
+"""Metadata record at the end of a complete log, and the prefix of its keys for the number of messages of a topic."""
 OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
+"""Names of attachments that simscen itself writes; other files must not use them."""
 _MEDIA_TYPES = {
     ".json": "application/json",
     ".pgm": "image/x-portable-graymap",
@@ -40,22 +42,24 @@ _CASES = TypeAdapter(Case)
 
 @dataclass(frozen=True, eq=False)
 class LogHeader:
-    """Description of a run before it starts.
+    """Description of a run, which is written at the start of its log.
 
-    With several robots, `robots` has the header of each robot by name, and the robot fields of the header itself are
-    those of the first robot. `files` and `facts` must not contain wall-clock times, host names or process IDs, because
-    logs of equal runs must be equal.
+    With several robots, `robots` has the header of each robot by name, and `case`, `map`, `robot_description`, `frames`
+    and `sensors` are those of the first robot. `files` and `facts` must not contain wall-clock times, host names or
+    process IDs, because logs of equal runs must be equal.
 
     Attributes:
         name: ID of the scenario.
+        seed: Seed of the run.
+        case: Inputs of the criteria besides the trace.
         scenario: Resolved YAML text of the scenario.
-        map: Map that the robot was given.
+        map: Map that the stack gets; None if there is none.
         robot_description: URDF of the robot.
-        frames: Poses of the sensors on the robot's base. A lidar that is missing here is placed by its first scan.
+        frames: Poses of the sensors on the robot's base. The pose of a lidar that is missing here is that in its scans.
         sensors: Reading types by sensor name, in the order in which sensors get their topics. Empty if read from a log.
         files: Attachments by name.
         facts: Additional metadata.
-        robots: Headers of several robots by name.
+        robots: Headers of the robots by name; empty for a single robot.
     """
 
     name: str
@@ -77,7 +81,7 @@ class LogHeader:
 
 
 def case_to_json(case: Case) -> str:
-    """Return a Case as strict JSON. Infinity is written as the text "Infinity"."""
+    """Return a Case as JSON, in which infinity is the string "Infinity"."""
     return str(to_json(case, inf_nan_mode="strings", indent=1), "utf-8")
 
 
@@ -94,12 +98,12 @@ def case_from_json(text: str | bytes) -> Case:
 
 
 def media_type(name: str) -> str:
-    """Return the media type for a file name. Does not use the table of the operating system, so that logs are equal."""
+    """Return the media type for a file name. The table is fixed, so that logs are equal on all operating systems."""
     return _MEDIA_TYPES.get(PurePosixPath(name).suffix, "application/octet-stream")
 
 
 def run_metadata(header: LogHeader, clock: Clock) -> dict[str, str]:
-    """Return the metadata record "simscen". Numbers keep their exact values."""
+    """Return the metadata record "simscen", with the exact resolution and origin of each map."""
     metadata = {"format": FORMAT, "scenario": header.name, "seed": str(header.seed), "tick_rate": str(clock.rate)}
     metadata |= {ROBOTS: json.dumps(list(header.robots))} if header.robots else _map_facts(header)
     for name, robot_header in header.robots.items():
@@ -115,24 +119,24 @@ def _map_facts(header: LogHeader) -> dict[str, str]:
 
 
 def robot_metadata(run_metadata: Mapping[str, str], robot: str) -> dict[str, str]:
-    """Return the metadata record with the map of one of several robots."""
+    """Return the metadata record "simscen" for one of several robots: with the resolution and origin of its map."""
     own = {fact: run_metadata[f"{robot}.{fact}"] for fact in (RESOLUTION, ORIGIN) if f"{robot}.{fact}" in run_metadata}
     return {**run_metadata, **own}
 
 
 def stack_facts(facts: Mapping[str, str], robot: str) -> dict[str, str]:
-    """Return the facts about the external stack of one of several robots, from the metadata record of all stacks."""
+    """Return the facts about the external stack of one of several robots, from those about all stacks."""
     prefix = f"{robot}."
     return {name.removeprefix(prefix): fact for name, fact in facts.items() if name.startswith(prefix)}
 
 
 def extra_facts(run_metadata: Mapping[str, str]) -> dict[str, str]:
-    """Return `LogHeader.facts` from the metadata record."""
+    """Return the value of `LogHeader.facts` from the metadata record "simscen"."""
     return {name[len(_FACT_PREFIX) :]: value for name, value in run_metadata.items() if name.startswith(_FACT_PREFIX)}
 
 
 def attachments(header: LogHeader) -> dict[str, bytes]:
-    """Return the attachments of the log by name. Raises ValueError if a file has a reserved name."""
+    """Return the attachments of the log by name. Raises ValueError if one of `header.files` has a reserved name."""
     cases = {f"{name}/{CASE}": case_to_json(robot.case).encode() for name, robot in header.robots.items()}
     files = cases or {CASE: case_to_json(header.case).encode()}
     if header.scenario:
@@ -143,16 +147,17 @@ def attachments(header: LogHeader) -> dict[str, bytes]:
 
 
 SCENERY_FILE = "scenery.json"
+"""Attachment with what pictures and markers show besides the trace."""
 _SCENERIES = TypeAdapter(Scenery)
 
 
 def scenery_to_json(scenery: Scenery) -> bytes:
-    """Return the scenery as strict JSON."""
+    """Return the scenery as JSON."""
     return to_json(scenery)
 
 
 def scenery_from_header(header: LogHeader) -> Scenery:
-    """Return the scenery of the log, empty for logs of older versions. Raises ValueError if it is invalid."""
+    """Return the attached scenery, or an empty one for logs of older versions. Raises ValueError if it is invalid."""
     data = header.files.get(SCENERY_FILE)
     if data is None:
         return Scenery()

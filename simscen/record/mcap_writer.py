@@ -1,52 +1,34 @@
-"""Writer of MCAP files that is fast enough for every simulation step, and the ROS 2 message definitions it embeds.
+"""Writer of MCAP files that is fast enough for every simulation step.
 
-The records are those of the mcap library, except for messages and chunks: the library takes 3–4 µs per message and
-fixes the compression level of zstd at 3, which together takes twice the time of everything else in recording.
+The mcap library encodes all records except messages, chunks, and their indexes. For these, the library takes twice as
+long as everything else in recording, also because its zstd compression level is fixed.
 """
 
-import json
 import struct
 import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping
-from importlib.resources import files
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import zstandard
 from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
-from simscen.record.messages.cdr import Slot, Template
-
-
-class MessageType(NamedTuple):
-    """A message type: full name, definition including nested types (ros2msg), and type hash (REP 2016)."""
-
-    name: str
-    definition: str
-    hash: str
-
-
-def load_message_types() -> dict[str, MessageType]:
-    """Return all message types of a log by name.
-
-    The file schemas.json is generated from the definitions of ROS 2 Humble in rosbags; a test checks it.
-    """
-    table = json.loads(files(__package__).joinpath("schemas.json").read_text("utf-8"))
-    return {name: MessageType(name, entry["definition"], entry["hash"]) for name, entry in table.items()}
-
+from simscen.record.messages.template import Slot, Template
+from simscen.record.topics import MessageType
 
 MESSAGE_HEADER_BYTES = 31
 """Size of a message record without the message."""
 _MESSAGE = int(Opcode.MESSAGE)
 _pack_head = struct.Struct("<BQHIQQ").pack_into
+"""Packs the header of a message record: opcode, record length, channel, sequence number, log time, publish time."""
 
 
 class Chunk:
-    """Buffer of records that will be compressed together.
+    """Buffer of records that will be compressed together, as an MCAP chunk.
 
-    When the buffer has more than `limit` bytes, `on_full` is called, which must write and clear it.
+    When the buffer has more than `limit` bytes, a Channel calls `on_full`, which must write and clear the chunk.
     """
 
     def __init__(self, limit: int, on_full: Callable[[], None]) -> None:
@@ -72,7 +54,7 @@ class Chunk:
             self.view = larger
 
     def __bool__(self) -> bool:
-        """Return whether the chunk has messages. The summary repeats all other records."""
+        """Return whether the chunk has messages. Without messages it need not be written: the summary has the rest."""
         return bool(self.active_channels())
 
     def active_channels(self) -> "list[Channel]":
@@ -96,9 +78,9 @@ class Chunk:
 
 
 class Channel:
-    """Channel of one topic, with its `number` in the file, which writes its messages to `chunk`.
+    """Channel of one topic, which adds messages to the current chunk. `number` is its ID in the file.
 
-    `entries` alternates times (ns) and offsets of the messages in the current chunk.
+    `entries` has two numbers for each message in the current chunk: its time in ns, and its offset.
     """
 
     def __init__(self, number: int, chunk: Chunk) -> None:
@@ -121,12 +103,15 @@ class Channel:
             chunk.on_full()
 
     def record(self, message: Template) -> "list[bytes | Slot]":
-        """Return the parts of a message record, for a message of fixed size. The first field is `time`."""
+        """Return the parts of a message record with a message of fixed size, for `compile_writer`.
+
+        The first field is `time` in ns; the others are those of the message.
+        """
         head = struct.pack("<BQHI", _MESSAGE, 22 + len(message.buffer), self.number, 0)
         return [head, Slot("Q", "time"), Slot("Q", "time"), *message.parts]
 
     def index(self) -> bytes:
-        """Return the MessageIndex record of the chunk for this channel."""
+        """Return the MessageIndex record with the messages of this channel in the current chunk."""
         entries = self.entries
         size = 8 * len(entries)
         return struct.pack(f"<BQHI{len(entries)}Q", Opcode.MESSAGE_INDEX, 6 + size, self.number, size, *entries)
@@ -134,16 +119,16 @@ class Channel:
 
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_BYTES = 1 << 18
-"""Maximum number of bytes to compress at once."""
+"""Size above which a chunk is written in any case."""
 CHUNK_FLUSH_BYTES, CHUNK_FLUSH_NS = 1 << 16, 500_000_000
-"""Size or duration from which `flush_if_due` writes a chunk. Unwritten chunks are lost if the process is killed."""
+"""Size or time span from which `flush_if_due` writes a chunk. Chunks in memory are lost if the process is killed."""
 _CHUNK = struct.Struct("<BQ3QII4sQ")
 """A Chunk record without its data."""
-_COMPRESSION_LEVEL = -2  # 4 % larger files than level 1, but 25 % faster
+_COMPRESSION_LEVEL = -2  # of zstd: 4 % larger files than level 1, but 25 % faster
 
 
 class Sink(Protocol):
-    """Destination of the bytes of a file."""
+    """Destination of the bytes of an MCAP file, such as an open file."""
 
     def write(self, data: bytes, /) -> object:
         """Write all of `data`."""
@@ -153,8 +138,8 @@ class Sink(Protocol):
 class McapWriter:
     """Writes an MCAP file to `sink`. Messages must be added in the order of their times.
 
-    `profile` and `library` are the fields of the MCAP header, for example "ros2" and "simscen".
-    A chunk is written when it is full, or at `flush_if_due`. `finish` writes the last chunk and the index.
+    `profile` and `library` are the fields of the MCAP header, for example "ros2" and "simscen". A chunk is written when
+    it has more than `chunk_size` bytes, or by `flush_if_due`. `finish` writes the last chunk and the index.
     """
 
     def __init__(self, sink: Sink, profile: str, library: str, chunk_size: int = CHUNK_BYTES) -> None:
@@ -175,7 +160,7 @@ class McapWriter:
         self._put(_encode(records.Header(profile, library)))
 
     def channel(self, topic: str, kind: MessageType, metadata: Mapping[str, str]) -> Channel:
-        """Add a channel of CDR messages."""
+        """Add a channel of CDR messages for a topic, and return it. Messages are added by `Channel.write`."""
         schema = self._schemas.get(kind.name)
         if schema is None:
             schema = self._schemas[kind.name] = len(self._schemas) + 1
@@ -203,21 +188,21 @@ class McapWriter:
         self._put(record)
 
     def message_counts(self) -> dict[str, int]:
-        """Return the number of messages by topic, so far."""
+        """Return the number of messages that have been added, by topic."""
         pending = {channel.number: len(channel.entries) // 2 for channel in self._chunk.channels}
         return {
             topic: self._counts[number] + pending.get(number, 0) for number, topic in enumerate(self._topics, start=1)
         }
 
     def flush_if_due(self) -> None:
-        """Write the current chunk if it is large or long enough."""
+        """Write the current chunk if it has CHUNK_FLUSH_BYTES, or spans CHUNK_FLUSH_NS."""
         if self._chunk:
             start, end = self._chunk.time_span()
             if self._chunk.size >= CHUNK_FLUSH_BYTES or end - start >= CHUNK_FLUSH_NS:
                 self._finish_chunk()
 
     def finish(self) -> None:
-        """Write the last chunk and the summary. Does not close the sink."""
+        """Write the last chunk and the summary section with the index. Does not close the sink."""
         if self._chunk:
             self._finish_chunk()
         self._put(_encode(records.DataEnd(self._checksum)))
@@ -237,7 +222,7 @@ class McapWriter:
         self._put(MAGIC)
 
     def _summary(self) -> list[bytes]:
-        """Return the groups of records of the summary."""
+        """Return the records of the summary section, one group per type of record."""
         statistics = records.Statistics(
             attachment_count=len(self._attachments),
             channel_count=len(self._channel_records),

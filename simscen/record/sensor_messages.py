@@ -1,4 +1,7 @@
-"""Messages of a log that are not part of its Trace: scans, particles, local plans and costmaps, for replays."""
+"""Storage for the messages of a log that replays show but that are not part of a Trace.
+
+These are scans, particles, local plans, costmaps, and log lines.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -21,7 +24,7 @@ LoggedMessages = list[tuple[int, bytes]]
 
 @dataclass(eq=False)
 class SensorMessages:
-    """Serialized messages of one robot, which are decoded only when needed because most of them never are.
+    """Serialized messages of one robot. They are decoded only when needed, because most of them never are.
 
     Attributes:
         time: Clock of the log.
@@ -29,8 +32,9 @@ class SensorMessages:
         costmaps: Messages by topic.
         mounts: Poses of lidars on the base, by frame.
         lines: Messages of /rosout, including the events of simscen itself.
-        stamped: Whether the stamps of messages count from the start of the run. Otherwise, use the tick of logging.
-        frames: Frame names of the robot.
+        stamped: True if the stamps of messages count from the start of the run. If False, only the tick of logging is
+            meaningful.
+        frames: Names of the robot's frames in the log, which decoded messages replace by those of the stack.
     """
 
     time: SimTime = field(default_factory=lambda: SimTime(1))
@@ -44,7 +48,10 @@ class SensorMessages:
     frames: RobotFrames = field(default_factory=RobotFrames)
 
     def handler(self, topic: str, message_type: str) -> Callable[[int, bytes], None] | None:
-        """Return a function that stores a message (tick, data) of a topic, or None if the topic is not stored."""
+        """Return a function that stores a message of a topic, or None if its messages are not stored.
+
+        Its arguments are the tick at which the message was logged, and the serialized message.
+        """
         if message_type == topics.SCAN_TYPE:
             return _append_to(self.scans.setdefault(topic, []))
         if (topic, message_type) == topics.PARTICLES[:2]:
@@ -56,7 +63,7 @@ class SensorMessages:
         return None
 
     def scan(self, data: bytes) -> Scan:
-        """Decode a scan, level; its tick is that of the measurement."""
+        """Decode a scan. Its tick is that of the measurement; the scan of a tilted lidar is projected to the floor."""
         scan = decode.laser_scan(MessageReader(data))
         frame = self.frames.stack_frame(scan.frame)
         limits = scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max
@@ -65,11 +72,11 @@ class SensorMessages:
         return level_scan(Scan(frame, self.time.tick(scan.stamp), scan.ranges, *limits, mount.plane, tilted))
 
     def cloud(self, data: bytes) -> Array:
-        """Decode the poses x, y, yaw (n, 3) of particles."""
+        """Decode a ParticleCloud to poses (n, 3) x, y, yaw."""
         return to_planar(decode.particle_cloud(MessageReader(data)))
 
     def path(self, data: bytes) -> Array:
-        """Decode the points x, y (n, 2) of a path."""
+        """Decode a Path to points (n, 2) x, y."""
         return decode.path(MessageReader(data)).poses[:, :2]
 
     def stack_lines(self) -> list[tuple[int, LogLine]]:
@@ -78,7 +85,7 @@ class SensorMessages:
         return [(tick, line) for tick, line in decoded if line.name != EVENT_LOGGER]
 
     def costmap(self, data: bytes) -> tuple[str, OccupancyGrid]:
-        """Decode the frame and the cells of a costmap."""
+        """Decode an OccupancyGrid to the name of its frame, and the grid."""
         frame, grid = decode.occupancy_grid(MessageReader(data))
         return self.frames.stack_frame(frame), grid
 

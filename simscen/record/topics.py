@@ -1,5 +1,7 @@
-"""Topics of a log with the message types and quality of service that ROS 2 nodes use."""
+"""Topics of a log, their quality of service, and the definitions of their message types."""
 
+import json
+from importlib.resources import files
 from typing import NamedTuple
 
 
@@ -18,7 +20,7 @@ MAP = Topic("/map", "nav_msgs/msg/OccupancyGrid", latched=True)
 ROBOT_DESCRIPTION = Topic("/robot_description", "std_msgs/msg/String", latched=True)
 TRUTH = Topic("/ground_truth/odom", "nav_msgs/msg/Odometry")
 FILTERED_ODOMETRY = Topic("/odometry/filtered", "nav_msgs/msg/Odometry")
-"""Topic name of ekf_node in robot_localization."""
+"""Named as the output of ekf_node in robot_localization."""
 CLEARANCE = Topic("/simscen/clearance", "std_msgs/msg/Float64")
 BELIEF = Topic("/amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped")
 PARTICLES = Topic("/particle_cloud", "nav2_msgs/msg/ParticleCloud")
@@ -65,3 +67,20 @@ _QOS = """\
 def qos(latched: bool) -> str:
     """Return the channel metadata `offered_qos_profiles` as rosbag2 writes it."""
     return _QOS.format(depth=1, durability=1) if latched else _QOS.format(depth=10, durability=2)
+
+
+class MessageType(NamedTuple):
+    """Message type: full name, definition including nested types (ros2msg), and type hash (REP 2016)."""
+
+    name: str
+    definition: str
+    hash: str
+
+
+def load_message_types() -> dict[str, MessageType]:
+    """Return all message types of a log by name, from schemas.json.
+
+    The file is generated from the definitions of ROS 2 Humble in rosbags; a test checks it.
+    """
+    table = json.loads(files(__package__).joinpath("schemas.json").read_text("utf-8"))
+    return {name: MessageType(name, entry["definition"], entry["hash"]) for name, entry in table.items()}

@@ -1,7 +1,8 @@
-"""Collection of the samples of a run, and their conversion to a Trace.
+"""Builder of the Trace of a run, and the tables in which the signals of a Trace are collected.
 
-The TraceBuilder collects samples from moments, the log reader from messages. Both pass orientations as the quaternions
-that the log stores, and one function converts them to yaw, so that the two traces are equal to the last bit.
+A TraceBuilder collects signals from moments, and the log reader from messages. Both collect orientations as the
+quaternions that the log contains, and the same function converts these to yaw. The two traces are therefore equal to
+the last bit.
 """
 
 import math
@@ -25,7 +26,11 @@ _tick = struct.Struct("d").pack
 
 
 class SignalBuffer:
-    """Growing table of a signal: each row has a tick and `width` numbers, packed as doubles by `pack`."""
+    """Growing table of a signal. Each row has a tick and `width` numbers.
+
+    `rows` are the bytes of all rows, and `pack` converts the numbers of a row to bytes. Where speed matters, callers
+    append to `rows` directly.
+    """
 
     def __init__(self, width: int) -> None:
         self._width = width + 1
@@ -37,12 +42,12 @@ class SignalBuffer:
         self.rows += self.pack(tick, *values)
 
     def append(self, tick: int, values: Array) -> None:
-        """Append a row of `width` numbers in an array of any shape."""
+        """Append a row, whose `width` numbers are in an array of any shape."""
         self.rows += _tick(tick)
         self.rows += values.tobytes()
 
     def extend(self, ticks: Ticks, values: Array) -> None:
-        """Append the rows of ticks (n,) and values (n, width)."""
+        """Append n rows, with ticks (n,) and values (n, width)."""
         self.rows += np.column_stack((ticks, values)).tobytes()
 
     def sort(self) -> None:
@@ -58,15 +63,11 @@ class SignalBuffer:
         return table[:, 0].astype(np.int64), table[:, 1:]
 
 
-def yaw_from_quaternions(quaternions: Array) -> Array:
-    """Return the yaw angles in [-π, π] of quaternions (n, 4) x, y, z, w."""
-    x, y, z, w = quaternions.T.copy()
-    angles: Array = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return angles
-
-
 def exact_planar_poses(points: Array) -> Array:
-    """Return poses (n, 7) for points (n, 3) x, y, yaw, equal to those of Pose3.planar to the last bit."""
+    """Return poses (n, 7) for points (n, 3) x, y, yaw, equal to those of Pose3.planar to the last bit.
+
+    The log contains the poses of Pose3.planar. The sine of numpy, which `planar_poses` uses, is slightly different.
+    """
     poses = np.zeros((len(points), 7))
     poses[:, :2] = points[:, :2]
     halves = np.where(np.isfinite(points[:, 2]), points[:, 2] / 2, np.nan).tolist()
@@ -75,15 +76,26 @@ def exact_planar_poses(points: Array) -> Array:
 
 
 def to_planar(poses: Array) -> Array:
-    """Return x, y, yaw (n, 3) of poses (n, 7) with x, y, z and a quaternion."""
-    return np.column_stack((poses[:, :2], yaw_from_quaternions(poses[:, 3:7])))
+    """Return x, y, yaw (n, 3), with yaw in [-π, π], for poses (n, 7 or more): x, y, z, and a quaternion x, y, z, w."""
+    x, y, z, w = poses[:, 3:7].T.copy()
+    return np.column_stack((poses[:, :2], np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))))
 
 
 class TraceRows:
-    """Collected signals of a run. A pose is x, y, z and a quaternion x, y, z, w.
+    """Signals and events of a run that have been collected for its Trace.
 
-    Columns: `truth` has pose, vx, vy, wz; `clearance` meters; `belief` pose and the covariances xx, xy, xyaw, yy, yyaw,
-    yawyaw; `odometry` and `objects` pose; `command` vx, vy, wz. `plans` are (planning tick, poses (n, 7)).
+    A pose has seven columns: x, y, z and a quaternion x, y, z, w.
+
+    Attributes:
+        truth: Pose, vx, vy, wz.
+        clearance: Clearance in m.
+        belief: Pose, and its covariance xx, xy, xyaw, yy, yyaw, yawyaw.
+        odometry: Pose.
+        command: vx, vy, wz.
+        objects: Poses of moving objects, by name.
+        scans: Ticks at which the stack received a scan.
+        plans: Tick at which each plan was made, and its poses (n, 7).
+        events: Events in order.
     """
 
     def __init__(self) -> None:
@@ -99,21 +111,21 @@ class TraceRows:
         self.events: list[Event] = []
 
     def object(self, name: str) -> SignalBuffer:
-        """Return the buffer of a moving object."""
+        """Return the buffer of a moving object, and create it if necessary."""
         buffer = self.objects.get(name)
         if buffer is None:
             buffer = self.objects[name] = SignalBuffer(7)
         return buffer
 
     def joint_objects(self, names: tuple[str, ...]) -> SignalBuffer:
-        """Return a buffer for ticks at which all these objects have moved: their poses, side by side in a row."""
+        """Return a buffer for ticks at which all these objects have moved. A row has their poses side by side."""
         buffer = self._joint.get(names)
         if buffer is None:
             buffer = self._joint[names] = SignalBuffer(7 * len(names))
         return buffer
 
     def split_joint_objects(self) -> None:
-        """Move the rows of joint buffers to the buffers of the single objects, sorted by tick."""
+        """Move the poses in joint buffers to the buffers of the objects, which are then sorted by tick."""
         for names, buffer in self._joint.items():
             ticks, poses = buffer.columns()
             for column, name in enumerate(names):
@@ -148,21 +160,24 @@ def _poses(buffer: SignalBuffer) -> Samples:
 
 
 class TraceBuilder:
-    """Builds the Trace of a run from moments in the order of their ticks.
+    """Builds the Trace of a robot from its moments, which must be added in the order of their ticks.
 
-    The Trace equals the one that `read_log` returns for a log recorded from the same moments.
+    The Trace equals the one that `read_log` returns for a log of the same moments.
     """
 
     def __init__(self, clock: Clock, thinning: Thinning | None = None) -> None:
-        """Share `thinning` with a Recorder that gets each moment right afterwards, to check each sample only once."""
+        """`thinning` can be that of a RobotPublisher that gets each moment right afterwards, to select samples once."""
         self._clock = clock
         self._thinning = Thinning(clock.rate) if thinning is None else thinning
         self._rows = TraceRows()
         self._truth, self._odometry, self._belief = SignalBuffer(11), SignalBuffer(3), SignalBuffer(9)
-        """Columns: pose, twist and clearance; x, y, yaw; x, y, yaw and covariance. `finish` converts them to rows."""
+        """Their columns are: pose, twist, and clearance; x, y, yaw; x, y, yaw, and covariance.
+
+        They are faster to append to than the buffers of TraceRows, to which `finish` converts them.
+        """
 
     def append(self, moment: Moment) -> None:
-        """Add one moment. Only appends numbers, because this is called at every beat."""
+        """Add one moment. This only appends numbers, because it is called at every beat."""
         tick, truth, decision = moment.tick, moment.truth, moment.decision
         rows, thinning = self._rows, self._thinning
         if truth is not None:
@@ -198,7 +213,7 @@ class TraceBuilder:
             buffer.rows += buffer.pack(tick, *pose)
 
     def finish(self, end_tick: int) -> Trace:
-        """Return the Trace until `end_tick`. Nothing may be appended afterwards."""
+        """Return the Trace until `end_tick`. No moment may be added afterwards."""
         rows, (ticks, truth) = self._rows, self._truth.columns()
         rows.truth.extend(ticks, truth[:, :10])
         rows.clearance.extend(ticks, truth[:, 10:])

@@ -1,4 +1,4 @@
-"""Downsampling of the signals of a run, shared by the recorder and the TraceBuilder."""
+"""Selection of the samples of a run that are recorded, for the log and for the Trace alike."""
 
 from collections.abc import Mapping
 
@@ -9,15 +9,18 @@ from simscen.core.messages.sensor_data import Odometry
 from simscen.core.records.trace import Truth
 
 COMMAND_RATE_HZ = 20
+"""Rate at which an unchanged command is recorded."""
 STANDSTILL_RATE_HZ = 1
+"""Rate at which an unchanged pose of an object is recorded."""
 
 
 class Thinning:
-    """Drops samples without new information. The clock has `rate` ticks per second.
+    """Selects the samples to keep. The clock has `rate` ticks per second.
 
-    A command is kept if it differs from the previous one, and otherwise 20 times a second. The pose of a moving object
-    is kept if it has changed, and otherwise once a second. Of several odometry sensors, the first one with a reading is
-    the robot's odometry. Repeated calls for the same tick return the same result.
+    A command is kept if it differs from the previous one, and otherwise 20 times a second. The pose of an object is
+    kept if it has changed, and otherwise once a second. Of several odometry sensors, the first one with a reading
+    counts as the robot's odometry. Repeated calls for the same tick return the same result, so that the recorder and
+    the TraceBuilder can use the same Thinning.
     """
 
     def __init__(self, rate: int) -> None:
@@ -37,7 +40,7 @@ class Thinning:
         """The previous sample if all its objects were kept. It is added to `_kept_poses` only when needed."""
 
     def keeps_command(self, tick: int, command: Twist) -> bool:
-        """Return whether to keep the command of this tick."""
+        """Return whether the command of this tick is to be kept."""
         if tick != self._command_checked_tick:
             self._command_checked_tick = tick
             if command != self._command or tick - self._command_kept_tick >= self._command_period:
@@ -51,7 +54,7 @@ class Thinning:
         return odometry.sensor == self._odometry
 
     def objects_to_keep(self, tick: int, truth: Truth) -> Mapping[str, Pose3]:
-        """Return the poses of moving objects to keep at this tick, by object name."""
+        """Return the poses of objects that are to be kept at this tick, by object name."""
         if tick != self._selected_tick:
             self._selected_tick, self._selected = tick, self._select_objects(tick, truth.objects)
         return self._selected
@@ -68,7 +71,7 @@ class Thinning:
         return kept
 
     def _have_all_moved(self, objects: PosesAtTick) -> bool:
-        """Return whether all objects have moved since the previous sample, whose poses were all kept."""
+        """Return True if all poses of the previous sample were kept, and all objects have moved since then."""
         if self._all_kept is None:
             return False
         previous, predicted = self._all_kept[1], objects.predicted
@@ -93,7 +96,7 @@ class Thinning:
 
 
 class Throttle:
-    """Limits messages to `rate` messages per second of simulated time."""
+    """Limiter of a topic to `rate` messages per second of simulated time."""
 
     def __init__(self, ticks_per_second: int, rate: int) -> None:
         self._period = max(1, ticks_per_second // rate)

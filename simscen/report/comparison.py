@@ -10,7 +10,7 @@ from simscen.core.records.comparison import (
     OutcomeCounts,
     ScenarioChange,
 )
-from simscen.judge.statistical_tests import PASS_RATE
+from simscen.judge.significance import PASS_RATE
 from simscen.report.display_text import Role, StyledLine, StyledText, one_line
 
 MAX_FLIPS = 10

@@ -156,14 +156,14 @@ class Adapter:
 
     def preempt(self, now: int, goal: Goal) -> None:
         """Send another goal first."""
-        self._goals.preempted(goal)
+        self._goals.preempt(goal)
         self._send(now)
 
     def cancel(self, now: int, everything: bool) -> None:
         """Drop the current goal, or all."""
         if self._sender is not None and self._goals.current is not None:
             self._sender.cancel(self._state(now), self._barrier)
-        self._goals.canceled(everything)
+        self._goals.cancel(everything)
 
     def step(self, now: int, messages: Sequence[Message], due: bool, limit_s: float) -> List[Message]:
         """Take one step at `now` nanoseconds within `limit_s` of wall time; return the messages of the stack.

@@ -201,11 +201,11 @@ class AdapterRun:
 
     def _process_frame(self, kind: int, content: Dict[str, Any], now: int) -> None:
         if kind == wire.GOAL:
-            self.goals.start([Goal.of(goal) for goal in content["goals"]])
+            self.goals.start([Goal.from_content(goal) for goal in content["goals"]])
             self._adapter.continue_after_failure = content["on_goal_failure"] == "continue"
             self._adapter.mode = content.get("mode", DEFAULT_MODE)
         elif kind == wire.PREEMPT:
-            self._adapter.preempt(now, Goal.of(content["goal"]))
+            self._adapter.preempt(now, Goal.from_content(content["goal"]))
         elif kind == wire.CANCEL:
             self._adapter.cancel(now, content["all"])
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from simscen.core.clock import Clock
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Decision, DeferredTruth, Moment, Truth
-from simscen.record.recorder import MomentSink
+from simscen.record.moment_buffer import MomentSink
 from simscen.run.faults.injector import FaultInjector
 from simscen.run.live_world.director import Director
 from simscen.run.live_world.stage import LiveStage

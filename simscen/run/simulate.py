@@ -15,10 +15,12 @@ from simscen.core.errors import InvalidInput, RunError
 from simscen.core.records.case import ROBOT_NAME, Run
 from simscen.core.records.trace import Trace
 from simscen.judge.result_json import to_json
-from simscen.judge.run_result import combine_robots, judge_run
+from simscen.judge.run_result import judge_run
+from simscen.judge.several_robots import combine_robots
 from simscen.loading.files.discovery import default_root
 from simscen.loading.scenario import load_scenario
-from simscen.record.recorder import MOMENT_DELAY_S, MomentBuffer, MomentSink, Recorder
+from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer, MomentSink
+from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
 from simscen.run.assembly import assemble
 from simscen.run.external.stack import ExternalStack, robot_file

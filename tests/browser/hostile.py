@@ -5,7 +5,7 @@ from simscen.core.messages.navigation import Goal
 from simscen.core.records.case import Case
 from simscen.core.records.run_result import RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.judge.evaluation import outcome_of_verdicts
+from simscen.judge.outcome import outcome_of_verdicts
 from simscen.record.log_header import LogHeader
 from simscen.record.log_reader import Log
 from simscen.testing.synthetic_trace import synthetic_trace

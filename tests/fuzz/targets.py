@@ -15,9 +15,11 @@ from simscen.cli.session.file_checks import FileChecker
 from simscen.core.errors import InvalidInput, Problem
 from simscen.judge.evaluation import judge
 from simscen.loading.scenario_text import spec_of_text
-from simscen.record.log_file import RecordReader
-from simscen.record.log_reader import read_run, recover
-from simscen.record.mcap_writer import Channel, McapWriter, MessageType
+from simscen.record.log_reader import read_run
+from simscen.record.log_recovery import recover
+from simscen.record.mcap_reader import RecordReader
+from simscen.record.mcap_writer import Channel, McapWriter
+from simscen.record.topics import MessageType
 from simscen.run.preparation import prepare
 
 CORPUS = Path(__file__).parent / "corpus"

@@ -83,19 +83,17 @@ TESTS_OF_MODULE = {
         ["tests/unit/criteria/test_smoothness_and_consistency.py"],
     ],
     "judge/run_result": [
-        [f"tests/unit/judge/test_{of}.py" for of in ("run_result", "disturbances", "several_robots")],
+        [f"tests/unit/judge/test_{of}.py" for of in ("run_result", "disturbances")],
     ],
     "judge/result_json": [[f"tests/unit/judge/test_{of}.py" for of in ("result_json", "run_result", "disturbances")]],
     "judge/evaluation": [
-        [
-            f"tests/unit/judge/test_{of}.py"
-            for of in ("required_evidence", "required_evidence_of_signals", "evaluation", "expected_failure")
-        ]
+        [f"tests/unit/judge/test_{of}.py" for of in ("required_evidence", "required_evidence_of_signals", "evaluation")]
     ],
-    **{f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]] for of in ("disturbances", "finding_text", "study")},
-    "judge/statistical_tests": [
-        ["tests/unit/judge/test_statistical_tests.py", "tests/unit/judge/test_significant_changes.py"]
-    ],
+    "judge/outcome": [[f"tests/unit/judge/test_{of}.py" for of in ("evaluation", "expected_failure")]],
+    **{
+        f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]]
+        for of in ("disturbances", "finding_text", "pass_rate_claims", "several_robots", "significance", "study")
+    },
     "judge/metrics/trajectory": [
         [f"{_METRICS}/test_path.py", f"{_METRICS}/test_pose_error.py"],
         [f"{_METRICS}/test_compute.py"],

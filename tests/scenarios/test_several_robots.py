@@ -12,7 +12,8 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
 from simscen.judge.result_json import from_json, to_json
-from simscen.judge.run_result import combine_robots, judge_run
+from simscen.judge.run_result import judge_run
+from simscen.judge.several_robots import combine_robots
 from simscen.loading.scenario import load_scenario
 from simscen.loading.scenario_text import criteria_of_text
 from simscen.record.log_reader import read_log

@@ -16,7 +16,7 @@ from simscen.bench.speed.measurement import Stopwatch
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.loading.scenario import load_scenario
-from simscen.record.recorder import MomentSink
+from simscen.record.moment_buffer import MomentSink
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation import PreparedScenario, lidar_height, prepare
 from simscen.run.simulate import GC_THRESHOLD, simulate

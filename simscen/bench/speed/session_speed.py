@@ -22,7 +22,7 @@ from simscen.core.records.trace import Moment
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.loading.scenario import load_scenario
-from simscen.record.recorder import MomentSink
+from simscen.record.moment_buffer import MomentSink
 from simscen.run.external.stack import with_external_reference
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation import PreparedScenario, prepare

@@ -13,7 +13,7 @@ from simscen.core.errors import Exit, InvalidInput, Problem
 from simscen.core.records.comparison import Comparison
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.metrics.comparison import compare_sessions, comparison_data, labeled_key
-from simscen.judge.statistical_tests import Significance
+from simscen.judge.significance import Significance
 from simscen.report.comparison import Links, session_comparison_lines
 from simscen.report.comparison_markup import session_comparison_markdown
 from simscen.report.console_reporter import print_lines

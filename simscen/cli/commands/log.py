@@ -11,7 +11,7 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.user_files import save
 from simscen.core.errors import UsageError
-from simscen.record.log_reader import recover as recover_log
+from simscen.record.log_recovery import recover as recover_log
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
 

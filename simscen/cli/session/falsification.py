@@ -20,7 +20,7 @@ from simscen.core.records.session_events import RunFinished, SessionEvent, Sessi
 from simscen.core.records.verdict import Status
 from simscen.core.version import __version__
 from simscen.judge.finding_text import run_margin
-from simscen.judge.statistical_tests import clopper_pearson_limits, is_counted
+from simscen.judge.pass_rate_claims import clopper_pearson_limits, is_counted
 from simscen.judge.study import StudyPlan, evaluate_study, value_text
 from simscen.loading.files.discovery import default_root, sibling
 from simscen.loading.loaded import LoadedScenario

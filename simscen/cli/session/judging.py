@@ -15,7 +15,8 @@ from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResu
 from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Evidence, LogCoverage
-from simscen.judge.run_result import combine_robots, judge_run
+from simscen.judge.run_result import judge_run
+from simscen.judge.several_robots import combine_robots
 from simscen.loading.files.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
 from simscen.loading.scenario_text import criteria_of_text

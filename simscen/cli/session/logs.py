@@ -7,7 +7,8 @@ from pathlib import Path
 from simscen.core.errors import InvalidInput, NothingSelected, Problem
 from simscen.core.records.run_result import RunResult
 from simscen.judge.result_json import from_json
-from simscen.judge.run_result import combine_robots, judge_run
+from simscen.judge.run_result import judge_run
+from simscen.judge.several_robots import combine_robots
 from simscen.loading.files.paths import is_folder
 from simscen.loading.scenario_text import criteria_of_text
 from simscen.loading.schema.messages import quoted

@@ -124,7 +124,7 @@ def _has_matching_log(finished: RunFinished) -> bool:
     """Return whether the log of a run exists and has the same verdicts; True if none was written."""
     if not finished.artifacts.mcap:
         return True
-    from simscen.record.log_file import attached_result  # only a resumed session needs the library
+    from simscen.record.mcap_reader import attached_result  # only a resumed session needs the library
 
     recorded = attached_result(Path(finished.artifacts.mcap))
     expected = json.loads(json.dumps(result_data(finished.result)))

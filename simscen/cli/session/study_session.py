@@ -22,7 +22,7 @@ from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
 from simscen.core.records.study import ClaimStatus
 from simscen.core.version import __version__
-from simscen.judge.statistical_tests import evaluate_claim
+from simscen.judge.pass_rate_claims import evaluate_claim
 from simscen.judge.study import StudyPlan, evaluate_study, in_seed_order
 from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario

@@ -1,1 +1,1 @@
-"""Metrics of every run and statistics of a session."""
+"""Metrics of every run, statistics of a session, and comparisons of stacks or sessions."""

@@ -1,4 +1,4 @@
-"""Metrics of every run: names, units, and definitions, as shown by `simscen explain metrics` and the reference."""
+"""Catalog of the metrics of every run: names, units, and definitions, for `simscen explain metrics` and the docs."""
 
 from collections.abc import Set
 from dataclasses import dataclass
@@ -8,7 +8,11 @@ from simscen.core.records.verdict import POSITION, Evidence
 
 @dataclass(frozen=True)
 class Metric:
-    """Definition of a metric: SI unit ("" for none), text, source, and the evidence that a log must contain."""
+    """Definition of a metric.
+
+    `unit` is an SI unit, "" for none. `text` defines the metric for users, and `source` names the paper or program that
+    the definition is from, "" for our own. `evidence` is what a log must contain to compute the metric.
+    """
 
     unit: str
     text: str
@@ -22,7 +26,7 @@ _GOALS = frozenset({Evidence.NAVIGATION})
 _SUCCESS = POSITION | _GOALS | {Evidence.CONTACTS}
 _BELIEF = POSITION | {Evidence.BELIEF}
 _PEOPLE = POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT}
-
+"""Evidence that several metrics need."""
 
 _ERRORS = {
     "rmse": "root mean square",
@@ -30,6 +34,7 @@ _ERRORS = {
     "median": "median",
     "max": "largest",
 }
+"""Statistics of pose errors: the end of the name of a metric, and its text."""
 
 METRICS: dict[str, Metric] = {
     "success": Metric(
@@ -170,4 +175,4 @@ METRICS: dict[str, Metric] = {
 """Metrics by name, in the order of the reference."""
 
 ADDRESSES = dict.fromkeys(METRICS, "simscen.judge.metrics.compute:compute_metrics")
-"""Names of the shipped metrics for the registry; plugins must not use them."""
+"""Module and function of each shipped metric, for the registry. Plugins must not use the names of these metrics."""

@@ -10,37 +10,33 @@ from simscen.core.records.comparison import BaselineComparison, Comparison, Flip
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.verdict import Status
 from simscen.core.statistics import bootstrap_mean_interval, sign_test
-from simscen.judge.evaluation import EXPECTED
 from simscen.judge.finding_text import sentence, violations
 from simscen.judge.metrics.catalog import METRICS
-from simscen.judge.statistical_tests import (
-    PASS_RATE,
-    PairedSample,
-    Significance,
-    signed_rank_test,
-    significant_changes,
-)
+from simscen.judge.outcome import EXPECTED
+from simscen.judge.significance import PASS_RATE, PairedSample, Significance, signed_rank_test, significant_changes
 
 COMPARED_METRICS = (
     *("time_to_goal", "path_length", "min_clearance", "mean_jerk", "time_not_moving", "replans", "recoveries"),
     "collisions",
 )
-"""Compared metrics, in the order of the table."""
+"""Metrics that are compared, in the order of the table. Metrics of plugins follow."""
 HIGHER_IS_BETTER = frozenset({"min_clearance"})
 """Compared metrics for which a higher value is better; for the others, a lower value is."""
 OUTCOME_INDEPENDENT = frozenset({"collisions"})
-"""Metrics that are comparable if a run fails. The others favor stacks that give up early."""
+"""Metrics that are compared in all pairs of runs. The others would favor stacks that give up early."""
 ALL_SCENARIOS = "all scenarios"
+"""`scenario` of the changes over all scenarios together."""
 _SEED = 1
 """Seed of the bootstrap: the same runs give the same intervals."""
 
 Pair = tuple[RunResult, RunResult]
+"""Results of the baseline and of the other stack or session for the same scenario and seed."""
 
 
 def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Comparison | None:
-    """Compare each of the `stacks` (NAME=VALUE) with the first. Returns None with fewer than two stacks.
+    """Compare each of the `stacks` (NAME=VALUE) with the first one. Returns None if there are fewer than two.
 
-    The order of the results does not matter. Repeated runs, which check determinism, do not count.
+    The order of the results does not matter. Repetitions of a run, which check determinism, do not count.
     """
     if len(stacks) < 2:
         return None
@@ -51,16 +47,20 @@ def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Compa
 def compare_sessions(
     sessions: Mapping[str, Sequence[RunResult]], folders: Mapping[str, str], significance: Significance
 ) -> Comparison:
-    """Compare the runs of two sessions, both by name, of which the first one is the baseline.
+    """Compare the runs of two sessions, of which the first one is the baseline.
 
-    Runs with several stacks are paired by stack as well. `folders` are the output folders by name.
+    `sessions` has the results, and `folders` the output folders, by the name of the session. If the sessions have runs
+    of several stacks, runs with the same stack are compared.
     """
     runs = [replace(run, key=labeled_key(run.key, name)) for name, own in sessions.items() for run in own]
     return _compare(runs, folders, significance)
 
 
 def labeled_key(key: RunKey, session: str) -> RunKey:
-    """Return the key with the session in place of the stack, which becomes part of the name of the scenario."""
+    """Return a key for comparing sessions, in which the session takes the place of the stack.
+
+    The name of the stack becomes a part of the name of the scenario. Keys of repetitions are returned unchanged.
+    """
     if key.repeats:
         return key
     scenario = f"{key.scenario} ({key.stack_name})" if key.stack_name else key.scenario
@@ -78,12 +78,13 @@ def _compare(results: Iterable[RunResult], stacks: Mapping[str, str], significan
 
 
 def _row(test: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> dict[str, OutcomeCounts]:
+    """Return the outcomes of a scenario or variation, by stack."""
     own = [run for key, run in runs.items() if key.test == test]
     return {name: _outcomes(run for run in own if run.key.stack_name == name) for name in stacks}
 
 
 def _own_outcome(run: RunResult) -> Outcome:
-    """Return the outcome of the run without its expectation."""
+    """Return the outcome that the run would have if it were not expected to fail."""
     if run.outcome is Outcome.ERROR:
         return Outcome.ERROR
     decisive = [verdict for verdict in run.verdicts if verdict.severity == "fail" and verdict.criterion != EXPECTED]
@@ -127,6 +128,7 @@ def _compare_with_baseline(
 
 
 def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
+    """Return the pairs grouped by scenario or variation."""
     found: dict[str, list[Pair]] = {}
     for pair in pairs:
         found.setdefault(pair[0].key.test, []).append(pair)
@@ -134,7 +136,10 @@ def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
 
 
 def _samples(completed: Sequence[Pair], same_arrival: Sequence[Pair], names: Iterable[str]) -> Iterator[PairedSample]:
-    """Yield the samples to test: the pass rate of all runs, and the pass rate and each metric of each scenario."""
+    """Yield the samples to test: the pass rate of all runs, and the pass rate and each metric of each scenario.
+
+    `same_arrival` are the pairs in which the same robots reached their last goals.
+    """
     scenarios = _by_scenario(completed)
     if len(scenarios) > 1:
         scenarios = {ALL_SCENARIOS: list(completed), **scenarios}
@@ -152,7 +157,7 @@ def _passed(run: RunResult) -> float:
 
 
 def _comparable(name: str, completed: Sequence[Pair], same_arrival: Sequence[Pair]) -> Sequence[Pair]:
-    """Return the pairs in which a metric can be compared: all, or those in which both runs or none arrived."""
+    """Return the pairs in which a metric can be compared: see OUTCOME_INDEPENDENT."""
     return completed if _kind(name) in OUTCOME_INDEPENDENT else same_arrival
 
 
@@ -189,6 +194,7 @@ def _arrived(run: RunResult) -> set[str]:
 
 
 def _flip(pair: Pair) -> Flip | None:
+    """Return the difference of the outcomes of a pair; None if they are equal."""
     one, two = pair
     if _own_outcome(one) is _own_outcome(two):
         return None
@@ -230,7 +236,7 @@ def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
 
 
 def comparison_data(comparison: Comparison) -> dict[str, Any]:
-    """Return the comparison as plain data, with stacks and scenarios as ordered lists."""
+    """Return the comparison as JSON data, with stacks and scenarios as ordered lists."""
     return {
         "baseline": comparison.baseline,
         "stacks": [

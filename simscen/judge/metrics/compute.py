@@ -1,4 +1,4 @@
-"""Metrics of every run, computed whether or not a criterion uses them."""
+"""Computation of the metrics of a run: all of the catalog, and those of plugins that a scenario requests."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -24,21 +24,22 @@ from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed,
 from simscen.criteria.trace_signals.readers import evenly_sampled_speed
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.criteria.trace_signals.sparc_ldlj import MOVED_SPEED_M_S, ldlj, sparc
+from simscen.judge.evaluation import missing_evidence_reason, partial_evidence_reason
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.trajectory import PATH_METRICS, POSE_METRICS, Values, path_metrics, pose_metrics
 
 STANDING_SPEED_M_S, STANDING_TURN_RATE_RAD_S = 0.01, 0.02
-"""Minimum speeds of a moving robot, as in HuNavSim, which uses the signed turn rate."""
+"""Speed and turn rate below which a robot does not move, as in HuNavSim, which uses the signed turn rate."""
 
 BARN_OPTIMAL_SPEED_M_S = 2.0
-"""Speed from which BARN computes the optimal time on the reference path."""
+"""Speed with which BARN computes the optimal time for the reference path."""
 
 ZONES = {
     "intimate": (0.0, INTIMATE_SPACE_M),
     "personal": (INTIMATE_SPACE_M, PERSONAL_SPACE_M),
     "social": (PERSONAL_SPACE_M, SOCIAL_SPACE_M),
 }
-"""Hall's zones around a person: range of distances in m."""
+"""Smallest and largest distance in m of each of Hall's zones around a person."""
 
 _SHORTEST = ("barn_score", "shortest_length", "path_length_ratio", "spl", "soft_spl")
 _NAVIGATION = ("success", "path_length", "time_to_goal", *_SHORTEST)
@@ -47,11 +48,12 @@ _MOTION = ("max_speed", "time_not_moving", "mean_jerk", "max_jerk", *_SMOOTHNESS
 _CLEARANCE = ("min_clearance", "mean_clearance")
 _PEOPLE = ("min_person_distance", *(f"intrusion_{zone}" for zone in ZONES))
 _EVENTS = ("collisions", "contact_time", "replans", "recoveries")
+"""Names of metrics that are computed together."""
 
 
 @dataclass(frozen=True)
 class MetricValues:
-    """Metrics by name in SI units. Undefined metrics are None, with the reason in `undefined`."""
+    """Values of metrics by name, in SI units. An undefined metric is None, and `undefined` has the reason by name."""
 
     values: Mapping[str, float | None]
     undefined: Mapping[str, str]
@@ -60,8 +62,8 @@ class MetricValues:
 def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_COVERAGE) -> MetricValues:
     """Return all metrics of the catalog.
 
-    A metric is undefined, with the reason, if the log lacks its evidence for all or part of the run, or if one of its
-    signals is not finite or unknown. This does not fail a run; only a criterion that needs the signal does.
+    A metric is undefined if the log lacks its evidence for all or part of the run, or if one of its signals is unknown
+    or not finite. An undefined metric does not fail the run; a criterion that needs the signal does.
     """
     path = cache(lambda: drive(trace))
     groups: tuple[tuple[tuple[str, ...], Callable[[], Values]], ...] = (
@@ -84,7 +86,7 @@ def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_C
 
 
 def _or_reason(names: Sequence[str], compute: Callable[[], Values]) -> Values:
-    """Return the metrics, or for each of `names` why they cannot be computed."""
+    """Return the metrics that `compute` returns, or for each of `names` the reason why they cannot be computed."""
     try:
         return compute()
     except (InvalidTrace, MissingEvidence, SignalUnavailable) as reason:
@@ -92,18 +94,18 @@ def _or_reason(names: Sequence[str], compute: Callable[[], Values]) -> Values:
 
 
 def _missing_evidence(name: str, coverage: LogCoverage) -> str:
-    """Return which evidence of a metric the log lacks, in words; "" if it has all of it."""
+    """Return which evidence of a metric the log lacks for all or part of the run, in words; "" if it is complete."""
     required = METRICS[name].evidence
-    if missing := coverage.lacking(required):
-        return f"the log lacks {' and '.join(evidence.value for evidence in missing)}"
-    return "; ".join(dict.fromkeys(reason for evidence, reason in coverage.partial.items() if evidence in required))
+    return missing_evidence_reason(required, coverage) or partial_evidence_reason(required, coverage)
 
 
 def barn_score(success: bool, seconds: float, reference_length: float) -> float:
-    """Return the BARN score: 0, or 0.125 (8 times the optimal time and slower) … 0.5 (twice and faster).
+    """Return the BARN score of a run that took `seconds`: 0 without success.
 
-    BARN's own code for moving obstacles computes the reference length as a difference of coordinates, which is
-    negative, so that every success scores 0.125 there. Raises ValueError unless the reference length is positive.
+    With success, the score is from 0.125, for at least 8 times the optimal time, to 0.5, for at most twice this time.
+    The optimal time is that of driving the `reference_length` in m at BARN_OPTIMAL_SPEED_M_S. Raises ValueError unless
+    the reference length is positive. BARN's own code for moving obstacles computes this length as a difference of
+    coordinates, which is negative, so that every success scores 0.125 there.
     """
     if not reference_length > 0:
         raise ValueError(f"the length of the reference path must be positive, but is {reference_length:g} m")
@@ -227,7 +229,7 @@ def add_plugin_metrics(
 ) -> MetricValues:
     """Return the metrics together with the plugin metrics that a scenario requests.
 
-    Raises InvalidTrace if one fails or is not a finite number, because the scenario needs it.
+    Raises InvalidTrace if one of these raises an exception or is not finite, because the scenario needs it.
     """
     values, undefined = dict(computed.values), dict(computed.undefined)
     for entry in metrics:
@@ -239,11 +241,10 @@ def add_plugin_metrics(
 
 
 def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -> float | str:
-    """Return the value, or why there is none."""
+    """Return the value of a plugin metric, or the reason why it is undefined. Raises InvalidTrace."""
     required = entry.measure.evidence
-    lacking = coverage.lacking(frozenset(Evidence) if required is None else required)
-    if lacking:
-        return f"the log lacks {' and '.join(one.value for one in lacking)}"
+    if reason := missing_evidence_reason(frozenset(Evidence) if required is None else required, coverage):
+        return reason
     try:
         found = entry.measure.measure(trace, case)
     except MissingEvidence as missing:

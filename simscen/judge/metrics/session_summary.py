@@ -1,4 +1,4 @@
-"""Statistics of a session as in publications of navigation benchmarks, each with its number of runs."""
+"""Statistics of all runs of a session, as in publications of navigation benchmarks: success rate, SPL, collisions."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -9,12 +9,21 @@ from simscen.core.statistics import wilson_interval
 
 @dataclass(frozen=True)
 class SessionSummary:
-    """Statistics of a session.
+    """Statistics of a session. A value is None if there are no runs to compute it from.
 
-    `success_rate` refers to all `runs`, including those with errors, with its 95 % Wilson interval. `spl` and
-    `soft_spl` are means over the `spl_runs` with a shortest path. Collisions are counted over the `kilometers` driven
-    and `hours` simulated in the `measured_runs`; a rate is None if nothing was driven. Each robot of a run counts like
-    a run, except in `runs` and successes: a run succeeds if all robots succeed.
+    Each robot of a run counts like a run, except in `runs`, `measured_runs`, and successes.
+
+    Attributes:
+        runs: Number of runs that were not skipped.
+        success_rate: Share of the `runs`, including those with errors, in which all robots succeeded.
+        success_interval: 95 % Wilson interval of the success rate.
+        spl: Mean of the metric `spl` over the `spl_runs`.
+        soft_spl: Mean of the metric `soft_spl`.
+        spl_runs: Number of runs that have the metric `spl`.
+        collisions: Number of collisions in the `measured_runs`.
+        kilometers: Distance driven in the `measured_runs`.
+        hours: Simulated time of the robots in the `measured_runs`.
+        measured_runs: Number of runs that have metrics.
     """
 
     runs: int
@@ -30,27 +39,27 @@ class SessionSummary:
 
     @property
     def collisions_per_km(self) -> float | None:
-        """Collisions per km, or None if no robot drove."""
+        """Collisions per kilometer; None if no robot drove."""
         return self.collisions / self.kilometers if self.kilometers > 0 else None
 
     @property
     def collisions_per_hour(self) -> float | None:
-        """Collisions per hour, or None without simulated time."""
+        """Collisions per hour; None without simulated time."""
         return self.collisions / self.hours if self.hours > 0 else None
 
 
 class SessionFigures:
-    """Collects the numbers of each run that the statistics of a session need."""
+    """Collector of the numbers of each run that the statistics of a session need."""
 
     def __init__(self) -> None:
         self._runs: list[tuple[tuple[str, str, int, str], RunFigures | None]] = []
 
     def add(self, result: RunResult) -> None:
-        """Add a run. Skipped runs do not count."""
+        """Add a run. A skipped run does not count."""
         if result.outcome is not Outcome.SKIPPED:
             key = result.key
             order = key.scenario, key.variation, key.seed, key.stack_name
-            self._runs.append((order, RunFigures.of(result) if result.metrics else None))
+            self._runs.append((order, RunFigures.from_result(result) if result.metrics else None))
 
     def summary(self) -> SessionSummary:
         """Return the statistics. The order in which runs were added does not matter."""
@@ -74,7 +83,10 @@ class SessionFigures:
 
 
 class RunFigures(NamedTuple):
-    """Numbers of a run for the statistics; tuples have one value for each robot."""
+    """Numbers of a run for the statistics of a session.
+
+    The tuples have one value for each robot that has the metric. `robot_seconds` is the simulated time of all robots.
+    """
 
     success: bool
     spl: tuple[float, ...]
@@ -84,8 +96,8 @@ class RunFigures(NamedTuple):
     robot_seconds: float
 
     @classmethod
-    def of(cls, run: RunResult) -> "RunFigures":
-        """Return the figures of a run."""
+    def from_result(cls, run: RunResult) -> "RunFigures":
+        """Return the numbers from the metrics of a run."""
         robots = max(1, sum(_is_metric(metric, "path_length") for metric in run.metrics))
         return cls(
             run.metrics.get("success") == 1.0,
@@ -97,37 +109,37 @@ class RunFigures(NamedTuple):
         )
 
 
-def session_summary_data(figures: SessionSummary) -> dict[str, float | list[float] | None]:
-    """Return the statistics as in results.json."""
-    interval = figures.success_interval
+def session_summary_data(summary: SessionSummary) -> dict[str, float | list[float] | None]:
+    """Return the statistics as JSON data for results.json."""
+    interval = summary.success_interval
     return {
-        "runs": figures.runs,
-        "success_rate": figures.success_rate,
+        "runs": summary.runs,
+        "success_rate": summary.success_rate,
         "success_interval": None if interval is None else list(interval),
-        "spl": figures.spl,
-        "soft_spl": figures.soft_spl,
-        "spl_runs": figures.spl_runs,
-        "collisions": figures.collisions,
-        "collisions_per_km": figures.collisions_per_km,
-        "collisions_per_hour": figures.collisions_per_hour,
-        "kilometres": figures.kilometers,
-        "hours": figures.hours,
-        "measured_runs": figures.measured_runs,
+        "spl": summary.spl,
+        "soft_spl": summary.soft_spl,
+        "spl_runs": summary.spl_runs,
+        "collisions": summary.collisions,
+        "collisions_per_km": summary.collisions_per_km,
+        "collisions_per_hour": summary.collisions_per_hour,
+        "kilometres": summary.kilometers,
+        "hours": summary.hours,
+        "measured_runs": summary.measured_runs,
     }
 
 
-def session_summary_line(figures: SessionSummary) -> str:
+def session_summary_line(summary: SessionSummary) -> str:
     """Return one line: "success 93% of 14 runs (69% … 99%) · SPL 0.81 of 12 runs · 0.8 collisions/km, 1.9/h in …"."""
     parts = []
-    if figures.success_interval is not None:
-        assert figures.success_rate is not None
-        low, high = figures.success_interval
-        parts.append(f"success {figures.success_rate:.0%} of {_runs(figures.runs)} ({low:.0%} … {high:.0%})")
-    if figures.spl is not None:
-        parts.append(f"SPL {figures.spl:.2f} of {_runs(figures.spl_runs)}")
-    per_km, per_hour = figures.collisions_per_km, figures.collisions_per_hour
+    if summary.success_interval is not None:
+        assert summary.success_rate is not None
+        low, high = summary.success_interval
+        parts.append(f"success {summary.success_rate:.0%} of {_runs(summary.runs)} ({low:.0%} … {high:.0%})")
+    if summary.spl is not None:
+        parts.append(f"SPL {summary.spl:.2f} of {_runs(summary.spl_runs)}")
+    per_km, per_hour = summary.collisions_per_km, summary.collisions_per_hour
     if per_km is not None and per_hour is not None:
-        total = f"{figures.kilometers:.2f} km, {figures.hours:.2f} h of {_runs(figures.measured_runs)}"
+        total = f"{summary.kilometers:.2f} km, {summary.hours:.2f} h of {_runs(summary.measured_runs)}"
         parts.append(f"{per_km:.1f} collisions/km, {per_hour:.1f}/h in {total}")
     return " · ".join(parts)
 
@@ -137,11 +149,12 @@ def _runs(number: int) -> str:
 
 
 def _known(run: RunResult, name: str) -> tuple[float, ...]:
-    """Return the values of a metric, including those of each of several robots (`a/collisions`)."""
+    """Return the defined values of a metric, of the only robot or of each robot (`a/collisions`)."""
     return tuple(value for metric, value in run.metrics.items() if _is_metric(metric, name) and value is not None)
 
 
 def _is_metric(metric: str, name: str) -> bool:
+    """Return whether `metric` is the metric `name` of any robot."""
     return metric.rpartition("/")[2] == name
 
 

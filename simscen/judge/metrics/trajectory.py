@@ -1,4 +1,4 @@
-"""Metrics of the trajectory: length and smoothness of the path, and pose errors of the localizer."""
+"""Metrics of trajectories: turns and curvature of the driven path, and errors of the estimated pose."""
 
 import numpy as np
 
@@ -9,17 +9,18 @@ from simscen.criteria.trace_signals.estimation_errors import nees_samples, pose_
 from simscen.criteria.trace_signals.ground_truth import Drive, teleport_samples, truth
 
 CURVATURE_SPACING_M = 0.3
-"""Minimum distance in m of the points for the curvature; closer points are noise (bench-mr)."""
+"""Minimum distance in m between points for computing the curvature, as in bench-mr. Closer points are noise."""
 
 Values = dict[str, float | str]
-"""Metrics by name: a number, or the reason why it is undefined."""
+"""Metrics by name. A value is a number, or the reason why the metric is undefined."""
 
 _CURVATURE = ("norm_curvature", "max_curvature")
 PATH_METRICS = ("heading_change", "path_irregularity", "aol", *_CURVATURE)
+"""Metrics that `path_metrics` returns."""
 
 
 def path_metrics(trace: Trace, path: Drive) -> Values:
-    """Return turns and curvature of the driven path, without teleportation."""
+    """Return the metrics on turns and curvature of the driven path, without teleportations."""
     segments = path_segments(trace, path)
     total_turn = heading_change(trace)
     return {
@@ -40,14 +41,17 @@ def path_segments(trace: Trace, path: Drive) -> list[Array]:
 
 
 def heading_change(trace: Trace) -> float:
-    """Return the sum of the changes of the true heading in rad, with wrapped differences (unlike Arena)."""
+    """Return the sum of the absolute changes of the true heading in rad, without teleportations.
+
+    Unlike in Arena, a change from π to -π is 0.
+    """
     changes = np.abs(wrap_array(np.diff(truth(trace).values[:, 2])))
     changes[[k - 1 for k in teleport_samples(trace) if 0 < k <= len(changes)]] = 0.0
     return float(changes.sum())
 
 
 def _irregularity(trace: Trace, total_turn: float) -> float | str:
-    """Return the rotation beyond that of the first plan to each goal (SEAN; a stub in HuNavSim)."""
+    """Return the turns in rad beyond those of the first plan to each goal, as in SEAN, or why they are undefined."""
     starts = [event.tick for event in trace.of_kind(EventKind.GOAL_ACCEPTED)]
     first = [next((plan for plan in trace.plans if plan.tick >= start), None) for start in starts]
     if not starts or None in first:
@@ -57,11 +61,13 @@ def _irregularity(trace: Trace, total_turn: float) -> float | str:
 
 
 def _slope_changes(segment: Array) -> float:
+    """Return the sum of the absolute changes of direction in rad along the points (n, 2) of a segment."""
     steps = np.diff(segment, axis=0)
     return float(np.abs(wrap_array(np.diff(np.arctan2(steps[:, 1], steps[:, 0])))).sum())
 
 
 def _curvature(segments: list[Array]) -> Values:
+    """Return the metrics on curvature: 1 / radius of the circle through three consecutive resampled points."""
     weighted, curvatures = 0.0, []
     for segment in segments:
         points = _resample(segment)
@@ -80,7 +86,7 @@ def _curvature(segments: list[Array]) -> Values:
 
 
 def _resample(segment: Array) -> Array:
-    """Return the points that are at least CURVATURE_SPACING_M from the previous one."""
+    """Return a selection of the points in which each is at least CURVATURE_SPACING_M from the previous one."""
     indices = [0]
     xs, ys = segment[:, 0].tolist(), segment[:, 1].tolist()
     for k in range(1, len(xs)):
@@ -91,14 +97,14 @@ def _resample(segment: Array) -> Array:
 
 
 RPE_DELTA_M = 1.0
-"""Driven distance in m between the two poses of a relative error."""
+"""Driven distance in m between the two poses of a relative pose error."""
 
 _STATISTICS = ("rmse", "mean", "median", "max")
 NO_BELIEF = "the robot never reported an estimated pose"
 
 
 def pose_metrics(trace: Trace) -> Values:
-    """Return APE, RPE over RPE_DELTA_M, and NEES."""
+    """Return the metrics on errors of the estimated pose: APE, RPE over RPE_DELTA_M, and NEES."""
     error = pose_error(trace)
     if not len(error):
         return dict.fromkeys(POSE_METRICS, NO_BELIEF)
@@ -122,7 +128,10 @@ def _statistics(name: str, errors: Array) -> Values:
 
 
 def _relative_errors(trace: Trace) -> Values:
-    """Return (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) of truth Q and belief P for pairs i, j RPE_DELTA_M of driving apart."""
+    """Return the RPE metrics, from (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) with truth Q and belief P.
+
+    The samples i and j are RPE_DELTA_M of driving apart.
+    """
     believed, true = trace.belief.values, _truth_at_beliefs(trace)
     i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))
     if not len(i):
@@ -140,7 +149,10 @@ def _relative_errors(trace: Trace) -> Values:
 
 
 def _pairs(steps: Array) -> tuple[list[int], list[int]]:
-    """Return consecutive samples between which the steps add up to RPE_DELTA_M (filter_pairs_by_path of evo)."""
+    """Return the first and the second index of pairs of samples between which the steps add up to RPE_DELTA_M.
+
+    `steps` are the distances in m between consecutive samples. evo calls this filter_pairs_by_path.
+    """
     ids, length = [0], 0.0
     for k, step in enumerate(steps.tolist(), start=1):
         length += step
@@ -158,6 +170,7 @@ def _between(origin: Array, poses: Array) -> Array:
 
 
 def _truth_at_beliefs(trace: Trace) -> Array:
+    """Return the true poses (n, 3) at the ticks of the belief, by interpolation."""
     poses, ticks = truth(trace), trace.belief.ticks
     x, y = (np.interp(ticks, poses.ticks, poses.values[:, axis]) for axis in (0, 1))
     return np.column_stack((x, y, np.interp(ticks, poses.ticks, np.unwrap(poses.values[:, 2]))))
@@ -179,3 +192,4 @@ POSE_METRICS = (
     "ape_trans_final",
     "nees",
 )
+"""Metrics that `pose_metrics` returns."""

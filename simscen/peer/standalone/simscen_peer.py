@@ -1,4 +1,7 @@
-"""simscen.peer for a Python without simscen: `import simscen_peer` with this folder on the path."""
+"""Module that loads the package simscen.peer under the name `simscen_peer`, for a Python without simscen.
+
+A stack adds this folder to `sys.path` and uses `import simscen_peer`.
+"""
 
 import importlib.util
 import sys

@@ -11,14 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.polygons import path_corners
 from simscen.core.records.events import Event, EventKind
 from simscen.reconstruction.drive.log_messages import LogMessages
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, Scans, TimedValues
 from simscen.reconstruction.evidence import windows
 from simscen.record.foreign.trace_reader import goal_events
-from simscen.record.localization_logs.rosbag import planar_pose
 from simscen.record.messages import event_text
 
 SAME_GOAL_M = 0.05
@@ -46,7 +45,7 @@ ToSeconds = Callable[[int], float]
 def goals_of(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -> tuple[tuple[RecordedGoal, ...], str]:
     """Return the goals of a drive and the final result of the navigation, "" if unknown."""
     sent = [
-        RecordedGoal("", Pose2(*planar_pose(message.content.pose)), to_seconds(message.log_time), source="/goal_pose")
+        RecordedGoal("", Pose3(*message.content.pose).plane, to_seconds(message.log_time), source="/goal_pose")
         for message in messages.of("goal")
     ]
     events = [
@@ -113,7 +112,7 @@ def _ends_of_plans(messages: LogMessages, to_seconds: ToSeconds) -> Iterator[Rec
     for message in messages.of("plan"):
         if not len(message.content.poses):
             continue
-        end = Pose2(*planar_pose(tuple(message.content.poses[-1].tolist())))
+        end = Pose3(*message.content.poses[-1].tolist()).plane
         if last is None or end.distance(last) > SAME_GOAL_M:
             yield RecordedGoal("", end, to_seconds(message.log_time), source="end of the plan on /plan")
         last = end

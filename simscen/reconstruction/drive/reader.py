@@ -19,7 +19,6 @@ from simscen.reconstruction.drive.recorded_drive import Polygon, RecordedDrive, 
 from simscen.record import topics
 from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
 from simscen.record.foreign.transforms import TransformTree, lidar_mount
-from simscen.record.localization_logs.rosbag import planar_pose
 from simscen.record.messages.decode import ScanMessage, StampedPose
 
 BASE_FRAMES = ("base_link", "base_footprint")
@@ -141,20 +140,20 @@ class _DriveReader:
     def _odometry(self) -> TimedValues:
         messages = self._messages.of("odom")
         rows = [
-            (*planar_pose(message.content.pose), *(message.content.twist or (0.0, 0.0, 0.0))) for message in messages
+            (*Pose3(*message.content.pose).plane, *(message.content.twist or (0.0, 0.0, 0.0))) for message in messages
         ]
         return self._signal("odom", rows, 6)
 
     def _belief(self) -> TimedValues:
         messages = self._messages.of("amcl_pose")
-        rows = [(*planar_pose(message.content.pose), *message.content.covariance) for message in messages]
+        rows = [(*Pose3(*message.content.pose).plane, *message.content.covariance) for message in messages]
         return self._signal("amcl_pose", rows, 9)
 
     def _poses(self, odometry: TimedValues, belief: TimedValues) -> tuple[TimedValues, str, bool]:
         """Return the best known poses in the map frame, their source, and whether they are a ground truth."""
         if truth := self._messages.of("truth"):
             return (
-                self._signal("truth", [planar_pose(message.content.pose) for message in truth], 3),
+                self._signal("truth", [Pose3(*message.content.pose).plane for message in truth], 3),
                 "ground truth",
                 True,
             )
@@ -188,7 +187,7 @@ class _DriveReader:
         stamped, poses = found
         times = (stamped.stamps - self._stamp_start) / NS_PER_SECOND
         order = np.argsort(times, kind="stable")
-        planar = np.array([planar_pose(tuple(pose)) for pose in poses[order].tolist()])
+        planar = np.array([Pose3(*pose).plane for pose in poses[order].tolist()])
         return TimedValues(times[order], planar, (stamped.logged[order] - self._start) / NS_PER_SECOND)
 
     @cached_property

@@ -14,7 +14,7 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedG
 from simscen.reconstruction.scenario.criteria import path_length
 from simscen.reconstruction.scenario.incidents import Incident, incidents_of
 from simscen.reconstruction.scenario_from_log import Reconstruction
-from simscen.record.log_file import attached_result
+from simscen.record.mcap_reader import attached_result
 
 STEP_S = 0.1
 """Time between two compared positions."""

@@ -14,21 +14,24 @@ TOPICS = {
     "tf_static": "/tf_static",
     "status": "/navigate_to_pose/_action/status",
 }
-"""Default topics by their names in `--topic NAME=TOPIC`. The status topic of the action gives the results of goals."""
+"""Default topics by role. A role is the NAME in `--topic NAME=TOPIC`: the use that simscen makes of a topic.
+
+The topic with the role `status` contains the results of goals.
+"""
 
 Clock = Literal["header", "log"]
-"""Source of times: the stamps of messages, or the time of logging."""
+"""Source of the times of messages: the stamps in their headers, or the times at which they were logged."""
 
 
 @dataclass(frozen=True)
 class ForeignLogOptions:
-    """Options for reading a log.
+    """Options for reading the log of a real robot.
 
     Attributes:
         truth: Ground truth: a topic, or two frames such as `map:base_link`. None if there is no ground truth.
-        topics: Topic by the names in TOPICS, where the log uses other topics than the defaults.
+        topics: Topics by role, for roles whose topic is not the default.
         tick_rate: Ticks per second of the trace.
-        clock: Source of times.
+        clock: Source of the times of messages.
         same_frame: Treat the frame of the ground truth as the map frame, even if its name differs.
         goals: Names of the goals that the robot was sent to, in order.
     """
@@ -41,13 +44,16 @@ class ForeignLogOptions:
     goals: tuple[str, ...] = ()
 
     def topic(self, role: str) -> str:
-        """Return the name of a topic in this log."""
+        """Return the topic with a role in this log."""
         return self.topics.get(role, TOPICS[role])
 
     @property
     def frames(self) -> tuple[str, str] | None:
         """The parent and child frame if the ground truth is a transform of tf, otherwise None."""
-        if self.truth is None or self.truth.startswith("/") or ":" not in self.truth:
-            return None
-        outer, inner = self.truth.split(":", 1)
-        return outer, inner
+        return None if self.truth is None else parse_frame_pair(self.truth)
+
+
+def parse_frame_pair(name: str) -> tuple[str, str] | None:
+    """Return the parent and child frame of a name such as `map:base_link`; None if it is the name of a topic."""
+    outer, colon, inner = name.partition(":")
+    return (outer, inner) if colon and not name.startswith("/") else None

@@ -1,4 +1,4 @@
-"""Iteration over the serialized messages of MCAP files and rosbag2 folders."""
+"""Iteration over the serialized messages of any MCAP file or rosbag2 folder, and recognition of simscen's logs."""
 
 import json
 import re
@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 from mcap import records
 
-from simscen.record.log_file import RecordReader, open_log
 from simscen.record.log_header import ROBOTS
-from simscen.record.log_reader import LOG_READ_ERRORS, invalid_log
+from simscen.record.log_reader import invalid_log, unreadable_log_as_invalid_input
+from simscen.record.mcap_reader import RecordReader, open_log
 from simscen.record.mcap_writer import MAGIC
 
 
 class UnusableLog(ValueError):
-    """The log cannot be used. The message states the reason, and `hint` how to fix it."""
+    """The log cannot be used. The message states the reason; `hint` states how to fix it, "" if unknown."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.hint = hint
@@ -25,19 +25,16 @@ class UnusableLog(ValueError):
 
 @contextmanager
 def unusable_log_as_invalid_input(path: Path) -> Iterator[None]:
-    """Context manager that raises InvalidInput, with file and reason, for a log that cannot be read or used."""
-    try:
-        yield
-    except UnusableLog as error:
-        raise invalid_log(path, "SC804", str(error), error.hint) from error
-    except OSError as error:
-        raise invalid_log(path, "SC800", f"cannot read the log: {error.strerror or error}") from error
-    except LOG_READ_ERRORS as error:
-        raise invalid_log(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
+    """Context manager that converts exceptions of a log that cannot be read or used to InvalidInput with its path."""
+    with unreadable_log_as_invalid_input(path):
+        try:
+            yield
+        except UnusableLog as error:
+            raise invalid_log(path, "SC804", str(error), error.hint) from error
 
 
 class RawMessage(NamedTuple):
-    """A serialized message; `time` is the time of logging in nanoseconds."""
+    """Serialized message. `encoding` is "cdr" for ROS 2, and `time` the time of logging in nanoseconds."""
 
     topic: str
     type: str
@@ -47,10 +44,10 @@ class RawMessage(NamedTuple):
 
 
 class McapMessages:
-    """Iterates over the messages of an MCAP file.
+    """Iterable of the messages of an MCAP file.
 
-    Afterwards, `complete` is False if the file is truncated, and `topics` has the message types by topic. Raises
-    UnusableLog for a log of ROS 1, and exceptions of the mcap library for damaged files.
+    After the iteration, `complete` is False if the file is truncated, and `topics` has the message types by topic. The
+    iteration raises UnusableLog for a log of ROS 1, and exceptions of the mcap library for damaged files.
     """
 
     def __init__(self, path: Path) -> None:
@@ -90,31 +87,30 @@ class McapMessages:
 
 
 def is_simscen_log(path: Path) -> bool:
-    """Return whether simscen recorded this file. Returns True for unreadable files, so that read_log reports them."""
+    """Return whether simscen recorded this file; True if it cannot be read, because `read_log` then reports why."""
     try:
-        with open_log(path) as stream:
-            for record in RecordReader(stream):
-                if isinstance(record, records.Metadata) and record.name == "simscen":
-                    return True
-                if isinstance(record, records.Message):
-                    return False
+        return _run_metadata(path) is not None
     except Exception:
         return True
-    return False
 
 
 def recorded_robots(path: Path) -> tuple[str, ...]:
-    """Return the names of the robots of a log of simscen with several robots; () for all other files."""
+    """Return the names of the robots if this is a log of simscen with several robots, otherwise ()."""
     try:
-        with open_log(path) as stream:
-            for record in RecordReader(stream):
-                if isinstance(record, records.Metadata) and record.name == "simscen":
-                    return tuple(json.loads(record.metadata.get(ROBOTS, "[]")))
-                if isinstance(record, records.Message):
-                    return ()
+        return tuple(json.loads((_run_metadata(path) or {}).get(ROBOTS, "[]")))
     except Exception:
         return ()
-    return ()
+
+
+def _run_metadata(path: Path) -> dict[str, str] | None:
+    """Return the metadata record that simscen writes before the first message, or None if there is none."""
+    with open_log(path) as stream:
+        for record in RecordReader(stream):
+            if isinstance(record, records.Metadata) and record.name == "simscen":
+                return dict(record.metadata)
+            if isinstance(record, records.Message):
+                break
+    return None
 
 
 def _reject_ros1(profile: str) -> None:
@@ -123,13 +119,14 @@ def _reject_ros1(profile: str) -> None:
 
 
 INSTALL_ROSBAGS = "pip install 'rosbags>=0.10,<1'"
+"""Hint for bags that need the optional package rosbags."""
 
 
 class BagMessages:
-    """Iterates over the messages of a rosbag2 folder.
+    """Iterable of the messages of a rosbag2 folder.
 
-    Afterwards, `complete` is False if messages are missing, and `topics` has the message types by topic. SQLite and
-    compressed bags need the optional package rosbags.
+    After the iteration, `complete` is False if messages are missing, and `topics` has the message types by topic.
+    SQLite and compressed bags need the optional package rosbags. Of these, only messages on `topics` are read.
     """
 
     def __init__(self, folder: Path, topics: Container[str]) -> None:
@@ -143,7 +140,7 @@ class BagMessages:
         return self._read_mcap(files) if files and not self._is_compressed() else self._read_with_rosbags()
 
     def _is_compressed(self) -> bool:
-        """Return whether rosbag2 compressed each message or file, in addition to the compression of MCAP."""
+        """Return whether rosbag2 compressed the messages or files. The compression of MCAP itself does not count."""
         metadata = self._folder / "metadata.yaml"
         text = metadata.read_text(encoding="utf-8", errors="replace") if metadata.is_file() else ""
         return re.search(r"compression_mode:\s*['\"]?(message|file)", text, re.IGNORECASE) is not None
@@ -179,7 +176,10 @@ class BagMessages:
 
 
 def open_messages(path: Path, topics: Container[str]) -> McapMessages | BagMessages:
-    """Open an MCAP file or a rosbag2 folder; messages of other topics may be left out. Raises UnusableLog."""
+    """Return an iterable of the messages of an MCAP file or a rosbag2 folder.
+
+    It contains all messages on `topics`, and may also contain others. Raises UnusableLog for .bag and .db3 files.
+    """
     if path.is_dir():
         return BagMessages(path, topics)
     if path.suffix == ".bag":

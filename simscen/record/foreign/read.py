@@ -1,4 +1,4 @@
-"""Entry point for reading logs of real robots: a Trace, what the log lacks, and sensor messages for replays."""
+"""Reader of logs of real robots: returns a Trace, the evidence that the log lacks, and sensor messages for replays."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry import Pose3
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import LogCoverage
 from simscen.record import topics
+from simscen.record.foreign.decoded_messages import DecodedMessages, decode_messages, topic_roles
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import RawMessage, open_messages, unusable_log_as_invalid_input
 from simscen.record.foreign.timebase import Timebase
 from simscen.record.foreign.trace_reader import ForeignTraceReader
-from simscen.record.foreign.tracks import DecodedMessages, decode_messages, topic_roles
 from simscen.record.foreign.transforms import lidar_mount
 from simscen.record.sensor_messages import SensorMessages
 
@@ -27,7 +27,7 @@ from simscen.record.sensor_messages import SensorMessages
 class ForeignLog:
     """Log of a real robot: its trace, the evidence that it lacks, and remarks for the user.
 
-    `sensors` and `map` are empty unless requested.
+    `sensors` and `map`, for replays, are empty unless requested. `map` is also None if the log has no map.
     """
 
     trace: Trace
@@ -40,9 +40,9 @@ class ForeignLog:
 def read_foreign_log(path: Path, options: ForeignLogOptions, with_sensors: bool = False) -> ForeignLog:
     """Read an MCAP file or a rosbag2 folder of a real robot.
 
-    The trace lasts from the first to the last relevant message. A truncated log has no event `run.ended`, so that no
-    criterion can pass. With `with_sensors`, also keep scans, particles, local plans, costmaps and the map. Raises
-    InvalidInput if the log cannot be used.
+    The trace lasts from the first to the last message on a topic with a role. The trace of a truncated log has no event
+    `run.ended`, so that no criterion can pass. With `with_sensors`, also keep scans, particles, local plans, costmaps
+    and the map. Raises InvalidInput if the log cannot be used.
     """
     with unusable_log_as_invalid_input(path):
         roles = topic_roles(options)
@@ -68,12 +68,16 @@ SENSOR_TOPICS = (
     *(topic.name for topic in (topics.PARTICLES, topics.LOCAL_PLAN, topics.MAP)),
     *(topic.name for topic in (topics.GLOBAL_COSTMAP, topics.LOCAL_COSTMAP)),
 )
-"""Sensor topics to read from SQLite bags. In MCAP files, lidars are found on any topic."""
+"""Topics to read for replays from SQLite bags. In MCAP files, scans on any topic are read."""
 BASE_FRAME = "base_link"
+"""Frame in which replays need the poses of lidars."""
 
 
 class SensorMessageCollector:
-    """Collects sensor messages while another reader iterates over the messages of a log. `map` is the last map."""
+    """Collects sensor messages while another reader iterates over the messages of a log.
+
+    `map` is the last map on /map; None if there is none.
+    """
 
     def __init__(self) -> None:
         self.map: OccupancyGrid | None = None
@@ -81,14 +85,14 @@ class SensorMessageCollector:
         self._messages: list[RawMessage] = []
 
     def collect(self, messages: Iterable[RawMessage]) -> Iterator[RawMessage]:
-        """Yield the same messages. Raises struct.error or ValueError for an invalid sensor message."""
+        """Yield all messages, and collect the sensor messages. Raises ValueError for an invalid sensor message."""
         for message in messages:
             if message.encoding == "cdr":
                 self._add(message)
             yield message
 
     def sensors(self, time: Timebase, decoded: DecodedMessages) -> SensorMessages:
-        """Return the collected messages at their ticks, with the mounts of lidars from static transforms."""
+        """Return the collected messages with their ticks, and the mounts of lidars from static transforms."""
         ticks = time.ticks_of_logged(np.array([message.time for message in self._messages], dtype=np.int64))
         for tick, message in zip(ticks.tolist(), self._messages, strict=True):
             handler = self._sensors.handler(message.topic, message.type)
@@ -97,7 +101,7 @@ class SensorMessageCollector:
         links = {pose.child: pose for _, poses in decoded.by_role["tf_static"] for pose in poses}
         for frame in links:
             if (mount := lidar_mount(frame, BASE_FRAME, links)) is not None:
-                self._sensors.mounts[frame] = Pose3.planar(Pose2(*mount.pose))
+                self._sensors.mounts[frame] = Pose3.planar(mount.pose)
         return self._sensors
 
     def _add(self, message: RawMessage) -> None:

@@ -1,4 +1,4 @@
-"""Conversion of the times of a real log, which can repeat, be late, or jump, to the ticks of a Trace."""
+"""Conversion of the times in a real log to the ticks of a Trace, and checks for clocks that were set meanwhile."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from simscen.core.records.trace import Ticks
 from simscen.record.foreign.raw_messages import UnusableLog
 
 MAX_BACKWARD_JUMP_NS = NS_PER_SECOND
-"""Maximum step back of the stamps of a topic. A larger one means that the clock was reset."""
+"""Largest step back of the stamps of a topic in ns. A larger one means that the clock was reset."""
 MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
-"""Minimum change of a clock that is reported. Smaller changes are within the delays of logging."""
+"""Smallest change of a clock in ns that is reported. Smaller changes are within the delays of logging."""
 MIN_MESSAGES_AROUND_STEP = 20
-"""Minimum number of messages before and after a change of a clock, to distinguish it from delayed messages."""
+"""Smallest number of messages before and after the change of a clock, to distinguish it from delayed messages."""
 MAX_CLOCK_STEP_RATIO = 1.5
-"""Maximum ratio of the permanent change of the difference of two clocks to its change at one message.
+"""Largest ratio of the lasting change of the difference of two clocks to its change at one message.
 
-The ratio is larger if a recorder catches up after a busy start, or loses messages meanwhile: then the difference
-changes by far more in total than at any single message, and no clock was set.
+If a clock is set, the two are about equal. If a recorder catches up after a busy start, or loses messages, the
+difference changes by far more in total than at any single message.
 """
 MAX_STAMP_DIFFERENCE_NS = 10 * NS_PER_SECOND
-"""Maximum difference between the stamps of two topics at the same time. A larger one means different clocks."""
+"""Largest difference in ns between the stamps of two topics at the same time. A larger one means different clocks."""
 
 
 @dataclass(frozen=True, eq=False)
 class StampedMessages:
-    """Times of the messages of a topic in ns, in the order of logging: times of logging, and stamps of the headers.
+    """Times of logging and stamps of the messages of a topic, in ns, in the order of logging.
 
-    Raises UnusableLog if the stamps jump back, or if their clock was set while they were recorded.
+    The constructor raises UnusableLog if the stamps jump back, or if their clock was set during the recording.
     """
 
     topic: str
@@ -54,7 +54,7 @@ class StampedMessages:
 
     @property
     def order_problems(self) -> str:
-        """Description of late and repeated stamps, or ""."""
+        """Description of the numbers of late and repeated stamps; "" if there are none."""
         late = int((np.diff(self.stamps) < 0).sum())
         repeated = len(self.stamps) - len(np.unique(self.stamps))
         texts = [
@@ -65,12 +65,13 @@ class StampedMessages:
 
 
 def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
-    """Return the index of the first message after the clock of the stamps was set, and the change in ns; or None.
+    """Return where the clock of the stamps was set: the index of the first message afterwards, and the change in ns.
 
-    Both times are those of one topic, in ns, in the order of logging. No message is logged before its stamp, so the
-    largest difference of stamp and time of logging is the difference of the two clocks. It changes permanently only if
-    a clock is set. A delayed or repeated message, a slow recorder, and a paused simulation change it for a short time
-    only, or they change the interval of logging rather than that of the stamps.
+    Returns None if the clock was not set. `logged` and `stamps` are the times of the messages of one topic, in ns, in
+    the order of logging. Because no message is logged before its stamp, the difference of the two clocks is the largest
+    value of the stamp minus the time of logging. Only setting a clock changes this difference permanently and from one
+    message to the next. A delayed or repeated message, a slow recorder, and a paused simulation change it for a short
+    time, or they change the interval of logging rather than that of the stamps.
     """
     count = MIN_MESSAGES_AROUND_STEP
     if len(stamps) < 2 * count:
@@ -91,8 +92,10 @@ def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
 def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int]) -> None:
     """Raise UnusableLog if the clock of the recorder was set back.
 
-    Both times are in ns, in the order of the file. If the messages have stamps, these must step back as well. A file
-    that is not sorted by time of logging is not an error: it has many steps back, or parts that do not overlap in time.
+    `logged` and `stamps` are the times of the messages of one topic, in ns, in the order of the file. The clock was set
+    back if the times of logging step back exactly once, to a time that the log has already covered, and the stamps
+    step back there as well or are all zero. Files may be unsorted: then there are several steps, or parts whose times
+    do not overlap.
     """
     times = np.array(logged, dtype=np.int64)
     backward = np.flatnonzero(np.diff(times) < 0)
@@ -110,10 +113,11 @@ def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int
 
 @dataclass(frozen=True, eq=False)
 class Timebase:
-    """Ticks of a log: 1/`rate` s since the first message at `start`, until the last message at `stop` (ns).
+    """Conversion of the times of messages to ticks: tick 0 is at `start`, the last tick at `stop` (both in ns).
 
-    `anchor` are messages with both times; they convert times of logging to times of headers. Without an anchor, the
-    times of logging are used.
+    There are `rate` ticks per second. `anchor` are messages with stamps and times of logging, by which the times of
+    logging of other messages are converted to the clock of the stamps. It is None if the times of logging are used for
+    all messages.
     """
 
     start: int
@@ -125,7 +129,10 @@ class Timebase:
     def from_logged(
         cls, logged: Iterable[Ticks], rate: int, anchor: StampedMessages | None, begin: int | None = None
     ) -> Timebase:
-        """Return the timebase of messages that were logged at these times (at least one), from `begin` on."""
+        """Return the timebase from `begin` until the last of the times of logging, of which there is at least one.
+
+        `logged` has the times of logging of each topic, in ns. `begin` is a time of logging; None for the first.
+        """
         times = np.concatenate(list(logged))
         begin = int(times.min()) if begin is None else begin
         start, stop = _header_times(np.array([begin, times.max()]), anchor).tolist()
@@ -133,11 +140,11 @@ class Timebase:
 
     @property
     def end(self) -> int:
-        """Last tick."""
+        """The last tick."""
         return int(self._ticks(np.array([self.stop]))[0])
 
     def ticks_of_logged(self, logged: Ticks) -> Ticks:
-        """Return the ticks of messages without stamps."""
+        """Return the ticks of messages without stamps, from their times of logging in ns."""
         return self._ticks(_header_times(logged, self.anchor))
 
     def ticks_of_stamped(self, messages: StampedMessages) -> Ticks:
@@ -153,14 +160,20 @@ class Timebase:
         return self._ticks(messages.stamps)
 
     def _ticks(self, times: Ticks) -> Ticks:
-        """Return the nearest ticks within the log. Latched messages can be older than the log, transforms newer."""
+        """Return the ticks nearest to times in ns, limited to the first and the last tick.
+
+        Latched messages can be older than the log, and transforms newer.
+        """
         since: Ticks = np.clip(times, self.start, self.stop) - self.start
         ticks: Ticks = (since * self.rate + NS_PER_SECOND // 2) // NS_PER_SECOND
         return ticks
 
 
 def _header_times(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
-    """Convert times of logging to times of headers by interpolation. Outside the anchor, the difference is constant."""
+    """Convert times of logging to the clock of the anchor's stamps, by interpolation between the anchor's messages.
+
+    Before and after these messages, the difference of the two clocks is assumed to be constant.
+    """
     if anchor is None:
         return logged
     stamps = np.maximum.accumulate(anchor.stamps)

@@ -1,4 +1,4 @@
-"""Conversion of the decoded messages of a real log to a Trace, with a list of what the log lacks."""
+"""Conversion of the decoded messages of a real log to the signals of a Trace, and to the evidence that it lacks."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from simscen.core.clock import NS_PER_SECOND
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Ticks
 from simscen.core.records.verdict import Evidence
+from simscen.record.foreign.decoded_messages import DecodedMessages
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.foreign.timebase import StampedMessages, Timebase
 from simscen.record.foreign.tracks import (
-    DecodedMessages,
     Track,
     is_twist_missing,
     stamped_messages,
@@ -33,12 +33,14 @@ _FINAL_STATES = {
     CANCELED: (EventKind.GOAL_CANCELED, "CANCELED"),
     ABORTED: (EventKind.GOAL_FAILED, "FAILED"),
 }
+"""Event of a goal, and result of the navigation if it is the last goal, by the final status of the goal."""
 
 
 def goal_events(messages: Sequence[tuple[int, list[GoalState]]], names: Sequence[str]) -> list[Event] | str:
-    """Return the events of goals from status messages (tick, states), or the reason why they are unknown.
+    """Return the events of goals from status messages, or the reason why they are unknown, as text.
 
-    The goals of the log have the `names` in this order. Goals that ended before the log started are ignored.
+    Each message is its tick and the states of all goals. `names` are the names of the goals in the order in which they
+    were accepted. Goals that ended before the log started are ignored.
     """
     accepted: dict[bytes, int] = {}
     ended: dict[bytes, tuple[int, int]] = {}
@@ -71,27 +73,36 @@ def _count(number: int) -> str:
 
 
 MAX_TRUTH_GAP_S = 1.0
-"""Maximum time without ground truth. Something may have happened in a longer gap."""
+"""Longest time without ground truth for complete evidence. A violation could remain unseen in a longer gap."""
 MIN_LATE_SUBSCRIPTION_S, MAX_LATE_SUBSCRIPTION_S = 0.05, 2.0
-"""Time after its start in which a recorder still subscribes to topics. What it holds before the last is left out."""
+"""Delay of the first ground truth or scan with which the log is judged only from then on.
+
+A recorder subscribes to one topic after another when it starts. A shorter delay does not matter, and a longer one has
+another cause.
+"""
 MAX_DISTANCE_BEFORE_BELIEF_M = 0.3
 """Distance that a robot may drive before the first pose of AMCL: a little more than Nav2's update_min_d, 0.25 m."""
 MAX_LISTED_TOPICS = 12
+"""Maximum number of topics that a message to the user lists."""
 _NOT_ON_STANDARD_TOPICS = (
     *(Evidence.CLEARANCE, Evidence.CONTACTS, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES),
     Evidence.OBJECTS,
 )
-_ALWAYS_MISSING = {
+_ALWAYS_MISSING: dict[Evidence, str] = {
     **dict.fromkeys(_NOT_ON_STANDARD_TOPICS, "no standard topic contains this"),
     Evidence.DISTURBANCES: "only logs of simscen contain faults and events",
     Evidence.FOOTPRINT: "the scenario has no `robot:`",
 }
+"""Evidence that the messages of a real log never contain, with the reason."""
 
 _EVIDENCE_OF_ROLE = {"cmd_vel": Evidence.COMMANDS, "scan": Evidence.SCANS, "plan": Evidence.PLANS}
+"""Evidence by the role of the topic that contains it."""
 
 
 class ForeignTraceReader:
-    """Converts one log: the `decoded` messages of the topics with roles, and the message types of all `topics`.
+    """Conversion of one log, which the constructor performs.
+
+    It takes the `decoded` messages, and the message types of all `topics` of the log.
 
     Attributes:
         rows: Signals and events.
@@ -130,7 +141,7 @@ class ForeignTraceReader:
         return track
 
     def _track(self, role: str, *evidence: Evidence) -> Track | None:
-        """Return the track of a role. If there is none, set its evidence as missing."""
+        """Return the track of a role. If there is none, return None and add its `evidence` to `missing`."""
         topic = (self._options.truth or "") if role == "truth" else self._options.topic(role)
         messages = self._decoded.by_role[role]
         if messages:
@@ -139,6 +150,7 @@ class ForeignTraceReader:
         return None
 
     def _reason_missing(self, role: str, topic: str) -> str:
+        """Return why there are no messages with a role, and other topics that might have it."""
         if role in self._decoded.problems:
             return self._decoded.problems[role]
         if topic in self._topics:
@@ -150,7 +162,10 @@ class ForeignTraceReader:
         return f"the log has no topic {topic}{candidates}"
 
     def _timebase(self, *tracks: Track | None) -> Timebase:
-        """Return the timebase of all decoded messages, anchored at the stamps of the best topic with stamps."""
+        """Return the timebase of all decoded messages.
+
+        Its anchor is the first topic with stamps among the `tracks`, the odometry, and the scans.
+        """
         logged = [
             np.array([time for time, _ in messages], dtype=np.int64)
             for role, messages in self._decoded.by_role.items()
@@ -169,9 +184,10 @@ class ForeignTraceReader:
         return Timebase.from_logged(logged, self._options.tick_rate, anchor, self._recorded_since(logged, tracks[0]))
 
     def _recorded_since(self, logged: Sequence[Ticks], truth: Track | None) -> int:
-        """Return the time of logging in ns since which the ground truth and the scans are recorded.
+        """Return the time of logging in ns from which the log is judged.
 
-        A recorder subscribes to the topics one after another; what it recorded before the last one is left out.
+        This is the time of the first message, or of the first ground truth or scan if that is slightly later: see
+        MAX_LATE_SUBSCRIPTION_S.
         """
         start = int(min(times.min() for times in logged))
         firsts = {} if truth is None else {truth.source: int(truth.logged.min())}
@@ -213,7 +229,7 @@ class ForeignTraceReader:
             self.partial |= dict.fromkeys((Evidence.TRUTH, Evidence.VELOCITY), f"{track.source} has no message {gap}")
 
     def _gap(self, ticks: Ticks) -> str:
-        """Return the first gap between samples that is too long, as text, or ""."""
+        """Return a description of the first gap between samples that is too long; "" if there is none."""
         edges = np.concatenate(([0], ticks, [self.time.end]))
         long = np.flatnonzero(np.diff(edges) > MAX_TRUTH_GAP_S * self.time.rate)
         if not len(long):
@@ -234,7 +250,7 @@ class ForeignTraceReader:
             )
 
     def _check_frames(self, truth: Track | None, belief: Track | None) -> None:
-        """Set the alignment as missing if ground truth and belief have different frames."""
+        """Add the alignment to `missing` if the ground truth and the belief have different frames."""
         map_frame = "map" if belief is None else belief.frame
         if truth is None or self._options.same_frame or truth.frame == map_frame:
             return
@@ -242,7 +258,7 @@ class ForeignTraceReader:
         self.missing[Evidence.ALIGNMENT] = f"{text}; if they are the same, use --same-frame"
 
     def _add_other_roles(self) -> None:
-        """Add odometry, commands, scans and plans."""
+        """Add the odometry, commands, scans and plans to `rows`, or their evidence to `missing`."""
         for role in ("odom", "cmd_vel", "scan", "plan"):
             messages = sorted(self._decoded.by_role[role], key=lambda message: message[0])
             if not messages:
@@ -291,7 +307,7 @@ def _stamp(message: Any) -> int | None:
 
 
 def _last_per_tick(ticks: Ticks) -> tuple[Ticks, Ticks]:
-    """Return the distinct ticks in ascending order, and the index of the last message of each."""
+    """Return the distinct ticks in ascending order, and for each tick the index of its last message."""
     order = np.argsort(ticks, kind="stable")
     ascending = ticks[order]
     last = np.append(ascending[1:] != ascending[:-1], True)

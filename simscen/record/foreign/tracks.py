@@ -1,99 +1,39 @@
-"""Decoding of the messages of a real log by their role, and tracks: sequences of poses of the robot."""
+"""Tracks: the poses of a robot over time, from a topic or from tf of a real log."""
 
 from __future__ import annotations
 
-import struct
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.records.trace import Ticks
-from simscen.record.foreign.options import TOPICS, ForeignLogOptions
-from simscen.record.foreign.raw_messages import RawMessage, UnusableLog
+from simscen.record.foreign.decoded_messages import DecodedMessages
+from simscen.record.foreign.options import ForeignLogOptions
+from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.foreign.timebase import StampedMessages, check_recorder_clock
 from simscen.record.foreign.transforms import TransformTree
-from simscen.record.messages import decode
-from simscen.record.messages.decode import NO_COVARIANCE, CheckedReader, StampedPose, decode_checked
+from simscen.record.messages.decode import NO_COVARIANCE, StampedPose
 
 DIFFERENCE_WINDOW_S = 0.2
-"""Time over which velocities are computed from poses. Poses of motion capture have a noise of some millimeters."""
+"""Time over which velocities are computed from poses, long enough to average the noise of motion capture."""
 MIN_MOTION_M_RAD = 0.1
-"""Motion in m or rad from which an odometry with zero twists counts as one without twists."""
-
-_POSE_DECODERS = {name: partial(decode_checked, decoder) for name, decoder in decode.POSE_DECODERS.items()}
-_TRANSFORM_DECODERS = {"tf2_msgs/msg/TFMessage": partial(decode_checked, decode.transforms)}
-_DECODERS: Mapping[str, Mapping[str, Callable[[bytes], Any]]] = {
-    "truth": _POSE_DECODERS,
-    "odom": {"nav_msgs/msg/Odometry": partial(decode_checked, decode.odometry)},
-    "amcl_pose": _POSE_DECODERS,
-    "scan": {"sensor_msgs/msg/LaserScan": lambda data: CheckedReader(data).header()[0]},
-    "cmd_vel": {
-        "geometry_msgs/msg/Twist": partial(decode_checked, decode.twist),
-        "geometry_msgs/msg/TwistStamped": partial(decode_checked, decode.twist_stamped),
-    },
-    "plan": {"nav_msgs/msg/Path": partial(decode_checked, decode.path)},
-    "tf": _TRANSFORM_DECODERS,
-    "tf_static": _TRANSFORM_DECODERS,
-    "status": {"action_msgs/msg/GoalStatusArray": partial(decode_checked, decode.goal_states)},
-}
-"""Decoders by role and message type. Only the stamps of scans are decoded."""
-
-
-@dataclass
-class DecodedMessages:
-    """Messages by role with their times of logging, and the reasons why a role has no messages."""
-
-    by_role: dict[str, list[tuple[int, Any]]] = field(default_factory=lambda: defaultdict(list))
-    problems: dict[str, str] = field(default_factory=dict)
-
-
-def topic_roles(options: ForeignLogOptions) -> dict[str, list[str]]:
-    """Return the roles of each topic. The topic of the ground truth can have another role, too."""
-    roles: dict[str, list[str]] = defaultdict(list)
-    for role in TOPICS:
-        roles[options.topic(role)].append(role)
-    if options.truth is not None and options.frames is None:
-        roles[options.truth].append("truth")
-    return dict(roles)
-
-
-def decode_messages(raw: Iterable[RawMessage], roles: Mapping[str, Sequence[str]]) -> DecodedMessages:
-    """Decode the messages of topics with roles. Raises UnusableLog for a message that does not match its type."""
-    decoded = DecodedMessages()
-    for message in raw:
-        for role in roles.get(message.topic, ()):
-            _decode(decoded, role, message)
-    return decoded
-
-
-def _decode(decoded: DecodedMessages, role: str, message: RawMessage) -> None:
-    decoders, messages = _DECODERS[role], decoded.by_role[role]
-    if message.encoding != "cdr":
-        encoding = message.encoding or "something unknown"
-        decoded.problems[role] = f"{message.topic} is encoded as {encoding}, not as CDR"
-        return
-    if message.type not in decoders:
-        expected = " or ".join(decoders)
-        decoded.problems[role] = f"{message.topic} is a {message.type or 'type without a name'}, expected {expected}"
-        return
-    try:
-        messages.append((message.time, decoders[message.type](message.data)))
-    except (struct.error, ValueError, UnicodeDecodeError, OverflowError) as error:
-        where = f"message {len(messages) + 1} of {message.topic}"
-        raise UnusableLog(f"{where} cannot be read as {message.type}: {error}") from error
+"""Motion in m or rad above which an odometry whose twists are all zero counts as one without twists."""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Poses (n, 7) in `frame` in the order of logging, with covariances (n, 6).
+    """Poses of the robot over time, in the order of logging.
 
-    `source` is a topic or two frames. `twists` (n, 3) is None if a message has none. `stamped` is None if the times of
-    logging are used.
+    Attributes:
+        source: Topic or pair of frames, for messages to the user.
+        frame: Frame of the poses.
+        logged: Times of logging (n,) in ns.
+        stamped: Stamps; None if the times of logging are used instead.
+        poses: x, y, z and a quaternion x, y, z, w (n, 7).
+        covariances: xx, xy, xyaw, yy, yyaw, yawyaw (n, 6); zeros if unknown.
+        twists: vx, vy, wz (n, 3); None unless all messages have a twist.
     """
 
     source: str
@@ -108,7 +48,7 @@ class Track:
 def stamped_messages(
     topic: str, logged: Sequence[int], stamps: Sequence[int], options: ForeignLogOptions
 ) -> StampedMessages | None:
-    """Return the stamps of a topic by time of logging, or None if they are never set or not to be used."""
+    """Return the stamps of a topic, sorted by time of logging; None if all are zero, or if `options` ignore stamps."""
     if options.clock == "log" or not any(stamps):
         return None
     times = np.array(logged, dtype=np.int64)
@@ -117,7 +57,10 @@ def stamped_messages(
 
 
 def track_from_topic(topic: str, messages: Sequence[tuple[int, StampedPose]], options: ForeignLogOptions) -> Track:
-    """Return the track of a topic. Raises UnusableLog if its messages have several frames."""
+    """Return the track of a topic from its messages and their times of logging.
+
+    Raises UnusableLog if the messages have several frames, or if a clock was set during the recording.
+    """
     frames = sorted({pose.frame for _, pose in messages})
     if len(frames) > 1:
         raise UnusableLog(f"{topic} has messages in several frames: {', '.join(frames)}")
@@ -137,7 +80,7 @@ def track_from_topic(topic: str, messages: Sequence[tuple[int, StampedPose]], op
 
 
 def track_from_tf(outer: str, inner: str, decoded: DecodedMessages, options: ForeignLogOptions) -> Track | str:
-    """Return the track of the frame `inner` in `outer` from tf, or the reason why there is none."""
+    """Return the track of the frame `inner` in `outer` from tf, or the reason why there is none, as text."""
     tree = TransformTree()
     for role in ("tf_static", "tf"):
         for logged, links in decoded.by_role[role]:

@@ -1,25 +1,22 @@
-"""Poses between tf frames of a log, and the mounting pose of a lidar."""
+"""Poses of frames in other frames, from the transforms on /tf and /tf_static of a log."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.records.trace import Ticks
-from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.foreign.timebase import StampedMessages
-from simscen.record.localization_logs.rows import PlanarPose
 from simscen.record.messages.decode import StampedPose
 
 
 @dataclass
 class _Link:
-    """Poses of a frame in its parent frame, with the times in ns of their logging and their stamps."""
+    """Poses of a frame in its parent frame, with their times of logging and their stamps in ns."""
 
     parent: str
     logged: list[int] = field(default_factory=list)
@@ -29,13 +26,16 @@ class _Link:
 
 
 class TransformTree:
-    """Transforms of /tf and /tf_static."""
+    """All transforms of a log, as a tree of frames."""
 
     def __init__(self) -> None:
         self._links: dict[str, _Link] = {}
 
     def add(self, logged: int, links: list[StampedPose], static: bool) -> None:
-        """Add one message. If a frame gets another parent, its previous transforms are dropped."""
+        """Add the transforms of one message on /tf, or on /tf_static if `static`.
+
+        `logged` is its time of logging in ns. If a frame gets another parent, its previous transforms are dropped.
+        """
         for transform in links:
             link = self._links.get(transform.child)
             if link is None or link.parent != transform.frame:
@@ -45,10 +45,10 @@ class TransformTree:
             link.poses.append(transform.pose)
 
     def between(self, outer: str, inner: str) -> tuple[StampedMessages, Array] | str:
-        """Return the poses (n, 7) of `inner` in `outer` with their times, or the reason why they are unknown.
+        """Return the poses (n, 7) of the frame `inner` in `outer` with their times, or why they are unknown, as text.
 
-        There is one pose for each message of the moving transform that is closest to `inner`. The other transforms keep
-        their value from one message to the next, without interpolation.
+        There is one pose for each message of the non-static transform that is closest to `inner`. At these times, the
+        other transforms have the value of their latest message, without interpolation.
         """
         chain = self._chain(outer, inner)
         if isinstance(chain, str):
@@ -91,7 +91,7 @@ def _latest_poses(link: _Link, times: Ticks) -> Array:
 
 
 def _compose(outer: Array, inner: Array) -> Array:
-    """Compose poses (n, 7)."""
+    """Return the composition of poses (n, 7), row by row; `inner` are poses in the frames `outer`."""
     ax, ay, az, aw = outer[:, 3:].T
     bx, by, bz, bw = inner[:, 3:].T
     rotations = np.column_stack(
@@ -112,16 +112,17 @@ _BASE_FRAMES = ("base_link", "base_footprint")
 
 
 class LidarMount(NamedTuple):
-    """Pose x, y, yaw of a lidar on the base. If the lidar is mounted upside down, its angles have the opposite sign."""
+    """Planar pose of a lidar on the base. If the lidar is mounted upside down, its angles have the opposite sign."""
 
-    pose: PlanarPose
+    pose: Pose2
     is_upside_down: bool
 
 
 def lidar_mount(frame: str, base: str, links: Mapping[str, StampedPose]) -> LidarMount | None:
-    """Return the mount of a lidar on the base frame of the odometry, or else on base_link; None if it is unknown.
+    """Return the mount of the lidar with the frame `frame` on the frame `base`.
 
-    `links` are the static transforms by child frame.
+    `links` are the static transforms by child frame. If they do not connect the two frames, return the mount on
+    base_link or base_footprint, or None if the frame of the lidar is not connected with these either.
     """
     pose, visited, nearest = Pose3(0, 0, 0, 0, 0, 0, 1), set(), None
     while True:
@@ -137,41 +138,5 @@ def lidar_mount(frame: str, base: str, links: Mapping[str, StampedPose]) -> Lida
 
 
 def _planar_mount(pose: Pose3) -> LidarMount:
-    qx, qy, qz, qw = pose.quaternion
-    x, y, _ = pose.position
-    yaw = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-    return LidarMount((x, y, yaw), 1 - 2 * (qx * qx + qy * qy) < 0)
-
-
-LoggedMessage = tuple[int, int, Any]
-"""Time of logging in ns, index in the log, and decoded message."""
-
-
-def parse_frame_pair(name: str) -> tuple[str, str] | None:
-    """Return the parent and child frame of a name such as `map:base_link`; None if it is the name of a topic."""
-    outer, colon, inner = name.partition(":")
-    return (outer, inner) if colon and not name.startswith("/") else None
-
-
-@dataclass
-class TransformMessages:
-    """Transforms of a log, with the index in the log of each message."""
-
-    transforms: TransformTree = field(default_factory=TransformTree)
-    indices: dict[int, int] = field(default_factory=dict)
-
-    def add(self, logged: int, index: int, links: list[StampedPose], static: bool) -> None:
-        """Add one message."""
-        self.transforms.add(logged, links, static)
-        self.indices[logged] = index
-
-    def between(self, outer: str, inner: str) -> list[LoggedMessage]:
-        """Return the poses of `inner` in `outer` as messages. Raises UnusableLog if they are unknown."""
-        result = self.transforms.between(outer, inner)
-        if isinstance(result, str):
-            raise UnusableLog(result)
-        times, poses = result
-        return [
-            (logged, self.indices[logged], StampedPose(stamp, outer, tuple(pose), child=inner))
-            for logged, stamp, pose in zip(times.logged.tolist(), times.stamps.tolist(), poses.tolist(), strict=True)
-        ]
+    points_down = 1 - 2 * (pose.qx * pose.qx + pose.qy * pose.qy) < 0  # the z axis
+    return LidarMount(pose.plane, points_down)

@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from simscen.core.clock import NS_PER_SECOND
+from simscen.core.geometry import Pose2, Pose3
 from simscen.record import topics
+from simscen.record.foreign.options import parse_frame_pair
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
-from simscen.record.foreign.transforms import (
-    LidarMount,
-    LoggedMessage,
-    TransformMessages,
-    lidar_mount,
-    parse_frame_pair,
-)
+from simscen.record.foreign.transforms import LidarMount, TransformTree, lidar_mount
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
     LocalizationRows,
-    PlanarPose,
     PoseRow,
     ScanRow,
     all_within,
@@ -30,7 +24,6 @@ from simscen.record.localization_logs.rows import (
 from simscen.record.messages.decode import (
     POSE_DECODERS,
     MessageReader,
-    Numbers,
     StampedPose,
     decode_checked,
     laser_scan,
@@ -38,7 +31,35 @@ from simscen.record.messages.decode import (
 )
 
 INITIAL_POSE_TOPIC = "/initialpose"
-"""Topic on which RViz and robots send the initial pose to AMCL."""
+"""Topic on which RViz and other programs send the initial pose to AMCL."""
+
+
+LoggedMessage = tuple[int, int, Any]
+"""Time of logging in ns, index in the log, and the decoded message."""
+
+
+@dataclass
+class _TransformMessages:
+    """Transforms of a log, and the index in the log of each message by its time of logging."""
+
+    transforms: TransformTree = field(default_factory=TransformTree)
+    indices: dict[int, int] = field(default_factory=dict)
+
+    def add(self, logged: int, index: int, links: list[StampedPose], static: bool) -> None:
+        """Add the transforms of one message on /tf, or on /tf_static if `static`."""
+        self.transforms.add(logged, links, static)
+        self.indices[logged] = index
+
+    def between(self, outer: str, inner: str) -> list[LoggedMessage]:
+        """Return the poses of the frame `inner` in `outer` as messages. Raises UnusableLog if they are unknown."""
+        result = self.transforms.between(outer, inner)
+        if isinstance(result, str):
+            raise UnusableLog(result)
+        times, poses = result
+        return [
+            (logged, self.indices[logged], StampedPose(stamp, outer, tuple(pose), child=inner))
+            for logged, stamp, pose in zip(times.logged.tolist(), times.stamps.tolist(), poses.tolist(), strict=True)
+        ]
 
 
 @dataclass
@@ -50,15 +71,17 @@ class _Messages:
     truth: list[LoggedMessage] = field(default_factory=list)
     initial: list[LoggedMessage] = field(default_factory=list)
     static_transforms: dict[str, StampedPose] = field(default_factory=dict)
-    tf: TransformMessages = field(default_factory=TransformMessages)
+    tf: _TransformMessages = field(default_factory=_TransformMessages)
     topics: dict[str, str] = field(default_factory=dict)
 
 
 def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None) -> LocalizationRows:
-    """Read an MCAP file or a rosbag2 folder in the order of logging, with the times of the headers.
+    """Read an MCAP file or a rosbag2 folder. Raises UnusableLog if messages cannot be used.
 
-    `odometry` and `reference` are topics, or pairs of frames such as `odom:base_link` to read from /tf. Without
-    `reference`, the ground truth of simscen's logs is used. The mount of the lidar is read from /tf_static.
+    `scan` is a topic. `odometry` and `reference` are topics, or pairs of frames such as `odom:base_link`, whose poses
+    are read from /tf. Without `reference`, the reference poses are the ground truth in logs of simscen. The mount of
+    the lidar is read from /tf_static. Times are stamps; if all stamps of a topic are zero, times of logging are used
+    for all topics.
     """
     messages = _collect_messages(path, odometry, scan, reference or topics.TRUTH.name)
     if frames := parse_frame_pair(odometry):
@@ -112,7 +135,7 @@ def _decode(raw: RawMessage, decoders: Mapping[str, Callable[[MessageReader], An
         raise UnusableLog(f"{raw.topic} is a {raw.type or 'type without a name'}, expected {' or '.join(decoders)}")
     try:
         return decode_checked(decoders[raw.type], raw.data)
-    except (struct.error, ValueError, OverflowError) as error:
+    except (ValueError, OverflowError) as error:
         raise UnusableLog(f"a message of {raw.topic} cannot be read as {raw.type}: {error}") from error
 
 
@@ -121,11 +144,11 @@ def _time(logged: int, message: Any, use_log_time: bool) -> float:
 
 
 def _poses(topic: str, messages: Iterable[LoggedMessage], use_log_time: bool, notes: list[str]) -> Iterator[PoseRow]:
-    """Yield the valid poses, and note the number of invalid ones."""
+    """Yield the valid poses, and add a note with the number of invalid ones."""
     invalid = 0
     for logged, index, message in messages:
         if all_within(message.pose, MAX_COORDINATE_M):
-            yield PoseRow(_time(logged, message, use_log_time), index, planar_pose(message.pose))
+            yield PoseRow(_time(logged, message, use_log_time), index, Pose3(*message.pose).plane)
         else:
             invalid += 1
     if invalid:
@@ -145,15 +168,9 @@ def _scans(topic: str, messages: _Messages, use_log_time: bool, notes: list[str]
             if mounts[scan.frame] is None:
                 frames = f"{scan.frame!r} and {base or 'base_link'!r}"
                 notes.append(f"/tf_static does not connect {frames}; the lidar is assumed to be at the base")
-        pose, is_upside_down = mounts[scan.frame] or LidarMount((0.0, 0.0, 0.0), False)
+        pose, is_upside_down = mounts[scan.frame] or LidarMount(Pose2(0.0, 0.0), False)
         ranges = scan.ranges
         if is_upside_down:
             ranges = ranges[::-1]
             layout = (-(scan.angle_min + (len(ranges) - 1) * scan.angle_increment), *layout[1:])
         yield ScanRow(_time(logged, scan, use_log_time), index, ranges, layout, pose)
-
-
-def planar_pose(pose: Numbers) -> PlanarPose:
-    """Return x, y and yaw of x, y, z and a unit quaternion."""
-    x, y, _, qx, qy, qz, qw = pose
-    return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))

@@ -1,46 +1,46 @@
-"""Rows of a log that a localizer needs: odometry, scans and reference poses."""
+"""Common form into which the readers of all formats convert a localization log."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from simscen.core.geometry import Array
+from simscen.core.geometry import Array, Pose2
 
 TICK_RATE_HZ = 1000
+"""Ticks per second to which the times of a log are rounded."""
 MAX_TIME_S, MAX_COORDINATE_M = 1e11, 1e6
-"""Limits for valid times and coordinates. Squares of larger numbers, as from broken sensors, could overflow."""
-PlanarPose = tuple[float, float, float]
-"""Pose x, y, yaw."""
+"""Largest valid time and coordinate. Broken sensors can report larger ones, whose squares could overflow."""
 
 
 @dataclass(frozen=True)
 class PoseRow:
-    """A pose at a time in s. `order` is the index of the row in the log."""
+    """Pose at a time in s. `order` is the index of the line or message in the log."""
 
     time: float
     order: int
-    pose: PlanarPose
+    pose: Pose2
 
 
 @dataclass(frozen=True, eq=False)
 class ScanRow:
-    """A scan at a time in s. `layout` is first angle, angle increment, minimum and maximum range.
+    """Scan at a time in s, with ranges (n,) in m.
 
-    `order` is the index of the row in the log, `mount` the pose of the lidar on the base.
+    `order` is the index of the line or message in the log. `layout` is the first angle, the angle increment (rad), and
+    the minimum and maximum range (m). `mount` is the pose of the lidar on the base.
     """
 
     time: float
     order: int
     ranges: Array
     layout: tuple[float, float, float, float]
-    mount: PlanarPose = (0.0, 0.0, 0.0)
+    mount: Pose2 = Pose2(0.0, 0.0)
 
 
 @dataclass
 class LocalizationRows:
-    """Rows of a log.
+    """Content of a localization log.
 
-    `truth` are the reference poses and `initial` the poses sent to the localizer. `hint` is shown if rows are missing,
-    `notes` are remarks for the user.
+    `truth` are the reference poses, and `initial` the initial poses that were sent to the localizer. `hint` is shown to
+    the user if odometry or scans are missing. `notes` are remarks for the user.
     """
 
     odometry: list[PoseRow] = field(default_factory=list)

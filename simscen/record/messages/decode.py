@@ -1,7 +1,8 @@
-"""Decoders of the ROS 2 messages that simscen reads, from its own logs and from logs of real robots.
+"""Decoders of the ROS 2 messages that simscen reads from its own logs, logs of real robots, and external stacks.
 
-The decoders read fields from a MessageReader, which returns the exact numbers, or from a CheckedReader, which validates
-the messages of other programs. Source: common_interfaces of ROS 2 Humble; these types have not changed since Foxy.
+A decoder takes a reader of one message. A MessageReader returns the numbers exactly as simscen wrote them. A
+CheckedReader is for messages of other programs: it rejects invalid poses and normalizes quaternions. The messages are
+those of common_interfaces of ROS 2 Humble, which have not changed since Foxy. A stamp is in nanoseconds.
 """
 
 import math
@@ -9,29 +10,49 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.records.trace import LogLine
-from simscen.record.messages.cdr import HEADER, CdrReader
+from simscen.peer.cdr import Reader
 
 Numbers = tuple[float, ...]
+"""Numbers in a fixed order, such as x, y, z and a quaternion x, y, z, w for a pose."""
 T = TypeVar("T")
 
 _COVARIANCE_INDICES = (0, 1, 5, 7, 11, 35)
 """Indices of xx, xy, xyaw, yy, yyaw, yawyaw in the 36 numbers of a covariance."""
 _PLANAR_TWIST_INDICES = (0, 1, 5)
+"""Indices of vx, vy, wz in the six numbers of a twist."""
 _MAX_QUATERNION_NORM_ERROR = 0.1
+"""Largest difference of the length of a quaternion from 1. It is far above rounding errors; zeros are rejected."""
 _NOT_A_ROTATION = "an orientation is not a quaternion of length 1"
 NO_COVARIANCE: Numbers = (0.0,) * 6
+"""Covariance of a pose whose message has none: xx, xy, xyaw, yy, yyaw, yawyaw."""
 
 
-class MessageReader(CdrReader):
-    """Reads the fields of a message with their exact values."""
+class MessageReader(Reader):
+    """Reads the fields of a message, with their exact values."""
+
+    @property
+    def remaining(self) -> int:
+        """Number of bytes that have not been read."""
+        return len(self._data) - self._offset
+
+    def array(self, kind: str, shape: tuple[int, ...]) -> npt.NDArray[np.generic]:
+        """Return the next numbers in an array of this shape, without a copy.
+
+        `kind` is a numpy type without byte order, e.g. "f8". Raises ValueError if the message has fewer numbers.
+        """
+        dtype, size = np.dtype(self._byte_order + kind), math.prod(shape)
+        if size:  # an empty sequence at the end of a message has no padding
+            self._align(dtype.itemsize)
+        return np.frombuffer(self._data, dtype, size, self._skip(size * dtype.itemsize)).reshape(shape)
 
     def frame(self) -> str:
-        """Return the next string, the name of a frame."""
+        """Return the name of a frame."""
         return self.string()
 
     def header(self) -> tuple[int, str]:
@@ -42,7 +63,8 @@ class MessageReader(CdrReader):
     def pose(self) -> Numbers:
         """Return x, y, z and the quaternion of a geometry_msgs/msg/Pose or Transform.
 
-        Raises ValueError if the length of the quaternion is not 1; a pose that is not a number is returned.
+        Raises ValueError if the length of the quaternion is not 1. A quaternion with nan is returned, because broken
+        odometry can have such a heading.
         """
         pose = self.take("7d")
         if abs(math.hypot(*pose[3:]) - 1.0) > _MAX_QUATERNION_NORM_ERROR:
@@ -51,15 +73,10 @@ class MessageReader(CdrReader):
 
 
 class CheckedReader(MessageReader):
-    """Reads a message of another program. Raises ValueError if the message is invalid.
+    """Reads a message of another program. Raises ValueError if a quaternion is invalid.
 
     Quaternions are normalized, and leading slashes of frames, which tf used before tf2, are removed.
     """
-
-    def __init__(self, data: bytes) -> None:
-        if len(data) < len(HEADER) or data[0] != 0 or data[1] not in (0, 1):
-            raise ValueError("a message is not plain CDR")
-        super().__init__(data)
 
     def frame(self) -> str:
         """Return the name of a frame without leading slashes."""
@@ -75,7 +92,7 @@ class CheckedReader(MessageReader):
 
 
 def decode_checked(decoder: Callable[[MessageReader], T], data: bytes) -> T:
-    """Decode a message of another program. Raises ValueError or struct.error if it does not match its type."""
+    """Return the message of another program, decoded by `decoder`. Raises ValueError if it does not match its type."""
     reader = CheckedReader(data)
     message = decoder(reader)
     if reader.remaining > 3:  # up to three bytes of padding
@@ -86,8 +103,8 @@ def decode_checked(decoder: Callable[[MessageReader], T], data: bytes) -> T:
 class StampedPose(NamedTuple):
     """Pose of the frame `child` in `frame`: x, y, z and a quaternion x, y, z, w.
 
-    `stamp` is in nanoseconds. `covariance` is xx, xy, xyaw, yy, yyaw, yawyaw, zeros if the message has none. `twist` is
-    vx, vy, wz in the child frame, None if the message has none.
+    `child` is "" if the message does not name it. `covariance` is xx, xy, xyaw, yy, yyaw, yawyaw; zeros if the message
+    has none. `twist` is vx, vy, wz in the frame `child`, or None if the message has none.
     """
 
     stamp: int
@@ -99,21 +116,21 @@ class StampedPose(NamedTuple):
 
 
 class VelocityCommand(NamedTuple):
-    """A velocity command vx, vy, wz. `stamp` is None if the message has no header."""
+    """Velocity command: `values` are vx, vy, wz. `stamp` is None if the message has no header."""
 
     stamp: int | None
     values: Numbers
 
 
 class PathMessage(NamedTuple):
-    """A path of poses (n, 7)."""
+    """Path: poses (n, 7), each x, y, z and a quaternion x, y, z, w."""
 
     stamp: int
     poses: Array
 
 
 class GoalState(NamedTuple):
-    """State of a goal of an action server: ID, acceptance time in ns, and status of action_msgs."""
+    """State of a goal of an action server: its ID, the time of its acceptance in ns, and a value of GoalStatus."""
 
     id: bytes
     accepted: int
@@ -121,7 +138,7 @@ class GoalState(NamedTuple):
 
 
 class ScanMessage(NamedTuple):
-    """A planar scan: angles in rad, ranges (n,) in m, inf without a hit."""
+    """Planar scan: angles in rad, and ranges (n,) in m, inf for a beam without a hit."""
 
     stamp: int
     frame: str
@@ -195,13 +212,13 @@ def laser_scan(reader: MessageReader) -> ScanMessage:
 
 
 def particle_cloud(reader: MessageReader) -> Array:
-    """Decode the particles (n, 8) of nav2_msgs/msg/ParticleCloud: pose and weight."""
+    """Decode nav2_msgs/msg/ParticleCloud: particles (n, 8), each x, y, z, a quaternion x, y, z, w, and the weight."""
     reader.header()
     return reader.array("f8", (reader.count(), 8)).astype(np.float64)
 
 
 def occupancy_grid(reader: MessageReader) -> tuple[str, OccupancyGrid]:
-    """Decode the frame and the cells of nav_msgs/msg/OccupancyGrid. The message rounds the resolution to float32."""
+    """Decode the frame and the grid of nav_msgs/msg/OccupancyGrid. The resolution has only 32-bit precision."""
     _, frame = reader.header()
     reader.take("iI")
     (resolution,) = reader.take("f")
@@ -213,7 +230,7 @@ def occupancy_grid(reader: MessageReader) -> tuple[str, OccupancyGrid]:
 
 
 def log_line(reader: MessageReader) -> LogLine:
-    """Decode level, logger and text of rcl_interfaces/msg/Log."""
+    """Decode the level, logger and text of rcl_interfaces/msg/Log."""
     reader.take("iI")
     (level,) = reader.take("B")
     return LogLine(int(level), reader.string(), reader.string())
@@ -235,7 +252,7 @@ POSE_DECODERS: dict[str, Callable[[MessageReader], StampedPose]] = {
     "geometry_msgs/msg/PoseStamped": pose_stamped,
     "geometry_msgs/msg/PoseWithCovarianceStamped": pose_with_covariance_stamped,
 }
-"""Decoders of the message types that contain one pose."""
+"""Decoders of messages that contain one pose, by message type."""
 
 
 def _planar_twist(reader: MessageReader) -> Numbers:

@@ -1,9 +1,12 @@
-"""Encoders of ROS 2 messages. Those with long arrays of numbers, except images, are in encode_arrays.py.
+"""Encoders of ROS 2 messages of fixed size, and of images. Encoders of other messages are in encode_arrays.py.
 
-For a message of fixed size, a function returns its layout as a Template. `Template.packer()` returns a function that
-takes the fields that the docstring lists, in this order, and returns the bytes. For other messages, a function returns
-the bytes. Definitions: common_interfaces of ROS 2 Humble. Unknown covariances are zeros, as
-REP 145 and the message definitions require. A `stamp` is the time of the measurement. A `twist` is vx, vy, wz.
+For a message of fixed size, the function returns a Template, and its docstring lists the fields of the slots.
+`Template.packer()` returns a function that takes the values of these fields, in this order, and returns the bytes of
+the message.
+
+A `stamp` is the time of the measurement: seconds and nanoseconds. A `pose` is x, y, z and a quaternion x, y, z, w. A
+`twist` is vx, vy, wz. The messages are those of common_interfaces of ROS 2 Humble. Unknown covariances are zeros, as
+REP 145 and the message definitions require.
 """
 
 from collections.abc import Sequence
@@ -12,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.clock import Stamp
-from simscen.record.messages.cdr import Template
+from simscen.record.messages.template import Template
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _TWIST = "2d24xd"
@@ -24,24 +27,24 @@ _TWIST_VARIANCES = "d48xd216xd"
 
 
 def clock() -> Template:
-    """Return the layout of rosgraph_msgs/msg/Clock: stamp."""
+    """Return the template of rosgraph_msgs/msg/Clock, with the field stamp."""
     return Template().slot("iI", "*stamp")
 
 
 def float64() -> Template:
-    """Return the layout of std_msgs/msg/Float64: value."""
+    """Return the template of std_msgs/msg/Float64, with the field value."""
     return Template().slot("d", "value")
 
 
 def twist() -> Template:
-    """Return the layout of geometry_msgs/msg/Twist: twist."""
+    """Return the template of geometry_msgs/msg/Twist, with the field twist."""
     return Template().slot(_TWIST, "*twist")
 
 
 def odometry(frame: str, child: str) -> Template:
-    """Return the layout of nav_msgs/msg/Odometry without covariances: stamp, pose, twist.
+    """Return the template of nav_msgs/msg/Odometry without covariances, with the fields stamp, pose, twist.
 
-    The pose is that of `child` in `frame`, the twist is in the child frame.
+    The pose is that of the frame `child` in `frame`. The twist is in the frame `child`.
     """
     return (
         _stamped(frame)
@@ -54,9 +57,9 @@ def odometry(frame: str, child: str) -> Template:
 
 
 def odometry_with_covariance(frame: str, child: str) -> Template:
-    """Return the layout of nav_msgs/msg/Odometry: stamp, pose, covariance, twist, variances.
+    """Return the template of nav_msgs/msg/Odometry, with the fields stamp, pose, covariance, twist, variances.
 
-    `covariance` has nine numbers for x, y, yaw, `variances` three for vx, vy, wz.
+    `covariance` is 3 x 3 for x, y, yaw, row by row. `variances` are those of vx, vy, wz.
     """
     return (
         _stamped(frame)
@@ -69,10 +72,11 @@ def odometry_with_covariance(frame: str, child: str) -> Template:
 
 
 def imu(frame: str) -> Template:
-    """Return the layout of sensor_msgs/msg/Imu: stamp, angular velocity, variance, linear acceleration, variance.
+    """Return the template of sensor_msgs/msg/Imu.
 
-    Each vector has the same variance for all axes. The first orientation covariance is -1, because there is no
-    orientation.
+    Its fields are stamp, angular_velocity (x, y, z), angular_velocity_variance, linear_acceleration (x, y, z), and
+    linear_acceleration_variance. The variance is the same for all axes. The first orientation covariance is -1, because
+    there is no orientation.
     """
     message = _stamped(frame).put("4d", *_NO_ROTATION).put("9d", -1.0, *[0.0] * 8)
     for vector in ("angular_velocity", "linear_acceleration"):
@@ -84,20 +88,24 @@ def imu(frame: str) -> Template:
 
 
 def pose_with_covariance(frame: str) -> Template:
-    """Return the layout of geometry_msgs/msg/PoseWithCovarianceStamped: stamp, pose, covariance (nine numbers)."""
+    """Return the template of geometry_msgs/msg/PoseWithCovarianceStamped, with the fields stamp, pose, covariance.
+
+    `covariance` is 3 x 3 for x, y, yaw, row by row.
+    """
     return _stamped(frame).slot("7d", "*pose").slot(_COVARIANCE, "*covariance")
 
 
 def pose_stamped(frame: str) -> Template:
-    """Return the layout of geometry_msgs/msg/PoseStamped: stamp, pose."""
+    """Return the template of geometry_msgs/msg/PoseStamped, with the fields stamp, pose."""
     return _stamped(frame).slot("7d", "*pose")
 
 
 def transforms(links: Sequence[tuple[str, str, str]], serialized_count: int = 0, serialized_bytes: int = 0) -> Template:
-    """Return the layout of tf2_msgs/msg/TFMessage: stamp, the poses of the links, and serialized.
+    """Return the template of tf2_msgs/msg/TFMessage, with the fields stamp, one pose for each link, and serialized.
 
-    Each link is a frame, its child frame, and the name of the field for the child's pose. The field
-    `serialized` exists if there are `serialized_count` more links as bytes, with the total size `serialized_bytes`.
+    A link is a frame, its child frame, and the name of the field for the pose of the child. All transforms have the
+    same stamp. `serialized` are the bytes of `serialized_count` further transforms, `serialized_bytes` in total, from a
+    TransformBatchPacker. This field does not exist if `serialized_count` is 0.
     """
     message = Template().put("I", len(links) + serialized_count)
     for frame, child, pose in links:
@@ -115,12 +123,15 @@ def _stamped(frame: str) -> Template:
 
 
 def boolean(value: bool) -> bytes:
-    """Return a std_msgs/msg/Bool."""
+    """Return the bytes of a std_msgs/msg/Bool."""
     return bytes(Template().put("B", value).buffer)
 
 
 def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray[np.float32]") -> bytes:
-    """Return a sensor_msgs/msg/Image: (h, w, 3) uint8 as rgb8, (h, w) float32 as 32FC1 (REP 118: depth in meters)."""
+    """Return the bytes of a sensor_msgs/msg/Image.
+
+    `pixels` are colors (h, w, 3), encoded as rgb8, or depths (h, w) in m, encoded as 32FC1 (REP 118).
+    """
     height, width = pixels.shape[:2]
     encoding, kind = ("rgb8", "u1") if pixels.ndim == 3 else ("32FC1", "<f4")
     content = pixels.astype(kind).tobytes()

@@ -1,6 +1,6 @@
-"""Encoders of ROS 2 messages with long arrays: scans, paths, particles, transforms and grids.
+"""Encoders of ROS 2 messages with arrays of any length: scans, paths, particles, transforms and grids.
 
-The arrays are serialized by numpy, without a Python loop over beams, cells, poses or particles.
+The arrays are serialized by numpy, without a Python loop over beams, cells, poses or particles, because that is slow.
 """
 
 import struct
@@ -14,31 +14,23 @@ from simscen.core.clock import Stamp
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
 from simscen.core.messages.sensor_data import Scan
-from simscen.record.messages.cdr import HEADER, Template
+from simscen.peer.cdr import HEADER
+from simscen.record.messages.template import Template
 
 Link = tuple[str, str, Stamp, Pose3]
 """Frame, child frame, stamp, and pose of the child in the frame."""
 
 
-def planar_quaternions(headings: Array) -> Array:
-    """Return quaternions (n, 4) x, y, z, w for headings (n,) in radians."""
-    halves = headings / 2
-    quaternions = np.zeros((len(halves), 4))
-    quaternions[:, 2] = np.sin(halves)
-    quaternions[:, 3] = np.cos(halves)
-    return quaternions
-
-
 def planar_poses(points: Array) -> Array:
-    """Return positions and quaternions (n, 7) for points (n, 3) x, y, yaw."""
-    poses = np.zeros((len(points), 7))
+    """Return poses (n, 7), x, y, z and a quaternion x, y, z, w, for points (n, 3 or more) x, y, yaw."""
+    poses, halves = np.zeros((len(points), 7)), points[:, 2] / 2
     poses[:, :2] = points[:, :2]
-    poses[:, 3:] = planar_quaternions(points[:, 2])
+    poses[:, 5], poses[:, 6] = np.sin(halves), np.cos(halves)
     return poses
 
 
 class LaserScanPacker:
-    """Encoder of sensor_msgs/msg/LaserScan without intensities."""
+    """Encoder of sensor_msgs/msg/LaserScan. Call it to get the bytes. The messages have no intensities."""
 
     def __init__(self, frame: str) -> None:
         self._pack = Template().slot("iI", "*stamp").string(frame).slot("7fI", "*numbers").packer()
@@ -53,9 +45,9 @@ class LaserScanPacker:
 
 
 class PathPacker:
-    """Encoder of nav_msgs/msg/Path. Every pose has the header of the path.
+    """Encoder of nav_msgs/msg/Path. Call it to get the bytes. Every pose has the header of the path.
 
-    A pose ends at a multiple of eight bytes, so that all poses but the first have the same layout.
+    A pose ends at a multiple of eight bytes, so that all poses except the first have the same layout.
     """
 
     def __init__(self, frame: str) -> None:
@@ -66,10 +58,9 @@ class PathPacker:
 
     @staticmethod
     def _frame_bytes(frame: str, start: int) -> bytes:
-        """Return the constant part of a geometry_msgs/msg/PoseStamped: the frame name, padded to eight bytes.
+        """Return the part of a geometry_msgs/msg/PoseStamped between its stamp and its pose: the name of the frame.
 
-        It is preceded by the stamp and followed by the seven numbers of the pose. The message starts `start` bytes
-        after the begin of the alignment.
+        It is padded to a multiple of eight bytes. `start` is the number of bytes of the message before the stamp.
         """
         pose = Template(prefix=b"", start=start).put("iI", 0, 0).string(frame).align(8)
         return bytes(pose.buffer[8:])
@@ -88,7 +79,7 @@ class PathPacker:
 
 
 class ParticleCloudPacker:
-    """Encoder of nav2_msgs/msg/ParticleCloud."""
+    """Encoder of nav2_msgs/msg/ParticleCloud. Call it to get the bytes."""
 
     def __init__(self, frame: str) -> None:
         self._pack = Template().slot("iI", "*stamp").string(frame).slot("I", "count").align(8).packer()
@@ -102,9 +93,9 @@ class ParticleCloudPacker:
 
 
 class TransformsPacker:
-    """Encoder of tf2_msgs/msg/TFMessage.
+    """Encoder of tf2_msgs/msg/TFMessage. Call it to get the bytes.
 
-    A transform ends at a multiple of eight bytes, so that all transforms but the first have the same layout.
+    A transform ends at a multiple of eight bytes, so that all transforms except the first have the same layout.
     """
 
     def __init__(self) -> None:
@@ -133,7 +124,10 @@ class TransformsPacker:
 
 
 def _transform_packer(frame: str, child: str, prefix: bytes, start: int) -> Callable[[Stamp, Pose3], bytes]:
-    """Return a packer of geometry_msgs/msg/TransformStamped that starts `start` bytes after a multiple of eight."""
+    """Return a function that packs a geometry_msgs/msg/TransformStamped, with `prefix` before it.
+
+    Its arguments are the stamp and the pose. The transform starts `start` bytes after a multiple of eight bytes.
+    """
     return (
         Template(prefix=prefix, start=start)
         .slot("iI", "*stamp")
@@ -145,7 +139,7 @@ def _transform_packer(frame: str, child: str, prefix: bytes, start: int) -> Call
 
 
 def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
-    """Return a nav_msgs/msg/OccupancyGrid."""
+    """Return the bytes of a nav_msgs/msg/OccupancyGrid."""
     height, width = grid.shape
     head = (
         Template()
@@ -161,21 +155,23 @@ def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
 
 
 def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
-    """Return a geometry_msgs/msg/PoseArray of points (n, 3 or more) x, y, yaw; n > 0.
+    """Return the bytes of a geometry_msgs/msg/PoseArray of points (n, 3 or more) x, y, yaw; n > 0.
 
-    Numbers are rounded to 32 bits, so that they compress well.
+    The numbers are rounded to 32-bit precision, so that they compress well.
     """
     head = Template().put("iI", *stamp).string(frame).put("I", len(points)).align(8)
     return bytes(head.buffer) + planar_poses(points).astype("<f4").astype("<f8").tobytes()
 
 
 Bytes = npt.NDArray[np.uint8]
+"""Bytes as an array, of one message or of several messages in rows."""
 
 
 class TransformBatchPacker:
-    """Encoder of transforms with the same links for many tf2_msgs/msg/TFMessage, in one call.
+    """Encoder of the transforms of the same links at many times, for one tf2_msgs/msg/TFMessage per time.
 
-    Each message has another transform before these, because the first transform has another layout.
+    The transforms are only a part of each message: the caller puts another transform before them. Only then have they
+    the same layout in each message, because a transform ends at a multiple of eight bytes.
     """
 
     def __init__(self, links: Sequence[tuple[str, str]]) -> None:
@@ -189,13 +185,12 @@ class TransformBatchPacker:
             self._slices.append((stamp, _reserve(message, "7d")))
         self._empty = np.frombuffer(message.buffer, np.uint8)
         self.size = len(self._empty)
-        """Number of bytes of the transforms of one message."""
+        """Size in bytes of these transforms in one message."""
 
     def __call__(self, stamps: Sequence[Stamp], poses: Array) -> Bytes:
         """Return the bytes (n, size) of the transforms of n messages.
 
-        All transforms of a message have its stamp. `poses` (n, links, 7) are the poses of the child frames in their
-        frames.
+        `stamps` has one stamp for each message, and `poses` (n, links, 7) the poses of the child frames.
         """
         packed = np.tile(self._empty, (len(poses), 1))
         times, numbers = np.array(stamps, "<u4").view(np.uint8), np.ascontiguousarray(poses, "<f8").view(np.uint8)
@@ -205,7 +200,7 @@ class TransformBatchPacker:
 
 
 def _reserve(message: Template, codes: str) -> slice:
-    """Append a slot, and return its position in the message."""
+    """Append a slot, and return the range of its bytes in the message."""
     message.slot(codes, "*numbers")
     end = len(message.buffer)
     return slice(end - calcsize(f"<{codes}"), end)

@@ -1,4 +1,4 @@
-"""Text of events: JSON for /simscen/events and readable lines for /rosout."""
+"""Conversion of events to text: JSON for /simscen/events, and readable lines for /rosout."""
 
 import json
 from typing import Any
@@ -6,8 +6,9 @@ from typing import Any
 from simscen.core.records.events import Event, EventKind
 
 EVENT_LOGGER = "simscen"
-"""Logger of the events on /rosout."""
+"""Name of the logger of events on /rosout."""
 INFO, WARN, ERROR = 20, 30, 40
+"""Levels of rcl_interfaces/msg/Log."""
 _LEVELS = {
     EventKind.GOAL_FAILED: ERROR,
     EventKind.COLLISION_STARTED: ERROR,
@@ -32,12 +33,12 @@ def from_json(text: str) -> Event:
 
 
 def level(event: Event) -> int:
-    """Return the severity for /rosout: a level of rcl_interfaces/msg/Log."""
+    """Return the level of an event on /rosout: INFO, WARN, or ERROR."""
     return _LEVELS.get(event.kind, INFO)
 
 
 def sentence(event: Event) -> str:
-    """Return the event as one line, for example "goal.failed shelf: error_code=208"."""
+    """Return an event as one readable line, for example "goal.failed shelf: error_code=208"."""
     head = f"{event.kind} {event.name}".rstrip()
     details = ", ".join(f"{key}={_short(value)}" for key, value in event.data.items())
     return f"{head}: {details}" if details else head

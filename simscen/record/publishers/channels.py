@@ -1,21 +1,24 @@
-"""Destinations of messages: channels of a log, and batches that are packed in one call for speed."""
+"""Destinations of the messages that publishers create: a log, or the namespace of a robot in a log.
+
+TopicWriter and BatchWriter are faster interfaces to a destination, for topics with many messages.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
-from simscen.record.mcap_writer import MESSAGE_HEADER_BYTES, Channel, McapWriter, MessageType, load_message_types
-from simscen.record.messages.cdr import Slot, Template, compile_writer, field_names
-from simscen.record.topics import CLOCK, Topic, qos
+from simscen.record.mcap_writer import MESSAGE_HEADER_BYTES, Channel, McapWriter
+from simscen.record.messages.template import Slot, Template, compile_writer, field_names
+from simscen.record.topics import CLOCK, MessageType, Topic, load_message_types, qos
 
 Write = Callable[[int, bytes], None]
-"""Writes a serialized message with a time in nanoseconds."""
+"""Function that writes a serialized message. Its arguments are a time in nanoseconds, and the bytes."""
 
 Layouts = Sequence[tuple[Topic, Template]]
-"""Topics with the layouts of their messages."""
+"""Topics with the templates of their messages."""
 
 
 class MessageSink(Protocol):
-    """Destination of messages: a log, or an external stack."""
+    """Destination of messages, such as a log or an external stack."""
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
         """Publish a serialized message at `time` nanoseconds."""
@@ -31,7 +34,11 @@ class MessageSink(Protocol):
 
 
 class TopicWriter:
-    """Writes the messages of one topic. `open_topic` is called before the first message and returns `write`."""
+    """Writer of the messages of one topic.
+
+    `open_topic` is called before the first message, so that a topic without messages is not opened. It returns the
+    function that writes messages, which is then available as `write`.
+    """
 
     def __init__(self, open_topic: Callable[[], Write]) -> None:
         self._open_topic = open_topic
@@ -43,7 +50,10 @@ class TopicWriter:
 
 
 class BatchWriter:
-    """Packs several messages with the same time. Fields with the same name have the same value in all messages."""
+    """Writer of one message on each of several topics, all with the same time.
+
+    Fields of the same name have the same value in all messages.
+    """
 
     def __init__(self, out: MessageSink, layouts: Layouts) -> None:
         self._out = out
@@ -54,13 +64,13 @@ class BatchWriter:
         ]
 
     def write(self, time: int, *fields: Any) -> None:
-        """Write all messages at `time` nanoseconds. The fields are in order of first appearance in the layouts."""
+        """Write all messages at `time` nanoseconds. `fields` are the values of `field_names` of all layouts."""
         for topic, pack, indices in self._messages:
             self._out.publish(topic, time, pack(*[fields[index] for index in indices]))
 
 
 class LogPublisher:
-    """Writes messages to a log. The channel of a topic is opened by its first message."""
+    """Destination that writes messages to a log. The channel of a topic is opened by its first message."""
 
     def __init__(self, writer: McapWriter) -> None:
         self._writer = writer
@@ -80,7 +90,7 @@ class LogPublisher:
         return _ChunkBatchWriter(self, layouts)
 
     def flush_if_due(self) -> None:
-        """Write buffered messages to the file if there are enough."""
+        """Write the messages in memory to the file if there are enough."""
         self._writer.flush_if_due()
 
     def channel(self, topic: Topic) -> Channel:
@@ -94,7 +104,10 @@ class LogPublisher:
 
 
 class _ChunkBatchWriter(BatchWriter):
-    """Packs all messages directly into the current chunk with one call, or one by one if they do not fit."""
+    """BatchWriter that packs all messages directly into the current chunk with one call.
+
+    The first messages, which open the channels, and messages that do not fit into the chunk are written one by one.
+    """
 
     def __init__(self, out: LogPublisher, layouts: Layouts) -> None:
         super().__init__(out, layouts)
@@ -130,9 +143,9 @@ class _ChunkBatchWriter(BatchWriter):
 
 
 class NamespacedPublisher:
-    """Publishes the messages of one of several robots in its namespace, as Nav2's bringup of several robots does.
+    """Destination that writes the messages of one of several robots to a log, in the namespace of the robot.
 
-    All robots share /clock.
+    Nav2's bringup of several robots uses the same namespaces. /clock has none.
     """
 
     def __init__(self, out: LogPublisher, robot: str) -> None:
@@ -151,7 +164,7 @@ class NamespacedPublisher:
         return self._out.batch_writer([(self._with_namespace(topic), message) for topic, message in layouts])
 
     def flush_if_due(self) -> None:
-        """Write buffered messages to the file if there are enough."""
+        """Write the messages in memory to the file if there are enough."""
         self._out.flush_if_due()
 
     def _with_namespace(self, topic: Topic) -> Topic:

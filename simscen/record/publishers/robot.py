@@ -1,4 +1,7 @@
-"""Publishers for the moments of one robot: ground truth, decisions of the stack, events; with sensors and scene."""
+"""Publisher of the moments of one robot, and its parts that publish ground truth, the stack's output, and events.
+
+The parts that publish sensor readings and markers are in sensors.py and scene.py.
+"""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -38,7 +41,7 @@ class EventPublisher:
         self._goal = encode.pose_stamped(frame_names.MAP).packer()
 
     def write(self, now: int, event: Event) -> None:
-        """Write an event at `now` nanoseconds."""
+        """Publish an event at `now` nanoseconds."""
         stamp = self._time.stamp(event.tick)
         line = event_text.level(event), event_text.EVENT_LOGGER, event_text.sentence(event)
         self._out.publish(topics.EVENTS, now, messages.string(event_text.to_json(event)))
@@ -56,9 +59,10 @@ class EventPublisher:
 
 
 class RobotPublisher:
-    """Publishes the moments of a robot in the order of their ticks, and with `clock` also the time on /clock.
+    """Publishes the moments of a robot, in the order of their ticks.
 
-    `header` and `scenery` describe the run before it starts. `robot` is the robot's name; "" for a single robot.
+    `header` and `scenery` describe the run. `robot` is the robot's name; "" for a single robot. With `clock`, it also
+    publishes the simulated time on /clock.
     """
 
     def __init__(
@@ -72,7 +76,7 @@ class RobotPublisher:
     ) -> None:
         self._time, frames = time, RobotFrames(robot)
         self.thinning = thinning = Thinning(time.rate)
-        """Selects the samples to keep. The trace builder uses it, too."""
+        """Selects the samples to publish. A TraceBuilder of the same robot can use it as well."""
         self.flush_if_due = out.flush_if_due
         if header.map is not None:
             out.publish(topics.MAP, 0, encode_arrays.occupancy_grid(frame_names.MAP, (0, 0), header.map))
@@ -103,13 +107,16 @@ class RobotPublisher:
                 self._events.write(now, event)
 
 
-PARTICLE_RATE_HZ = 2  # a cloud of 500 particles has 32 kB, a third of all other messages of a second
-POSE_ARRAY_RATE_HZ, MAX_ARRAY_POSES = 1, 200  # for viewers only
-LOCAL_PLAN_RATE_HZ = 5  # for viewers only
+PARTICLE_RATE_HZ = 2
+"""Maximum rate of ParticleCloud messages, which are larger than most others."""
+POSE_ARRAY_RATE_HZ, MAX_ARRAY_POSES = 1, 200
+"""Maximum rate, and maximum number of poses, of the PoseArray of particles, which only viewers need."""
+LOCAL_PLAN_RATE_HZ = 5
+"""Maximum rate of local plans, which only viewers need."""
 
 
 class StackPublisher:
-    """Publishes the decisions of a stack: beliefs, plans, costmaps, commands and log lines."""
+    """Publishes the decisions of a stack: beliefs, plans, costmaps, commands, and log lines."""
 
     def __init__(self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames) -> None:
         self._out, self._time, self._thinning, self._frames = out, time, thinning, frames
@@ -152,11 +159,14 @@ class StackPublisher:
 
 
 MAX_LAYOUTS = 16
-"""Maximum number of sets of moving objects with a cached message layout. Most runs have few such sets."""
+"""Maximum number of sets of moving objects for which a writer is cached. Most runs have few such sets."""
 
 
 class TruthPublisher:
-    """Publishes ground truth and clearance, the poses of robot and moving objects on /tf, and with `clock` the time."""
+    """Publishes the ground truth: pose, velocity and clearance of the robot, and poses of moving objects.
+
+    The poses of the robot and of moving objects are also on /tf. With `clock`, it publishes the time on /clock.
+    """
 
     def __init__(
         self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames, clock: bool = True
@@ -170,7 +180,7 @@ class TruthPublisher:
         self._precomputed: _PrecomputedBatch | None = None
 
     def write(self, now: int, tick: int, truth: Truth) -> None:
-        """Publish the sample of `tick`, which is at `now` nanoseconds."""
+        """Publish the ground truth of `tick`, which is at `now` nanoseconds."""
         poses = self._thinning.objects_to_keep(tick, truth) if truth.objects else {}
         stamp, fields = self._time.stamp(tick), (truth.pose, truth.twist, truth.clearance)
         if type(poses) is PosesAtTick:
@@ -191,7 +201,7 @@ class TruthPublisher:
         self._tf_writer.write(now, self._pack_transforms([(frame_names.MAP, self._frame, stamp, truth.pose), *links]))
 
     def _precompute(self, predicted: PredictedPoses) -> "_PrecomputedBatch":
-        """Serialize the transforms of all objects for all ticks of a prediction."""
+        """Serialize the transforms of all objects for all ticks for which their poses are predicted."""
         previous, names = self._precomputed, predicted.names
         if previous is not None and previous.predicted.names == names:
             transforms, layout = previous.transforms, previous.layout
@@ -210,7 +220,10 @@ class TruthPublisher:
 
 
 class _PrecomputedBatch(NamedTuple):
-    """Messages for objects whose poses are known in advance; `serialized` has the transforms of each tick."""
+    """Serialized transforms of objects whose poses are known in advance: one row of `serialized` for each tick.
+
+    `transforms` has serialized them, and `layout` writes them together with the other messages of a tick.
+    """
 
     predicted: PredictedPoses
     transforms: TransformBatchPacker

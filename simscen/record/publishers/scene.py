@@ -1,88 +1,29 @@
 """Publisher of markers for 3D viewers: objects, footprints, zones, ramps and places."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from simscen.core.environment.costmap_filters import Filter
 from simscen.core.environment.scenery import FilterZone, Scenery
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Pose3
 from simscen.core.records.case import Case
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.record import frame_names, topics
 from simscen.record.frame_names import RobotFrames
-from simscen.record.messages.cdr import Template
+from simscen.record.messages.encode_markers import (
+    ARROW,
+    LINE_LIST,
+    TEXT,
+    TRIANGLE_LIST,
+    Color,
+    Marker,
+    marker_array,
+    outline_edges,
+    rectangle_triangles,
+)
 from simscen.record.publishers.channels import MessageSink
-
-Color = tuple[float, float, float, float]
-"""Red, green, blue and opacity, 0 to 1."""
-ARROW, LINE_LIST, TEXT, TRIANGLE_LIST = 0, 5, 9, 11
-_ADD, _DELETE_ALL = 0, 3
-
-
-class Marker(NamedTuple):
-    """One shape of visualization_msgs/msg/Marker.
-
-    `group` is its namespace, which viewers can show and hide. `scale` is in meters. `pose` is in `frame`, and `points`
-    (n, 3) are relative to `pose`.
-    """
-
-    frame: str
-    group: str
-    kind: int
-    color: Color
-    scale: tuple[float, float, float]
-    pose: Pose3 = Pose3()
-    points: Array = np.empty((0, 3))
-    text: str = ""
-
-
-def marker_array(markers: Iterable[Marker]) -> bytes:
-    """Return a visualization_msgs/msg/MarkerArray that replaces all previous markers of its topic.
-
-    Stamps are zero and frames locked, so that each marker moves with its frame.
-    """
-    markers = list(markers)
-    message = Template().put("I", len(markers) + 1)
-    _put(message, Marker("map", "", ARROW, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0, _DELETE_ALL)
-    for number, marker in enumerate(markers):
-        _put(message, marker, number, _ADD)
-    return bytes(message.buffer)
-
-
-def _put(message: Template, marker: Marker, number: int, action: int) -> None:
-    message.put("iI", 0, 0).string(marker.frame).string(marker.group).put("3i", number, marker.kind, action)
-    message.put("7d", *marker.pose).put("3d", *marker.scale).put("4f", *marker.color)
-    message.put("iI", 0, 0)  # lifetime: forever
-    message.put("B", True).put("I", len(marker.points))
-    if len(marker.points):
-        message.align(8)
-        message.buffer += np.ascontiguousarray(marker.points, dtype="<f8").tobytes()
-    message.put("I", 0)  # no colors per point
-    message.string("").put("iI", 0, 0).string("").string("").put("2I", 0, 0)  # no texture
-    message.string(marker.text)
-    message.string("").string("").put("I", 0).put("B", False)  # no mesh
-
-
-def outline_edges(outlines: Iterable[Sequence[Sequence[float]]], height: float = 0.0) -> Array:
-    """Return the edges of polygons as points (n, 3) of a LINE_LIST."""
-    edges = [edge for outline in outlines for edge in _edges(np.array(outline, dtype=np.float64), height)]
-    return np.concatenate(edges) if edges else np.empty((0, 3))
-
-
-def rectangle_triangles(corners: Array, height: float = 0.0) -> Array:
-    """Return rectangles (n, 4) min x, min y, max x, max y as points (6n, 3) of a TRIANGLE_LIST."""
-    points = np.full((len(corners), 6, 3), height)
-    points[:, :, :2] = corners[:, [[0, 1], [2, 1], [2, 3], [0, 1], [2, 3], [0, 3]]]
-    return points.reshape(-1, 3)
-
-
-def _edges(outline: Array, height: float) -> Iterator[Array]:
-    raised = np.column_stack((outline[:, :2], np.full(len(outline), height)))
-    yield np.stack((raised, np.roll(raised, -1, axis=0)), axis=1).reshape(-1, 3)
-
 
 OBJECT_COLOR: Color = (0.0, 0.41, 0.58, 1.0)
 PEDESTRIAN_COLOR: Color = (0.48, 0.24, 0.51, 1.0)
@@ -93,17 +34,20 @@ PLACE_COLOR: Color = (0.44, 0.45, 0.49, 1.0)
 RAMP_COLOR: Color = (0.66, 0.58, 0.43, 1.0)
 TRUTH_COLOR: Color = (0.0, 0.44, 0.34, 1.0)
 BELIEF_COLOR: Color = (0.8, 0.2, 0.5, 1.0)
-"""Colors of Okabe and Ito, as on pages and pictures."""
+"""Colors of Okabe and Ito, as in reports and pictures."""
 LINE_SCALE, TEXT_SCALE = (0.03, 0.0, 0.0), (0.0, 0.0, 0.25)
-"""Scales in m: width of lines and height of letters."""
+"""`scale` of markers in m: the width of lines in x, and the height of letters in z."""
 MAX_MASK_BLOCKS = 2000
-"""Maximum number of blocks of a filter mask to draw, the largest first."""
+"""Maximum number of rectangles of a filter mask that are drawn, the largest first."""
 _MARKER_HEIGHT_M = 0.02  # above the floor, so that the map does not hide markers
 _TEXT_POSE = Pose3(0.0, 0.0, 0.5)
 
 
 class ScenePublisher:
-    """Publishes all markers of `robot` whenever one of them changes. Poses of moving objects are on /tf."""
+    """Publishes the markers of the world and of `robot` ("" for a single robot) whenever one of them changes.
+
+    Markers move with the frames of the robot and of objects, whose poses are on /tf, and need no message for this.
+    """
 
     def __init__(self, out: MessageSink, case: Case, scenery: Scenery, frames: RobotFrames, robot: str) -> None:
         self._out, self._case, self._frames, self._robot, self._scenery = out, case, frames, robot, scenery
@@ -112,7 +56,7 @@ class ScenePublisher:
         own_zones = (zone for zone in scenery.zones if zone.robot == robot)
         self._zones: dict[tuple[str, str], FilterZone] = {(zone.filter, zone.region): zone for zone in own_zones}
         self.has_published = False
-        """Whether `write` was called. After the first call, `write` is needed only at ticks with events."""
+        """True after the first call of `write`. From then on, `write` is needed only at ticks with events."""
 
     def write(self, now: int, events: Sequence[Event]) -> None:
         """Update the markers after events, and publish them at `now` nanoseconds if they have changed."""
@@ -143,7 +87,7 @@ class ScenePublisher:
         return True
 
     def _find_zone(self, filter_: Filter, region: str) -> FilterZone | None:
-        """Return a zone from the start of the run, or a new one for a region."""
+        """Return the zone that had this region at the start of the run, or a new one; None if it is unknown."""
         for zone in self._scenery.zones:
             if (zone.filter, zone.region, zone.robot) == (filter_, region, self._robot):
                 return zone
@@ -180,7 +124,7 @@ class ScenePublisher:
 
 
 def _outlines(event: Event) -> list[list[tuple[float, float]]]:
-    """Return the outlines in an object.spawned event, without those of plug-ins that are not polygons."""
+    """Return the outlines in an object.spawned event. A plugin may write values that are no polygons; skip these."""
     parts = event.data.get("parts")
     outlines = [_corners(part) for part in parts] if isinstance(parts, list) else []
     return [corners for corners in outlines if len(corners) > 2]

@@ -22,16 +22,16 @@ _DEFAULT_TOPICS = {
     "Imu": ("imu", topics.IMU_TYPE),
     "Bump": ("bumper", topics.BUMPER_TYPE),
 }
-"""Default topic and message type by reading type, a class of simscen.core.messages.sensor_data."""
+"""Default topic and message type, by the name of a class of simscen.core.messages.sensor_data."""
 
 
 class SensorPublisher:
-    """Publishes readings when the stack receives them. The stamp of a message is the time of the measurement.
+    """Publishes readings at the time at which the stack receives them, with the time of the measurement as the stamp.
 
-    The first sensor of a type gets the default topic, for example /scan, and others a topic with their name in front.
-    `sensors` maps sensor names to reading types, in the order in which sensors get their topics; `declared` lists these
-    topics with the sensor names. A sensor that is missing in `sensors` gets its topic with its first reading. `mounts`
-    are the poses of sensors on the base.
+    The first sensor of a type gets the default topic, for example /scan. The others get a topic that starts with their
+    name, for example /rear/scan. `sensors` maps the names of sensors to reading types, in the order in which sensors
+    get their topics. A sensor that is missing there gets its topic with its first reading. `mounts` are the poses of
+    sensors on the base. `declared` are the topics of all `sensors`: pairs of the name of a sensor, and a topic.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class SensorPublisher:
     def write_filtered(self, now: int, odometry: Odometry) -> None:
         """Publish the odometry of the stack's filter at `now` nanoseconds.
 
-        From now on the filter, and not the wheel odometry, defines the transform from odom to base on /tf.
+        From now on, the filter defines the transform from odom to base on /tf, and no longer the wheel odometry.
         """
         if self._filtered_odometry is None:
             self._filtered_odometry = self._odometry_writers(topics.FILTERED_ODOMETRY)
@@ -156,7 +156,7 @@ class SensorPublisher:
                 self._out.publish(topic, now, encode.image(frame, stamp, pixels))
 
     def _publish_mounts(self, now: int) -> None:
-        """Publish all static transforms in one message, because late subscribers get only the last message."""
+        """Publish the mounts of all sensors in one message, because late subscribers get only the last message."""
         base = self._frames.base
         links = [(base, self._frames.sensor_frame(name), _START, pose) for name, pose in self._mounts.items()]
         if links:
@@ -179,14 +179,14 @@ class SensorPublisher:
 
 
 class _OdometryWriters(NamedTuple):
-    """Writers of odometry together with odom→base on /tf, without and with map→odom."""
+    """Writers of odometry together with odom→base on /tf; `with_map` also writes map→odom."""
 
     without_map: BatchWriter
     with_map: BatchWriter
 
 
 def _image_topics(sensor: str) -> list[tuple[Topic, bool]]:
-    """Return the topics of a camera, each with whether it contains depths."""
+    """Return the topics of a camera: one with False for colors, and one with True for depths."""
     root = f"/{_ros_name(sensor)}"
     names = ("image_raw", False), ("depth/image_raw", True)
     return [(Topic(f"{root}/{name}", topics.IMAGE_TYPE), is_depth) for name, is_depth in names]
@@ -195,7 +195,7 @@ def _image_topics(sensor: str) -> list[tuple[Topic, bool]]:
 def _ros_name(text: str) -> str:
     """Return a valid ROS name for a sensor: letters, digits and underscores, without a digit at the start.
 
-    A sensor named ground_truth must not publish on the topics of the ground truth.
+    A sensor with the name ground_truth gets another one, so that its topic is not that of the ground truth.
     """
     name = re.sub(r"[^A-Za-z0-9_]", "_", text)
     return f"sensor_{name}" if name[:1].isdigit() or name in ("", "ground_truth") else name

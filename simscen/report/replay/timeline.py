@@ -14,7 +14,7 @@ from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Verdict
 from simscen.criteria.registry import verdict_names
 from simscen.judge.finding_text import DISTURBANCE, comparison, disturbance_times, subject
-from simscen.judge.run_result import WORLD_EVENT_PREFIXES
+from simscen.judge.several_robots import WORLD_EVENT_PREFIXES
 from simscen.loading.scenario_text import parts_of_text
 from simscen.loading.yaml.tree import Key, MappingNode, key_position
 from simscen.model.scenario import ScenarioSpec

@@ -57,7 +57,7 @@ class ReferenceStackPeer(Peer):
             stack = self._stack or self._start_stack(step)
             for kind, content in self._requests:
                 if kind == wire.PREEMPT:
-                    stack.preempt(content["tick"], _goal(Goal.of(content["goal"])))
+                    stack.preempt(content["tick"], _goal(Goal.from_content(content["goal"])))
                 else:
                     stack.cancel(content["tick"])
             self._requests.clear()
@@ -98,7 +98,7 @@ class ReferenceStackPeer(Peer):
         pose, std = estimate["pose"], estimate["std"]
         self._stack.start(
             Estimate(None if pose is None else Pose2(*pose), (std[0], std[1], std[2])),
-            tuple(_goal(Goal.of(goal)) for goal in task["goals"]),
+            tuple(_goal(Goal.from_content(goal)) for goal in task["goals"]),
         )
         return self._stack
 

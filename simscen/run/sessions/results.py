@@ -119,7 +119,7 @@ def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
     log = folder / f"run{PARTIAL_SUFFIX}"
     if failure is None or not log.exists():
         return failure
-    from simscen.record.log_reader import recover
+    from simscen.record.log_recovery import recover
 
     note = ""
     if log.stat().st_size > MAX_RECOVER_BYTES:

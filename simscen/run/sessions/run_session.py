@@ -203,7 +203,7 @@ def _folder(run: RunFinished, earlier: Path) -> Path:
 def _disagreement(new_path: Path, earlier_path: Path) -> str | None:
     """Describe the first difference of two logs, or return None. Raises InvalidInput for an unreadable log."""
     from simscen.record.log_reader import read_log
-    from simscen.record.trace_difference import first_disagreement
+    from simscen.record.trace_difference import first_pose_difference
 
     new_log, earlier_log = read_log(new_path), read_log(earlier_path)
     if not earlier_log.result or not new_log.result:
@@ -214,7 +214,7 @@ def _disagreement(new_path: Path, earlier_path: Path) -> str | None:
         f"{name}: {statuses.get(name, 'absent')} instead of {earlier_statuses.get(name, 'absent')}" for name in changed
     ]
     pairs = zip(new_log.traces, earlier_log.traces, strict=False)
-    return "; ".join(differences) or next((parts for pair in pairs if (parts := first_disagreement(*pair))), None)
+    return "; ".join(differences) or next((parts for pair in pairs if (parts := first_pose_difference(*pair))), None)
 
 
 def _statuses(result: RunResult) -> dict[str, str]:

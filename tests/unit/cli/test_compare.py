@@ -15,7 +15,7 @@ from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResu
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.metrics.comparison import compare_sessions
-from simscen.judge.statistical_tests import Significance
+from simscen.judge.significance import Significance
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
 

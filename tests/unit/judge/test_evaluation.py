@@ -11,7 +11,8 @@ from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.criteria.clearance import Clearance
 from simscen.criteria.findings import at_least, at_most
 from simscen.criteria.registry import AnyCriterion
-from simscen.judge.evaluation import findings_defect, judge, outcome_of_verdicts
+from simscen.judge.evaluation import findings_defect, judge
+from simscen.judge.outcome import outcome_of_verdicts
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 TRACE = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})

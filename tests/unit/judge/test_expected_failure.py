@@ -4,8 +4,8 @@ import pytest
 
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import ExpectedFailure, Finding, Status, Verdict
-from simscen.judge.evaluation import apply_expectation, outcome_of_verdicts
 from simscen.judge.finding_text import DISTURBANCE
+from simscen.judge.outcome import apply_expectation, outcome_of_verdicts
 
 PASS, FAIL, UNCLEAR, ERROR = Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR
 

@@ -9,7 +9,7 @@ from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResu
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import ExpectedFailure, Finding, Status, Verdict
 from simscen.judge.finding_text import DISTURBANCE
-from simscen.judge.run_result import combine_robots
+from simscen.judge.several_robots import combine_robots
 from simscen.testing.synthetic_trace import synthetic_trace
 
 

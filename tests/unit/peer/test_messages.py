@@ -1,6 +1,7 @@
 """Tests that the messages of the peer client equal those of the log."""
 
 import contextlib
+import struct
 
 import numpy as np
 import pytest
@@ -98,4 +99,10 @@ def test_bytes_that_are_no_message_are_refused(data: bytes, kind: str) -> None:
     with contextlib.suppress(ValueError):
         messages.read(kind, data)
     with pytest.raises(ValueError, match="not plain CDR"):
-        Reader(b"\0\0\0\0" + data)
+        Reader(b"\0\2\0\0" + data)
+
+
+def test_big_endian_numbers_are_read() -> None:
+    layout, count, padding = bytes(8), struct.pack(">I", 2), bytes(4)
+    data = b"\0\0\0\0" + layout + count + padding + struct.pack(">2d", 0.5, -3.0)
+    assert list(messages.read("std_msgs/msg/Float64MultiArray", data)) == [0.5, -3.0]

@@ -19,9 +19,9 @@ from moments import CASE, CLOCK, about, moments
 
 from simscen.core.errors import InvalidInput
 from simscen.core.records.trace import Trace
-from simscen.record import log_file
-from simscen.record.log_file import RecordReader
+from simscen.record import mcap_reader
 from simscen.record.log_reader import Log, read_log
+from simscen.record.mcap_reader import RecordReader
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
 
@@ -52,7 +52,7 @@ def killed(folder: Path, seconds: float) -> Path:
         import os, signal, sys
         sys.path.insert(0, {str(HERE)!r})
         from moments import CLOCK, about, moments
-        from simscen.record.recorder import MOMENT_DELAY_S, MomentBuffer
+        from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer
         from simscen.record.recorder import Recorder
         recorder = Recorder({str(folder / "run.mcap")!r}, CLOCK, about())
         log = MomentBuffer(CLOCK.ticks(MOMENT_DELAY_S), recorder).sink(recorder.robots[""])
@@ -131,11 +131,11 @@ def chunked(path: Path, compression: CompressionType, data: bytes) -> Path:
 @pytest.mark.parametrize("compression", CompressionType)
 def test_chunks_are_read_up_to_a_limit(tmp_path: Path, monkeypatch, compression: CompressionType) -> None:
     path = chunked(tmp_path / "run.mcap", compression, bytes(10_000))
-    monkeypatch.setattr(log_file, "MAX_RECORD_BYTES", 20_000)
+    monkeypatch.setattr(mcap_reader, "MAX_RECORD_BYTES", 20_000)
     with path.open("rb") as stream:
         (message,) = [record for record in RecordReader(stream) if isinstance(record, Message)]
     assert message.data == bytes(10_000)
-    monkeypatch.setattr(log_file, "MAX_RECORD_BYTES", 9_000)
+    monkeypatch.setattr(mcap_reader, "MAX_RECORD_BYTES", 9_000)
     with path.open("rb") as stream, pytest.raises((ValueError, McapError), match=r"more than|exceeds limit"):
         list(RecordReader(stream))
 

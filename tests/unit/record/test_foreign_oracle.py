@@ -16,8 +16,8 @@ from simscen.judge.evaluation import judge
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import is_simscen_log
 from simscen.record.foreign.read import read_foreign_log
-from simscen.record.log_file import RecordReader, open_log
 from simscen.record.log_reader import read_log
+from simscen.record.mcap_reader import RecordReader, open_log
 from simscen.run.simulate import simulate_file
 
 SCENARIO = """\

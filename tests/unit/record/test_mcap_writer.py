@@ -13,9 +13,10 @@ from mcap.writer import CompressionType, Writer
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.record import topics
-from simscen.record.mcap_writer import McapWriter, load_message_types
+from simscen.record.mcap_writer import McapWriter
 from simscen.record.messages import encode
 from simscen.record.publishers.channels import BatchWriter, LogPublisher
+from simscen.record.topics import load_message_types
 
 TEXT = load_message_types()["std_msgs/msg/String"]
 MESSAGES = [(1 + i % 3, 1000 * (i // 2), random.Random(i).randbytes(300)) for i in range(2000)]

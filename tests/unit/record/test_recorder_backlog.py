@@ -7,7 +7,7 @@ from moments import moments
 
 from simscen.core.errors import RunError
 from simscen.core.records.trace import Moment
-from simscen.record.recorder import MomentBuffer
+from simscen.record.moment_buffer import MomentBuffer
 
 SOME = list(moments(2.0))
 

@@ -5,8 +5,7 @@ import json
 from schemas_from_rosbags import SCHEMAS, expected
 
 from simscen.record import topics
-from simscen.record.mcap_writer import load_message_types
-from simscen.record.topics import Topic
+from simscen.record.topics import Topic, load_message_types
 
 
 def test_schemas_have_not_drifted_from_rosbags() -> None:

@@ -8,7 +8,7 @@ from moments import CLOCK, moments
 
 from simscen.core.records.trace import Samples, Trace
 from simscen.record.trace_builder import TraceBuilder
-from simscen.record.trace_difference import first_disagreement
+from simscen.record.trace_difference import first_pose_difference
 
 
 @pytest.fixture
@@ -27,14 +27,16 @@ def moved(trace: Trace, column: int, by: float) -> Trace:
 
 @pytest.mark.parametrize(("column", "by"), [(0, 0.0), (0, 1e-12), (1, -9e-6), (2, 9e-6), (2, 2 * math.pi)])
 def test_runs_that_differ_in_last_bits_agree(trace: Trace, column: int, by: float) -> None:
-    assert first_disagreement(trace, moved(trace, column, by)) is None
+    assert first_pose_difference(trace, moved(trace, column, by)) is None
 
 
 @pytest.mark.parametrize(("column", "by"), [(0, 1.1e-5), (1, -1.0), (2, 1e-4), (0, math.nan)])
 def test_different_path_is_reported_with_its_tick(trace: Trace, column: int, by: float) -> None:
-    assert "tick 24 (t = 0.100 s): the true pose differs by" in str(first_disagreement(trace, moved(trace, column, by)))
+    assert "tick 24 (t = 0.100 s): the true pose differs by" in str(
+        first_pose_difference(trace, moved(trace, column, by))
+    )
 
 
 def test_different_end_is_a_difference(trace: Trace) -> None:
-    assert first_disagreement(trace, dataclasses.replace(trace, end=241)) == "the runs end at ticks 240 and 241"
-    assert "tick rate" in str(first_disagreement(trace, dataclasses.replace(trace, tick_rate=100)))
+    assert first_pose_difference(trace, dataclasses.replace(trace, end=241)) == "the runs end at ticks 240 and 241"
+    assert "tick rate" in str(first_pose_difference(trace, dataclasses.replace(trace, tick_rate=100)))

@@ -22,7 +22,7 @@ from simscen.judge.metrics.comparison import (
     comparison_data,
     labeled_key,
 )
-from simscen.judge.statistical_tests import PASS_RATE, Significance, signed_rank_test
+from simscen.judge.significance import PASS_RATE, Significance, signed_rank_test
 
 STACKS = ("ref=reference", "mine=./nav --fast")
 GOOD = {"time_to_goal": 10.0, "path_length": 5.0, "min_clearance": 0.5, "collisions": 0.0}

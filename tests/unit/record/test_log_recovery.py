@@ -9,8 +9,10 @@ from mcap.reader import make_reader
 from moments import CLOCK, about, moments
 
 from simscen.core.errors import InvalidInput
-from simscen.record.log_reader import read_log, recover
-from simscen.record.recorder import MOMENT_DELAY_S, MomentBuffer, Recorder
+from simscen.record.log_reader import read_log
+from simscen.record.log_recovery import recover
+from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer
+from simscen.record.recorder import Recorder
 
 
 def messages(path: Path) -> list[tuple[str, int, bytes]]:

@@ -9,7 +9,7 @@ from scipy.stats import binom, binomtest
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult, error_result
 from simscen.core.records.study import ClaimStatus
-from simscen.judge.statistical_tests import anytime_limits, clopper_pearson_limits, decide, evaluate_claim
+from simscen.judge.pass_rate_claims import anytime_limits, clopper_pearson_limits, decide, evaluate_claim
 from simscen.model.acceptance import PassRate, fewest_runs
 
 SIMULATED_STUDIES = 2000

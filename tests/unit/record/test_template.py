@@ -1,11 +1,12 @@
-"""Templates align as CDR asks, and cursors read what they wrote."""
+"""Templates align as CDR asks, and readers read what they wrote."""
 
 import struct
 
 import numpy as np
 import pytest
 
-from simscen.record.messages.cdr import CdrReader, Template, compile_packer
+from simscen.record.messages.decode import MessageReader, particle_cloud
+from simscen.record.messages.template import Template, compile_packer
 
 
 def test_alignment_is_counted_after_the_header() -> None:
@@ -32,10 +33,10 @@ def test_a_packer_puts_fields_into_slots_and_leaves_the_constants_alone() -> Non
     assert len(first) == len(message.buffer)
     assert first[12:] == bytes(message.buffer[12:])[:-24] + struct.pack("<3d", 0.5, 0.0, 1.5)
     assert second[12:-24] == first[12:-24]
-    cursor = CdrReader(second)
-    assert cursor.take("iI") == (3, 4)
-    assert cursor.string() == "map"
-    assert cursor.take("5d") == (0.0, 0.0, 2.5, 0.0, 3.5)
+    reader = MessageReader(second)
+    assert reader.take("iI") == (3, 4)
+    assert reader.string() == "map"
+    assert reader.take("5d") == (0.0, 0.0, 2.5, 0.0, 3.5)
 
 
 def test_fields_that_are_called_alike_are_asked_for_once() -> None:
@@ -46,30 +47,35 @@ def test_fields_that_are_called_alike_are_asked_for_once() -> None:
     assert compile_packer((*one.parts, *other.parts))(0.5, 7) == struct.pack("<di4xd", 0.5, 7, 0.5)
 
 
-def test_a_cursor_reads_what_a_template_wrote() -> None:
+def test_a_reader_reads_what_a_template_wrote() -> None:
     message = Template()
     message.put("B", 7)
     message.string("odom")
     message.put("3d", 1.0, -0.0, 1e-300)
-    cursor = CdrReader(bytes(message.buffer))
-    assert cursor.take("B") == (7,)
-    assert cursor.string() == "odom"
-    assert cursor.array("f8", (3,)).tolist() == [1.0, 0.0, 1e-300]
+    reader = MessageReader(bytes(message.buffer))
+    assert reader.take("B") == (7,)
+    assert reader.string() == "odom"
+    assert reader.array("f8", (3,)).tolist() == [1.0, 0.0, 1e-300]
 
 
 def test_a_message_that_ends_too_early_is_an_error() -> None:
     message = Template()
     message.put("I", 5)
     data = bytes(message.buffer)
-    with pytest.raises(struct.error):
-        CdrReader(data).take("d")
-    with pytest.raises(struct.error):
-        CdrReader(data).string()
-    with pytest.raises(struct.error):
-        CdrReader(data).array("i1", (9, 9))
+    with pytest.raises(ValueError, match="ends before"):
+        MessageReader(data).take("d")
+    with pytest.raises(ValueError, match="ends before"):
+        MessageReader(data).string()
+    with pytest.raises(ValueError, match="ends before"):
+        MessageReader(data).array("i1", (9, 9))
 
 
 def test_arrays_are_read_without_a_copy() -> None:
-    cells = CdrReader(b"\0\1\0\0" + bytes(range(6))).array("i1", (2, 3))
+    cells = MessageReader(b"\0\1\0\0" + bytes(range(6))).array("i1", (2, 3))
     assert np.array_equal(cells, np.arange(6).reshape(2, 3))
     assert not cells.flags.owndata
+
+
+def test_an_empty_particle_cloud_is_read() -> None:
+    message = Template().put("iI", 0, 0).string("map").put("I", 0)
+    assert particle_cloud(MessageReader(bytes(message.buffer))).shape == (0, 8)

@@ -3,13 +3,7 @@
 import pytest
 from scipy.stats import binomtest, wilcoxon
 
-from simscen.judge.statistical_tests import (
-    PASS_RATE,
-    PairedSample,
-    Significance,
-    signed_rank_test,
-    significant_changes,
-)
+from simscen.judge.significance import PASS_RATE, PairedSample, Significance, signed_rank_test, significant_changes
 
 
 def sample(

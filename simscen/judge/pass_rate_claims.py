@@ -1,26 +1,24 @@
-"""Statistical tests: of the claim that a robot passes at least a share of all runs, and of changes between paired runs.
+"""Statistical tests of a claim: that a robot passes at least the share `min` of all runs.
 
-The runs must be independent: each has its own seed, and its own random values if the scenario is varied. Each test has
-the stated error rates whatever the true rate is: a robot below `min` is accepted with a probability of at most
-1 - `confidence`.
+The runs must be independent: each has its own seed, and its own random values if the scenario is varied. Whatever the
+true pass rate is, each test keeps the stated error rate: if the rate is below `min`, the claim is held with a
+probability of at most 1 - `confidence`.
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 from simscen.core.records.comparison import ScenarioChange
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.study import ClaimResult, ClaimStatus
-from simscen.core.statistics import holm, sign_test
 from simscen.model.acceptance import PassRate
 
 
 def evaluate_claim(claim: PassRate, results: Sequence[RunResult]) -> ClaimResult:
-    """Return the result of the claim after these runs, in the order of their seeds.
+    """Return the result of a claim after these runs, which must be in the order of their seeds.
 
-    A sequential test is decided at the first run that decides it; later runs do not count. A crash or time-out of the
-    stack under test counts as a failure. Any other error blocks the claim.
+    A sequential test ends at the first run that decides it; later runs do not count. A crash or time-out of the stack
+    under test counts as a failed run. Any other error blocks the claim.
     """
     outcomes = [result.outcome is Outcome.PASSED for result in results if is_counted(result)]
     errors = len(results) - len(outcomes)
@@ -47,9 +45,10 @@ def is_counted(result: RunResult) -> bool:
 
 
 def decide(claim: PassRate, outcomes: Sequence[bool]) -> tuple[int, ClaimStatus]:
-    """Return the number of runs that decide the claim, and the decision; all runs if it is undecided.
+    """Return the number of runs after which the claim is decided, and the decision.
 
-    `outcomes` are True for passed runs, in order, at most `max_runs` of them.
+    If it is undecided, this is the number of all runs. `outcomes` are True for passed runs, in order; there are at most
+    `claim.max_runs`.
     """
     if claim.method == "fixed":
         runs = len(outcomes)
@@ -73,14 +72,14 @@ def _by_limits(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
 
 
 def _by_mixture(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
-    """Decide as soon as `min` is outside of the `anytime_limits`."""
+    """Return the decision of the method `anytime`: the claim is decided when `min` is outside the `anytime_limits`."""
     if _is_compatible(claim.min, passed, runs, claim.confidence):
         return ClaimStatus.UNDECIDED
     return ClaimStatus.HELD if passed > claim.min * runs else ClaimStatus.REFUTED
 
 
 def _by_likelihood_ratio(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
-    """Compare the likelihoods of `target` and `min`.
+    """Return the decision of the method `sprt`, which compares the likelihoods of the rates `target` and `min`.
 
     The limits 1 / alpha and beta are those of Wald's inequalities: they bound each error rate, while Wald's usual
     approximation (1 - beta) / alpha only bounds their sum. (Wald: Sequential Tests of Statistical Hypotheses, 1945.)
@@ -94,7 +93,7 @@ def _by_likelihood_ratio(claim: PassRate, passed: int, runs: int) -> ClaimStatus
 
 
 def confidence_limits(claim: PassRate, passed: int, runs: int) -> tuple[float, float] | None:
-    """Return the lower and the upper confidence limit of the pass rate; None for `sprt`."""
+    """Return the lower and the upper confidence limit of the pass rate by the method of the claim; None for `sprt`."""
     if claim.method == "sprt":
         return None
     limits = anytime_limits if claim.method == "anytime" else clopper_pearson_limits
@@ -102,7 +101,7 @@ def confidence_limits(claim: PassRate, passed: int, runs: int) -> tuple[float, f
 
 
 def clopper_pearson_limits(passed: int, runs: int, confidence: float) -> tuple[float, float]:
-    """Return the exact one-sided limits of a rate, each with the probability `confidence`.
+    """Return the exact lower and upper limit of a rate; each of them holds with the probability `confidence`.
 
     (Clopper and Pearson: The Use of Confidence or Fiducial Limits Illustrated in the Case of the Binomial, 1934.)
     """
@@ -114,10 +113,11 @@ def clopper_pearson_limits(passed: int, runs: int, confidence: float) -> tuple[f
 
 
 def anytime_limits(passed: int, runs: int, confidence: float) -> tuple[float, float]:
-    """Return limits of a rate that are valid after every run at the same time, with the probability `confidence`.
+    """Return a lower and an upper limit of a rate, computed after any run of a sequence of runs.
 
-    They contain the rates p with (runs + 1) · P(passed | runs, p) > 1 - confidence: the beta-binomial mixture with a
-    uniform prior. (Robbins: Statistical Methods Related to the Law of the Iterated Logarithm, 1970.)
+    With the probability `confidence`, the limits after all of these runs are valid at the same time. They contain the
+    rates p with (runs + 1) · P(passed | runs, p) > 1 - confidence: the beta-binomial mixture with a uniform prior.
+    (Robbins: Statistical Methods Related to the Law of the Iterated Logarithm, 1970.)
     """
     rate = passed / runs
     low = _boundary(passed, runs, confidence, inside=rate, outside=0.0) if passed else 0.0
@@ -126,7 +126,10 @@ def anytime_limits(passed: int, runs: int, confidence: float) -> tuple[float, fl
 
 
 def _boundary(passed: int, runs: int, confidence: float, inside: float, outside: float) -> float:
-    """Return the boundary between a compatible rate `inside` and an incompatible rate `outside`, by bisection."""
+    """Return the boundary between a compatible rate `inside` and an incompatible rate `outside`, by bisection.
+
+    Which rates are compatible is defined by `_is_compatible`.
+    """
     while (middle := (inside + outside) / 2) not in (inside, outside):
         if _is_compatible(middle, passed, runs, confidence):
             inside = middle
@@ -139,69 +142,3 @@ def _is_compatible(rate: float, passed: int, runs: int, confidence: float) -> bo
     """Return whether (runs + 1) · P(passed | runs, rate) > 1 - confidence. 0 < rate < 1."""
     log_count = math.lgamma(runs + 2) - math.lgamma(passed + 1) - math.lgamma(runs - passed + 1)
     return log_count + passed * math.log(rate) + (runs - passed) * math.log1p(-rate) > math.log(1 - confidence)
-
-
-PASS_RATE = "pass rate"
-"""Name of the sample with 1 for a passed and 0 for a failed run."""
-
-
-@dataclass(frozen=True)
-class Significance:
-    """Conditions under which a change is significant.
-
-    alpha:       largest p-value, after Holm's correction for the number of tests
-    min_effect:  smallest change of a mean, relative to that of the baseline; smaller ones do not matter
-    """
-
-    alpha: float = 0.05
-    min_effect: float = 0.05
-
-
-@dataclass(frozen=True)
-class PairedSample:
-    """Values of the pass rate or of a metric in pairs of runs (baseline, other) of one scenario, or of all."""
-
-    scenario: str
-    what: str
-    unit: str
-    pairs: Sequence[tuple[float, float]]
-    higher_is_better: bool | None
-
-    def p_value(self) -> float:
-        """Return the p-value of McNemar's exact test for the pass rate, of the signed-rank test for a metric."""
-        if self.what == PASS_RATE:
-            return sign_test(self.pairs.count((0.0, 1.0)), self.pairs.count((1.0, 0.0)))
-        return signed_rank_test([two - one for one, two in self.pairs])
-
-
-def significant_changes(samples: Iterable[PairedSample], significance: Significance) -> tuple[ScenarioChange, ...]:
-    """Return the changes that are significant and large enough, with adjusted p-values.
-
-    If nothing has changed, any change is found with a probability of at most `alpha`. Samples without any difference
-    cannot be significant and do not count in the correction.
-    """
-    tested = [sample for sample in samples if any(one != two for one, two in sample.pairs)]
-    found = []
-    for sample, p in zip(tested, holm([sample.p_value() for sample in tested]), strict=True):
-        baseline, value = (sum(side) / len(sample.pairs) for side in zip(*sample.pairs, strict=True))
-        if p <= significance.alpha and abs(value - baseline) >= significance.min_effect * abs(baseline):
-            is_worse = None if sample.higher_is_better is None else (value < baseline) == sample.higher_is_better
-            found.append(
-                ScenarioChange(
-                    sample.scenario, sample.what, sample.unit, len(sample.pairs), baseline, value, p, is_worse
-                )
-            )
-    return tuple(found)
-
-
-def signed_rank_test(differences: Sequence[float]) -> float:
-    """Return the p-value of Wilcoxon's two-sided signed-rank test of paired differences, by scipy.
-
-    Pairs without a difference do not count; 1 if there is no difference at all. (Wilcoxon: Individual Comparisons by
-    Ranking Methods, 1945.)
-    """
-    if not any(differences):
-        return 1.0
-    from scipy.stats import wilcoxon  # the import takes half a second
-
-    return float(wilcoxon(differences).pvalue)

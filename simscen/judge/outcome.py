@@ -1,0 +1,65 @@
+"""Outcome of a run from its verdicts, also for a run that is expected to fail."""
+
+from collections.abc import Sequence
+
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.verdict import ExpectedFailure, Status, Verdict
+from simscen.criteria.findings import held, missed
+from simscen.judge.finding_text import DISTURBANCE
+
+
+def outcome_of_verdicts(verdicts: Sequence[Verdict]) -> Outcome:
+    """Return the outcome of a completed run.
+
+    Only verdicts of severity `fail` can fail the run, and inconclusive counts as failed. An error of any criterion,
+    whatever its severity, makes the run an error; so does a run without any verdict.
+    """
+    if not verdicts or any(verdict.status is Status.ERROR for verdict in verdicts):
+        return Outcome.ERROR
+    decisive = [verdict for verdict in verdicts if verdict.severity == "fail"]
+    return Outcome.PASSED if all(verdict.status is Status.PASS for verdict in decisive) else Outcome.FAILED
+
+
+EXPECTED = "expected"
+"""Criterion name of the verdict that states whether an expected failure took place."""
+
+
+def apply_expectation(
+    expected: ExpectedFailure | None, verdicts: Sequence[Verdict], outcome: Outcome, is_complete: bool
+) -> tuple[Outcome, Verdict | None]:
+    """Return the outcome of a run that is `expected` to fail, and a verdict on this expectation.
+
+    `verdicts` and `outcome` are those of the run without the expectation. Without an expectation, or if the outcome is
+    an error or the log is not complete, return the `outcome` unchanged and None.
+
+    This is strict like pytest's `xfail(strict=True)`: the run fails if nothing fails, if a listed criterion passes, and
+    if a criterion that is not listed does not pass. A missing disturbance is only expected if its name is listed.
+    """
+    if expected is None or outcome is Outcome.ERROR or not is_complete:
+        return outcome, None
+    decisive = [verdict for verdict in verdicts if verdict.severity == "fail"]
+    covered = [verdict for verdict in decisive if _is_expected_to_fail(verdict, expected)]
+    failed = [verdict for verdict in covered if verdict.status is Status.FAIL]
+    excused = [verdict for verdict in covered if verdict.status is not Status.PASS]
+    unexpected = [verdict for verdict in covered if verdict.status is Status.PASS] if expected.criteria else []
+    limit = f"a failure: {expected.reason}"
+    name = EXPECTED if all(verdict.id != EXPECTED for verdict in verdicts) else f"{EXPECTED}#2"
+    if unexpected or not failed:
+        measured = f"{_names(unexpected)} passed" if unexpected else _nothing_failed(covered)
+        return Outcome.FAILED, Verdict(EXPECTED, name, "fail", (missed(EXPECTED, measured, limit),))
+    others = [verdict for verdict in decisive if verdict.status is not Status.PASS and verdict not in excused]
+    verdict = Verdict(EXPECTED, name, "fail", (held(EXPECTED, f"{_names(failed)} failed", limit),))
+    return (Outcome.FAILED if others else Outcome.FAILED_AS_EXPECTED), verdict
+
+
+def _is_expected_to_fail(verdict: Verdict, expected: ExpectedFailure) -> bool:
+    return verdict.id in expected.criteria if expected.criteria else verdict.criterion != DISTURBANCE
+
+
+def _nothing_failed(verdicts: Sequence[Verdict]) -> str:
+    undecided_verdicts = [verdict for verdict in verdicts if verdict.status is not Status.PASS]
+    return f"nothing failed, {_names(undecided_verdicts)} undecided" if undecided_verdicts else "everything passed"
+
+
+def _names(verdicts: Sequence[Verdict]) -> str:
+    return ", ".join(verdict.id for verdict in verdicts)

@@ -1,0 +1,113 @@
+"""Combination of the results of the robots of a run to one result."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+from simscen.core.records.events import DisturbanceOutcome, Event
+from simscen.core.records.run_result import Outcome, RunFailure, RunResult
+from simscen.core.records.trace import Trace
+from simscen.core.records.verdict import ExpectedFailure, Verdict
+from simscen.criteria.timeline import has_ended
+from simscen.judge.finding_text import DISTURBANCE
+from simscen.judge.outcome import apply_expectation
+
+T = TypeVar("T")
+SUCCESS = "success"
+"""Metric that the run has as well as each robot."""
+WORLD_EVENT_PREFIXES = ("object.", "pedestrian.", "event.", "mark", "run.")
+"""Prefixes of the kinds of events of the world. The trace of each robot contains these events."""
+
+
+def combine_robots(
+    results: Mapping[str, RunResult], traces: Mapping[str, Trace], expected: ExpectedFailure | None = None
+) -> RunResult:
+    """Return the result of a run from the results and traces of its robots, both by the name of the robot.
+
+    The run passes if all robots pass. Verdicts, metrics and faults of a robot get the name `robot/name`. Events of the
+    world, and verdicts on them, are listed once and without a robot. The metric `success` also exists for the run: the
+    smallest of the robots. `expected` is set if the run is expected to fail.
+    """
+    first = next(iter(results.values()))
+    shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
+    judged = [(verdict, line) for verdict, line in _verdicts_with_lines(first) if _is_about_world(verdict, shared)]
+    for name, result in results.items():
+        own = (
+            (verdict, line) for verdict, line in _verdicts_with_lines(result) if not _is_about_world(verdict, shared)
+        )
+        judged += [(_with_robot_name(verdict, name), line) for verdict, line in own]
+    verdicts = tuple(verdict for verdict, _ in judged)
+    outcome, expectation = apply_expectation(expected, verdicts, _worst(results), all(map(has_ended, traces.values())))
+    if expected is not None and expectation is not None:
+        judged.append((expectation, expected.line))
+    errors = [(name, result.error) for name, result in results.items() if result.error is not None]
+    successes = [result.metrics.get(SUCCESS) for result in results.values()]
+    success = None if None in successes else min(value for value in successes if value is not None)
+    return replace(
+        first,
+        outcome=outcome,
+        verdicts=tuple(verdict for verdict, _ in judged),
+        lines=tuple(line for _, line in judged) if first.lines else (),
+        metrics={SUCCESS: success, **_with_robot_names({name: result.metrics for name, result in results.items()})},
+        undefined=_with_robot_names({name: result.undefined for name, result in results.items()}),
+        events=_events(traces),
+        disturbances=(*_disturbances(first, "event"), *_faults(results)),
+        error=_prefixed_failure(errors[0][0], errors[0][1]) if errors else None,
+        reason="" if expected is None else expected.reason,
+    )
+
+
+def _verdicts_with_lines(result: RunResult) -> list[tuple[Verdict, int]]:
+    return list(zip(result.verdicts, result.lines or (0,) * len(result.verdicts), strict=True))
+
+
+def _with_robot_name(verdict: Verdict, robot: str) -> Verdict:
+    """Return the verdict with the name of the robot in its ID, and in the text on a missing fault."""
+    findings = verdict.findings
+    if verdict.criterion == DISTURBANCE:
+        findings = tuple(replace(finding, measured=f"{robot}/{finding.measured}") for finding in findings)
+    return replace(verdict, id=f"{robot}/{verdict.id}", findings=findings)
+
+
+def _is_about_world(verdict: Verdict, events: set[str]) -> bool:
+    """Return whether the verdict is on a missing event of the scenario. `events` are the names of all events."""
+    return verdict.criterion == DISTURBANCE and not events.isdisjoint((verdict.id, verdict.id.rpartition("#")[0]))
+
+
+def _worst(results: Mapping[str, RunResult]) -> Outcome:
+    outcomes = [result.outcome for result in results.values()]
+    return next((worst for worst in (Outcome.ERROR, Outcome.FAILED) if worst in outcomes), Outcome.PASSED)
+
+
+def _with_robot_names(parts: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
+    return {f"{name}/{key}": value for name, part in parts.items() for key, value in part.items()}
+
+
+def _events(traces: Mapping[str, Trace]) -> dict[str, int]:
+    """Return the number of events by kind. Events of the world count once, but not those of the other robots."""
+    first = next(iter(traces.values()))
+    counts = Counter(str(event.kind) for event in first.events if _is_world_event(event) and event.name not in traces)
+    for trace in traces.values():
+        counts.update(str(event.kind) for event in trace.events if not _is_world_event(event))
+    return dict(sorted(counts.items()))
+
+
+def _is_world_event(event: Event) -> bool:
+    return str(event.kind).startswith(WORLD_EVENT_PREFIXES)
+
+
+def _disturbances(result: RunResult, kind: str) -> list[DisturbanceOutcome]:
+    return [one for one in result.disturbances if one.disturbance.kind == kind]
+
+
+def _faults(results: Mapping[str, RunResult]) -> list[DisturbanceOutcome]:
+    return [
+        replace(one, disturbance=replace(one.disturbance, name=f"{name}/{one.disturbance.name}"))
+        for name, result in results.items()
+        for one in _disturbances(result, "fault")
+    ]
+
+
+def _prefixed_failure(name: str, error: RunFailure | None) -> RunFailure | None:
+    return error and replace(error, message=f"{name}: {error.message}")

@@ -1,0 +1,77 @@
+"""Tests of which changes between a baseline and another stack or session are significant, from paired runs."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from simscen.core.records.session_events import ScenarioChange
+from simscen.core.statistics import holm, sign_test
+
+PASS_RATE = "pass rate"
+"""`what` of a PairedSample whose values are 1 for a passed and 0 for a failed run."""
+
+
+@dataclass(frozen=True)
+class Significance:
+    """Conditions under which a change is significant.
+
+    Attributes:
+        alpha: Largest p-value, after Holm's correction for the number of tests.
+        min_effect: Smallest change of the mean that matters, relative to the mean of the baseline.
+    """
+
+    alpha: float = 0.05
+    min_effect: float = 0.05
+
+
+@dataclass(frozen=True)
+class PairedSample:
+    """Values of one quantity in pairs of runs (baseline, other).
+
+    `what` is PASS_RATE or the name of a metric, and `scenario` a scenario or all of them. `higher_is_better` is None if
+    neither direction is better.
+    """
+
+    scenario: str
+    what: str
+    unit: str
+    pairs: Sequence[tuple[float, float]]
+    higher_is_better: bool | None
+
+    def p_value(self) -> float:
+        """Return the p-value of McNemar's exact test for the pass rate, of the signed-rank test for a metric."""
+        if self.what == PASS_RATE:
+            return sign_test(self.pairs.count((0.0, 1.0)), self.pairs.count((1.0, 0.0)))
+        return signed_rank_test([two - one for one, two in self.pairs])
+
+
+def significant_changes(samples: Iterable[PairedSample], significance: Significance) -> tuple[ScenarioChange, ...]:
+    """Return the changes that are significant and large enough, with p-values adjusted by Holm's correction.
+
+    If nothing has changed, the probability of finding any change is at most `alpha`. Samples without any difference
+    cannot be significant, and do not count in the correction.
+    """
+    tested = [sample for sample in samples if any(one != two for one, two in sample.pairs)]
+    found = []
+    for sample, p in zip(tested, holm([sample.p_value() for sample in tested]), strict=True):
+        baseline, value = (sum(side) / len(sample.pairs) for side in zip(*sample.pairs, strict=True))
+        if p <= significance.alpha and abs(value - baseline) >= significance.min_effect * abs(baseline):
+            is_worse = None if sample.higher_is_better is None else (value < baseline) == sample.higher_is_better
+            found.append(
+                ScenarioChange(
+                    sample.scenario, sample.what, sample.unit, len(sample.pairs), baseline, value, p, is_worse
+                )
+            )
+    return tuple(found)
+
+
+def signed_rank_test(differences: Sequence[float]) -> float:
+    """Return the p-value of Wilcoxon's two-sided signed-rank test of paired differences.
+
+    Pairs without a difference do not count. The p-value is 1 if there is no difference at all.
+    (Wilcoxon: Individual Comparisons by Ranking Methods, 1945.)
+    """
+    if not any(differences):
+        return 1.0
+    from scipy.stats import wilcoxon  # the import takes half a second
+
+    return float(wilcoxon(differences).pvalue)

@@ -1,0 +1,181 @@
+"""Readers of localization logs in text formats: CSV and CARMEN."""
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.geometry import Pose2
+from simscen.record.foreign.raw_messages import UnusableLog
+from simscen.record.localization_logs.rows import (
+    MAX_COORDINATE_M,
+    MAX_TIME_S,
+    LocalizationRows,
+    PoseRow,
+    ScanRow,
+    all_within,
+)
+
+
+def read_csv_rows(path: Path) -> LocalizationRows:
+    """Read a CSV file. Raises UnusableLog for an invalid row.
+
+    The first cell of a row is its kind: odom, scan, truth, or mount. `simscen localize --help` describes the columns.
+    """
+    rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), Pose2(0.0, 0.0)
+    with path.open(encoding="utf-8", newline="") as lines:
+        for number, row in _numbered_rows(lines, rows.hint):
+            cells = [cell.strip() for cell in row]
+            if not cells or not cells[0] or cells[0].startswith("#"):
+                continue
+            try:
+                values = [float(cell) for cell in cells[1:] if cell]
+                if cells[0] == "mount":
+                    mount = _checked_pose(values)
+                else:
+                    _add_row(rows, cells[0], number, values, mount)
+            except ValueError as error:
+                raise UnusableLog(f"line {number}: {error}", rows.hint) from error
+    return rows
+
+
+def _numbered_rows(lines: Iterable[str], hint: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the rows of a CSV file, numbered from 1. Raises UnusableLog with `hint` if it is not CSV."""
+    reader = csv.reader(lines)
+    try:
+        yield from enumerate(reader, 1)
+    except csv.Error as error:
+        raise UnusableLog(f"line {reader.line_num} is not CSV: {error}", hint) from error
+
+
+def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float], mount: Pose2) -> None:
+    """Add a row of the CSV file to `rows`. `order` is its number, and `mount` the last pose of the lidar."""
+    match kind:
+        case "odom" | "truth":
+            time, pose = (values or [math.nan])[0], values[1:]
+            target = rows.odometry if kind == "odom" else rows.truth
+            _check_time(time)
+            target.append(PoseRow(time, order, _checked_pose(pose)))
+        case "scan":
+            if len(values) < 6 or not all(math.isfinite(value) for value in values[:5]):
+                raise ValueError("a scan needs TIME, ANGLE_MIN, ANGLE_INCREMENT, RANGE_MIN, RANGE_MAX and ranges")
+            time, first, step, range_min, range_max = values[:5]
+            _check_time(time)
+            rows.scans.append(ScanRow(time, order, np.array(values[5:]), (first, step, range_min, range_max), mount))
+        case _:
+            raise ValueError(f"unknown kind of row {kind!r}; use odom, scan, truth or mount")
+
+
+def _check_time(time: float) -> None:
+    if not all_within((time,), MAX_TIME_S):
+        raise ValueError(f"{time} is not a valid time")
+
+
+def _checked_pose(values: list[float]) -> Pose2:
+    """Return the pose x, y, yaw. Raises ValueError unless these are three valid numbers."""
+    if len(values) != 3 or not all(math.isfinite(value) for value in values):
+        raise ValueError(f"expected 3 numbers, got {values}")
+    if not all_within(values, MAX_COORDINATE_M):
+        raise ValueError(f"invalid coordinates {values}")
+    return Pose2(*values)
+
+
+DEFAULT_MAX_RANGE_M = 81.9
+"""Range that a SICK LMS reports for a beam without a hit. FLASER lines do not contain the maximum range."""
+
+
+def read_carmen_rows(path: Path) -> LocalizationRows:
+    """Read a CARMEN log. Raises UnusableLog for an invalid line.
+
+    The odometry is in ODOM, FLASER and ROBOTLASER1 lines, scans are in the latter two, and reference poses in TRUEPOS
+    lines. Other lines are ignored.
+    """
+    rows = LocalizationRows(hint="its lines must start with ODOM, FLASER or ROBOTLASER1")
+    with path.open(encoding="utf-8", errors="strict") as lines:
+        for number, line in enumerate(lines, 1):
+            words = line.split()
+            if words and words[0] in _LINE_PARSERS:
+                try:
+                    _LINE_PARSERS[words[0]](rows, number, words)
+                except (ValueError, IndexError) as error:
+                    raise UnusableLog(f"line {number} is not a {words[0]} line: {error}") from error
+    return rows
+
+
+def _parse_odom(rows: LocalizationRows, order: int, words: list[str]) -> None:
+    rows.odometry.append(PoseRow(_time(words[-3]), order, _pose(words[1:4])))
+
+
+def _parse_truepos(rows: LocalizationRows, order: int, words: list[str]) -> None:
+    rows.truth.append(PoseRow(_time(words[-3]), order, _pose(words[1:4])))
+
+
+def _parse_flaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
+    """Parse `FLASER n r… x y theta odom_x odom_y odom_theta time host logger_time`."""
+    count = int(words[1])
+    ranges, rest = _ranges(words[2 : 2 + count], count), words[2 + count :]
+    time = _time(rest[6])
+    step = math.pi / max(1, count - 1) if count % 2 else math.pi / count
+    rows.odometry.append(PoseRow(time, order, _pose(rest[3:6])))
+    mount = _relative_pose(_pose(rest[3:6]), _pose(rest[:3]))
+    mount = mount if math.hypot(*mount[:2]) < 1.0 else Pose2(0.0, 0.0)  # some logs have corrected poses here
+    rows.scans.append(ScanRow(time, order, ranges, (-math.pi / 2, step, 0.0, DEFAULT_MAX_RANGE_M), mount))
+
+
+def _parse_robotlaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
+    """Parse `ROBOTLASER1 type start fov step max accuracy mode n r… m remission… laser robot … time host time`.
+
+    `laser` and `robot` are poses of three numbers each.
+    """
+    first, _, step, range_max = (_parse_finite(word) for word in words[2:6])
+    count = int(words[8])
+    ranges = _ranges(words[9 : 9 + count], count)
+    rest = words[10 + count + int(words[9 + count]) :]
+    time, laser, robot = _time(words[-3]), _pose(rest[:3]), _pose(rest[3:6])
+    rows.odometry.append(PoseRow(time, order, robot))
+    rows.scans.append(ScanRow(time, order, ranges, (first, step, 0.0, range_max), _relative_pose(robot, laser)))
+
+
+def _ranges(words: list[str], count: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    if len(words) != count or count < 1:
+        raise ValueError(f"expected {count} ranges, got {len(words)}")
+    return np.array([float(word) for word in words])
+
+
+def _pose(words: list[str]) -> Pose2:
+    x, y, yaw = (_parse_finite(word) for word in words)
+    if not all_within((x, y, yaw), MAX_COORDINATE_M):
+        raise ValueError(f"invalid coordinates {x:g}, {y:g}")
+    return Pose2(x, y, yaw)
+
+
+def _relative_pose(base: Pose2, other: Pose2) -> Pose2:
+    """Return the pose `other` in the frame of `base`. Pose2.between rounds differently."""
+    dx, dy, c, s = other.x - base.x, other.y - base.y, math.cos(base.yaw), math.sin(base.yaw)
+    return Pose2(c * dx + s * dy, c * dy - s * dx, math.remainder(other.yaw - base.yaw, 2 * math.pi))
+
+
+def _time(word: str) -> float:
+    if not all_within((value := _parse_finite(word),), MAX_TIME_S):
+        raise ValueError(f"{word} is not a valid time")
+    return value
+
+
+def _parse_finite(word: str) -> float:
+    if not math.isfinite(value := float(word)):
+        raise ValueError(f"{word} is not a number")
+    return value
+
+
+_LINE_PARSERS: dict[str, Callable[[LocalizationRows, int, list[str]], None]] = {
+    "ODOM": _parse_odom,
+    "FLASER": _parse_flaser,
+    "ROBOTLASER1": _parse_robotlaser,
+    "TRUEPOS": _parse_truepos,
+}
+"""Functions that add a line of a CARMEN log to the rows, by the first word of the line.
+
+Their arguments are the rows, the number of the line, and its words.
+"""

@@ -1,0 +1,78 @@
+"""Recovery of the log of an aborted run: adds the index at the end of the file, which other tools need."""
+
+import os
+from pathlib import Path
+from typing import IO
+
+from mcap import records
+
+from simscen.record.log_contents import NotSimscenLog
+from simscen.record.log_file import write_error
+from simscen.record.log_reader import unreadable_log_as_invalid_input
+from simscen.record.mcap_reader import RecordReader, open_log
+from simscen.record.mcap_writer import MAGIC, Channel, McapWriter
+from simscen.record.topics import MessageType
+
+
+def recover(path: Path) -> bool:
+    """Rewrite a log with an index, and return True; return False if the log already has an index.
+
+    The log keeps its name, and remains the log of an aborted run. Raises InvalidInput if the file cannot be read or is
+    not MCAP, and RunError of kind "output" if the new file cannot be written.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with unreadable_log_as_invalid_input(path):
+        try:
+            with open_log(path) as stream:
+                if _ends_with_magic(stream):
+                    return False
+                with part.open("wb") as file:
+                    _copy(stream, file)
+            part.replace(path)
+        except OSError as error:
+            if part.exists():
+                raise write_error(part, error) from error
+            raise
+        finally:
+            part.unlink(missing_ok=True)
+    return True
+
+
+def _ends_with_magic(stream: IO[bytes]) -> bool:
+    """Return whether the file ends as a complete MCAP file does. Raises NotSimscenLog if it is not an MCAP file."""
+    if stream.read(len(MAGIC)) != MAGIC:
+        raise NotSimscenLog("it is not an MCAP file")
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(max(len(MAGIC), size - len(MAGIC)))
+    is_complete = stream.read() == MAGIC
+    stream.seek(0)
+    return is_complete
+
+
+def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
+    """Write all complete records to `file`, with an index. Only the end of the file changes."""
+    writer: McapWriter | None = None
+    types: dict[int, MessageType] = {}
+    channels: dict[int, Channel] = {}
+    for record in RecordReader(stream):
+        if isinstance(record, records.Header):
+            writer = McapWriter(file, record.profile, record.library)
+            continue
+        if writer is None:
+            raise NotSimscenLog("it has no header")
+        match record:
+            case records.Schema():
+                types[record.id] = MessageType(record.name, record.data.decode(), "")
+            case records.Channel():
+                channels[record.id] = writer.channel(record.topic, types[record.schema_id], record.metadata)
+            case records.Message():
+                channels[record.channel_id].write(record.log_time, record.data)
+            case records.Attachment():
+                writer.add_attachment(record.name, record.media_type, record.data)
+            case records.Metadata():
+                writer.add_metadata(record.name, record.metadata)
+            case _:
+                pass  # indexes are written again
+    if writer is None:
+        raise NotSimscenLog("it has no header")
+    writer.finish()

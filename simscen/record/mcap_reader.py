@@ -1,0 +1,93 @@
+"""Reader of MCAP files: of all records in order, or of an attached result only."""
+
+import errno
+import json
+import os
+import stat
+import struct
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import IO, Any
+
+from lz4.frame import LZ4FrameDecompressor
+from mcap import records
+from mcap.exceptions import EndOfFile, McapError
+from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+from simscen.record.log_header import RESULT
+
+MAX_RECORD_BYTES = 1 << 28
+"""Largest record or decompressed chunk in bytes, so that a damaged file cannot exhaust the memory."""
+
+
+def open_log(path: Path) -> IO[bytes]:
+    """Open a file for reading. Raises OSError, also if it is not a regular file: reading a FIFO would block."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
+    return os.fdopen(descriptor, "rb")
+
+
+def attached_result(path: Path) -> dict[str, Any] | None:
+    """Return the result.json that is attached to a log, or None if the log or the attachment does not exist."""
+    try:
+        with open_log(path) as stream:
+            attachments = make_reader(stream).iter_attachments()
+            found = next((file for file in attachments if file.name == RESULT), None)
+            data = json.loads(found.data) if found is not None else None
+    except (OSError, McapError, ValueError, struct.error):
+        return None
+    return data if isinstance(data, dict) else None
+
+
+class RecordReader:
+    """Iterates over all records of an MCAP file, including those inside chunks.
+
+    The iteration stops before a truncated record; `is_truncated` is then True. It raises the exceptions of the mcap
+    library for bytes that are not MCAP, and ValueError if a chunk is too large.
+    """
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        # The library does not detect a truncated record. StreamReader accepts any object with a `read` method.
+        exact: Any = _ExactStream(stream)
+        self._reader = StreamReader(exact, emit_chunks=True, validate_crcs=True, record_size_limit=MAX_RECORD_BYTES)
+        self.is_truncated = False
+
+    def __iter__(self) -> Iterator[records.McapRecord]:
+        try:
+            for record in self._reader.records:
+                if isinstance(record, records.Chunk):
+                    yield from breakup_chunk(_decompressed(record), validate_crc=True)
+                else:
+                    yield record
+        except EndOfFile:
+            self.is_truncated = True
+
+
+def _decompressed(chunk: records.Chunk) -> records.Chunk:
+    """Return a chunk, decompressed if it uses lz4. Raises ValueError if it has more than MAX_RECORD_BYTES.
+
+    The mcap library decompresses zstd itself.
+    """
+    if chunk.compression == "lz4":  # the library would decompress it without a limit
+        data = LZ4FrameDecompressor().decompress(chunk.data, max_length=MAX_RECORD_BYTES + 1)
+        chunk = replace(chunk, compression="", data=data, uncompressed_size=len(data))
+    if chunk.uncompressed_size > MAX_RECORD_BYTES:
+        raise ValueError(f"a chunk has more than {MAX_RECORD_BYTES >> 20} MiB of messages")
+    return chunk
+
+
+class _ExactStream:
+    """A stream that returns exactly the requested number of bytes, or raises EndOfFile."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream = stream
+
+    def read(self, size: int) -> bytes:
+        data = self._stream.read(size)
+        if len(data) < size:
+            raise EndOfFile
+        return data

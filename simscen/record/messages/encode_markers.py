@@ -1,0 +1,81 @@
+"""Encoder of visualization_msgs/msg/MarkerArray, and functions that compute the points of its shapes."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose3
+from simscen.record.messages.template import Template
+
+Color = tuple[float, float, float, float]
+"""Red, green, blue and opacity, 0 to 1."""
+ARROW, LINE_LIST, TEXT, TRIANGLE_LIST = 0, 5, 9, 11
+"""Values of `type` of visualization_msgs/msg/Marker."""
+_ADD, _DELETE_ALL = 0, 3
+"""Values of `action` of visualization_msgs/msg/Marker."""
+
+
+class Marker(NamedTuple):
+    """One shape of visualization_msgs/msg/Marker.
+
+    `group` is its namespace, which viewers can show and hide. `kind` is its type. `scale` is in meters; its meaning
+    depends on `kind`. `pose` is in `frame`, and `points` (n, 3) are relative to `pose`.
+    """
+
+    frame: str
+    group: str
+    kind: int
+    color: Color
+    scale: tuple[float, float, float]
+    pose: Pose3 = Pose3()
+    points: Array = np.empty((0, 3))
+    text: str = ""
+
+
+def marker_array(markers: Iterable[Marker]) -> bytes:
+    """Return the bytes of a visualization_msgs/msg/MarkerArray that replaces all previous markers of its topic.
+
+    Stamps are zero and frames are locked, so that each marker moves with its frame.
+    """
+    markers = list(markers)
+    message = Template().put("I", len(markers) + 1)
+    _put(message, Marker("map", "", ARROW, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0, _DELETE_ALL)
+    for number, marker in enumerate(markers):
+        _put(message, marker, number, _ADD)
+    return bytes(message.buffer)
+
+
+def _put(message: Template, marker: Marker, number: int, action: int) -> None:
+    message.put("iI", 0, 0).string(marker.frame).string(marker.group).put("3i", number, marker.kind, action)
+    message.put("7d", *marker.pose).put("3d", *marker.scale).put("4f", *marker.color)
+    message.put("iI", 0, 0)  # lifetime: forever
+    message.put("B", True).put("I", len(marker.points))
+    if len(marker.points):
+        message.align(8)
+        message.buffer += np.ascontiguousarray(marker.points, dtype="<f8").tobytes()
+    message.put("I", 0)  # no colors per point
+    message.string("").put("iI", 0, 0).string("").string("").put("2I", 0, 0)  # no texture
+    message.string(marker.text)
+    message.string("").string("").put("I", 0).put("B", False)  # no mesh
+
+
+def outline_edges(outlines: Iterable[Sequence[Sequence[float]]], height: float = 0.0) -> Array:
+    """Return the edges of polygons as points (n, 3) of a LINE_LIST, all at `height` in m."""
+    edges = [edge for outline in outlines for edge in _edges(np.array(outline, dtype=np.float64), height)]
+    return np.concatenate(edges) if edges else np.empty((0, 3))
+
+
+def rectangle_triangles(corners: Array, height: float = 0.0) -> Array:
+    """Return rectangles as points (6n, 3) of a TRIANGLE_LIST, all at `height` in m.
+
+    `corners` (n, 4) are min x, min y, max x, max y of each rectangle.
+    """
+    points = np.full((len(corners), 6, 3), height)
+    points[:, :, :2] = corners[:, [[0, 1], [2, 1], [2, 3], [0, 1], [2, 3], [0, 3]]]
+    return points.reshape(-1, 3)
+
+
+def _edges(outline: Array, height: float) -> Iterator[Array]:
+    raised = np.column_stack((outline[:, :2], np.full(len(outline), height)))
+    yield np.stack((raised, np.roll(raised, -1, axis=0)), axis=1).reshape(-1, 3)
