@@ -11,7 +11,7 @@ from simscen.core.records.session_events import (
     ScenarioChange,
 )
 from simscen.judge.statistical_tests import PASS_RATE
-from simscen.report.display_text import Role, StyledLine, StyledText, one_line
+from simscen.report.display_text import Role, StyledLine, StyledText, number_with_noun, one_line
 
 MAX_FLIPS = 10
 """Maximum number of runs with different outcomes to list."""
@@ -65,7 +65,7 @@ def session_verdict(against: BaselineComparison, is_worse: bool) -> str:
         return f"{against.stack} is significantly worse"
     runs = "1 run fails that passed" if newly_failed == 1 else f"{newly_failed} runs fail that passed"
     more = f"; {runs} before, which may be chance" if newly_failed else ""
-    return f"{against.stack} is not significantly worse in {pairs_text(against.pairs)}{more}"
+    return f"{against.stack} is not significantly worse in {number_with_noun(against.pairs, 'pair')}{more}"
 
 
 def outcome_text(outcomes: OutcomeCounts) -> str:
@@ -78,9 +78,9 @@ def excluded_text(against: BaselineComparison) -> str:
     """Return which runs are not compared, and why, or ""."""
     parts = []
     if against.broken:
-        parts.append(f"{pairs_text(against.broken)} with an error")
+        parts.append(f"{number_with_noun(against.broken, 'pair')} with an error")
     if against.alone:
-        parts.append(f"{against.alone} {'run' if against.alone == 1 else 'runs'} without a partner")
+        parts.append(f"{number_with_noun(against.alone, 'run')} without a partner")
     return "left out: " + ", ".join(parts) if parts else ""
 
 
@@ -88,14 +88,16 @@ def unequal_progress_text(against: BaselineComparison) -> str:
     """Return a note on the pairs in which only one run reached its goals, with their number; "" without such pairs."""
     if not against.parted:
         return ""
-    return f"in {pairs_text(against.parted)} only one run reached its goals, so their metrics are not compared"
+    return f"in {number_with_noun(against.parted, 'pair')} only one run reached its goals, so their metrics are not compared"
 
 
 def comparison_headline(baseline: str, against: BaselineComparison) -> str:
     """Return the result of the comparison in one line: pairs, better and worse outcomes, p-value."""
     better = sum(flip.passed == against.stack for flip in against.flips)
     worse = len(against.flips) - better
-    text = f"{against.stack} against {baseline}: {pairs_text(against.pairs)} of the same scenario and seed"
+    text = (
+        f"{against.stack} against {baseline}: {number_with_noun(against.pairs, 'pair')} of the same scenario and seed"
+    )
     if not against.pairs:
         return f"{against.stack} against {baseline}: nothing to compare"
     if not against.flips:
@@ -111,7 +113,7 @@ def change_text(change: ScenarioChange, prefix: str = "") -> str:
         digits = 3 if change.unit and max(abs(change.baseline), abs(change.value)) < 1 else 2
         unit = f" {change.unit}" if change.unit else ""
         values = f"{change.what} {change.baseline:.{digits}f} → {change.value:.{digits}f}{unit}"
-    return f"{change.scenario.removeprefix(prefix)}: {values} (p = {change.p:.2g}, {pairs_text(change.pairs)})"
+    return f"{change.scenario.removeprefix(prefix)}: {values} (p = {change.p:.2g}, {number_with_noun(change.pairs, 'pair')})"
 
 
 def change_verdict(change: ScenarioChange) -> str:
@@ -220,8 +222,3 @@ def _differences(baseline: str, against: BaselineComparison) -> Iterator[StyledL
 def shorten(text: str, max_length: int = MAX_STACK_NAME) -> str:
     """Shorten text to `max_length` characters by removing its middle."""
     return text if len(text) <= max_length else f"{text[: (max_length - 1) // 2]}…{text[-(max_length // 2) :]}"
-
-
-def pairs_text(number: int) -> str:
-    """Return "1 pair", "2 pairs", and so on."""
-    return f"{number} pair" if number == 1 else f"{number} pairs"

@@ -1,7 +1,6 @@
 """Comparison of stacks or sessions as HTML and as Markdown."""
 
 from dataclasses import replace
-from html import escape
 
 from simscen.core.records.session_events import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
 from simscen.report.comparison import (
@@ -20,7 +19,7 @@ from simscen.report.comparison import (
     unequal_progress_text,
     with_changed_metrics,
 )
-from simscen.report.display_text import one_line
+from simscen.report.display_text import html_text, one_line
 
 EXPLANATION = (
     "Runs are paired by scenario and seed. Passed: number of passed and of finished runs. Differences are means over "
@@ -33,17 +32,17 @@ _HEAD = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "-/=/+", "p")
 def as_html(comparison: Comparison) -> str:
     """Return the comparison as a section of the report."""
     names = "".join(
-        f"<th>{_html_text(name)}<div class='quiet'>{_html_text(value)}</div></th>"
+        f"<th>{html_text(name)}<div class='quiet'>{html_text(value)}</div></th>"
         for name, value in comparison.stacks.items()
     )
     rows = "".join(
-        f"<tr><td>{_html_text(scenario)}</td>{''.join(_cell(row[name]) for name in comparison.stacks)}</tr>"
+        f"<tr><td>{html_text(scenario)}</td>{''.join(_cell(row[name]) for name in comparison.stacks)}</tr>"
         for scenario, row in comparison.outcomes.items()
     )
     total = "".join(_cell(comparison.total(name)) for name in comparison.stacks)
     total_row = f"<tr><td><b>all</b></td>{total}</tr>" if len(comparison.outcomes) > 1 else ""
     return (
-        f'<section class="in"><h2>{_html_text(" and ".join(comparison.stacks))}</h2><p class="quiet">{EXPLANATION}</p>'
+        f'<section class="in"><h2>{html_text(" and ".join(comparison.stacks))}</h2><p class="quiet">{EXPLANATION}</p>'
         f"<table><tr><th>passed</th>{names}</tr>{rows}{total_row}</table>"
         f"{''.join(_against_html(comparison.baseline, against) for against in comparison.against)}</section>"
     )
@@ -109,27 +108,27 @@ def _cell(outcomes: OutcomeCounts) -> str:
 def _against_html(baseline: str, against: BaselineComparison) -> str:
     flips = "".join(
         f'<tr class="{"" if flip.passed == against.stack else "bad"}">'
-        f"<td>{'better' if flip.passed == against.stack else 'worse'}</td><td>{_html_text(flip.scenario)}</td>"
+        f"<td>{'better' if flip.passed == against.stack else 'worse'}</td><td>{html_text(flip.scenario)}</td>"
         f"<td>seed {flip.seed}</td>"
-        f"<td>passed with {_html_text(flip.passed)}, failed with {_html_text(flip.failed)}</td>"
-        f"<td>{_html_text(flip.why)}</td></tr>"
+        f"<td>passed with {html_text(flip.passed)}, failed with {html_text(flip.failed)}</td>"
+        f"<td>{html_text(flip.why)}</td></tr>"
         for flip in against.flips
     )
-    _, *headings = (_html_text(head.format(baseline, against.stack)) for head in _HEAD)
+    _, *headings = (html_text(head.format(baseline, against.stack)) for head in _HEAD)
     heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in headings)
     rows = "".join(_difference(difference) for difference in against.differences)
     changes = "".join(
         f'<tr class="{"bad" if change.is_worse else ""}"><td>{change_verdict(change)}</td>'
-        f"<td>{_html_text(change_text(change))}</td></tr>"
+        f"<td>{html_text(change_text(change))}</td></tr>"
         for change in against.changes
     )
     notes = "".join(
-        f'<p class="quiet">{_html_text(note)}</p>'
+        f'<p class="quiet">{html_text(note)}</p>'
         for note in (unequal_progress_text(against), excluded_text(against))
         if note
     )
     return (
-        f"<h3>{_html_text(comparison_headline(baseline, against))}</h3>"
+        f"<h3>{html_text(comparison_headline(baseline, against))}</h3>"
         + (f"<table>{flips}</table>" if flips else "")
         + (f"<table><tr>{heads}</tr>{rows}</table>" if rows else "")
         + (f"<table><tr><th colspan='2'>significant changes</th></tr>{changes}</table>" if changes else "")
@@ -150,7 +149,3 @@ def _cells(one: MetricDifference) -> tuple[str, ...]:
     name = f"{one.metric}, {one.unit}".removesuffix(", ")
     signs = f"{one.lower}/{one.equal}/{one.higher}"
     return name, str(one.pairs), before, after, difference, interval, signs, f"{one.p:.2g}"
-
-
-def _html_text(text: str) -> str:
-    return escape(one_line(text))

@@ -1,10 +1,11 @@
-"""Text for terminals, XML, and CI logs: escaping, and lines with styled parts."""
+"""Text for terminals, XML, HTML, and CI logs: escaping, paths, and lines with styled parts."""
 
 import os
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path, PurePath
 from shutil import get_terminal_size
 from typing import Literal, TextIO
@@ -33,6 +34,16 @@ def escape_control(text: str) -> str:
 def one_line(text: str) -> str:
     """Escape control characters, and replace all white space by single spaces."""
     return escape_control(" ".join(text.split()))
+
+
+def html_text(text: str) -> str:
+    """Escape text for one line of HTML, also for attributes in double quotes."""
+    return escape(one_line(text), quote=True)
+
+
+def number_with_noun(number: int, noun: str) -> str:
+    """Return a number with a regular noun: "1 run", "2 runs"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def shell_command_text(text: str) -> str:

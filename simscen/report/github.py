@@ -10,7 +10,7 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.finding_text import tightest_margin
-from simscen.report.comparison_markup import as_markdown, markdown_cell
+from simscen.report.comparison_markup import comparison_markdown, markdown_cell
 from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import relative, relative_to_checkout
 from simscen.report.text_reporters import Reporter
@@ -96,7 +96,7 @@ def markdown(runs: Sequence[RunFinished], session: SessionFinished, pictures: st
     more = f", {session.expected} failed as expected" if session.expected else ""
     more += f", {session.skipped} skipped" if session.skipped else ""
     head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}{more}"
-    comparison = [] if session.comparison is None else as_markdown(session.comparison)
+    comparison = [] if session.comparison is None else comparison_markdown(session.comparison)
     rows = [
         f"| {symbols[run.outcome]} | {markdown_cell(short_run_name(run.key))} "
         f"| {run.result.simulated:.1f} s | {_reason_cell(run)} |"

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from itertools import islice
 from pathlib import Path
 from sys import intern
 from typing import Any, TypeVar
@@ -253,63 +252,3 @@ def _relocate(run: Run, cwd: str) -> Run:
 
 def _invalid(path: Path, message: str, hint: str = "") -> InvalidInput:
     return InvalidInput([Problem(str(path), 0, 0, "SC810", message, hint)])
-
-
-MAX_SESSIONS = 50
-"""Maximum number of sessions to search for failures."""
-UNDECIDED_KINDS = frozenset({"interrupted", "not-run"})
-"""Kinds of errors after which the outcome of the previous session still counts."""
-
-
-@dataclass(frozen=True)
-class LastFailed:
-    """Runs whose latest outcome was a failure, and the `folder` of the newest session."""
-
-    folder: Path
-    runs: frozenset[RunKey]
-
-
-def sessions_in(folder: Path) -> list[Path]:
-    """Return the output folders of sessions in `folder`, newest first, without links such as `latest`."""
-    if not folder.is_dir():
-        return []
-    sessions = [each for each in folder.iterdir() if (each / JOURNAL_FILE).is_file() and not each.is_symlink()]
-    return sorted(
-        sessions,
-        key=lambda each: (_session_time(each), (each / JOURNAL_FILE).stat().st_mtime_ns, each.name),
-        reverse=True,
-    )
-
-
-def last_failed(folder: Path) -> LastFailed | None:
-    """Return the runs that failed when they were last run in a session of `folder`, or None without any session."""
-    sessions = sessions_in(folder)
-    if not sessions:
-        return None
-    known: dict[RunKey, bool] = {}
-    for session in islice(sessions, MAX_SESSIONS):
-        outcomes: dict[RunKey, bool] = {}
-        for key, good in _outcomes(session):
-            outcomes[key.first] = outcomes.get(key.first, True) and good
-        known = {**outcomes, **known}
-    return LastFailed(sessions[0], frozenset(key for key, good in known.items() if not good))
-
-
-def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
-    """Yield each finished run and whether it passed or failed as expected. Yields nothing for an invalid journal."""
-    try:
-        runs = read_journal(session).runs
-    except InvalidInput:
-        return
-    for run in runs:
-        if run.result.error is None or run.result.error.kind not in UNDECIDED_KINDS:
-            yield run.key, run.outcome.good
-
-
-def _session_time(session: Path) -> str:
-    """Return the time of the session from run.json (ISO 8601), or "" if it is unknown."""
-    try:
-        document = json.loads((session / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return ""
-    return str(document.get("written", "")) if isinstance(document, dict) else ""

@@ -7,7 +7,7 @@ from heapq import nsmallest
 from simscen.core.records.run_result import REPEAT_SUFFIX, Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionFinished, SessionStarted
 from simscen.judge.finding_text import disturbance_line, tightest_margin
-from simscen.report.display_text import Role, StyledLine, StyledText, one_line, shell_command_text
+from simscen.report.display_text import Role, StyledLine, StyledText, number_with_noun, one_line, shell_command_text
 from simscen.report.violations import (
     error_details,
     error_summary,
@@ -77,9 +77,11 @@ def _common_folder(ids: Sequence[str]) -> str:
 
 def session_header(started: SessionStarted) -> StyledLine:
     """Return the header, for example "simscen 0.1.0 · 14 scenarios · 2 workers"."""
-    runs = "" if started.total == started.scenarios else f" · {_count(started.total, 'run')}"
-    workers = _count(started.workers, "worker")
-    head = f"simscen {started.version} · {_count(started.scenarios, 'scenario')}{_stacks_text(started.stacks)}"
+    runs = "" if started.total == started.scenarios else f" · {number_with_noun(started.total, 'run')}"
+    workers = number_with_noun(started.workers, "worker")
+    head = (
+        f"simscen {started.version} · {number_with_noun(started.scenarios, 'scenario')}{_stacks_text(started.stacks)}"
+    )
     return (StyledText(f"{head}{runs} · {workers}", "quiet"),)
 
 
@@ -212,10 +214,6 @@ def _label(name: str) -> StyledText:
     return StyledText(f"      {name:9} ", "quiet")
 
 
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
 MAX_DETAILED_FAILURES = 20
 """Maximum number of failures with paths. Further failures have only their cause."""
 NONDETERMINISTIC = "nondeterministic"
@@ -263,7 +261,7 @@ def log_comparison(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
     if not compared:
         return
     differ = sum(any(_differs(run) for run in pair) for pair in compared)
-    pairs_text = f"{len(compared)} pair{'s' if len(compared) > 1 else ''} of runs, byte for byte"
+    pairs_text = f"{number_with_noun(len(compared), 'pair')} of runs, byte for byte"
     if differ:
         yield (StyledText(f"logs differ: in {differ} of {pairs_text}", "warning"),)
         yield (StyledText(f"  {_difference_text(compared)}", "quiet"),)

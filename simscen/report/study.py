@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from simscen.core.records.study import ClaimResult, ClaimStatus, ParameterEffect, RateRow, Study
-from simscen.report.display_text import Role, StyledLine, StyledText, one_line
+from simscen.report.display_text import Role, StyledLine, StyledText, number_with_noun, one_line
 
 MAX_ROWS = 60
 """Maximum number of rows of pass rates to list."""
@@ -35,10 +35,10 @@ def study_lines(study: Study) -> Iterator[StyledLine]:
 def pass_rate_text(study: Study) -> str:
     """Return the pass rate of all runs, with its interval if the runs are random."""
     runs = study.passed + study.failed
-    text = f"study of {one_line(study.scenario)}: {study.passed} of {runs_text(runs)} passed"
+    text = f"study of {one_line(study.scenario)}: {study.passed} of {number_with_noun(runs, 'run')} passed"
     if runs:
         text += f" ({100 * study.passed / runs:.1f} %{interval_text(study.limits)})"
-    return text + (f", {runs_text(study.errors)} could not be completed" if study.errors else "")
+    return text + (f", {number_with_noun(study.errors, 'run')} could not be completed" if study.errors else "")
 
 
 def notes(study: Study) -> list[str]:
@@ -63,7 +63,7 @@ def claim_title(claim: ClaimResult) -> str:
 def claim_text(claim: ClaimResult) -> str:
     """Return the claim and its result in one sentence."""
     statement = f"claim: pass rate of at least {_percent(claim.min_rate)} with {_percent(claim.confidence)} confidence"
-    runs = f"{claim.passed} of {runs_text(claim.runs)} passed{limits_text(claim)}"
+    runs = f"{claim.passed} of {number_with_noun(claim.runs, 'run')} passed{limits_text(claim)}"
     match claim.status:
         case ClaimStatus.HELD:
             return f"{statement}: held, {runs}"
@@ -72,7 +72,7 @@ def claim_text(claim: ClaimResult) -> str:
         case ClaimStatus.UNDECIDED:
             return f"{statement}: undecided, {runs}; {undecided_hint(claim)}"
         case ClaimStatus.BLOCKED:
-            return f"{statement}: open, because {runs_text(claim.errors)} could not be completed; {runs}"
+            return f"{statement}: open, because {number_with_noun(claim.errors, 'run')} could not be completed; {runs}"
 
 
 def undecided_hint(claim: ClaimResult) -> str:
@@ -93,11 +93,6 @@ def limits_text(claim: ClaimResult) -> str:
 def interval_text(limits: tuple[float, float] | None) -> str:
     """Return ", 95 % interval 94 … 100 %", or "" without limits."""
     return "" if limits is None else f", 95 % interval {100 * limits[0]:.1f} … {100 * limits[1]:.1f} %"
-
-
-def runs_text(number: int) -> str:
-    """Return "1 run" or "3 runs"."""
-    return f"{number} run" if number == 1 else f"{number} runs"
 
 
 def effect_text(effect: ParameterEffect) -> str:

@@ -34,8 +34,8 @@ from simscen.core.records.study import ClaimStatus, Study
 from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.report.junit import Family, xml_parts
 from simscen.report.results_json import json_parts
+from simscen.report.session_history import PastSession, past_sessions
 from simscen.report.suite import RunningSession, Session, to_html
-from simscen.report.suite.history import PastSession, past_sessions
 from simscen.run.reproducibility import arithmetic_fingerprints, cpu_flags, software_versions
 from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, write_atomically
 

@@ -3,13 +3,12 @@
 import base64
 import re
 from collections.abc import Sequence
-from html import escape
 from pathlib import Path, PurePath
 from urllib.parse import quote
 
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
-from simscen.report.display_text import one_line, relative
+from simscen.report.display_text import html_text, relative
 
 OUTCOME_SYMBOLS = {
     Outcome.PASSED: "✓",
@@ -18,16 +17,6 @@ OUTCOME_SYMBOLS = {
     Outcome.FAILED_AS_EXPECTED: "~",
     Outcome.SKIPPED: "–",
 }
-
-
-def html_text(text: str) -> str:
-    """Escape text for one line of HTML, also for attributes in double quotes."""
-    return escape(one_line(text), quote=True)
-
-
-def count(number: int, noun: str) -> str:
-    """Return a number with a noun: "1 run", "2 runs"."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def outcome_badge(outcome: Outcome) -> str:

@@ -13,13 +13,14 @@ from urllib.parse import quote
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import Comparison, RunFinished
 from simscen.core.records.study import Study
-from simscen.report.comparison_markup import as_html
+from simscen.report.comparison_markup import comparison_html
+from simscen.report.display_text import html_text, number_with_noun
 from simscen.report.picture.palette import css_variables
-from simscen.report.study_markup import study_html
+from simscen.report.session_history import PastSession, outcome_change, past_outcomes
 from simscen.report.suite import elements
-from simscen.report.suite.elements import OUTCOME_SYMBOLS, anchor, count, html_text, outcome_symbols, sparkline
-from simscen.report.suite.history import PastSession, outcome_change, past_outcomes
+from simscen.report.suite.elements import OUTCOME_SYMBOLS, anchor, outcome_symbols, sparkline
 from simscen.report.suite.run_entry import full_run_name, run_element, theme
+from simscen.report.suite.study_section import study_html
 
 ORDER = (Outcome.ERROR, Outcome.FAILED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED, Outcome.PASSED)
 MAX_MARKS = 200
@@ -75,7 +76,7 @@ def to_html(session: Session) -> str:
     groups_html = "\n".join(_group_element(group, session, totals, pictures) for group in groups)
     style, script = css_variables() + _asset("suite.css"), _asset("suite.js")
     counts = _outcome_counts(totals)
-    comparison = "" if session.comparison is None else as_html(session.comparison)
+    comparison = "" if session.comparison is None else comparison_html(session.comparison)
     if session.study is not None:
         comparison += study_html(session.study, listed, session.folder)
     return (
@@ -123,7 +124,11 @@ def listed_runs(runs: Sequence[RunFinished]) -> Sequence[RunFinished]:
 
 def _headline(session: Session, totals: Totals, counts: str, listed: int) -> str:
     links = " · ".join(f'<a href="{name}">{name}</a>' for name in _FILES[1:] if name in session.files)
-    facts = [count(len(session.runs), "run"), f"{totals.simulated:.0f} s simulated", *([links] if links else [])]
+    facts = [
+        number_with_noun(len(session.runs), "run"),
+        f"{totals.simulated:.0f} s simulated",
+        *([links] if links else []),
+    ]
     if listed < len(session.runs):
         facts.append(f"this page lists {listed} of them, those that did not end as expected first")
     return (
@@ -149,7 +154,7 @@ def _progress(live: RunningSession, done: int) -> str:
     names = ", ".join(html_text(full_run_name(key)) for key in live.current)
     return (
         f'<p id="live" role="status"><progress max="{live.total}" value="{done}" aria-label="runs done"></progress> '
-        f"{done} of {count(live.total, 'run')} done{f', running: {names}' if names else ''} "
+        f"{done} of {number_with_noun(live.total, 'run')} done{f', running: {names}' if names else ''} "
         '<button type="button" id="pause" aria-pressed="false">pause</button></p>'
     )
 

@@ -16,10 +16,10 @@ from simscen.judge.finding_text import (
     tightest_margin,
     time_and_place,
 )
-from simscen.report.display_text import escape_control, plain_text, shell_command_text
+from simscen.report.display_text import escape_control, html_text, plain_text, shell_command_text
+from simscen.report.session_history import PastOutcome
 from simscen.report.session_lines import violation_lines
-from simscen.report.suite.elements import anchor, html_text, link, outcome_badge, outcome_symbols, sparkline
-from simscen.report.suite.history import PastOutcome
+from simscen.report.suite.elements import anchor, link, outcome_badge, outcome_symbols, sparkline
 from simscen.report.violations import (
     error_details,
     error_summary,

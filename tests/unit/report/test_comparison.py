@@ -15,7 +15,7 @@ from simscen.core.records.session_events import (
     SessionFinished,
     SessionStarted,
 )
-from simscen.report.comparison import comparison_lines, difference_columns, shorten
+from simscen.report.comparison import comparison_lines, difference_cells, shorten
 from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import plain_text
 from simscen.report.github import markdown
@@ -124,6 +124,6 @@ def test_in_results_json_it_is_data(comparison, passed) -> None:
 
 def test_small_numbers_have_one_more_digit() -> None:
     near = MetricDifference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
-    assert difference_columns(near) == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
-    assert difference_columns(TIME) == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
-    assert difference_columns(REPLANS)[0] == "3.00"
+    assert difference_cells(near) == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
+    assert difference_cells(TIME) == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
+    assert difference_cells(REPLANS)[0] == "3.00"

@@ -11,9 +11,9 @@ from PIL import Image
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import Artifacts
 from simscen.report.results_json import to_json
+from simscen.report.session_history import past_sessions
 from simscen.report.suite import RunningSession, Session, elements, to_html
 from simscen.report.suite.elements import anchor
-from simscen.report.suite.history import past_sessions
 from simscen.report.suite.run_entry import smallest_margin, theme
 
 VOID = ("meta", "img", "input", "rect", "polyline", "circle")

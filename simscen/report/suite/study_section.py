@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import Study
-from simscen.report.display_text import relative
+from simscen.report.display_text import html_text, relative
 from simscen.report.study import (
     claim_text,
     effect_text,
@@ -13,7 +13,6 @@ from simscen.report.study import (
     pass_rate_text,
     significant_effects,
 )
-from simscen.report.suite.elements import html_text
 from simscen.spec.quantities import si_number
 
 MAX_PLOTS = 8

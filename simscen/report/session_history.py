@@ -1,18 +1,19 @@
 """Outcomes of the same runs in earlier sessions."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from simscen.core.errors import InvalidInput
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import read_key
-from simscen.report.journal_reader import sessions_in
+from simscen.report.journal_reader import JOURNAL_FILE, read_journal
 
-MAX_SESSIONS = 10
+MAX_SHOWN_SESSIONS = 10
 """Maximum number of earlier sessions to show."""
 MAX_RESULTS_BYTES = 64 << 20
 """Maximum size of a results.json to read."""
@@ -43,7 +44,7 @@ def past_sessions(folder: Path) -> list[PastSession]:
     folders = sessions_in(folder.absolute().parent)
     index = next((k for k, each in enumerate(folders) if each.name == folder.absolute().name), -1)
     sessions = (past for each in folders[index + 1 :] if (past := _read(each)) is not None)
-    return list(islice(sessions, MAX_SESSIONS))
+    return list(islice(sessions, MAX_SHOWN_SESSIONS))
 
 
 def _read(folder: Path) -> PastSession | None:
@@ -73,3 +74,63 @@ def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
     if not known or known[-1].outcome.good == run.outcome.good:
         return ""
     return f"{known[-1].outcome.value.replace('-', ' ')} before"
+
+
+MAX_SEARCHED_SESSIONS = 50
+"""Maximum number of sessions to search for failures."""
+UNDECIDED_KINDS = frozenset({"interrupted", "not-run"})
+"""Kinds of errors after which the outcome of the previous session still counts."""
+
+
+@dataclass(frozen=True)
+class LastFailed:
+    """Runs whose latest outcome was a failure, and the `folder` of the newest session."""
+
+    folder: Path
+    runs: frozenset[RunKey]
+
+
+def sessions_in(folder: Path) -> list[Path]:
+    """Return the output folders of sessions in `folder`, newest first, without links such as `latest`."""
+    if not folder.is_dir():
+        return []
+    sessions = [each for each in folder.iterdir() if (each / JOURNAL_FILE).is_file() and not each.is_symlink()]
+    return sorted(
+        sessions,
+        key=lambda each: (_session_time(each), (each / JOURNAL_FILE).stat().st_mtime_ns, each.name),
+        reverse=True,
+    )
+
+
+def last_failed(folder: Path) -> LastFailed | None:
+    """Return the runs that failed when they were last run in a session of `folder`, or None without any session."""
+    sessions = sessions_in(folder)
+    if not sessions:
+        return None
+    known: dict[RunKey, bool] = {}
+    for session in islice(sessions, MAX_SEARCHED_SESSIONS):
+        outcomes: dict[RunKey, bool] = {}
+        for key, good in _outcomes(session):
+            outcomes[key.first] = outcomes.get(key.first, True) and good
+        known = {**outcomes, **known}
+    return LastFailed(sessions[0], frozenset(key for key, good in known.items() if not good))
+
+
+def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
+    """Yield each finished run and whether it passed or failed as expected. Yields nothing for an invalid journal."""
+    try:
+        runs = read_journal(session).runs
+    except InvalidInput:
+        return
+    for run in runs:
+        if run.result.error is None or run.result.error.kind not in UNDECIDED_KINDS:
+            yield run.key, run.outcome.good
+
+
+def _session_time(session: Path) -> str:
+    """Return the time of the session from run.json (ISO 8601), or "" if it is unknown."""
+    try:
+        document = json.loads((session / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ""
+    return str(document.get("written", "")) if isinstance(document, dict) else ""
