@@ -12,7 +12,7 @@ from simscen.core.records.session_events import RunFinished, SessionEvent, Sessi
 from simscen.judge.finding_text import tightest_margin
 from simscen.report.comparison_markup import comparison_markdown, markdown_cell
 from simscen.report.console_reporter import text_reporter
-from simscen.report.display_text import relative, relative_to_checkout
+from simscen.report.display_text import relative_path, relative_to_checkout
 from simscen.report.text_reporters import Reporter
 from simscen.report.violations import (
     error_summary,
@@ -114,7 +114,7 @@ def _picture_lines(runs: list[RunFinished], folder: str, pictures: str) -> list[
     failures = [run for run in runs if not run.outcome.good and run.artifacts.picture]
     lines = []
     for run in failures[:MAX_PICTURES]:
-        address = f"{pictures.rstrip('/')}/{quote(relative(run.artifacts.picture, folder))}"
+        address = f"{pictures.rstrip('/')}/{quote(relative_path(run.artifacts.picture, folder))}"
         lines += [f"**{markdown_cell(short_run_name(run.key))}**", "", f"![map of the run]({address})", ""]
     return lines
 

@@ -14,7 +14,7 @@ from simscen.core.records.session_events import Artifacts, RunFinished, SessionS
 from simscen.judge.result_json import from_data, read_key, result_data
 from simscen.judge.study import StudyPlan
 from simscen.model.acceptance import PassRate
-from simscen.report.display_text import relative, relative_to_cwd
+from simscen.report.display_text import relative_path, relative_to_cwd
 
 JOURNAL_FILE = "events.jsonl"
 JOURNAL_FORMAT = 2
@@ -91,7 +91,7 @@ def _study_plan_from_data(data: dict[str, Any], planned: Sequence[PlannedRun]) -
 
 def finished_run_to_data(run: RunFinished, folder: Path) -> dict[str, Any]:
     """Return a finished run as JSON data, with files relative to `folder`."""
-    files = {name: relative(path, str(folder)) if path else "" for name, path in asdict(run.artifacts).items()}
+    files = {name: relative_path(path, str(folder)) if path else "" for name, path in asdict(run.artifacts).items()}
     data = {"wall": run.wall, "again": run.again, "file": run.file, "tags": list(run.tags)}
     data |= {"resumed": True} if run.resumed else {}
     return {**data, "files": files, "result": result_data(run.result)}

@@ -157,8 +157,8 @@ def _console(out: TextIO, style: TerminalStyle) -> Console:
     return Console(
         file=out,
         force_terminal=True,
-        color_system="standard" if style.color else None,
-        no_color=not style.color,
+        color_system="standard" if style.has_color else None,
+        no_color=not style.has_color,
         highlight=False,
         soft_wrap=True,
         emoji=False,

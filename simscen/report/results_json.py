@@ -13,7 +13,7 @@ from simscen.judge.metrics.comparison import comparison_data
 from simscen.judge.metrics.session_summary import SessionFigures, SessionSummary, session_summary_data
 from simscen.judge.result_json import result_data
 from simscen.judge.study import study_data
-from simscen.report.display_text import escape_ci_markers_in_json, relative
+from simscen.report.display_text import escape_ci_markers_in_json, relative_path
 from simscen.report.text_reporters import Reporter
 
 FORMAT = 1
@@ -108,7 +108,7 @@ def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
     artifacts = run.artifacts
     names = "mcap", "picture", "replay", "result"
     files = {name: getattr(artifacts, name) for name in names}
-    return {name: relative(path, folder) for name, path in files.items() if path}
+    return {name: relative_path(path, folder) for name, path in files.items() if path}
 
 
 def json_reporter(out: TextIO) -> Reporter:

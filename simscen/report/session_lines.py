@@ -202,7 +202,7 @@ def artifact_lines(run: RunFinished) -> Iterator[StyledLine]:
         if path:
             yield (_label(name), StyledText(one_line(path), file=path))
     if run.again:
-        yield (_label("again"), StyledText(shell_command_text(run.again), shell=True))
+        yield (_label("again"), StyledText(shell_command_text(run.again), is_shell=True))
 
 
 def _scenario_line(run: RunFinished) -> StyledLine:

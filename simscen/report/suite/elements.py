@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
-from simscen.report.display_text import html_text, relative
+from simscen.report.display_text import html_text, relative_path
 
 OUTCOME_SYMBOLS = {
     Outcome.PASSED: "✓",
@@ -38,7 +38,7 @@ def link(path: str, folder: str, label: str) -> str:
     """Return a link to a file in the folder of the session, or "" for files outside of it."""
     if not path or not folder or not PurePath(path).is_relative_to(folder) or ".." in PurePath(path).parts:
         return ""
-    return f'<a href="./{quote(relative(path, folder))}">{html_text(label)}</a>'
+    return f'<a href="./{quote(relative_path(path, folder))}">{html_text(label)}</a>'
 
 
 def anchor(key: RunKey) -> str:

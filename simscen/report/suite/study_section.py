@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import Study
-from simscen.report.display_text import html_text, relative
+from simscen.report.display_text import html_text, relative_path
 from simscen.report.study import (
     claim_text,
     effect_text,
@@ -118,7 +118,7 @@ def _dot(x: float, y: float, run: RunFinished, folder: str) -> str:
         f"<title>{html_text(name)}</title></circle>"
     )
     target = run.artifacts.replay or run.artifacts.mcap
-    return f'<a href="{html_text(relative(target, folder))}">{mark}</a>' if target else mark
+    return f'<a href="{html_text(relative_path(target, folder))}">{mark}</a>' if target else mark
 
 
 def _range(values: Sequence[float]) -> tuple[float, float]:
