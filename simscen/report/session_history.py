@@ -1,4 +1,4 @@
-"""Outcomes of the same runs in earlier sessions."""
+"""Earlier sessions: outcomes of their runs for the HTML report, and the runs that failed last, for `--last-failed`."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,14 +14,14 @@ from simscen.judge.result_json import read_key
 from simscen.report.journal_reader import JOURNAL_FILE, read_journal
 
 MAX_SHOWN_SESSIONS = 10
-"""Maximum number of earlier sessions to show."""
+"""Maximum number of earlier sessions in the report."""
 MAX_RESULTS_BYTES = 64 << 20
 """Maximum size of a results.json to read."""
 
 
 @dataclass(frozen=True)
 class PastOutcome:
-    """Outcome of a run in an earlier session, with its simulated seconds."""
+    """Outcome of a run in an earlier session, with the simulated time in s."""
 
     outcome: Outcome
     simulated: float
@@ -34,13 +34,13 @@ class PastSession:
     name: str
     runs: Mapping[RunKey, PastOutcome] = field(default_factory=dict)
 
-    def number(self, *outcomes: Outcome) -> int:
+    def count(self, *outcomes: Outcome) -> int:
         """Return the number of runs with one of these outcomes."""
         return sum(run.outcome in outcomes for run in self.runs.values())
 
 
 def past_sessions(folder: Path) -> list[PastSession]:
-    """Return the sessions next to the output folder that are older than it, newest first."""
+    """Return the earlier sessions, newest first: those whose output folders are next to `folder` and older."""
     folders = sessions_in(folder.absolute().parent)
     index = next((k for k, each in enumerate(folders) if each.name == folder.absolute().name), -1)
     sessions = (past for each in folders[index + 1 :] if (past := _read(each)) is not None)
@@ -69,7 +69,10 @@ def past_outcomes(run: RunFinished, past: Sequence[PastSession]) -> list[PastOut
 
 
 def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
-    """Return the previous outcome of a run if it has changed, for example "failed before", or ""."""
+    """Return the previous outcome of a run, for example "failed before", if exactly one of both outcomes is good.
+
+    Return "" if the outcome has not changed, or if no earlier session has the run.
+    """
     known = [outcome for outcome in past_outcomes(run, past) if outcome is not None]
     if not known or known[-1].outcome.good == run.outcome.good:
         return ""
@@ -79,19 +82,19 @@ def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
 MAX_SEARCHED_SESSIONS = 50
 """Maximum number of sessions to search for failures."""
 UNDECIDED_KINDS = frozenset({"interrupted", "not-run"})
-"""Kinds of errors after which the outcome of the previous session still counts."""
+"""Error kinds of runs without an outcome. For such a run, the outcome in the session before it still counts."""
 
 
 @dataclass(frozen=True)
 class LastFailed:
-    """Runs whose latest outcome was a failure, and the `folder` of the newest session."""
+    """Runs whose latest outcome was a failure or an error, and the output `folder` of the newest session."""
 
     folder: Path
     runs: frozenset[RunKey]
 
 
 def sessions_in(folder: Path) -> list[Path]:
-    """Return the output folders of sessions in `folder`, newest first, without links such as `latest`."""
+    """Return the output folders of sessions in `folder`, newest first, without symbolic links such as `latest`."""
     if not folder.is_dir():
         return []
     sessions = [each for each in folder.iterdir() if (each / JOURNAL_FILE).is_file() and not each.is_symlink()]
@@ -103,7 +106,7 @@ def sessions_in(folder: Path) -> list[Path]:
 
 
 def last_failed(folder: Path) -> LastFailed | None:
-    """Return the runs that failed when they were last run in a session of `folder`, or None without any session."""
+    """Return the runs that failed when they last ran in a session of `folder`; None if there are no sessions."""
     sessions = sessions_in(folder)
     if not sessions:
         return None
@@ -117,7 +120,7 @@ def last_failed(folder: Path) -> LastFailed | None:
 
 
 def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
-    """Yield each finished run and whether it passed or failed as expected. Yields nothing for an invalid journal."""
+    """Yield the key of each finished run, and whether its outcome is good. Yields nothing for an invalid journal."""
     try:
         runs = read_journal(session).runs
     except InvalidInput:
@@ -128,7 +131,7 @@ def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
 
 
 def _session_time(session: Path) -> str:
-    """Return the time of the session from run.json (ISO 8601), or "" if it is unknown."""
+    """Return the time in run.json at which the session was written (ISO 8601); "" if it is unknown."""
     try:
         document = json.loads((session / "run.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -154,7 +154,7 @@ class _Progress:
             print_progress("")
             repeatable = replace(event, again=repeat_command(self._jobs[event.key]))
             print_text(
-                "\n".join(plain_text(line) for line in run_lines(repeatable, RunNaming(every_seed=True))), sys.stderr
+                "\n".join(plain_text(line) for line in run_lines(repeatable, RunNaming(has_seeds=True))), sys.stderr
             )
         print_progress(f"{self._done} of {self._total} runs" if self._done < self._total else "")
 

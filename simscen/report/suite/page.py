@@ -275,15 +275,15 @@ def _session_row(session: PastSession) -> str:
     simulated = sum(run.simulated for run in session.runs.values())
     return (
         f'<tr><th scope="row"><a href="../{quote(session.name)}/report.html">{html_text(session.name)}</a></th>'
-        f"<td>{session.number(*_GOOD)} of {len(session.runs)}</td>"
-        f"<td>{session.number(Outcome.FAILED)}</td><td>{session.number(Outcome.ERROR)}</td>"
+        f"<td>{session.count(*_GOOD)} of {len(session.runs)}</td>"
+        f"<td>{session.count(Outcome.FAILED)}</td><td>{session.count(Outcome.ERROR)}</td>"
         f"<td>{simulated:.0f} s</td></tr>"
     )
 
 
 def _pass_rate_sparkline(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
     """Return a line chart of the share of runs with the expected outcome."""
-    shares = [session.number(*_GOOD) / max(1, len(session.runs)) for session in reversed(past)]
+    shares = [session.count(*_GOOD) / max(1, len(session.runs)) for session in reversed(past)]
     shares.append(sum(run.outcome.good for run in runs) / max(1, len(runs)))
     values = ", ".join(f"{share:.0%}" for share in shares)
     return sparkline(shares, f"share of runs as expected, oldest first: {values}", 0.0, 1.0)

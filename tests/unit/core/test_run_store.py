@@ -92,7 +92,7 @@ def test_the_page_of_many_runs_lists_failures_first_and_counts_all(monkeypatch: 
 def test_the_summary_on_github_is_limited_to_the_first_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(github, "MAX_ROWS", 2)
     runs = [run(1), run(2), run(3, outcome=Outcome.FAILED)]
-    text = github.markdown(RunStore(runs), SessionFinished(2, 1, 0, simulated=1.0, wall=1.0))
+    text = github.summary_markdown(RunStore(runs), SessionFinished(2, 1, 0, simulated=1.0, wall=1.0))
     rows = [line for line in text.splitlines() if "seed" in line or "more" in line]
     assert [("❌" in row, "✅" in row) for row in rows] == [(True, False), (False, True), (False, False)]
     assert "and 1 more" in rows[-1]

@@ -18,7 +18,7 @@ from simscen.core.records.session_events import (
 from simscen.report.comparison import comparison_lines, difference_cells, shorten
 from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import plain_text
-from simscen.report.github import markdown
+from simscen.report.github import summary_markdown
 from simscen.report.results_json import to_json
 from simscen.report.suite import Session, to_html
 
@@ -110,7 +110,7 @@ def test_on_the_page_it_is_a_section_without_live_text_from_outside(comparison, 
 
 def test_on_github_it_is_in_the_summary(comparison, passed) -> None:
     session = SessionFinished(1, 0, 0, 1.0, 1.0, comparison=comparison)
-    told = markdown([passed], session)
+    told = summary_markdown([passed], session)
     assert "| navigation/goal | 10/10 | 6/9 |" in told
     assert "- navigation/goal, seed 3: passed with ref, failed with mine: clearance" in told.replace("&#95;", "_")
     rows = [line for line in told.splitlines() if "time" in line and "28.23" in line]
