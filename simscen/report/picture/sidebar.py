@@ -1,4 +1,4 @@
-"""Sidebar of a run picture: reason of an error, criteria with their results, and legend."""
+"""Sidebar of the picture of a run: reason of an error, criteria with their results, and legend."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ from simscen.report.picture.scene import Scene
 WIDTH_PX = 360
 _PADDING_PX = 18
 _LINE_HEIGHT_PX = 17
-_ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
+_STATUS_ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
 Pen = ImageDraw.ImageDraw
 DrawSymbol = Callable[[Pen, float, float], None]
 """Function that draws the symbol of a legend entry: pen, x of its left edge and y of its center in px."""
@@ -25,8 +25,11 @@ Row = tuple[Status, Color, list[str]]
 """Status of a criterion, its color, and lines of text."""
 
 
-def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
-    """Draw the sidebar with at least `height` pixels. `parts` are the names of the drawn parts, for the legend."""
+def draw_sidebar(scene: Scene, parts: Sequence[str], min_height: int) -> Image.Image:
+    """Return the sidebar, which is at least `min_height` pixels high.
+
+    `parts` are the names of what was drawn on the map; the legend explains only these.
+    """
     reasons, rows = _reasons(scene), _criteria(scene)
     legend = [entry[1:] for entry in _legend(round_time_step(scene.result.simulated)) if _is_drawn(parts, entry[0])]
     text_height = (
@@ -34,30 +37,30 @@ def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
         + (14 if reasons else 0)
         + sum(_LINE_HEIGHT_PX * len(lines) + 8 for _, _, lines in rows)
     )
-    min_height = 54 + text_height + 26 + 20 * len(legend) + 62
-    image = Image.new("RGB", (WIDTH_PX, max(height, min_height)), palette.PAGE)
+    height = max(min_height, 54 + text_height + 26 + 20 * len(legend) + 62)
+    image = Image.new("RGB", (WIDTH_PX, height), palette.PAGE)
     draw = ImageDraw.Draw(image, "RGBA")
-    _criteria_list(draw, reasons, rows)
+    _draw_criteria(draw, reasons, rows)
     top = image.height - 20 * len(legend) - 50
     for number, (text, draw_symbol) in enumerate(legend):
         y = top + 20 * number
         draw_symbol(draw, _PADDING_PX, y)
         draw_text(draw, TextItem(_PADDING_PX + 34, y, text, 12, palette.FAINT_INK))
-    _time_bar(draw, scene, image.height - 30)
+    _draw_time_bar(draw, scene, image.height - 30)
     return image
 
 
 def _is_drawn(parts: Sequence[str], word: str) -> bool:
-    """Return whether the picture has a part that an entry of the legend explains.
+    """Return whether something was drawn that the entry of the legend with this `word` explains.
 
-    `parts` are the names of the drawn parts. The name of a part starts or ends with the `word` of its legend entry; the
-    word "" belongs to every part.
+    This is the case if a name in `parts` starts or ends with the word. The word "" stands for an entry that is always
+    in the legend.
     """
     return any(part.startswith(word) or part.endswith(f" {word}") for part in parts)
 
 
 def _reasons(scene: Scene) -> list[str]:
-    """Return the lines with an error, or the reason of a skipped or expectedly failed run."""
+    """Return the lines with the error of a run, or the reason of a skipped run or expected failure; otherwise []."""
     result = scene.result
     if result.error is not None:
         return _wrap(printable(f"{result.error.kind}: {result.error.message}"), _PADDING_PX)
@@ -67,9 +70,9 @@ def _reasons(scene: Scene) -> list[str]:
 
 
 def _criteria(scene: Scene) -> list[Row]:
-    """Return a row per criterion, failures first."""
+    """Return a row for each criterion, failures first."""
     rows: list[Row] = []
-    for verdict in sorted(scene.result.verdicts, key=lambda verdict: _ORDER.index(verdict.status)):
+    for verdict in sorted(scene.result.verdicts, key=lambda verdict: _STATUS_ORDER.index(verdict.status)):
         finding = verdict.tightest
         is_warning = verdict.severity == "warn" and verdict.status is not Status.PASS
         color = palette.AMBER if is_warning else palette.STATUSES[verdict.status]
@@ -84,7 +87,7 @@ def _criteria(scene: Scene) -> list[Row]:
     return rows
 
 
-def _criteria_list(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
+def _draw_criteria(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
     y = 24.0
     for line in reasons:
         draw_text(draw, TextItem(_PADDING_PX, y, line, 13, palette.INK))
@@ -101,7 +104,7 @@ def _criteria_list(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
 
 
 def _wrap(text: str, left: int = _PADDING_PX + 20, size: int = 13) -> list[str]:
-    """Wrap a text. Words that are longer than a line are split."""
+    """Wrap a text in the font `size`, starting at the pixel `left`. Words that are longer than a line are split."""
     available = WIDTH_PX - left - 12
     lines, current = [], ""
     for word in text.split(" "):
@@ -129,7 +132,10 @@ def _cross(draw: Pen, x: float, y: float, color: Color) -> None:
 
 
 def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
-    """Return the entries of the legend: word in the names of the parts (see `_is_drawn`), text, and symbol."""
+    """Return the entries of the legend: word by which `_is_drawn` selects the entry, text, and symbol.
+
+    `step` is the time between two dots on the true path in s.
+    """
     return [
         ("", f"true path, a dot every {step:g} s", _path),
         ("belief", "estimated path", _dashes),
@@ -173,10 +179,10 @@ def _arrow(draw: Pen, x: float, y: float) -> None:
     draw.polygon([(x + 7, y - 2), (x + 12, y - 8), (x + 17, y - 2)], fill=palette.AMBER)
 
 
-def _ring(color: Color, crossed: bool) -> DrawSymbol:
+def _ring(color: Color, is_crossed: bool) -> DrawSymbol:
     def draw_symbol(draw: Pen, x: float, y: float) -> None:
         draw.ellipse((x + 5, y - 7, x + 19, y + 7), fill=(*color, 46), outline=color, width=2)
-        if crossed:
+        if is_crossed:
             _cross(draw, x + 12, y, color)
         else:
             draw.line([(x + 12, y), (x + 25, y)], fill=color, width=2)
@@ -220,8 +226,8 @@ def _diamond(draw: Pen, x: float, y: float) -> None:
     draw.polygon([(x + 12, y - 6), (x + 18, y), (x + 12, y + 6), (x + 6, y)], fill=palette.INK)
 
 
-def _time_bar(draw: Pen, scene: Scene, y: float) -> None:
-    """Draw the color scale of the path, from the start to the end of the run."""
+def _draw_time_bar(draw: Pen, scene: Scene, y: float) -> None:
+    """Draw the color scale of the true path, from the start to the end of the run, around the row `y`."""
     end = f"{scene.result.simulated:.0f} s"
     left, right = _PADDING_PX + 34, WIDTH_PX - _PADDING_PX - math.ceil(font(12).getlength(end)) - 8
     draw_text(draw, TextItem(_PADDING_PX, y, "0 s", 12, palette.FAINT_INK))

@@ -20,7 +20,7 @@ from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import plain_text
 from simscen.report.github import summary_markdown
 from simscen.report.results_json import to_json
-from simscen.report.suite import Session, to_html
+from simscen.report.suite import SessionReport, to_html
 
 FLIP = Flip("navigation/goal", 3, "ref", "mine", "clearance: 0.03 m < 0.05 m, at t = 4.10 s, (2.59, 4.42)")
 TIME = MetricDifference("time_to_goal", "s", 8, 25.341, 28.23, 2.889, (0.78, 4.954), 1, 0, 7, 0.070)
@@ -99,13 +99,13 @@ def test_piped_and_in_ascii_it_stands_before_the_last_line(comparison) -> None:
 
 
 def test_on_the_page_it_is_a_section_without_live_text_from_outside(comparison, passed) -> None:
-    html = to_html(Session([passed], comparison=comparison))
+    html = to_html(SessionReport([passed], comparison=comparison))
     for tag in ("section", "table", "tr", "td", "th", "h3", "p", "div"):
         assert len(re.findall(f"<{tag}[ >]", html)) == html.count(f"</{tag}>"), tag
     assert "mine against ref" in html
     assert "&lt;b&gt;" in html
     assert "time_to_goal, s" in html
-    assert '<section class="in"' not in to_html(Session([passed]))
+    assert '<section class="in"' not in to_html(SessionReport([passed]))
 
 
 def test_on_github_it_is_in_the_summary(comparison, passed) -> None:
