@@ -41,7 +41,7 @@ MAIN_PARAMETERS = frozenset(
         *("update_min_a", "update_min_d", "recovery_alpha_fast", "recovery_alpha_slow"),
     )
 )  # fmt: skip
-"""Parameters that the page emphasizes, by the last part of the name: plugins, speeds, tolerances, sizes, and rates."""
+"""Last parts of the names of main parameters, which the page lists first: plugins, speeds, tolerances, and sizes."""
 
 
 def tree_of(log: Log, columns: PackedColumns) -> dict[str, Any] | None:
@@ -124,7 +124,7 @@ def _reported_parameters(log: Log) -> dict[str, Mapping[str, Any]]:
 
 
 def is_main_parameter(name: str) -> bool:
-    """Return whether the page emphasizes a parameter, for example `FollowPath.desired_linear_vel`."""
+    """Return whether the page lists a parameter first, for example `FollowPath.desired_linear_vel`."""
     return name.rpartition(".")[2] in MAIN_PARAMETERS
 
 
