@@ -14,7 +14,7 @@ from simscen.editor.checking import TextChecks
 from simscen.editor.document import NEW, ChangedMeanwhile, Content, Document, EditedFile
 from simscen.editor.forms import form_data
 from simscen.editor.map_view.background import Backgrounds
-from simscen.editor.map_view.map_edits import edits_of
+from simscen.editor.map_view.map_edits import read_edits
 from simscen.editor.map_view.map_objects import MapObject, object_at_problem
 from simscen.editor.map_view.scene import map_objects, scene_data, scene_parts
 from simscen.editor.preview import preview_data
@@ -206,7 +206,7 @@ class EditorSession:
 
     def _edited_text(self, text: str, edits: Any) -> str:
         try:
-            return apply_edits(text, edits_of(edits, text, self.file.kind)).text
+            return apply_edits(text, read_edits(edits, text, self.file.kind)).text
         except EditRefused as error:
             raise RequestRefused(str(error), 422) from error
 
