@@ -131,7 +131,7 @@ def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.M
     assert tree is not None and tree["ticks"] == [1, 2]
     assert [text for *_, text in lines_of(log_, columns)] == ["last"]
     assert shown == [{"node": "/amcl", "values": [["max_particles", "2000", True]], "total": 2}]
-    assert columns.left_out == [
+    assert columns.reductions == [
         "changes of the behavior tree, without conditions: 2 of 5",
         "parameters of the stack: 1 of 2",
         "log lines of the stack, the last ones: 1 of 2",
