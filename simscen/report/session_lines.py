@@ -48,7 +48,7 @@ class RunNaming:
     width: int = 0
 
     @classmethod
-    def of(cls, session: SessionStarted, columns: int | None = None) -> "RunNaming":
+    def for_session(cls, session: SessionStarted, columns: int | None = None) -> "RunNaming":
         """Choose the names of a session. They contain seeds and stacks only if there are several.
 
         `columns` is the width of the terminal; None for no limit.
@@ -160,6 +160,7 @@ def outcome_counts(session: SessionFinished, unfinished: Mapping[str, int]) -> I
 
 
 def _timing_and_junit(session: SessionFinished) -> Iterator[StyledText]:
+    """Yield the simulated and wall time of a session, and the path of junit.xml if it was written."""
     speed = f" ({session.simulated / session.wall:.0f}x)" if session.wall > 0 else ""
     yield StyledText(f" · {session.simulated:.0f} s simulated in {session.wall:.1f} s{speed}", "quiet")
     if session.junit:
@@ -211,6 +212,7 @@ def artifact_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def _scenario_line(run: RunFinished) -> StyledLine:
+    """Return the scenario file with the line of the first violation."""
     first = next((violation.line for violation in reported_violations(run) if not violation.is_warning), 0)
     return (_label("scenario"), StyledText(source_location(run, first), file=scenario_file(run)))
 

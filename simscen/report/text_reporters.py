@@ -63,7 +63,7 @@ class SessionFormatter:
     def _lines(self, event: SessionEvent) -> Iterator[StyledLine]:
         match event:
             case SessionStarted():
-                self.naming = RunNaming.of(event, self._columns())
+                self.naming = RunNaming.for_session(event, self._columns())
                 yield session_header(event)
             case RunFinished():
                 self._runs.append(event)

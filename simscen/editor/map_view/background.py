@@ -32,7 +32,7 @@ class Backgrounds:
     _cached_files: object = None
     _cached: dict[str, Any] = field(default_factory=dict)
 
-    def of(self, source: LoadedWorld | None) -> dict[str, Any]:
+    def background(self, source: LoadedWorld | None) -> dict[str, Any]:
         """Return the background of a world as JSON data.
 
         Its `id` changes with the files of the map or SDF world; "" for a world without such files. `bounds` are the

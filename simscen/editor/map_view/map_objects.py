@@ -15,6 +15,7 @@ from simscen.loading.yaml.tree import Key
 from simscen.spec.quantities import si_number
 
 Keys = tuple[Key, ...]
+"""Path to a value in a YAML file: keys of mappings and indices of lists."""
 Notation = Literal["pose", "point", "keyframe"]
 """Notation of a position in the file: a mapping with x, y, and yaw; a list [x, y]; or a list [t, x, y, yaw]."""
 Corners = list[tuple[float, float]]

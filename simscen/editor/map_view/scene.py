@@ -105,7 +105,7 @@ def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
         "places": sorted(world_places(parts.world_data)),
         "inline": parts.is_inline,
         "world_file": _world_file(parts, display_name),
-        "background": backgrounds.of(parts.world),
+        "background": backgrounds.background(parts.world),
     }
 
 

@@ -39,6 +39,8 @@ _MARGIN_PX = 14
 
 Draw = Callable[[Canvas, Scene], Iterator[Label]]
 """Function that draws one kind of thing on the canvas, and yields labels, which are placed when all is drawn."""
+# The layers in drawing order: ground, below the robots, objects, and above the robots. Those below and above the robots
+# are drawn for each robot.
 _GROUND_LAYERS: tuple[Draw, ...] = (world_layer.draw_ground, world_layer.draw_floors)
 _OBJECT_LAYERS: tuple[Draw, ...] = (event_layer.draw_places, world_layer.draw_objects)
 _LAYERS_BELOW_ROBOT: tuple[Draw, ...] = (
@@ -125,7 +127,7 @@ def _required_points(scene: Scene) -> Array:
 def _draw_header(image: Image.Image, scene: Scene) -> None:
     """Draw the outcome, the name of the scenario, and the facts of the run at the top of the picture."""
     result, pen = scene.result, ImageDraw.Draw(image)
-    word, color = result.outcome.value.replace("-", " ").upper(), palette.OUTCOMES[result.outcome]
+    word, color = result.outcome.value.replace("-", " ").upper(), palette.OUTCOME_COLORS[result.outcome]
     width = math.ceil(font(16).getlength(word)) + 24
     pen.rounded_rectangle((16, 16, 16 + width, 46), 6, fill=color)
     draw_text(pen, TextItem(16 + width / 2, 31, word, 16, palette.PAGE, "mm"))

@@ -17,7 +17,9 @@ UNKNOWN: Color = (226, 223, 216)
 WALL: Color = (58, 63, 71)
 INK: Color = (38, 42, 48)
 FAINT_INK: Color = (98, 103, 111)
+"""Colors of text, and of less important text."""
 RULE: Color = (222, 224, 227)
+"""Color of separating lines."""
 GRID = (38, 42, 48, 24)
 """Color of grid lines with an opacity of 24, so that they are visible on free space, but not on walls."""
 BELIEF: Color = (20, 20, 24)
@@ -37,15 +39,14 @@ GRAY: Color = (98, 103, 111)
 ROBOTS: tuple[Color, ...] = ((30, 34, 40), (0, 113, 86), (122, 62, 130), (150, 98, 0), (0, 105, 148))
 """Colors of the paths' outlines with several robots, in the order of their names; further robots repeat them."""
 
-OUTCOMES = {
+OUTCOME_COLORS = {
     Outcome.PASSED: GREEN,
     Outcome.FAILED: RED,
     Outcome.ERROR: AMBER,
     Outcome.FAILED_AS_EXPECTED: GRAY,
     Outcome.SKIPPED: GRAY,
 }
-STATUSES = {Status.PASS: GREEN, Status.FAIL: RED, Status.INCONCLUSIVE: AMBER, Status.ERROR: AMBER}
-SIGNS = {Status.PASS: "✓", Status.FAIL: "✗", Status.INCONCLUSIVE: "?", Status.ERROR: "!"}
+STATUS_COLORS = {Status.PASS: GREEN, Status.FAIL: RED, Status.INCONCLUSIVE: AMBER, Status.ERROR: AMBER}
 
 _TIME_COLORS = ((40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 150, 30))
 

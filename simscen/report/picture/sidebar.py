@@ -75,7 +75,7 @@ def _criteria(scene: Scene) -> list[Row]:
     for verdict in sorted(scene.result.verdicts, key=lambda verdict: _STATUS_ORDER.index(verdict.status)):
         finding = verdict.tightest
         is_warning = verdict.severity == "warn" and verdict.status is not Status.PASS
-        color = palette.AMBER if is_warning else palette.STATUSES[verdict.status]
+        color = palette.AMBER if is_warning else palette.STATUS_COLORS[verdict.status]
         if finding is None:
             rows.append((verdict.status, color, _wrap(f"{printable(verdict.id)}: checked nothing")))
             continue
@@ -96,7 +96,7 @@ def _draw_criteria(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
     draw_text(draw, TextItem(_PADDING_PX, y, "criteria", 12, palette.FAINT_INK))
     y += 22
     for status, color, lines in rows:
-        (_check_mark if status is Status.PASS else _cross)(draw, _PADDING_PX + 5, y, color)
+        (_draw_check_mark if status is Status.PASS else _draw_cross)(draw, _PADDING_PX + 5, y, color)
         for line in lines:
             draw_text(draw, TextItem(_PADDING_PX + 20, y, line, 13, palette.INK))
             y += _LINE_HEIGHT_PX
@@ -122,11 +122,11 @@ def _wrap(text: str, left: int = _PADDING_PX + 20, size: int = 13) -> list[str]:
     return [*lines, current]
 
 
-def _check_mark(draw: Pen, x: float, y: float, color: Color) -> None:
+def _draw_check_mark(draw: Pen, x: float, y: float, color: Color) -> None:
     draw.line([(x - 5, y), (x - 1, y + 4), (x + 5, y - 5)], fill=color, width=2)
 
 
-def _cross(draw: Pen, x: float, y: float, color: Color) -> None:
+def _draw_cross(draw: Pen, x: float, y: float, color: Color) -> None:
     draw.line([(x - 4, y - 4), (x + 4, y + 4)], fill=color, width=2)
     draw.line([(x - 4, y + 4), (x + 4, y - 4)], fill=color, width=2)
 
@@ -137,92 +137,94 @@ def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
     `step` is the time between two dots on the true path in s.
     """
     return [
-        ("", f"true path, a dot every {step:g} s", _path),
-        ("belief", "estimated path", _dashes),
+        ("", f"true path, a dot every {step:g} s", _draw_path),
+        ("belief", "estimated path", _draw_dashes),
         ("", "plans", lambda d, x, y: d.line([(x, y), (x + 24, y)], fill=palette.PLAN, width=4)),
-        ("set down", "robot lifted and set down elsewhere", _arrow),
-        ("goal", "goal, its tolerance and heading", _ring(palette.GREEN, False)),
-        ("failed", "goal that failed", _ring(palette.RED, True)),
-        ("robot", "robot at the end", _robot),
-        ("object", "object at the end; before: color of the time", _block(palette.OBJECT)),
-        ("door", "door at the end; dashed: open and closed", _door),
-        ("person", "person at the end, with heading", _pedestrian),
-        ("keepout zone", "keepout zone", _hatched(palette.RED, -6)),
-        ("speed zone", "zone with a speed limit", _hatched(palette.AMBER, 6)),
-        ("ground", "ramp or sill; chevrons point uphill", _block(palette.GROUND)),
-        ("floor", "floor with different friction", _block(palette.SLIPPERY)),
-        ("fault", "start of a fault; band: fault active", _band),
-        ("event", "robot at an event", _diamond),
+        ("set down", "robot lifted and set down elsewhere", _draw_arrow),
+        ("goal", "goal, its tolerance and heading", _ring_symbol(palette.GREEN, False)),
+        ("failed", "goal that failed", _ring_symbol(palette.RED, True)),
+        ("robot", "robot at the end", _draw_robot),
+        ("object", "object at the end; before: color of the time", _block_symbol(palette.OBJECT)),
+        ("door", "door at the end; dashed: open and closed", _draw_door),
+        ("person", "person at the end, with heading", _draw_pedestrian),
+        ("keepout zone", "keepout zone", _hatched_symbol(palette.RED, -6)),
+        ("speed zone", "zone with a speed limit", _hatched_symbol(palette.AMBER, 6)),
+        ("ground", "ramp or sill; chevrons point uphill", _block_symbol(palette.GROUND)),
+        ("floor", "floor with different friction", _block_symbol(palette.SLIPPERY)),
+        ("fault", "start of a fault; band: fault active", _draw_band),
+        ("event", "robot at an event", _draw_diamond),
         ("collision", "collision", lambda d, x, y: d.regular_polygon((x + 12, y, 7), 5, fill=palette.RED)),
-        ("violation", "violated criterion", lambda d, x, y: _cross(d, x + 12, y, palette.RED)),
+        ("violation", "violated criterion", lambda d, x, y: _draw_cross(d, x + 12, y, palette.RED)),
     ]
 
 
-def _path(draw: Pen, x: float, y: float) -> None:
+def _draw_path(draw: Pen, x: float, y: float) -> None:
     for k in range(24):
         draw.line([(x + k, y), (x + k + 1, y)], fill=palette.time_color(k / 24), width=3)
     draw.ellipse((x + 8, y - 4, x + 16, y + 4), fill=palette.PAGE, outline=palette.time_color(0.5), width=2)
 
 
-def _robot(draw: Pen, x: float, y: float) -> None:
+def _draw_robot(draw: Pen, x: float, y: float) -> None:
     draw.rectangle((x + 4, y - 6, x + 20, y + 6), fill=palette.START, outline=palette.ROBOT)
     draw.polygon([(x + 13, y - 3), (x + 18, y), (x + 13, y + 3)], fill=palette.PAGE)
 
 
-def _dashes(draw: Pen, x: float, y: float) -> None:
+def _draw_dashes(draw: Pen, x: float, y: float) -> None:
     for k in range(3):
         draw.line([(x + 10 * k, y), (x + 10 * k + 5, y)], fill=palette.BELIEF, width=2)
 
 
-def _arrow(draw: Pen, x: float, y: float) -> None:
+def _draw_arrow(draw: Pen, x: float, y: float) -> None:
     draw.line([(x + 12, y + 6), (x + 12, y - 3)], fill=palette.AMBER, width=3)
     draw.polygon([(x + 7, y - 2), (x + 12, y - 8), (x + 17, y - 2)], fill=palette.AMBER)
 
 
-def _ring(color: Color, is_crossed: bool) -> DrawSymbol:
+def _ring_symbol(color: Color, is_crossed: bool) -> DrawSymbol:
     def draw_symbol(draw: Pen, x: float, y: float) -> None:
         draw.ellipse((x + 5, y - 7, x + 19, y + 7), fill=(*color, 46), outline=color, width=2)
         if is_crossed:
-            _cross(draw, x + 12, y, color)
+            _draw_cross(draw, x + 12, y, color)
         else:
             draw.line([(x + 12, y), (x + 25, y)], fill=color, width=2)
 
     return draw_symbol
 
 
-def _block(color: Color) -> DrawSymbol:
+def _block_symbol(color: Color) -> DrawSymbol:
     def draw_symbol(draw: Pen, x: float, y: float) -> None:
         draw.rectangle((x + 3, y - 6, x + 21, y + 6), fill=(*color, 110), outline=color)
 
     return draw_symbol
 
 
-def _door(draw: Pen, x: float, y: float) -> None:
+def _draw_door(draw: Pen, x: float, y: float) -> None:
     draw.rectangle((x + 2, y - 2, x + 22, y + 2), fill=(*palette.OBJECT, 150), outline=palette.OBJECT)
     for k in range(3):
         draw.line([(x + 2, y - 2 - 3 * k), (x + 2, y - 3 - 3 * k)], fill=palette.OBJECT)
 
 
-def _pedestrian(draw: Pen, x: float, y: float) -> None:
+def _draw_pedestrian(draw: Pen, x: float, y: float) -> None:
     draw.ellipse((x + 6, y - 6, x + 18, y + 6), fill=(*palette.PEDESTRIAN, 150), outline=palette.PEDESTRIAN)
     draw.line([(x + 12, y), (x + 23, y)], fill=palette.PEDESTRIAN, width=2)
 
 
-def _hatched(color: Color, down: float) -> DrawSymbol:
+def _hatched_symbol(color: Color, rise: float) -> DrawSymbol:
+    """Return a function that draws slanted lines, which rise by 2 * `rise` px to the right, or fall if negative."""
+
     def draw_symbol(draw: Pen, x: float, y: float) -> None:
         for k in range(3):
-            draw.line([(x + 7 * k, y + down), (x + 7 * k + 9, y - down)], fill=color, width=1)
+            draw.line([(x + 7 * k, y + rise), (x + 7 * k + 9, y - rise)], fill=color, width=1)
 
     return draw_symbol
 
 
-def _band(draw: Pen, x: float, y: float) -> None:
+def _draw_band(draw: Pen, x: float, y: float) -> None:
     draw.line([(x, y), (x + 24, y)], fill=palette.FAULTY, width=10)
     draw.polygon([(x + 13, y - 8), (x + 8, y + 1), (x + 12, y + 1), (x + 11, y + 8), (x + 17, y - 2), (x + 13, y - 2)],
                  fill=palette.AMBER)  # fmt: skip
 
 
-def _diamond(draw: Pen, x: float, y: float) -> None:
+def _draw_diamond(draw: Pen, x: float, y: float) -> None:
     draw.polygon([(x + 12, y - 6), (x + 18, y), (x + 12, y + 6), (x + 6, y)], fill=palette.INK)
 
 
