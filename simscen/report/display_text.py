@@ -151,9 +151,10 @@ def wrap_line(line: StyledLine, columns: int | None) -> list[StyledLine]:
 
 
 def _indent(line: StyledLine) -> int:
-    """Return the indentation for wrapped lines: the column after a label, or without one two columns more than here.
+    """Return the indentation for the further lines of a wrapped line: the column after its label.
 
-    A label is a first part that ends with a space, such as "      again ".
+    A label is a first part that ends with a space, such as "      again ". For a line without a label, return two
+    columns more than the indentation of the line.
     """
     first = line[0].text
     if first.strip() and first.endswith(" "):
@@ -224,7 +225,7 @@ def _words(piece: StyledText) -> Iterator[tuple[str, str, bool]]:
 
 @dataclass(frozen=True)
 class TerminalStyle:
-    """Features of an output stream: color, lines that are updated in place for live progress, and a terminal width."""
+    """Features of an output stream. With live progress, lines on the screen are updated in place."""
 
     has_color: bool
     has_live_progress: bool
