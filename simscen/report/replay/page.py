@@ -25,7 +25,7 @@ from simscen.record.log_reader import Log
 from simscen.report.display_text import escape_control, one_line
 from simscen.report.picture.palette import css_variables
 from simscen.report.replay.packed_columns import PackedColumns
-from simscen.report.replay.robot_data import grid_of, moving_objects, robot_data
+from simscen.report.replay.robot_data import moving_objects, occupancy_grid_data, robot_data
 from simscen.report.replay.timeline import disturbance_data, read_source_lines, timeline_entries, verdict_data
 
 PAGE_FOLDER = PACKAGE / "data" / "replay"
@@ -119,7 +119,7 @@ def scenery_data(log: Log, columns: PackedColumns) -> dict[str, Any]:
         "ground": [{"outline": corners_data(one.outline), "height": one.height} for one in scenery.ground],
         "floors": [{"outline": corners_data(one.outline), "friction": one.friction} for one in scenery.floors],
         "zones": _zones(scenery),
-        "map": None if scenery.map is None else grid_of(scenery.map.grid, columns),
+        "map": None if scenery.map is None else occupancy_grid_data(scenery.map.grid, columns),
     }
 
 

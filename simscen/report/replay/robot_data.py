@@ -22,7 +22,7 @@ from simscen.record.sensor_messages import LoggedMessages, SensorMessages
 from simscen.report.display_text import one_line
 from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, spaced_in_time
 from simscen.report.replay.signal_plots import signal_limits, signal_plots
-from simscen.report.replay.stack_report import lines_of, parameters_of, tree_of
+from simscen.report.replay.stack_report import behavior_tree_data, log_lines_data, parameters_data
 from simscen.report.replay.timeline import SourceLines
 
 MAX_BEAMS, MAX_RANGES = 360, 300_000
@@ -39,7 +39,7 @@ _POINT_STEP_M, _PARTICLE_YAW_STEP_RAD = 0.01, 0.02
 """Steps to which positions and ranges, and the headings of particles, are rounded."""
 
 
-def scans_of(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str, Any]]:
+def scans_data(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str, Any]]:
     """Return the scans of each lidar with the ticks at which they were received and measured."""
     return [_lidar(topic, messages, sensors, columns) for topic, messages in sorted(sensors.scans.items()) if messages]
 
@@ -70,7 +70,7 @@ def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, column
     }
 
 
-def particles_of(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
+def particles_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
     """Return the particle clouds, each reduced to MAX_PARTICLES; None if the log has none."""
     if not sensors.particles:
         return None
@@ -89,12 +89,12 @@ def particles_of(sensors: SensorMessages, columns: PackedColumns) -> dict[str, A
     }
 
 
-def plans_of(plans: Sequence[Path], columns: PackedColumns) -> dict[str, Any] | None:
+def plans_data(plans: Sequence[Path], columns: PackedColumns) -> dict[str, Any] | None:
     """Return the plans with the ticks at which they were made; None without plans."""
     return _paths([(plan.tick, plan.points[:, :2]) for plan in plans], columns)
 
 
-def local_plans_of(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
+def local_plans_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
     """Return the local plans of the controller; None without any."""
     indices = evenly_spaced(len(sensors.local_plans), MAX_LOCAL_PLANS).tolist()
     columns.note_reduction("local plans", len(indices), len(sensors.local_plans))
@@ -116,7 +116,7 @@ def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, 
     }
 
 
-def grid_of(grid: OccupancyGrid, columns: PackedColumns) -> dict[str, Any]:
+def occupancy_grid_data(grid: OccupancyGrid, columns: PackedColumns) -> dict[str, Any]:
     """Return a grid; its cells are listed row by row, starting at the pose of its origin."""
     rows, width = grid.shape
     return {
@@ -128,7 +128,7 @@ def grid_of(grid: OccupancyGrid, columns: PackedColumns) -> dict[str, Any]:
     }
 
 
-def costmaps_of(sensors: SensorMessages, trace: Trace, columns: PackedColumns) -> list[dict[str, Any]]:
+def costmaps_data(sensors: SensorMessages, trace: Trace, columns: PackedColumns) -> list[dict[str, Any]]:
     """Return the grids of each costmap topic in the map frame."""
     return [_costmap(topic, messages, sensors, trace, columns) for topic, messages in sorted(sensors.costmaps.items())]
 
@@ -147,7 +147,7 @@ def _costmap(
         is_same_grid = previous is not None and previous.shape == grid.shape and previous.origin == grid.origin
         cells = grid.cells.astype(np.int64) - previous.cells if previous is not None and is_same_grid else grid.cells
         origin = grid.origin if frame == frame_names.MAP else map_from_odom(trace, tick).compose(grid.origin)
-        grid_data = grid_of(OccupancyGrid(cells, grid.resolution, origin), columns)
+        grid_data = occupancy_grid_data(OccupancyGrid(cells, grid.resolution, origin), columns)
         grids.append({"tick": tick, "changes": is_same_grid, **grid_data})
         previous = grid
     return {"name": one_line(topic), "grids": grids}
@@ -199,15 +199,15 @@ def robot_data(
         "goals": _goals(case, lines),
         "truth": _poses(trace.truth, columns),
         "belief": _belief(trace.belief, columns),
-        "map": None if log.header.map is None else grid_of(log.header.map, columns),
-        "scans": scans_of(log.sensors, columns),
-        "particles": particles_of(log.sensors, columns),
-        "plans": plans_of(trace.plans, columns),
-        "local": local_plans_of(log.sensors, columns),
-        "costmaps": costmaps_of(log.sensors, trace, columns),
-        "tree": tree_of(log, columns),
-        "lines": lines_of(log, columns),
-        "parameters": parameters_of(log, columns),
+        "map": None if log.header.map is None else occupancy_grid_data(log.header.map, columns),
+        "scans": scans_data(log.sensors, columns),
+        "particles": particles_data(log.sensors, columns),
+        "plans": plans_data(trace.plans, columns),
+        "local": local_plans_data(log.sensors, columns),
+        "costmaps": costmaps_data(log.sensors, trace, columns),
+        "tree": behavior_tree_data(log, columns),
+        "lines": log_lines_data(log, columns),
+        "parameters": parameters_data(log, columns),
         "clock": columns.add(trace.truth.ticks),
         "strips": signal_plots(trace, case, spec, columns),
         "limits": signal_limits(verdicts, name),

@@ -44,7 +44,7 @@ MAIN_PARAMETERS = frozenset(
 """Last parts of the names of main parameters, which the page lists first: plugins, speeds, tolerances, and sizes."""
 
 
-def tree_of(log: Log, columns: PackedColumns) -> dict[str, Any] | None:
+def behavior_tree_data(log: Log, columns: PackedColumns) -> dict[str, Any] | None:
     """Return the changes of the behavior tree in order: tick, node, previous status, and status; None without any."""
     changes = list(_tree_changes(log))
     if not changes:
@@ -73,7 +73,7 @@ def _tree_changes(log: Log) -> Iterator[tuple[int, str, str, str]]:
             yield tick, found[1], found[2], found[3]
 
 
-def lines_of(log: Log, columns: PackedColumns) -> list[list[Any]]:
+def log_lines_data(log: Log, columns: PackedColumns) -> list[list[Any]]:
     """Return the log lines of the stack without changes of its behavior tree: tick, severity, logger, and text."""
     lines = [(tick, line) for tick, line in log.sensors.stack_lines() if not _is_tree_change(line)]
     kept = lines[-MAX_LINES:]
@@ -92,7 +92,7 @@ def _severity(level: int) -> str:
     return "error" if level >= _ERROR else "warning" if level >= _WARNING else "info"
 
 
-def parameters_of(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
+def parameters_data(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
     """Return the parameters of each node; [] if the stack reported none.
 
     The `values` of a node are lists of a name, a value as text, and whether it is a main parameter. Its `total` is the

@@ -53,7 +53,7 @@ class TimelineEntry:
         lane: Name of the lane in which the entry is drawn.
         until: Last tick of an interval; None for a single event.
         ended: Kind of the event that ended the interval; "" if the run ended first.
-        bad: Whether the event is a failure, such as a collision.
+        is_failure: Whether the event is a failure, such as a collision.
         line: Line in the scenario file; 0 if unknown.
         name: Name of the goal, fault, object, or event that the entry is about.
         text: Further data of the event as text.
@@ -68,7 +68,7 @@ class TimelineEntry:
     text: str
     until: int | None = None
     ended: str = ""
-    bad: bool = False
+    is_failure: bool = False
     line: int = 0
     place: Sequence[float] = field(default=())
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -76,7 +76,7 @@ class TimelineEntry:
     def as_data(self, robot: str) -> dict[str, Any]:
         """Return the entry as JSON data without empty values. `robot` is the name of its robot; "" for a single one."""
         data = {"tick": self.tick, "kind": self.kind, "lane": self.lane, "name": self.name, "text": self.text}
-        more: dict[str, Any] = {"until": self.until, "ended": self.ended, "bad": self.bad, "line": self.line}
+        more: dict[str, Any] = {"until": self.until, "ended": self.ended, "bad": self.is_failure, "line": self.line}
         more |= {"place": self.place, "about": self.about}
         return data | {key: value for key, value in more.items() if value} | ({"robot": robot} if robot else {})
 
@@ -117,7 +117,7 @@ def _entry(event: Event, lines: SourceLines) -> TimelineEntry:
         lane=_LANES.get(event.kind, "events"),
         name=one_line(event.name),
         text=one_line(details),
-        bad=event.kind in _FAILURE_KINDS,
+        is_failure=event.kind in _FAILURE_KINDS,
         line=_line(event, lines),
         place=place,
         about=event.data if event.kind == K.ZONE_SWITCHED else {},
