@@ -111,11 +111,8 @@ def test_a_description_that_is_no_object_has_no_parameters(about: str) -> None:
 
 def test_a_log_without_an_external_stack_has_nothing_of_it() -> None:
     empty = log_with((0, INFO, EVENT_LOGGER, "goal.accepted shelf"))
-    assert (behavior_tree_data(empty, Spy()), log_lines_data(empty, Spy()), parameters_data(empty, Spy())) == (
-        None,
-        [],
-        [],
-    )
+    assert behavior_tree_data(empty, Spy()) is None
+    assert log_lines_data(empty, Spy()) == parameters_data(empty, Spy()) == []
 
 
 def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
