@@ -232,7 +232,7 @@ def failure_representation(run: RunFinished) -> Any:
     This is the only form in which xdist transfers a failure from worker to controller; it is not public in pytest.
     """
     lines = [f"{plain_text(line).removeprefix('      ')}\n" for line in violation_lines(run)]
-    first = next((complaint.line for complaint in reported_violations(run) if not complaint.warning), 0)
+    first = next((complaint.line for complaint in reported_violations(run) if not complaint.is_warning), 0)
     crash = ReprFileLocation(path=scenario_file(run), lineno=first or 1, message=_cause(run))
     return ReprExceptionInfo(ReprTraceback([ReprEntryNative(lines)], extraline=None, style="native"), crash)
 
@@ -241,4 +241,4 @@ def _cause(run: RunFinished) -> str:
     """Return the first reason in one line."""
     if run.outcome is Outcome.ERROR:
         return error_summary(run)
-    return next((complaint.message for complaint in reported_violations(run) if not complaint.warning), "failed")
+    return next((complaint.message for complaint in reported_violations(run) if not complaint.is_warning), "failed")
