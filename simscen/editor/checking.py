@@ -1,4 +1,4 @@
-"""Problems of a text that is not saved yet: those that `simscen validate` reports."""
+"""Checks of an edited text that may not be saved yet: the same as those of `simscen validate`."""
 
 from dataclasses import dataclass, field
 
@@ -16,17 +16,18 @@ from simscen.loading.variations.variation_problems import VariationProblems, mer
 from simscen.loading.world_cache import WorldCache
 
 CHECKED_VARIATIONS = range(1, 4)
-"""Numbers of the variations that are checked while a text is edited; `simscen validate` checks all of them."""
+"""Numbers of the variations that are checked while a text is edited. `simscen validate` checks all variations."""
 
 MAX_WORLDS = 8
-"""Worlds that are kept: each change of an inline world is a new one."""
+"""Maximum number of cached worlds. Each change of an inline world makes a new one."""
 
 
 @dataclass
 class TextChecks:
-    """Checks of one file; worlds and shortest paths are kept between two checks.
+    """Loads and checks texts of one file.
 
-    `stack` replaces the stack of the scenario.
+    Built worlds and shortest paths are cached, because they rarely differ between two texts. `lenient` has the meaning
+    of the option --lenient. `stack` replaces the stack of the scenario, unless it is None.
     """
 
     file: EditedFile
@@ -35,10 +36,9 @@ class TextChecks:
     cache: WorldCache = field(default_factory=lambda: WorldCache(MAX_WORLDS))
 
     def load(self, text: str) -> tuple[LoadedScenario, ...] | list[Problem]:
-        """Return the first variations of a scenario, or its problems."""
-        file = self.file
-        numbers = CHECKED_VARIATIONS
-        loaded = try_variations(file.path, file.root, file.world_path, self.stack, numbers, {file.path: text})
+        """Return the first variations of the scenario in a text, or the problems that prevent loading it."""
+        file, unsaved = self.file, {self.file.path: text}
+        loaded = try_variations(file.path, file.root, file.world_path, self.stack, CHECKED_VARIATIONS, unsaved)
         if isinstance(loaded, list):
             return loaded
         return tuple(scenario.with_changes(lenient=self.lenient) for scenario in loaded)
@@ -46,27 +46,29 @@ class TextChecks:
     def problems(self, text: str) -> list[Problem]:
         """Return all problems of a text, in the order of the file."""
         try:
-            found = self._scenario(text) if self.file.kind == "scenario" else self._world(text)
+            found = self._scenario_problems(text) if self.file.kind == "scenario" else self._world_problems(text)
         except InvalidInput as error:
             found = error.problems
         return sorted(dict.fromkeys(found))
 
-    def _scenario(self, text: str) -> list[Problem]:
+    def _scenario_problems(self, text: str) -> list[Problem]:
         loaded = self.load(text)
         if isinstance(loaded, list):
             return loaded
         checked = [
-            VariationProblems(scenario.variation, scenario.set_by, self._in_world(scenario)) for scenario in loaded
+            VariationProblems(scenario.variation, scenario.set_by, self._variation_problems(scenario))
+            for scenario in loaded
         ]
         return merge_problems(checked)
 
-    def _in_world(self, loaded: LoadedScenario) -> list[Problem]:
+    def _variation_problems(self, loaded: LoadedScenario) -> list[Problem]:
+        """Return the problems of one variation, including those in its world, such as a start inside of a wall."""
         try:
             return [*loaded.notes, *check_in_world(loaded, self.cache)]
         except InvalidInput as error:
             return [*loaded.notes, *error.problems]
 
-    def _world(self, text: str) -> list[Problem]:
+    def _world_problems(self, text: str) -> list[Problem]:
         file = self.file
         source = load_world_file(file.path, file.root, file.world_path, {file.path: text})
         own = check_world_file(source)

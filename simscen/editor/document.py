@@ -1,4 +1,4 @@
-"""File that is edited, with its kind and the folders that it may refer to; saved only if it has not changed since."""
+"""Reading and saving of the edited file, which is not overwritten if another program has changed it meanwhile."""
 
 import hashlib
 import stat
@@ -15,9 +15,13 @@ from simscen.run.sessions.output_folder import write_atomically
 
 @dataclass(frozen=True)
 class EditedFile:
-    """A scenario or world file: absolute path, `kind` ("scenario" or "world"), root, and additional folders.
+    """The file that is edited, and the folders whose files it may refer to.
 
-    `shown` is its name in problems: the path relative to the root.
+    Attributes:
+        path: Absolute path of the file.
+        kind: "scenario" or "world".
+        root: Root of the scenario.
+        world_path: Further folders with worlds and maps.
     """
 
     path: Path
@@ -27,28 +31,28 @@ class EditedFile:
 
     @property
     def display_name(self) -> str:
-        """Name of the file in problems."""
+        """Name of the file in messages: its path relative to the root or to one of the further folders."""
         return PathSandbox.around(self.root, self.world_path).display_name(self.path)
 
     def library(self, text: str) -> Library:
-        """Return a reader of files that has `text` in the place of the content of this file."""
+        """Return a reader of the files in these folders that reads `text` instead of the content of this file."""
         return Library(PathSandbox.around(self.root, self.world_path), unsaved={self.path: text})
 
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 NEW = ""
-"""Version of a file that does not exist yet."""
+"""Version of a file that does not exist."""
 
 
 class Content(NamedTuple):
-    """Text of a file with line breaks as \\n, and its version, which changes with every byte of the file."""
+    """Text of a file with \\n as line breaks, and its version: a hash of all bytes, or NEW if there is no file."""
 
     text: str
     version: str
 
 
 class ChangedMeanwhile(Exception):
-    """The file was changed, created, or deleted since it was read; `content` is what it is now."""
+    """The file was changed, created, or deleted after the editor read it; `content` is its present content."""
 
     def __init__(self, message: str, content: Content) -> None:
         super().__init__(message)
@@ -57,9 +61,9 @@ class ChangedMeanwhile(Exception):
 
 @dataclass
 class Document:
-    """A scenario or world file. `display_name` is its name in messages.
+    """Reads and saves a text file. `display_name` is its name in messages.
 
-    Line breaks (\\n or \\r\\n) and a byte order mark stay as they are in the file.
+    The kind of line breaks (\\n or \\r\\n) and a byte order mark are preserved.
     """
 
     path: Path
@@ -68,7 +72,7 @@ class Document:
     _mark: bytes = b""
 
     def read(self) -> Content:
-        """Return the content of the file. Raises InvalidInput if it is not a readable text file."""
+        """Return the content of the file. Raises InvalidInput if it is no text file, or mixes kinds of line breaks."""
         text = read_text(self.path, self.display_name)
         if isinstance(text, Problem):
             raise InvalidInput([text])
@@ -84,11 +88,11 @@ class Document:
     def save(self, text: str, version: str, overwrite: bool = False) -> str:
         """Replace the content of the file atomically and return its new version.
 
-        Raises ChangedMeanwhile if the file is not the `version` any more, unless `overwrite`; UsageError if the file
-        cannot be written.
+        `version` is the version on which the text is based. Raises ChangedMeanwhile if the file has another version
+        now, unless `overwrite` is true; UsageError if the file cannot be written.
         """
         if not overwrite and (now := self._current_version()) != version:
-            raise ChangedMeanwhile(self._what_changed(version, now), self._current(now))
+            raise ChangedMeanwhile(self._change_message(version, now), self._content_of_version(now))
         data = self._mark + text.replace("\n", self._line_break).encode()
         try:
             mode = stat.S_IMODE(self.path.stat().st_mode) if self.path.exists() else None
@@ -105,11 +109,13 @@ class Document:
         except OSError:
             return NEW
 
-    def _current(self, version: str) -> Content:
+    def _content_of_version(self, version: str) -> Content:
+        """Return the present content of the file, whose version is known; the text is "" if it cannot be read."""
         text = read_text(self.path, self.display_name) if version != NEW else ""
         return Content(text if isinstance(text, str) else "", version)
 
-    def _what_changed(self, version: str, now: str) -> str:
+    def _change_message(self, version: str, now: str) -> str:
+        """Return the message of ChangedMeanwhile for a change from `version` to the version `now`."""
         what = "was created" if version == NEW else "was deleted" if now == NEW else "was changed by another program"
         return f"{self.display_name} {what} since it was opened here; reload it, or overwrite it with your text"
 

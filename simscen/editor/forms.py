@@ -1,4 +1,8 @@
-"""Forms for the values of a file, made from its JSON Schema, and lookup of the schema of a value."""
+"""Forms for editing the values of a file, made from its JSON Schema.
+
+`keys` are the path to a value in the file: keys of mappings and indices of lists. `data` is the plain content of the
+file, on which the choice between alternatives of the schema depends.
+"""
 
 import json
 import re
@@ -24,23 +28,23 @@ _TYPES: dict[str, type | tuple[type, ...]] = {
 
 @lru_cache(maxsize=4)
 def schema_of_kind(kind: str) -> Schema:
-    """Return the schema of a kind of file, such as "scenario"."""
+    """Return the JSON Schema of a kind of file: "scenario" or "world"."""
     schema: Schema = json.loads((PACKAGE / "data" / "schemas" / f"{kind}.schema.json").read_text(encoding="utf-8"))
     return schema
 
 
 def schema_at(root: Schema, keys: Sequence[Key], data: Any) -> Schema:
-    """Return the schema of the value at `keys` of a file with the content `data`; {} if it is unknown."""
-    schema = resolved(root, root, data)
+    """Return the schema of the value at `keys`; {} if it is unknown. `root` is the schema of the file."""
+    schema = resolve_schema(root, root, data)
     for key in keys:
-        below = value_at(data, (key,))
-        schema = resolved(root, below_of(schema, key), below)
-        data = below
+        child = value_at(data, (key,))
+        schema = resolve_schema(root, child_schema(schema, key), child)
+        data = child
     return schema
 
 
-def below_of(schema: Schema, key: Key) -> Schema:
-    """Return the schema of a key or an item of a value; {} if there is none."""
+def child_schema(schema: Schema, key: Key) -> Schema:
+    """Return the schema of the value of a key, or of the item with an index; {} if there is none."""
     if isinstance(key, int):
         prefix = schema.get("prefixItems", [])
         found = prefix[key] if key < len(prefix) else schema.get("items", {})
@@ -50,24 +54,27 @@ def below_of(schema: Schema, key: Key) -> Schema:
     return found if isinstance(found, dict) else {}
 
 
-def resolved(root: Schema, schema: Schema, data: Any) -> Schema:
-    """Return a schema with its reference and its conditions replaced by what applies to `data`."""
-    for _ in range(8):
+def resolve_schema(root: Schema, schema: Schema, data: Any) -> Schema:
+    """Return a schema in which references, conditions, and alternatives are replaced by the schemas that apply.
+
+    `data` is the value to which they must apply.
+    """
+    for _ in range(MAX_REFERENCES):
         if "$ref" in schema:
             target = root["$defs"][schema["$ref"].rpartition("/")[2]]
             schema = {**target, **{key: value for key, value in schema.items() if key != "$ref"}}
         elif "if" in schema and "else" in schema:
             branch = schema["then" if _applies(schema["if"], data) else "else"]
-            schema = _merged(schema, branch, ("if", "then", "else"))
-        elif chosen := next(_applying(root, schema, data), None):
-            schema = _merged(schema, chosen, ("allOf", "oneOf", "anyOf"))
+            schema = _merge_branch(schema, branch, ("if", "then", "else"))
+        elif branch := next(_applicable_branches(root, schema, data), None):
+            schema = _merge_branch(schema, branch, ("allOf", "oneOf", "anyOf"))
         else:
             break
     return schema
 
 
 def value_at(data: Any, keys: Sequence[Key]) -> Any:
-    """Return the value at `keys` of plain data; None if there is none."""
+    """Return the value at `keys`; None if there is none."""
     for key in keys:
         if isinstance(data, dict):
             data = data.get(str(key))
@@ -79,20 +86,24 @@ def value_at(data: Any, keys: Sequence[Key]) -> Any:
 
 
 def alternatives(schema: Schema) -> list[str]:
-    """Return the keys of which a mapping has exactly one, such as the kinds of triggers; [] if there are none."""
+    """Return the keys of which a mapping must have exactly one, such as the kinds of triggers; [] if there are none."""
     options = [one.get("required", []) for one in schema.get("oneOf", []) if isinstance(one, dict)]
     return [option[0] for option in options if len(option) == 1]
 
 
-def _merged(schema: Schema, branch: Schema, without: tuple[str, ...]) -> Schema:
-    """Return a branch with the description of the schema that it is a branch of."""
+def _merge_branch(schema: Schema, branch: Schema, without: tuple[str, ...]) -> Schema:
+    """Return a schema without the keys `without`, to which a branch is added. The outer description has priority."""
     outer = {key: value for key, value in schema.items() if key not in without}
     description = outer.get("description") or branch.get("description", "")
     return {**outer, **branch, "description": description}
 
 
-def _applying(root: Schema, schema: Schema, data: Any) -> Iterator[Schema]:
-    """Yield the alternatives of a tagged union that fit the `type` in the data, and the first one if there is none."""
+def _applicable_branches(root: Schema, schema: Schema, data: Any) -> Iterator[Schema]:
+    """Yield the branches of allOf, oneOf, and anyOf that apply to the data, best first.
+
+    These are branches whose condition is true, then references to a schema whose `type` is that in the data, then the
+    first reference as a default.
+    """
     unions = [one for key in ("allOf", "oneOf", "anyOf") for one in schema.get(key, []) if isinstance(one, dict)]
     conditional = [union for union in unions if "if" in union and "then" in union]
     yield from (one["then"] for one in conditional if _applies(one["if"], data))
@@ -107,7 +118,7 @@ def _applying(root: Schema, schema: Schema, data: Any) -> Iterator[Schema]:
 
 
 def _applies(condition: Schema, data: Any) -> bool:
-    """Return whether a condition of the kinds that our schemas use is true for the data."""
+    """Return whether an `if` of a schema is true for the data. Supports only what the schemas of simscen use."""
     wanted = condition.get("type")
     if wanted is not None and not isinstance(data, _TYPES[wanted]):
         return False
@@ -120,28 +131,32 @@ def _applies(condition: Schema, data: Any) -> bool:
     return all(value_at(data, (key,)) in (None, constant) for key, constant in constants.items())
 
 
+MAX_REFERENCES = 8
+"""Maximum number of references and conditions that lead to a schema, so that a circle of references ends."""
 MAX_DEPTH = 4
+"""Maximum depth of nested fields in a form. Deeper values are edited in the text."""
 MAX_ITEMS = 12
-"""Longer lists are edited in the text, or on the map."""
-MAX_TEXT_FIELD = 60
-"""Texts that are longer, or have line breaks, get a field of several lines."""
-PREFERRED = {
+"""Maximum number of items of a list in a form. Longer lists are edited in the text or on the map."""
+MAX_TEXT_FIELD_CHARACTERS = 60
+"""Longer strings, and strings with line breaks, get a field with several lines."""
+FIRST_VALUE_OF_KEY = {
     "name": "new",
     "description": "description",
     "keyframes": [[0, 0, 0, 0]],
     "through": [[0, 0]],
     "points": [[0, 0], [1, 0]],
 }
-"""First values of keys for which the schema suggests none."""
+"""Values of new keys, where the schema suggests none that is useful."""
 
 Keys = tuple[Key, ...]
-_UNIT = re.compile(r"\s*\((?:[a-z ]+), e\.g\. ([^)]*)\)$")
+_EXAMPLE_OF_QUANTITY = re.compile(r"\s*\((?:[a-z ]+), e\.g\. ([^)]*)\)$")
 
 
 def form_data(kind: str, text: str, data: Any, keys: Keys) -> dict[str, Any]:
-    """Return the form of the value at `keys`: its help, its fields, and the keys that can be added.
+    """Return the form of the value at `keys` as JSON data: its help, its fields, and the keys that can be added.
 
-    `data` is the content of the text with what it extends. The form of the whole file has no nested fields.
+    `data` is the content of the `text` including the files that it extends. The form of the complete file, whose `keys`
+    are (), has no nested fields.
     """
     root = schema_of_kind(kind)
     schema = schema_at(root, keys, data)
@@ -151,12 +166,17 @@ def form_data(kind: str, text: str, data: Any, keys: Keys) -> dict[str, Any]:
 
 
 class _Form:
+    """Makes the fields of a form with at most `max_depth` levels. `source` is the syntax tree of the text."""
+
     def __init__(self, root: Schema, text: str, source: SourceNode | None, max_depth: int) -> None:
         self._root, self._text, self._source, self._max_depth = root, text, source, max_depth
 
     def field(self, keys: Keys, schema: Schema, value: Any, required: bool, depth: int) -> dict[str, Any]:
-        """Return the field of a value, with the fields in it."""
-        help_, example = _help(schema)
+        """Return the field of the value at `keys`, with the fields of its keys or items.
+
+        `depth` is 0 for the value of the form itself.
+        """
+        help_, example = _help_and_example(schema)
         written = None if self._source is None or not keys else source_at(self._source, keys)
         base = {
             "key": str(keys[-1]) if keys else "",
@@ -179,23 +199,23 @@ class _Form:
             shown = [key for key in value if not isinstance(value[key], dict | list)]
         fields = []
         for key in shown:
-            below = resolved(self._root, below_of(schema, key), value[key])
-            fields.append(self.field((*keys, key), below, value[key], key in needed, depth + 1))
+            child = resolve_schema(self._root, child_schema(schema, key), value[key])
+            fields.append(self.field((*keys, key), child, value[key], key in needed, depth + 1))
         return {"fields": fields, "addable": self._addable(keys, schema, value)}
 
     def _addable(self, keys: Keys, schema: Schema, value: dict[str, Any]) -> list[dict[str, Any]]:
-        """Return the keys that can be added to a mapping, each with its help and a first value."""
+        """Return the keys that can be added to a mapping, each with its help and a value for the new key."""
         choices = alternatives(schema)
         has_choice = any(choice in value for choice in choices)
         found = []
         for key, one in schema.get("properties", {}).items():
             if key in value or key.endswith("+") or (key in choices and has_choice):
                 continue
-            below = resolved(self._root, one, None)
-            initial = first_value(self._root, below, key)
+            child = resolve_schema(self._root, one, None)
+            initial = first_value(self._root, child, key)
             if initial is None or (not keys and isinstance(initial, dict | list)):
                 continue
-            found.append({"key": key, "help": _help(below)[0], "value": initial})
+            found.append({"key": key, "help": _help_and_example(child)[0], "value": initial})
         return found
 
     def _list(self, keys: Keys, schema: Schema, value: list[Any], depth: int) -> dict[str, Any]:
@@ -203,8 +223,8 @@ class _Form:
             return {"fields": [], "addable": [], "omitted": len(value)}
         fields = []
         for index, item in enumerate(value):
-            below = resolved(self._root, below_of(schema, index), item)
-            fields.append(self.field((*keys, index), below, item, required=False, depth=depth + 1))
+            child = resolve_schema(self._root, child_schema(schema, index), item)
+            fields.append(self.field((*keys, index), child, item, required=False, depth=depth + 1))
         return {"fields": fields, "addable": []}
 
     def _scalar(self, schema: Schema, value: Any, written: SourceNode | None) -> dict[str, Any]:
@@ -214,7 +234,7 @@ class _Form:
             return {"type": "choice", "choices": [True, False], "value": value}
         if schema.get("type") == "string" or (isinstance(value, str) and "type" not in schema):
             text = "" if value is None else str(value)
-            is_long = "\n" in text.strip() or len(text) > MAX_TEXT_FIELD
+            is_long = "\n" in text.strip() or len(text) > MAX_TEXT_FIELD_CHARACTERS
             return {"type": "long text" if is_long else "text", "value": text}
         raw = "" if value is None else str(value)
         if written is not None and written.kind == "scalar" and not written.style:
@@ -223,9 +243,12 @@ class _Form:
 
 
 def first_value(root: Schema, schema: Schema, key: str = "", depth: int = 0) -> Any:
-    """Return a valid value for a new key or item as far as the schema says one; None if there is no simple one."""
-    if key in PREFERRED:
-        return PREFERRED[key]
+    """Return a value for a new key or item that is valid according to the schema; None if there is no simple one.
+
+    `depth` is the number of mappings and lists around the value, at most MAX_DEPTH.
+    """
+    if key in FIRST_VALUE_OF_KEY:
+        return FIRST_VALUE_OF_KEY[key]
     if "default" in schema and schema["default"] not in (None, "", [], {}):
         return schema["default"]
     if "const" in schema:
@@ -241,7 +264,7 @@ def first_value(root: Schema, schema: Schema, key: str = "", depth: int = 0) -> 
         case "string":
             return "new"
         case "array":
-            item = resolved(root, below_of(schema, 0), None)
+            item = resolve_schema(root, child_schema(schema, 0), None)
             one = first_value(root, item, "", depth + 1) if depth < MAX_DEPTH else None
             return None if one is None else [one] * max(1, schema.get("minItems", 1))
         case "object":
@@ -249,18 +272,20 @@ def first_value(root: Schema, schema: Schema, key: str = "", depth: int = 0) -> 
     return None
 
 
-def _first_mapping(root: Schema, schema: Schema, depth: int) -> Any:
+def _first_mapping(root: Schema, schema: Schema, depth: int) -> dict[str, Any] | None:
+    """Return a mapping with the required keys; None if one of them has no simple value."""
     if depth >= MAX_DEPTH:
         return None
-    properties, made = schema.get("properties", {}), {}
+    properties, made = schema.get("properties", {}), dict[str, Any]()
     for key in schema.get("required", []):
-        made[key] = first_value(root, resolved(root, properties.get(key, {}), {}), key, depth + 1)
+        made[key] = first_value(root, resolve_schema(root, properties.get(key, {}), {}), key, depth + 1)
         if made[key] is None:
             return None
     return made
 
 
 def _first_number(schema: Schema) -> float:
+    """Return 0, 1, or another number within the limits of the schema."""
     low: float = schema["minimum"] if "minimum" in schema else schema.get("exclusiveMinimum", -1.0)
     high: float = schema["maximum"] if "maximum" in schema else schema.get("exclusiveMaximum", 1.0)
     if low < 0 or (low == 0 and "exclusiveMinimum" not in schema):
@@ -268,11 +293,11 @@ def _first_number(schema: Schema) -> float:
     return max(1.0, low) if high > max(1.0, low) else (low + high) / 2
 
 
-def _help(schema: Schema) -> tuple[str, str]:
-    """Return the description of a value without the example of a quantity, and that example."""
+def _help_and_example(schema: Schema) -> tuple[str, str]:
+    """Return the description of a value, and the example of a quantity at its end, such as "0.5 m"; "" for none."""
     paragraphs = str(schema.get("description", "")).split("\n\n")
     text = "\n\n".join(" ".join(part.split()) for part in paragraphs).strip()
-    match = _UNIT.search(text)
+    match = _EXAMPLE_OF_QUANTITY.search(text)
     if match is None:
         plain = re.fullmatch(r"[a-z ]+, e\.g\. (.*)", text)
         return ("", plain[1]) if plain else (text, "")

@@ -1,4 +1,4 @@
-"""Text of a new scenario in a world or on a map: a robot, a goal that it can reach, and criteria."""
+"""Text of a new scenario in a given world or on a map: a robot, a goal that the robot can reach, and two criteria."""
 
 import os
 from pathlib import Path
@@ -15,13 +15,19 @@ from simscen.loading.files.single_files import load_world_file
 from simscen.loading.loaded import LoadedWorld
 
 LIDAR_HEIGHT_M = 0.2
-ROOM_M = 0.5
-"""Distance from walls that start and goal have where there is room."""
+"""Height at which the map of a world is made."""
+PREFERRED_CLEARANCE_M = 0.5
+"""Minimum distance of start and goal from walls. It is halved, then 0, if no position has it."""
 CANDIDATES = 200
+"""Maximum number of free positions from which start and goal are chosen."""
 
 
 def new_scenario_text(file: Path, world_file: Path, root: Path, world_path: tuple[Path, ...], lenient: bool) -> str:
-    """Return the text of a scenario `file` in a world that `simscen world` reads. Raises InvalidInput."""
+    """Return the text of a new scenario `file` in the world of `world_file`. Raises InvalidInput if it is invalid.
+
+    `world_file` is a world file, a ROS map, or an SDF file. `root` and `world_path` are the folders whose files the
+    world may refer to.
+    """
     from simscen.worlds.built_world import build_world_and_map
 
     source = load_world_file(world_file, root, world_path)
@@ -48,7 +54,10 @@ def new_scenario_text(file: Path, world_file: Path, root: Path, world_path: tupl
 
 
 def _world_lines(source: LoadedWorld, written: str) -> list[str]:
-    """Return the key `world`: the world file, or an inline world on a map or SDF file, to which things can be added."""
+    """Return the lines of the key `world`; `written` is the path of the world as YAML.
+
+    For a map or an SDF file, this is an inline world, to which obstacles, objects, and regions can be added.
+    """
     if source.spec is not None:
         return [f"world: {written}"]
     return ["world:", "  simscen: 1", f"  {'sdf' if source.sdf is not None else 'map'}: {written}"]
@@ -59,29 +68,32 @@ def _pose_text(pose: Pose2) -> str:
 
 
 def _start_and_goal(built: BuiltWorld) -> tuple[Pose2, Pose2]:
-    """Return two free positions that are far apart and connected; the origin twice if there is no free space."""
-    points = _roomy_points(built)
+    """Return two free positions that are far apart, and between which the robot can drive.
+
+    Return the origin twice if there is no free space.
+    """
+    points = _free_points(built)
     if not len(points):
         return Pose2(0.0, 0.0), Pose2(0.0, 0.0)
     start = points[0]
     from simscen.worlds.routes.shortest_paths import shortest_paths_in
 
     poses = [Pose2(round(x, 2), round(y, 2)) for x, y in points.tolist()]
-    ways = shortest_paths_in(built, poses, ROOM_M / 2)
+    paths = shortest_paths_in(built, poses, PREFERRED_CLEARANCE_M / 2)
     order = np.argsort(-np.linalg.norm(points - start, axis=1))
-    reachable = (poses[k] for k in order.tolist() if ways.path(poses[0], poses[k]) is not None)
+    reachable = (poses[k] for k in order.tolist() if paths.path(poses[0], poses[k]) is not None)
     return poses[0], next(reachable, poses[0])
 
 
-def _roomy_points(built: BuiltWorld) -> Array:
-    """Return positions (n, 2) far from walls; the first one is nearest to a corner of the map."""
+def _free_points(built: BuiltWorld) -> Array:
+    """Return at most CANDIDATES free positions (n, 2) in m in the order of cells, far from walls if possible."""
     from scipy import ndimage
 
     grid = built.map
     free = np.pad(grid.cells == FREE, 1)
-    room = ndimage.distance_transform_edt(free)[1:-1, 1:-1] * grid.resolution
-    for needed in (ROOM_M, ROOM_M / 2, 0.0):
-        cells = _in_bounds(np.argwhere(room > needed), built)
+    clearance = ndimage.distance_transform_edt(free)[1:-1, 1:-1] * grid.resolution
+    for min_clearance in (PREFERRED_CLEARANCE_M, PREFERRED_CLEARANCE_M / 2, 0.0):
+        cells = _in_bounds(np.argwhere(clearance > min_clearance), built)
         if len(cells):
             chosen = cells[np.linspace(0, len(cells) - 1, min(CANDIDATES, len(cells))).astype(np.int64)]
             return np.round(grid.center_of(chosen), 2)
@@ -89,7 +101,7 @@ def _roomy_points(built: BuiltWorld) -> Array:
 
 
 def _in_bounds(cells: npt.NDArray[np.int64], built: BuiltWorld) -> npt.NDArray[np.int64]:
-    """Return the cells inside the bounds of a world without a map of its own, which limit where goals may be."""
+    """Return the cells (n, 2) inside the bounds of the world, where goals may be; all cells if the world has a map."""
     if built.world.grid is not None:
         return cells
     left, low, right, high = built.world.bounds

@@ -1,4 +1,4 @@
-"""Shortest paths and clearances of the robots of a scenario, for the map while something is dragged."""
+"""Shortest paths and clearances of the robots of a scenario, which the map shows while something is dragged."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -22,14 +22,16 @@ from simscen.worlds.routes.shortest_paths import ShortestPaths
 OUTLINE_STEP_M = 0.05
 """Distance between the points of a footprint at which the clearance is measured."""
 MAX_LEGS = 40
-FAR_M = 1000.0
-"""Clearances beyond this are not shown: there is nothing around."""
+"""Maximum number of paths from one stop to the next that are shown for each robot."""
+MAX_CLEARANCE_M = 1000.0
+"""Larger clearances are not shown, because there is nothing around."""
 
 
 def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
-    """Return, for each robot by key, its footprint, the path through its goals, and its clearance at each stop.
+    """Return the data of each robot by its key in the text: footprint, path through its goals, and clearances.
 
-    A text with problems gives the data `reason`.
+    The stops of the path are the start and the goals. If the text has problems, there are no robots, and `reason` says
+    why; otherwise it is "".
     """
     loaded = checks.load(text)
     if isinstance(loaded, list):
@@ -45,6 +47,7 @@ def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
 
 
 def _reason(problems: Sequence[Problem]) -> str:
+    """Return the first problem of the text as the reason why no path is shown."""
     first = min(problems)
     return f"No path is shown until this is corrected: line {first.line}: {first.message}"
 
@@ -55,39 +58,47 @@ def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:
     scene = Scene(loaded, blocking_world(loaded, world), size, checks.cache)
     goals = scenario_goals(loaded.spec)[: len(loaded.spec.goals)]
     stops = [scene.start, *(goal.pose for goal in goals)]
-    solids = _standing_solids(scene)
-    ways = checks.cache.shortest_paths(solids, extend_bounds(world.bounds, stops), size.inscribed, scene.z_range)
-    legs = [_leg(ways, *ends) for ends in list(pairwise(stops))[:MAX_LEGS]]
+    solids = _static_solids(scene)
+    paths = checks.cache.shortest_paths(solids, extend_bounds(world.bounds, stops), size.inscribed, scene.z_range)
+    legs = [_leg(paths, *ends) for ends in list(pairwise(stops))[:MAX_LEGS]]
     return {
         "footprint": [[round(x, 4), round(y, 4)] for x, y in size.footprint],
         "legs": legs,
-        "clearances": [_clearance(ways, size, stop) for stop in stops],
+        "clearances": [_clearance(paths, size, stop) for stop in stops],
     }
 
 
-def _standing_solids(scene: Scene) -> tuple[Solid, ...]:
-    """Return what blocks the robot: fixed solids, and bodies that nothing moves. Equal scenes give the same tuple."""
-    moved = scene.immovable_bodies
-    return (*scene.world.solids, *moved) if moved else scene.world.solids
+def _static_solids(scene: Scene) -> tuple[Solid, ...]:
+    """Return the solids that block the robot: those of the world, and bodies that nothing moves.
+
+    Without such bodies, this is the tuple of the world itself, because the cache of shortest paths compares identities.
+    """
+    immovable = scene.immovable_bodies
+    return (*scene.world.solids, *immovable) if immovable else scene.world.solids
 
 
-def _leg(ways: ShortestPaths, start: Pose2, goal: Pose2) -> dict[str, Any]:
-    way = ways.path(start, goal)
-    if way is None:
+def _leg(paths: ShortestPaths, start: Pose2, goal: Pose2) -> dict[str, Any]:
+    """Return the points and the length in m of the shortest path; a straight line without length if there is none."""
+    path = paths.path(start, goal)
+    if path is None:
         return {"points": [[start.x, start.y], [goal.x, goal.y]], "length": None}
-    return {"points": np.round(way, 3).tolist(), "length": round(polyline_length(way), 2)}
+    return {"points": np.round(path, 3).tolist(), "length": round(polyline_length(path), 2)}
 
 
-def _clearance(ways: ShortestPaths, size: RobotSize, pose: Pose2) -> float | None:
-    """Return the distance in m from the footprint at a pose to the nearest solid; negative if they overlap."""
+def _clearance(paths: ShortestPaths, size: RobotSize, pose: Pose2) -> float | None:
+    """Return the distance in m from the footprint at a pose to the nearest solid; None if nothing is near.
+
+    The distance is negative if they overlap.
+    """
     if size.radius is not None:
-        nearest = float(ways.clearances(np.array([[pose.x, pose.y]]))[0]) - size.radius
+        nearest = float(paths.clearances(np.array([[pose.x, pose.y]]))[0]) - size.radius
     else:
-        nearest = float(ways.clearances(pose.apply(np.array(list(_outline_points(size))))).min())
-    return None if not math.isfinite(nearest) or nearest > FAR_M else round(nearest, 3)
+        nearest = float(paths.clearances(pose.apply(np.array(list(_outline_points(size))))).min())
+    return None if not math.isfinite(nearest) or nearest > MAX_CLEARANCE_M else round(nearest, 3)
 
 
 def _outline_points(size: RobotSize) -> Iterator[Array]:
+    """Yield the center of the robot, and points (x, y) on the outline of its footprint, in the base frame."""
     yield np.zeros(2)
     ends = (*size.footprint[1:], size.footprint[0])
     for a, b in zip(size.footprint, ends, strict=True):

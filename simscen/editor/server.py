@@ -1,4 +1,4 @@
-"""Local web server of the editor, and the files that it edits.
+"""Local HTTP server of the editor: its page, the requests of the page, and the files that are edited.
 
 The server answers only requests whose address contains its secret token.
 """
@@ -25,10 +25,11 @@ _WORLD_PAGE = re.compile(r"world-([0-9]{1,4})")
 
 
 class OpenFiles:
-    """The sessions of a server. The page of the n-th world file is below `world-n/`; its session starts with its page.
+    """The editor sessions of a server: the main file, and the world files that the main file refers to.
 
-    The number of a world file never changes, so that a page cannot save into another file when the scenario names
-    another world.
+    The page of the n-th world file has the address `world-n/`; its session starts when the page is first requested. The
+    number of a world file never changes, so that a page cannot save into another file when the scenario is changed to
+    refer to another world.
     """
 
     def __init__(self, main: EditorSession) -> None:
@@ -36,10 +37,10 @@ class OpenFiles:
         self._worlds: dict[Path, int] = {}
         self._sessions: dict[int, EditorSession] = {}
         self._lock = threading.Lock()
-        main.world_page = self._page_of
+        main.world_page_address = self._page_address
 
     def resolve(self, name: str) -> tuple[EditorSession, str] | None:
-        """Return the session of a requested path, and the path within it; None if there is no such world file."""
+        """Return the session that a requested path belongs to, and the rest of the path; None for an unknown file."""
         first, slash, rest = name.partition("/")
         match = _WORLD_PAGE.fullmatch(first) if slash else None
         if match is None:
@@ -48,22 +49,24 @@ class OpenFiles:
         return None if session is None else (session, rest)
 
     def close(self) -> None:
-        """End all sessions."""
+        """Stop the runs of all sessions."""
         for session in (self.main, *self._sessions.values()):
             session.runs.close()
 
-    def _page_of(self, world: Path) -> str:
+    def _page_address(self, world: Path) -> str:
+        """Return the address of the page of a world file, and give the file a number if it has none."""
         with self._lock:
             return f"world-{self._worlds.setdefault(world, len(self._worlds) + 1)}/"
 
     def _session(self, number: int) -> EditorSession | None:
+        """Return the session of a world file, and start it if necessary; None if the file cannot be opened."""
         with self._lock:
             if number not in self._sessions:
                 path = next((path for path, known in self._worlds.items() if known == number), None)
                 if path is None:
                     return None
                 try:
-                    self._sessions[number] = self.main.other(replace(self.main.file, path=path, kind="world"))
+                    self._sessions[number] = self.main.open_other(replace(self.main.file, path=path, kind="world"))
                 except InvalidInput:
                     return None
             return self._sessions[number]
@@ -73,8 +76,9 @@ ADDRESS = "127.0.0.1"
 PAGE_FOLDER = PACKAGE / "data" / "editor"
 REPLAY_FOLDER = PACKAGE / "data" / "replay"
 SHARED_MODULES = ("camera.js", "dom.js")
-"""Modules of the replay page that this page uses as well."""
+"""JavaScript modules of the replay page that this page uses as well."""
 MAX_REQUEST_BYTES = 4 << 20
+"""Maximum size of the body of a request."""
 CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; frame-src 'self'; "
@@ -85,7 +89,7 @@ _POLICY_OF_PAGE = re.compile(r'http-equiv="Content-Security-Policy" content="([^
 
 
 class Response(NamedTuple):
-    """HTTP response; `policy` is its Content-Security-Policy."""
+    """HTTP response. `policy` is its Content-Security-Policy."""
 
     body: bytes
     content_type: str
@@ -94,12 +98,12 @@ class Response(NamedTuple):
 
 
 class EditorServer(ThreadingHTTPServer):
-    """Serves the page of one session at `url`, on this machine only. Port 0 selects a free port."""
+    """Serves the page of a session at `url`, only for programs on this machine."""
 
     daemon_threads = True
 
     def __init__(self, session: EditorSession, port: int = 0) -> None:
-        """Listen on the port. Raises OSError if it is taken."""
+        """Listen on the port; 0 selects a free one. Raises OSError if the port is in use."""
         super().__init__((ADDRESS, port), _Handler)
         self.open_files, self.token = OpenFiles(session), secrets.token_urlsafe(24)
         self.hosts = {f"{name}:{self.server_port}" for name in (ADDRESS, "localhost")}
@@ -113,11 +117,11 @@ class EditorServer(ThreadingHTTPServer):
 
     @property
     def session(self) -> EditorSession:
-        """Session of the file of the command."""
+        """Session of the file that the command `simscen edit` names."""
         return self.open_files.main
 
     def close_files(self) -> None:
-        """End the sessions of all files."""
+        """Stop the runs of all sessions."""
         self.open_files.close()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
@@ -133,12 +137,12 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = 60
 
     def do_GET(self) -> None:
-        """Response with a file of the page, or the replay page of a run."""
+        """Send a file of the editor page, or the replay page of a run."""
         if (requested := self._authorized()) is not None:
             self._send(self._file(*requested))
 
     def do_POST(self) -> None:
-        """Response a request of the page."""
+        """Answer a request of the page: JSON to one of the `requests` of a session."""
         body = self._body()
         if (requested := self._authorized()) is None:
             return
@@ -150,10 +154,13 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(_response(*requested, body))
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Print nothing: the address contains the token."""
+        """Print nothing, because the address contains the token."""
 
     def _authorized(self) -> tuple[EditorSession, str] | None:
-        """Return the session of a request and the path within it; if it is not allowed, answer, and return None."""
+        """Return the session of a request, and the path of the request within this session.
+
+        If the request is not allowed, send an error, and return None.
+        """
         origin, host = self.headers.get("Origin"), self.headers.get("Host", "")
         if host not in self.server.hosts:
             self._send(_error("wrong host", HTTPStatus.MISDIRECTED_REQUEST))
@@ -173,7 +180,7 @@ class _Handler(BaseHTTPRequestHandler):
         return requested
 
     def _body(self) -> bytes | None:
-        """Return the body of a request; None if it is too large or has no length, and then close the connection."""
+        """Return the body of a request. If it is too large or has no length, close the connection and return None."""
         length = self.headers.get("Content-Length", "")
         if not length.isdecimal() or int(length) > MAX_REQUEST_BYTES:
             self.close_connection = True
@@ -210,6 +217,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _replay(session: EditorSession, number: int) -> Response:
+    """Return the replay page of a run with the policy that the page itself contains."""
     trial = session.runs.trial(number)
     if trial is None or not trial.replay.is_file():
         return _error("there is no such replay", HTTPStatus.NOT_FOUND)
@@ -220,6 +228,7 @@ def _replay(session: EditorSession, number: int) -> Response:
 
 
 def _response(session: EditorSession, name: str, body: bytes) -> Response:
+    """Return the answer of a session to the request `api/NAME` with a JSON object as its body."""
     handler = session.requests.get(name.removeprefix("api/")) if name.startswith("api/") else None
     if handler is None:
         return _error("no such request", HTTPStatus.NOT_FOUND)
@@ -249,7 +258,7 @@ def _error(message: str, status: HTTPStatus) -> Response:
 
 
 def _internal_error() -> Response:
-    """Print the traceback for a report, and tell the page."""
+    """Print the traceback in the terminal, and return an error for the page."""
     traceback.print_exc()
     return _error(
         "internal error: this is a bug in simscen; the terminal shows details", HTTPStatus.INTERNAL_SERVER_ERROR

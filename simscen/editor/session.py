@@ -1,4 +1,7 @@
-"""What the page asks the program for: one method for each request, with JSON data in and out."""
+"""Requests that the editor page sends to simscen: one method for each, with JSON data as argument and result.
+
+The page holds the edited text, and sends it with each request as `text`.
+"""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -11,8 +14,8 @@ from simscen.editor.checking import TextChecks
 from simscen.editor.document import NEW, ChangedMeanwhile, Content, Document, EditedFile
 from simscen.editor.forms import form_data
 from simscen.editor.map_view.background import Backgrounds
-from simscen.editor.map_view.map_edits import edits_of
-from simscen.editor.map_view.map_objects import object_at_problem
+from simscen.editor.map_view.map_edits import read_edits
+from simscen.editor.map_view.map_objects import MapObject, object_at_problem
 from simscen.editor.map_view.scene import map_objects, scene_data, scene_parts
 from simscen.editor.preview import preview_data
 from simscen.editor.text_editing.splices import EditRefused
@@ -20,20 +23,22 @@ from simscen.editor.text_editing.text_edits import apply_edits
 from simscen.editor.trial_run import TrialRuns
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.stacks.choice import StackChoice
-from simscen.loading.yaml.source_nodes import parse_source
+from simscen.loading.yaml.source_nodes import SourceNode, parse_source
 from simscen.loading.yaml.textfile import MAX_FILE_BYTES
 from simscen.run.process.jobs import Backend
 
 Data = dict[str, Any]
-WithCommand = Callable[[LoadedScenario], tuple[LoadedScenario, list[Problem]]]
+"""JSON object."""
+CommandResolver = Callable[[LoadedScenario], tuple[LoadedScenario, list[Problem]]]
+"""Function that returns a scenario with the commands of its external stacks, and problems if they are unknown."""
 
 
-def _as_it_is(loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:
+def _without_commands(loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:
     return loaded, []
 
 
 class RequestRefused(Exception):
-    """The request cannot be answered; `status` is the HTTP status, `data` goes to the page."""
+    """The request cannot be answered. `status` is the HTTP status, `data` are further keys of the answer."""
 
     def __init__(self, message: str, status: int = 400, data: Data | None = None) -> None:
         super().__init__(message)
@@ -41,7 +46,11 @@ class RequestRefused(Exception):
 
 
 class EditorSession:
-    """One file in one editor. The page holds the text, and sends it with each request."""
+    """Answers the requests about one edited file.
+
+    Methods without an underscore whose names are in `requests` are requests of the page. They raise RequestRefused if
+    the request cannot be answered.
+    """
 
     def __init__(
         self,
@@ -50,18 +59,18 @@ class EditorSession:
         new_text: str = "",
         lenient: bool = False,
         stack: StackChoice | None = None,
-        with_command: WithCommand = _as_it_is,
+        resolve_commands: CommandResolver = _without_commands,
     ) -> None:
-        """Open a file; `new_text` is the text of one that does not exist yet. Raises InvalidInput.
+        """Open a file. `new_text` is the text of a file that does not exist yet; "" for an existing file.
 
-        Runs use `stack` instead of the stack of the scenario. `with_command` returns a scenario with the commands of
-        its external stacks, and problems if they are unknown.
+        `backend_factory` makes the processes of runs. `lenient` has the meaning of the option --lenient. Runs use
+        `stack` instead of the stack of the scenario, unless it is None. Raises InvalidInput if the file cannot be read.
         """
         self.file = file
         self.runs = TrialRuns(backend_factory)
-        self.world_page: Callable[[Path], str] = lambda _: ""
-        """Returns the address of the page that edits a world file, relative to that of this session."""
-        self._backend_factory, self._lenient, self._with_command = backend_factory, lenient, with_command
+        self.world_page_address: Callable[[Path], str] = lambda _: ""
+        """Returns the address of the page that edits a world file, relative to the page of this session."""
+        self._backend_factory, self._lenient, self._resolve_commands = backend_factory, lenient, resolve_commands
         self._stack = stack
         self._document = Document(file.path, file.display_name)
         self._opened = Content(new_text, NEW) if new_text else self._document.read()
@@ -82,19 +91,19 @@ class EditorSession:
             "run-stop": self.run_stop,
         }
 
-    def other(self, file: EditedFile) -> "EditorSession":
-        """Open another file with the same options. Raises InvalidInput."""
+    def open_other(self, file: EditedFile) -> "EditorSession":
+        """Return a session for another file with the same options. Raises InvalidInput if it cannot be read."""
         return EditorSession(file, self._backend_factory, lenient=self._lenient)
 
     def open(self, _: Data) -> Data:
-        """Return the text of the file as it is now; that of the last time if it cannot be read any more."""
+        """Return the present text of the file, or the text that was read last if the file can no longer be read."""
         if self._opened.version != NEW:
             with suppress(InvalidInput, OSError):
                 self._opened = self._document.read()
         return self._opened_data(self._opened)
 
     def reload(self, _: Data) -> Data:
-        """Read the file again."""
+        """Read the file again, and return its text."""
         try:
             self._opened = self._document.read()
         except InvalidInput as error:
@@ -102,31 +111,35 @@ class EditorSession:
         return self._opened_data(self._opened)
 
     def scene(self, request: Data) -> Data:
-        """Return what the map shows of a text; `known` is the id of a background that the page has already."""
+        """Return what the map shows of a text.
+
+        The request contains the ID of the background that the page already has as `known`. If this is the background,
+        the answer has None instead of it.
+        """
         with self._scene_lock:
             parts = scene_parts(self.file, _text(request))
             if parts is None:
                 raise RequestRefused("the text is not a YAML mapping yet, so the map shows its last valid state", 422)
             data = scene_data(parts, self._backgrounds)
-        data["world_page"] = self.world_page(parts.world.path) if data["world_file"] and parts.world else ""
+        data["world_page"] = self.world_page_address(parts.world.path) if data["world_file"] and parts.world else ""
         if data["background"]["id"] and data["background"]["id"] == request.get("known"):
             data["background"] = None
         return data
 
     def problems(self, request: Data) -> Data:
-        """Return the problems of a text, each with the id of the thing on the map that it is about."""
+        """Return the problems of a text, each with the ID of the object on the map that contains its position."""
         text = _text(request)
         with self._check_lock:
             found = self._checks.problems(text)
         parts = scene_parts(self.file, text)
         objects = [] if parts is None else map_objects(parts)
-        own = parse_source(text)
-        return {"problems": [self._problem_data(one, objects, own, text) for one in found]}
+        source = parse_source(text)
+        return {"problems": [self._problem_data(one, objects, source, text) for one in found]}
 
     def edit(self, request: Data) -> Data:
-        """Return the text after edits that were made on the map or in a form."""
+        """Return the text after `edits` that were made on the map or in a form."""
         text = _text(request)
-        return {"text": self._edited(text, request.get("edits"))}
+        return {"text": self._edited_text(text, request.get("edits"))}
 
     def form(self, request: Data) -> Data:
         """Return the form of the value at `keys`."""
@@ -139,15 +152,18 @@ class EditorSession:
         return form_data(self.file.kind, text, parts.tree.plain, tuple(keys))
 
     def preview(self, request: Data) -> Data:
-        """Return paths and clearances as they would be after some edits."""
+        """Return the paths and clearances of the robots as they would be after `edits`."""
         if self.file.kind != "scenario":
             return {"reason": "", "robots": {}}
-        text = self._edited(_text(request), request.get("edits", []))
+        text = self._edited_text(_text(request), request.get("edits", []))
         with self._preview_lock:
             return preview_data(self._preview_checks, text)
 
     def save(self, request: Data) -> Data:
-        """Write the text to the file if that is still the `version` that the page has read, or with `overwrite`."""
+        """Write the text to the file, and return the new version.
+
+        Refused if the file no longer has the `version` that the page has read, unless `overwrite` is true.
+        """
         text, version = _text(request), request.get("version")
         try:
             saved = self._document.save(text, str(version), request.get("overwrite") is True)
@@ -158,7 +174,7 @@ class EditorSession:
         return {"version": saved}
 
     def run(self, request: Data) -> Data:
-        """Start a run of a text; of a scenario with variations, of the first one."""
+        """Start a run of the scenario, or of its first variation. Refused if the text has errors."""
         if self.file.kind != "scenario":
             raise RequestRefused("only a scenario can run")
         with self._check_lock:
@@ -169,32 +185,33 @@ class EditorSession:
         errors = [problem for problem in problems if problem.severity == "error"]
         if errors:
             raise RequestRefused(f"the scenario has problems: {_first_message(errors)}", 422)
-        scenario, undefined = self._with_command(loaded[0])
+        scenario, undefined = self._resolve_commands(loaded[0])
         if undefined:
             raise RequestRefused(f"{_first_message(undefined)}; {undefined[0].hint}", 422)
         return self.runs.start(scenario).data()
 
     def run_status(self, request: Data) -> Data:
-        """Return the state of a run."""
+        """Return the state of the run with the number `run`."""
         trial = self.runs.trial(_run_number(request))
         if trial is None:
             raise RequestRefused("there is no such run", 404)
         return trial.data()
 
     def run_stop(self, request: Data) -> Data:
-        """Stop a run."""
+        """Stop the run with the number `run`."""
         trial = self.runs.trial(_run_number(request))
         if trial is not None:
             trial.is_canceled = True
         return {}
 
-    def _edited(self, text: str, edits: Any) -> str:
+    def _edited_text(self, text: str, edits: Any) -> str:
         try:
-            return apply_edits(text, edits_of(edits, text, self.file.kind)).text
+            return apply_edits(text, read_edits(edits, text, self.file.kind)).text
         except EditRefused as error:
             raise RequestRefused(str(error), 422) from error
 
     def _opened_data(self, content: Content) -> Data:
+        """Return the answer to `open` and `reload`."""
         return {
             "name": self.file.display_name,
             "kind": self.file.kind,
@@ -204,7 +221,8 @@ class EditorSession:
             "stack": "" if self._stack is None else self._stack.name,
         }
 
-    def _problem_data(self, problem: Problem, objects: list[Any], own: Any, text: str) -> Data:
+    def _problem_data(self, problem: Problem, objects: list[MapObject], source: SourceNode | None, text: str) -> Data:
+        """Return a problem as JSON data. `source` is the syntax tree of the text; None if it is invalid."""
         is_own = problem.path == self.file.display_name
         return {
             "path": problem.path,
@@ -215,11 +233,12 @@ class EditorSession:
             "severity": problem.severity,
             "message": problem.message,
             "hint": problem.hint,
-            "object": object_at_problem(problem, objects, own, text) if is_own else "",
+            "object": object_at_problem(problem, objects, source, text) if is_own else "",
         }
 
 
 def _text(request: Data) -> str:
+    """Return the text of a request. Raises RequestRefused if there is none, or if it is too large."""
     text = request.get("text")
     if not isinstance(text, str):
         raise RequestRefused("the request has no text")
@@ -234,5 +253,6 @@ def _first_message(problems: list[Problem]) -> str:
 
 
 def _run_number(request: Data) -> int:
+    """Return the number of the run that a request names; 0 if it names none."""
     number = request.get("run")
     return number if isinstance(number, int) else 0

@@ -1,4 +1,4 @@
-"""Run the text of the editor once, in a process of its own, without saving it."""
+"""Trial runs of the text in the editor, in a process of their own, so that the text need not be saved."""
 
 import shutil
 import tempfile
@@ -17,18 +17,30 @@ from simscen.run.process.jobs import Backend, Job, ReplayMode
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 WALL_LIMIT_S = 300.0
-END_S = 5.0
-"""How long to wait for a run that was stopped; its process ends with this one at the latest."""
-REPLAY = "replay.html"
+"""Maximum wall time of a run."""
+STOP_TIMEOUT_S = 5.0
+"""Maximum wall time to wait for a run to stop. Its process ends with the process of the editor at the latest."""
+REPLAY_FILE = "replay.html"
 
 
 class _Canceled(Exception):
-    """The person at the page stopped the run."""
+    """The user stopped the run."""
 
 
 @dataclass
 class Trial:
-    """One run: its progress in simulated seconds, then its verdicts."""
+    """State of one run, which changes while the run takes place.
+
+    Attributes:
+        number: Number of the run, starting at 1.
+        folder: Folder of its files.
+        limit: Maximum simulated time in s.
+        seconds: Simulated time so far in s.
+        state: "running", then the outcome of the run, "canceled", or "error".
+        message: Reason of the end or the error; "" while the run takes place.
+        verdicts: Verdicts after the end, each with `id`, `status`, `text`, and `line`.
+        is_canceled: Whether the run must stop.
+    """
 
     number: int
     folder: Path
@@ -40,7 +52,7 @@ class Trial:
     is_canceled: bool = False
 
     def data(self) -> dict[str, Any]:
-        """Return the state as JSON data; `replay`: whether there is a replay page."""
+        """Return the state as JSON data. Its key `replay` states whether there is a replay page."""
         return {
             "run": self.number,
             "state": self.state,
@@ -54,11 +66,14 @@ class Trial:
     @property
     def replay(self) -> Path:
         """The replay page of the run."""
-        return self.folder / REPLAY
+        return self.folder / REPLAY_FILE
 
 
 class TrialRuns:
-    """Runs texts one after the other, in a temporary folder that is deleted at the end."""
+    """Runs scenarios one after the other, with files in a temporary folder that `close` deletes.
+
+    `backend_factory` makes the processes of a run.
+    """
 
     def __init__(self, backend_factory: Callable[[], Backend]) -> None:
         self._backend_factory = backend_factory
@@ -67,7 +82,7 @@ class TrialRuns:
         self._lock = threading.Lock()
 
     def start(self, loaded: LoadedScenario) -> Trial:
-        """Start a run, and cancel the one before."""
+        """Start a run in a thread, after canceling all earlier runs, and return its state."""
         for trial in self._trials:
             trial.is_canceled = True
         self._folder = self._folder or Path(tempfile.mkdtemp(prefix="simscen-edit-"))
@@ -78,20 +93,22 @@ class TrialRuns:
         return trial
 
     def trial(self, number: int) -> Trial | None:
-        """Return a run by its number from 1."""
+        """Return the state of the run with a number; None if there is no such run."""
         return self._trials[number - 1] if 0 < number <= len(self._trials) else None
 
     def close(self) -> None:
         """Cancel all runs and delete their files."""
         for trial in self._trials:
             trial.is_canceled = True
-        has_ended = self._lock.acquire(timeout=END_S)
+        has_ended = self._lock.acquire(timeout=STOP_TIMEOUT_S)
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
         if has_ended:
             self._lock.release()
 
     def _run(self, loaded: LoadedScenario, trial: Trial) -> None:
+        """Simulate a scenario after the runs before it have ended, and write its progress and result to `trial`."""
+
         def listen(event: SessionEvent) -> None:
             if trial.is_canceled:
                 raise _Canceled
@@ -109,6 +126,7 @@ class TrialRuns:
             trial.state, trial.message = "error", one_line(str(error))
 
     def _finish(self, trial: Trial, result: RunResult) -> None:
+        """Write the result to `trial`; the state last, because the page then shows the rest."""
         lines = result.lines or (0,) * len(result.verdicts)
         for verdict, line in zip(result.verdicts, lines, strict=False):
             finding = verdict.tightest

@@ -8,7 +8,6 @@ probability of at most 1 - `confidence`.
 import math
 from collections.abc import Sequence
 
-from simscen.core.records.comparison import ScenarioChange
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.study import ClaimResult, ClaimStatus
 from simscen.model.acceptance import PassRate

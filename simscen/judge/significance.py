@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from simscen.core.records.session_events import ScenarioChange
+from simscen.core.records.comparison import ScenarioChange
 from simscen.core.statistics import holm, sign_test
 
 PASS_RATE = "pass rate"

@@ -230,7 +230,7 @@ def failure_representation(run: RunFinished) -> Any:
     The class is not public in pytest, but it is the only form in which xdist sends a failure to the controller.
     """
     lines = [f"{plain_text(line).removeprefix('      ')}\n" for line in violation_lines(run)]
-    first = next((complaint.line for complaint in reported_violations(run) if not complaint.warning), 0)
+    first = next((complaint.line for complaint in reported_violations(run) if not complaint.is_warning), 0)
     crash = ReprFileLocation(path=scenario_file(run), lineno=first or 1, message=_cause(run))
     return ReprExceptionInfo(ReprTraceback([ReprEntryNative(lines)], extraline=None, style="native"), crash)
 
@@ -239,4 +239,4 @@ def _cause(run: RunFinished) -> str:
     """Return the first reason of the failure in one line."""
     if run.outcome is Outcome.ERROR:
         return error_summary(run)
-    return next((complaint.message for complaint in reported_violations(run) if not complaint.warning), "failed")
+    return next((complaint.message for complaint in reported_violations(run) if not complaint.is_warning), "failed")

@@ -1,4 +1,4 @@
-"""Texts and console lines that compare stacks or sessions."""
+"""Comparison of stacks or sessions as console lines, and the texts that HTML and Markdown use as well."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -11,26 +11,31 @@ from simscen.core.records.comparison import (
     ScenarioChange,
 )
 from simscen.judge.significance import PASS_RATE
-from simscen.report.display_text import Role, StyledLine, StyledText, one_line
+from simscen.report.display_text import Role, StyledLine, StyledText, number_with_noun, one_line
 
 MAX_FLIPS = 10
-"""Maximum number of runs with different outcomes to list."""
+"""Maximum number of listed flips. A flip is a scenario and seed that passes with only one of the two stacks."""
 MAX_CHANGES = 10
-"""Maximum number of significant changes to list."""
+"""Maximum number of listed significant changes."""
 MIN_NAME_COLUMNS = 24
-"""Minimum width of the column of scenario names."""
-MAX_STACK_NAME = 16
+"""Minimum width of the column of scenario names, in characters."""
+MAX_STACK_NAME_COLUMNS = 16
+"""Maximum width of the name of a stack or session in a heading, in characters."""
 
 
 Links = Mapping[tuple[str, str, int], str]
-"""Replay, log, or command of a failed run by stack or session, scenario, and seed."""
+"""Path of the replay or log of a failed run, or the command that repeats it.
+
+The key consists of the name of the stack or session, the scenario ID, and the seed.
+"""
 NO_LINKS: Links = {}
 
 
 def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | None = None) -> Iterator[StyledLine]:
     """Yield a table of outcomes by scenario and stack, then the comparison of each stack with the first one.
 
-    `prefix` is removed from IDs. Names are shortened to fit into `columns`, if given.
+    `prefix` is removed from scenario IDs. `columns` is the width of the terminal, for which scenario names are
+    shortened; None for no limit.
     """
     yield ()
     yield from _outcome_table(comparison, prefix, columns)
@@ -41,7 +46,10 @@ def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | No
 
 
 def session_comparison_lines(comparison: Comparison, links: Links, is_worse: bool) -> Iterator[StyledLine]:
-    """Yield the comparison of a session with the baseline: changed outcomes first, and the verdict `is_worse` last."""
+    """Yield the comparison of one session with the baseline: changed outcomes first, and the verdict last.
+
+    `is_worse` is the verdict: the session is significantly worse than the baseline.
+    """
     (against,) = comparison.against
     yield from _comparison_section(comparison.baseline, with_changed_metrics(against), "", links)
     yield from _outcome_table(comparison, "", None, changed_only=True)
@@ -59,36 +67,36 @@ def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
 
 
 def session_verdict(against: BaselineComparison, is_worse: bool) -> str:
-    """Return in one sentence whether a session is worse than the baseline."""
+    """Return the verdict in one sentence. If `is_worse` is false, it contains the number of runs that newly fail."""
     newly_failed = sum(flip.failed == against.stack for flip in against.flips)
     if is_worse:
         return f"{against.stack} is significantly worse"
     runs = "1 run fails that passed" if newly_failed == 1 else f"{newly_failed} runs fail that passed"
     more = f"; {runs} before, which may be chance" if newly_failed else ""
-    return f"{against.stack} is not significantly worse in {pairs_text(against.pairs)}{more}"
+    return f"{against.stack} is not significantly worse in {number_with_noun(against.pairs, 'pair')}{more}"
 
 
 def outcome_text(outcomes: OutcomeCounts) -> str:
-    """Return passed and finished runs such as "3/5", followed by the number of errors such as "1!"."""
+    """Return the passed and the completed runs such as "3/5", or "3/5 1!" if one more run ended with an error."""
     errors = f" {outcomes.errors}!" if outcomes.errors else ""
     return f"{outcomes.passed}/{outcomes.decided}{errors}"
 
 
 def excluded_text(against: BaselineComparison) -> str:
-    """Return which runs are not compared, and why, or ""."""
+    """Return a note on the runs that are not compared, with the reason; "" if all runs are compared."""
     parts = []
     if against.error_pairs:
-        parts.append(f"{pairs_text(against.error_pairs)} with an error")
+        parts.append(f"{number_with_noun(against.error_pairs, 'pair')} with an error")
     if against.unpaired_runs:
-        parts.append(f"{against.unpaired_runs} {'run' if against.unpaired_runs == 1 else 'runs'} without a partner")
+        parts.append(f"{number_with_noun(against.unpaired_runs, 'run')} without a partner")
     return "left out: " + ", ".join(parts) if parts else ""
 
 
 def unequal_progress_text(against: BaselineComparison) -> str:
-    """Return a note on the pairs in which only one run reached its goals, with their number; "" without such pairs."""
+    """Return a note with the number of pairs in which only one run reached its goals; "" if there are none."""
     if not against.pairs_with_one_arrival:
         return ""
-    pairs = pairs_text(against.pairs_with_one_arrival)
+    pairs = number_with_noun(against.pairs_with_one_arrival, "pair")
     return f"in {pairs} only one run reached its goals, so their metrics are not compared"
 
 
@@ -96,7 +104,9 @@ def comparison_headline(baseline: str, against: BaselineComparison) -> str:
     """Return the result of the comparison in one line: pairs, better and worse outcomes, p-value."""
     better = sum(flip.passed == against.stack for flip in against.flips)
     worse = len(against.flips) - better
-    text = f"{against.stack} against {baseline}: {pairs_text(against.pairs)} of the same scenario and seed"
+    text = (
+        f"{against.stack} against {baseline}: {number_with_noun(against.pairs, 'pair')} of the same scenario and seed"
+    )
     if not against.pairs:
         return f"{against.stack} against {baseline}: nothing to compare"
     if not against.flips:
@@ -105,36 +115,44 @@ def comparison_headline(baseline: str, against: BaselineComparison) -> str:
 
 
 def change_text(change: ScenarioChange, prefix: str = "") -> str:
-    """Return a significant change of a scenario in one line."""
+    """Return a significant change of a scenario in one line. `prefix` is removed from the scenario ID."""
     if change.what == PASS_RATE:
         values = f"{PASS_RATE} {change.baseline:.0%} → {change.value:.0%}"
     else:
         digits = 3 if change.unit and max(abs(change.baseline), abs(change.value)) < 1 else 2
         unit = f" {change.unit}" if change.unit else ""
         values = f"{change.what} {change.baseline:.{digits}f} → {change.value:.{digits}f}{unit}"
-    return f"{change.scenario.removeprefix(prefix)}: {values} (p = {change.p:.2g}, {pairs_text(change.pairs)})"
+    pairs = number_with_noun(change.pairs, "pair")
+    return f"{change.scenario.removeprefix(prefix)}: {values} (p = {change.p:.2g}, {pairs})"
 
 
 def change_verdict(change: ScenarioChange) -> str:
-    """Return "worse", "better", or "other" for a metric that may go either way."""
+    """Return "worse" or "better"; "other" for a metric of which neither a larger nor a smaller value is better."""
     return "other" if change.is_worse is None else "worse" if change.is_worse else "better"
 
 
-def difference_columns(one: MetricDifference) -> tuple[str, str, str, str]:
-    """Return the two means, their difference, and its interval, with an extra digit for values below 1."""
-    digits = 3 if one.unit and max(abs(one.baseline), abs(one.value)) < 1 else 2
-    interval = "" if one.interval is None else " … ".join(f"{bound:+.{digits}f}" for bound in one.interval)
-    return f"{one.baseline:.{digits}f}", f"{one.value:.{digits}f}", f"{one.difference:+.{digits}f}", interval
+def difference_cells(metric: MetricDifference) -> tuple[str, str, str, str]:
+    """Return four table cells: mean of the baseline, mean of the other stack, difference, and 95 % interval.
+
+    The interval is "" if there are too few pairs.
+    """
+    digits = 3 if metric.unit and max(abs(metric.baseline), abs(metric.value)) < 1 else 2
+    interval = "" if metric.interval is None else " … ".join(f"{bound:+.{digits}f}" for bound in metric.interval)
+    return f"{metric.baseline:.{digits}f}", f"{metric.value:.{digits}f}", f"{metric.difference:+.{digits}f}", interval
 
 
 def listed_outcomes(comparison: Comparison, changed_only: bool) -> dict[str, Mapping[str, OutcomeCounts]]:
-    """Return the outcomes by scenario; with `changed_only`, only those with a changed number of passed runs."""
+    """Return the outcomes by scenario and stack.
+
+    With `changed_only`, return only scenarios whose numbers of outcomes differ between the stacks or sessions.
+    """
     return {name: row for name, row in comparison.outcomes.items() if not changed_only or len(set(row.values())) > 1}
 
 
 def _outcome_table(
     comparison: Comparison, prefix: str, columns: int | None, changed_only: bool = False
 ) -> Iterator[StyledLine]:
+    """Yield a heading, a row for each scenario, and a row for all scenarios. Arguments are as in `comparison_lines`."""
     rows = [
         (one_line(scenario.removeprefix(prefix)), [outcome_text(row[name]) for name in comparison.stacks])
         for scenario, row in listed_outcomes(comparison, changed_only).items()
@@ -160,6 +178,7 @@ def _outcome_table(
 def _comparison_section(
     baseline: str, against: BaselineComparison, prefix: str, links: Links = NO_LINKS
 ) -> Iterator[StyledLine]:
+    """Yield the headline, flips, metrics, significant changes, and notes of one comparison with the baseline."""
     yield (StyledText(f"  {comparison_headline(baseline, against)}", "name"),)
     for flip in against.flips[:MAX_FLIPS]:
         better = flip.passed == against.stack
@@ -173,14 +192,14 @@ def _comparison_section(
             yield (StyledText(f"           {link}"),)
     if len(against.flips) > MAX_FLIPS:
         yield (StyledText(f"    and {len(against.flips) - MAX_FLIPS} more, in the JSON results", "quiet"),)
-    yield from _differences(baseline, against)
-    yield from _changes(against, prefix)
+    yield from _metric_table(baseline, against)
+    yield from _change_lines(against, prefix)
     for note in (unequal_progress_text(against), excluded_text(against)):
         if note:
             yield (StyledText(f"    {note}", "quiet"),)
 
 
-def _changes(against: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
+def _change_lines(against: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
     if not against.changes:
         return
     yield (StyledText("    significant changes", "quiet"),)
@@ -196,7 +215,7 @@ def _changes(against: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
         yield (StyledText(f"    and {len(against.changes) - MAX_CHANGES} more, in the JSON results", "quiet"),)
 
 
-def _differences(baseline: str, against: BaselineComparison) -> Iterator[StyledLine]:
+def _metric_table(baseline: str, against: BaselineComparison) -> Iterator[StyledLine]:
     if not against.differences:
         return
     stacks = shorten(baseline), shorten(against.stack)
@@ -204,7 +223,7 @@ def _differences(baseline: str, against: BaselineComparison) -> Iterator[StyledL
     rows = [
         (
             f"{difference.metric}, {difference.unit}".removesuffix(", "),
-            *difference_columns(difference),
+            *difference_cells(difference),
             f"{difference.lower}/{difference.equal}/{difference.higher}",
         )
         for difference in against.differences
@@ -218,11 +237,6 @@ def _differences(baseline: str, against: BaselineComparison) -> Iterator[StyledL
         yield (StyledText(f"    {'  '.join((first, *cells))}".rstrip(), "plain" if number else "quiet"),)
 
 
-def shorten(text: str, max_length: int = MAX_STACK_NAME) -> str:
+def shorten(text: str, max_length: int = MAX_STACK_NAME_COLUMNS) -> str:
     """Shorten text to `max_length` characters by removing its middle."""
     return text if len(text) <= max_length else f"{text[: (max_length - 1) // 2]}…{text[-(max_length // 2) :]}"
-
-
-def pairs_text(number: int) -> str:
-    """Return "1 pair", "2 pairs", and so on."""
-    return f"{number} pair" if number == 1 else f"{number} pairs"

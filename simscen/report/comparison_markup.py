@@ -1,7 +1,6 @@
-"""Comparison of stacks or sessions as HTML and as Markdown."""
+"""Comparison of stacks or sessions as a section of an HTML page, and as Markdown for GitHub."""
 
 from dataclasses import replace
-from html import escape
 
 from simscen.core.records.comparison import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
 from simscen.report.comparison import (
@@ -12,7 +11,7 @@ from simscen.report.comparison import (
     change_text,
     change_verdict,
     comparison_headline,
-    difference_columns,
+    difference_cells,
     excluded_text,
     listed_outcomes,
     outcome_text,
@@ -20,44 +19,55 @@ from simscen.report.comparison import (
     unequal_progress_text,
     with_changed_metrics,
 )
-from simscen.report.display_text import one_line
+from simscen.report.display_text import html_text, one_line
 
 EXPLANATION = (
     "Runs are paired by scenario and seed. Passed: number of passed and of finished runs. Differences are means over "
     "pairs with 95 % bootstrap intervals; p is from McNemar's exact test for outcomes and from Wilcoxon's signed-rank "
     "test for metrics, for significant changes with Holm's correction. -/=/+: pairs with a lower, equal, higher value."
 )
-_HEAD = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "-/=/+", "p")
+"""Text next to the tables that explains their columns."""
+_HEADINGS = ("", "pairs", "{0}", "{1}", "difference", "95 % interval", "-/=/+", "p")
+"""Headings of the table of metrics. {0} is the name of the baseline, {1} that of the stack compared with it."""
 
 
-def as_html(comparison: Comparison) -> str:
-    """Return the comparison as a section of the report."""
+def comparison_html(comparison: Comparison) -> str:
+    """Return the comparison as a `<section>` of the HTML report."""
     names = "".join(
-        f"<th>{_html_text(name)}<div class='quiet'>{_html_text(value)}</div></th>"
+        f"<th>{html_text(name)}<div class='quiet'>{html_text(value)}</div></th>"
         for name, value in comparison.stacks.items()
     )
     rows = "".join(
-        f"<tr><td>{_html_text(scenario)}</td>{''.join(_cell(row[name]) for name in comparison.stacks)}</tr>"
+        f"<tr><td>{html_text(scenario)}</td>{''.join(_outcome_cell(row[name]) for name in comparison.stacks)}</tr>"
         for scenario, row in comparison.outcomes.items()
     )
-    total = "".join(_cell(comparison.total(name)) for name in comparison.stacks)
+    total = "".join(_outcome_cell(comparison.total(name)) for name in comparison.stacks)
     total_row = f"<tr><td><b>all</b></td>{total}</tr>" if len(comparison.outcomes) > 1 else ""
     return (
-        f'<section class="in"><h2>{_html_text(" and ".join(comparison.stacks))}</h2><p class="quiet">{EXPLANATION}</p>'
+        f'<section class="in"><h2>{html_text(" and ".join(comparison.stacks))}</h2><p class="quiet">{EXPLANATION}</p>'
         f"<table><tr><th>passed</th>{names}</tr>{rows}{total_row}</table>"
-        f"{''.join(_against_html(comparison.baseline, against) for against in comparison.against)}</section>"
+        f"{''.join(_against_baseline_html(comparison.baseline, against) for against in comparison.against)}</section>"
     )
 
 
 def session_comparison_markdown(comparison: Comparison, links: Links, is_worse: bool) -> list[str]:
-    """Return the comparison of a session with the baseline as lines of Markdown, for a pull request."""
+    """Return the comparison of one session with the baseline as lines of Markdown, for a pull request.
+
+    `is_worse` is the verdict: the session is significantly worse than the baseline.
+    """
     (against,) = comparison.against
     reduced = replace(comparison, against=(with_changed_metrics(against),))
-    return [f"### simscen: {session_verdict(against, is_worse)}", *as_markdown(reduced, links, changed_only=True)]
+    return [
+        f"### simscen: {session_verdict(against, is_worse)}",
+        *comparison_markdown(reduced, links, changed_only=True),
+    ]
 
 
-def as_markdown(comparison: Comparison, links: Links = NO_LINKS, changed_only: bool = False) -> list[str]:
-    """Return the comparison as lines of Markdown; `changed_only` omits scenarios with as many passed runs as before."""
+def comparison_markdown(comparison: Comparison, links: Links = NO_LINKS, changed_only: bool = False) -> list[str]:
+    """Return the comparison as lines of Markdown.
+
+    `changed_only` omits scenarios whose numbers of outcomes are equal for all stacks or sessions.
+    """
     cell = markdown_cell
     names = [cell(name) for name in comparison.stacks]
     lines = ["", f"| passed | {' | '.join(names)} |", f"|---|{'---:|' * len(names)}"]
@@ -75,9 +85,9 @@ def as_markdown(comparison: Comparison, links: Links = NO_LINKS, changed_only: b
         ]
         more = len(against.flips) - MAX_FLIPS
         lines += [f"- and {more} more, in the JSON results"] if more > 0 else []
-        heads = [cell(head.format(comparison.baseline, against.stack)) for head in _HEAD]
+        heads = [cell(head.format(comparison.baseline, against.stack)) for head in _HEADINGS]
         lines += ["", f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
-        lines += [f"| {' | '.join(_cells(difference))} |" for difference in against.differences]
+        lines += [f"| {' | '.join(_metric_cells(difference))} |" for difference in against.differences]
         lines += ["", "Significant changes:", ""] if against.changes else []
         lines += [
             f"- {change_verdict(change)}: {cell(change_text(change))}" for change in against.changes[:MAX_CHANGES]
@@ -89,6 +99,7 @@ def as_markdown(comparison: Comparison, links: Links = NO_LINKS, changed_only: b
 
 
 def _link_markdown(flip: Flip, links: Links) -> str:
+    """Return the link to the failed run of a flip in parentheses; "" if there is none."""
     link = links.get((flip.failed, flip.scenario, flip.seed))
     return f" (`{link}`)" if link else ""
 
@@ -101,35 +112,36 @@ def markdown_cell(text: str) -> str:
     return one_line(text).translate(_MARKDOWN_ESCAPES)
 
 
-def _cell(outcomes: OutcomeCounts) -> str:
+def _outcome_cell(outcomes: OutcomeCounts) -> str:
     css_class = "odd" if outcomes.errors else "bad" if outcomes.failed else "good"
     return f'<td class="count {css_class}">{outcome_text(outcomes)}</td>'
 
 
-def _against_html(baseline: str, against: BaselineComparison) -> str:
+def _against_baseline_html(baseline: str, against: BaselineComparison) -> str:
+    """Return flips, metrics, significant changes, and notes of one comparison with the baseline as HTML."""
     flips = "".join(
         f'<tr class="{"" if flip.passed == against.stack else "bad"}">'
-        f"<td>{'better' if flip.passed == against.stack else 'worse'}</td><td>{_html_text(flip.scenario)}</td>"
+        f"<td>{'better' if flip.passed == against.stack else 'worse'}</td><td>{html_text(flip.scenario)}</td>"
         f"<td>seed {flip.seed}</td>"
-        f"<td>passed with {_html_text(flip.passed)}, failed with {_html_text(flip.failed)}</td>"
-        f"<td>{_html_text(flip.why)}</td></tr>"
+        f"<td>passed with {html_text(flip.passed)}, failed with {html_text(flip.failed)}</td>"
+        f"<td>{html_text(flip.why)}</td></tr>"
         for flip in against.flips
     )
-    _, *headings = (_html_text(head.format(baseline, against.stack)) for head in _HEAD)
+    _, *headings = (html_text(head.format(baseline, against.stack)) for head in _HEADINGS)
     heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in headings)
-    rows = "".join(_difference(difference) for difference in against.differences)
+    rows = "".join(_metric_row_html(difference) for difference in against.differences)
     changes = "".join(
         f'<tr class="{"bad" if change.is_worse else ""}"><td>{change_verdict(change)}</td>'
-        f"<td>{_html_text(change_text(change))}</td></tr>"
+        f"<td>{html_text(change_text(change))}</td></tr>"
         for change in against.changes
     )
     notes = "".join(
-        f'<p class="quiet">{_html_text(note)}</p>'
+        f'<p class="quiet">{html_text(note)}</p>'
         for note in (unequal_progress_text(against), excluded_text(against))
         if note
     )
     return (
-        f"<h3>{_html_text(comparison_headline(baseline, against))}</h3>"
+        f"<h3>{html_text(comparison_headline(baseline, against))}</h3>"
         + (f"<table>{flips}</table>" if flips else "")
         + (f"<table><tr>{heads}</tr>{rows}</table>" if rows else "")
         + (f"<table><tr><th colspan='2'>significant changes</th></tr>{changes}</table>" if changes else "")
@@ -137,20 +149,16 @@ def _against_html(baseline: str, against: BaselineComparison) -> str:
     )
 
 
-def _difference(one: MetricDifference) -> str:
-    name, *cells = _cells(one)
-    is_significant = one.interval is not None and not one.interval[0] <= 0.0 <= one.interval[1]
+def _metric_row_html(metric: MetricDifference) -> str:
+    name, *cells = _metric_cells(metric)
+    is_significant = metric.interval is not None and not metric.interval[0] <= 0.0 <= metric.interval[1]
     listed = "".join(f'<td class="margin">{cell}</td>' for cell in cells)
     return f"<tr{' class=clear' if is_significant else ''}><td>{name}</td>{listed}</tr>"
 
 
-def _cells(one: MetricDifference) -> tuple[str, ...]:
-    """Return a row of the table of differences."""
-    before, after, difference, interval = difference_columns(one)
-    name = f"{one.metric}, {one.unit}".removesuffix(", ")
-    signs = f"{one.lower}/{one.equal}/{one.higher}"
-    return name, str(one.pairs), before, after, difference, interval, signs, f"{one.p:.2g}"
-
-
-def _html_text(text: str) -> str:
-    return escape(one_line(text))
+def _metric_cells(metric: MetricDifference) -> tuple[str, ...]:
+    """Return a row of the table of metrics, with one cell for each of `_HEADINGS`."""
+    before, after, difference, interval = difference_cells(metric)
+    name = f"{metric.metric}, {metric.unit}".removesuffix(", ")
+    signs = f"{metric.lower}/{metric.equal}/{metric.higher}"
+    return name, str(metric.pairs), before, after, difference, interval, signs, f"{metric.p:.2g}"

@@ -1,4 +1,7 @@
-"""Choice of the reporter that prints a session on the console, and printing of single lines."""
+"""Choice of the reporter for the console: with live progress, with color, or plain; and printing of single lines.
+
+Reporters with color are imported only when they are used, because rich is slow to import.
+"""
 
 import os
 from collections.abc import Iterable, Mapping
@@ -13,13 +16,14 @@ def text_reporter(
 ) -> Reporter:
     """Return a reporter with live progress on a terminal, plain lines elsewhere, and color where it is supported.
 
-    `live` overrides the detection for `out`. `slow` is the number of slowest runs to list at the end; 0 lists all.
+    `live` overrides the detection of a terminal. `slow` is the number of slowest runs to list at the end; 0 lists all,
+    None none.
     """
     style = detect_style(out, environ)
     if live is not None:
-        style = TerminalStyle(live or style.color, live, style.terminal)
-    if style.live:
-        from simscen.report.live_console import LiveReporter  # rich is slow to import
+        style = TerminalStyle(live or style.has_color, live, style.is_terminal)
+    if style.has_live_progress:
+        from simscen.report.live_console import LiveReporter
 
         return LiveReporter(out, style, slow)
     return _line_reporter(out, style, slow)
@@ -31,7 +35,8 @@ def print_lines(lines: Iterable[StyledLine], out: TextIO, environ: Mapping[str, 
 
 
 def _line_reporter(out: TextIO, style: TerminalStyle, slow: int | None = None) -> PlainReporter:
-    if not style.color:
+    """Return a reporter without live progress."""
+    if not style.has_color:
         return PlainReporter(out, style, slow)
     from simscen.report.live_console import ColorReporter
 

@@ -10,10 +10,9 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.finding_text import tightest_margin
-from simscen.report.comparison_markup import as_markdown, markdown_cell
+from simscen.report.comparison_markup import comparison_markdown, markdown_cell
 from simscen.report.console_reporter import text_reporter
-from simscen.report.display_text import relative, relative_to_checkout
-from simscen.report.text_reporters import Reporter
+from simscen.report.display_text import relative_path, relative_to_checkout
 from simscen.report.violations import (
     error_summary,
     reason_without_failure,
@@ -23,28 +22,26 @@ from simscen.report.violations import (
 )
 
 MAX_PICTURES = 10
+"""Maximum number of pictures in the summary."""
 MAX_ROWS = 1000
 """Maximum number of runs in the summary; GitHub refuses a summary of more than 1 MiB."""
 
 
-def github_reporter(
-    out: TextIO, summary: TextIO | None = None, slow: int | None = None, pictures: str = ""
-) -> Reporter:
-    """Return a reporter that prints plain lines and annotations, and writes the job summary to `summary`.
+class GitHubReporter:
+    """Prints plain lines and annotations, and writes the job summary to `summary` at the end of the session.
 
-    `slow` is the number of slowest runs to list, as in text_reporter. `pictures` is the URL of the uploaded output
-    folder; without it, the summary has no pictures.
+    `slow` is the number of slowest runs to list, as in text_reporter. `pictures_url` is the address of the uploaded
+    output folder; without it, the summary has no pictures.
     """
-    return _GitHub(out, summary, slow, pictures)
 
-
-class _GitHub:
-    def __init__(self, out: TextIO, summary: TextIO | None, slow: int | None, pictures: str) -> None:
-        self._out, self._summary, self._pictures = out, summary, pictures
+    def __init__(
+        self, out: TextIO, summary: TextIO | None = None, slow: int | None = None, pictures_url: str = ""
+    ) -> None:
+        self._out, self._summary, self._pictures_url = out, summary, pictures_url
         self._plain = text_reporter(out, live=False, slow=slow)
         self._runs = RunStore()
 
-    def __enter__(self) -> "_GitHub":
+    def __enter__(self) -> "GitHubReporter":
         self._plain.__enter__()
         return self
 
@@ -62,18 +59,23 @@ class _GitHub:
                 self._out.write(f"{line}\n")
             self._out.flush()
         if isinstance(event, SessionFinished) and self._summary is not None:
-            self._summary.write(markdown(self._runs, event, self._pictures))
+            self._summary.write(summary_markdown(self._runs, event, self._pictures_url))
             self._summary.flush()
 
 
 def annotations(run: RunFinished) -> list[str]:
-    """Return the workflow commands for one run."""
+    """Return workflow commands, such as `::error file=…::…`, that annotate the scenario file of a run.
+
+    There is one for each violation and for an error. A skipped run or an expected failure has a single notice.
+    """
     name = short_run_name(run.key)
     if excuse := reason_without_failure(run):
-        line = next((each.line for each in reported_violations(run) if not each.warning), 0)
+        line = next((each.line for each in reported_violations(run) if not each.is_warning), 0)
         return [_command("notice", run, line, name, excuse)]
     lines = [
-        _command("warning" if each.warning else "error", run, each.line, name, "\n".join((each.message, *each.detail)))
+        _command(
+            "warning" if each.is_warning else "error", run, each.line, name, "\n".join((each.message, *each.detail))
+        )
         for each in reported_violations(run)
     ]
     if run.outcome is Outcome.ERROR:
@@ -81,8 +83,11 @@ def annotations(run: RunFinished) -> list[str]:
     return lines
 
 
-def markdown(runs: Sequence[RunFinished], session: SessionFinished, pictures: str = "") -> str:
-    """Return a table of at most MAX_ROWS runs, failures first, and with a URL the pictures of failures."""
+def summary_markdown(runs: Sequence[RunFinished], session: SessionFinished, pictures_url: str = "") -> str:
+    """Return the job summary: counts, a table of at most MAX_ROWS runs with failures first, and a stack comparison.
+
+    With `pictures_url`, the address of the output folder, it also contains the pictures of failures.
+    """
     symbols = {
         Outcome.ERROR: "⚠️",
         Outcome.FAILED: "❌",
@@ -96,7 +101,7 @@ def markdown(runs: Sequence[RunFinished], session: SessionFinished, pictures: st
     more = f", {session.expected} failed as expected" if session.expected else ""
     more += f", {session.skipped} skipped" if session.skipped else ""
     head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}{more}"
-    comparison = [] if session.comparison is None else as_markdown(session.comparison)
+    comparison = [] if session.comparison is None else comparison_markdown(session.comparison)
     rows = [
         f"| {symbols[run.outcome]} | {markdown_cell(short_run_name(run.key))} "
         f"| {run.result.simulated:.1f} s | {_reason_cell(run)} |"
@@ -104,17 +109,17 @@ def markdown(runs: Sequence[RunFinished], session: SessionFinished, pictures: st
     ]
     if len(listed) < len(runs):
         rows.append(f"| | and {len(runs) - len(listed)} more | | |")
-    picture_lines = _picture_lines(listed, session.folder, pictures) if pictures else []
+    picture_lines = _picture_lines(listed, session.folder, pictures_url) if pictures_url else []
     table = ["| | scenario | simulated | |", "|---|---|---:|---|", *rows]
     return "\n".join([head, "", *table, *comparison, "", *picture_lines, ""])
 
 
-def _picture_lines(runs: list[RunFinished], folder: str, pictures: str) -> list[str]:
-    """Return the pictures of the first runs that did not pass."""
+def _picture_lines(runs: list[RunFinished], folder: str, pictures_url: str) -> list[str]:
+    """Return the pictures of the first runs that did not pass. `folder` is the output folder of the session."""
     failures = [run for run in runs if not run.outcome.good and run.artifacts.picture]
     lines = []
     for run in failures[:MAX_PICTURES]:
-        address = f"{pictures.rstrip('/')}/{quote(relative(run.artifacts.picture, folder))}"
+        address = f"{pictures_url.rstrip('/')}/{quote(relative_path(run.artifacts.picture, folder))}"
         lines += [f"**{markdown_cell(short_run_name(run.key))}**", "", f"![map of the run]({address})", ""]
     return lines
 
@@ -131,16 +136,17 @@ def _reason_cell(run: RunFinished) -> str:
 
 
 def _command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:
+    """Return a workflow command. `level` is error, warning, or notice; `line` 0 stands for the first line."""
     file = relative_to_checkout(scenario_file(run))
     properties = f"file={_escape_property(file)},line={max(line or 1, 1)},title={_escape_property(title)}"
     return f"::{level} {properties}::{_escape_message(message)}"
 
 
 def _escape_message(text: str) -> str:
-    """Escape the message of a command as @actions/core does."""
+    """Escape the message of a workflow command as GitHub's package @actions/core does."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def _escape_property(text: str) -> str:
-    """Escape a property of a command as @actions/core does."""
+    """Escape a property of a workflow command as GitHub's package @actions/core does."""
     return _escape_message(text).replace(":", "%3A").replace(",", "%2C")

@@ -1,7 +1,8 @@
-"""Writer of events.jsonl, the journal of a session, which survives if simscen is killed.
+"""Writer of events.jsonl, the journal of a session, from which all other reports can be generated again.
 
-The first line of a session lists all its runs. Each further line records that a run started or ended, and is written to
-disk before the session continues. All other reports can be generated again from the journal.
+The first line of a session lists all its runs. Each further line records an event: a run started or finished, runs were
+added to a study, or the session ended. A line is written to disk before the session continues, so that finished runs
+are not lost if simscen is killed.
 """
 
 import fcntl
@@ -27,14 +28,18 @@ from simscen.report.journal_reader import (
 )
 
 BLOCK_BYTES = 1 << 20
+"""Number of bytes that are read at a time to find the last line break of a journal."""
 
 
 class Journal:
-    """Writes the events of a session in `folder`, and locks the folder until the process ends.
+    """Writes the events of a session to events.jsonl in `folder`, and locks this folder until `close`.
 
-    With `resume`, the folder may contain a journal. With `sync`, each line is on the disk before the session continues.
-    Raises UsageError if the folder belongs to another session, and OSError if the file cannot be opened. If a line
-    cannot be written later, sets `error` and lets the session continue.
+    With `resume`, the folder may already contain a journal, to which lines are appended. With `sync`, each line is on
+    the disk before the session continues. If a line cannot be written, for example because the disk is full, `error` is
+    set, and the session continues.
+
+    Raises UsageError if another process writes to the folder, or if the folder contains a journal without `resume`;
+    OSError if the file cannot be opened.
     """
 
     def __init__(self, folder: Path, resume: bool = False, sync: bool = True) -> None:
@@ -57,9 +62,10 @@ class Journal:
         shard: tuple[int, int] = (1, 1),
         study: StudyPlan | None = None,
     ) -> None:
-        """Start a session with these runs. Previous lines of the journal no longer count.
+        """Start a session with these runs. Readers ignore all earlier lines of the journal.
 
-        `shard` (i, n) means that these are the runs of part i of n. `study` is the plan if they are a study.
+        `version` is the version of simscen, `workers` the number of worker processes. `shard` (i, n) means that these
+        are the runs of part i of n. `study` is the plan of a study; None for other sessions.
         """
         self._numbers, self._finished = {run.key: number for number, run in enumerate(runs)}, set()
         facts = {
@@ -74,7 +80,7 @@ class Journal:
         self._write({"event": "planned", **facts, "runs": [planned_run_to_data(run) for run in runs]})
 
     def add(self, runs: Sequence[PlannedRun], study: StudyPlan) -> None:
-        """Add further runs to the session of a study."""
+        """Add further runs to the session of a study, whose new plan is `study`."""
         first = len(self._numbers)
         self._numbers |= {run.key: number for number, run in enumerate(runs, start=first)}
         data = [planned_run_to_data(run) for run in runs]
@@ -95,7 +101,7 @@ class Journal:
                 pass
 
     def complete(self, runs: Sequence[RunFinished]) -> None:
-        """Write the finished runs that are missing after an interrupt or a full disk."""
+        """Write those of the finished runs that are not in the journal yet, after an interrupt or a full disk."""
         for run in runs:
             if run.key not in self._finished:
                 self(run)
@@ -105,6 +111,7 @@ class Journal:
         os.close(self._file)
 
     def _write(self, message: dict[str, Any]) -> bool:
+        """Append a line with the seconds since the start. If that fails, set `error`, and return False."""
         message = {**message, "at": round(time.monotonic() - self._start, 3)}
         data = json.dumps(message, sort_keys=True, ensure_ascii=True, allow_nan=False).encode() + b"\n"
         size = os.fstat(self._file).st_size
@@ -136,7 +143,7 @@ def _truncate_to_complete_lines(file: int) -> int:
 
 
 def require_free(folder: Path) -> None:
-    """Raise UsageError if a session is running in `folder`."""
+    """Raise UsageError if another process writes the journal in `folder`."""
     if (folder / JOURNAL_FILE).is_file():
         file = os.open(folder / JOURNAL_FILE, os.O_RDONLY)
         try:
@@ -146,6 +153,7 @@ def require_free(folder: Path) -> None:
 
 
 def _lock(file: int, folder: Path) -> None:
+    """Lock an open journal until it is closed. Raises UsageError if another process has locked it."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

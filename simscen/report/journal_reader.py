@@ -1,9 +1,8 @@
-"""Reader of events.jsonl, the journal of a session, and the format of its lines."""
+"""Reader of events.jsonl, the journal of a session, and conversion of plans and runs to and from its JSON lines."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from itertools import islice
 from pathlib import Path
 from sys import intern
 from typing import Any, TypeVar
@@ -15,20 +14,25 @@ from simscen.core.records.session_events import Artifacts, RunFinished, SessionS
 from simscen.judge.result_json import from_data, read_key, result_data
 from simscen.judge.study import StudyPlan
 from simscen.model.acceptance import PassRate
-from simscen.report.display_text import relative, relative_to_cwd
+from simscen.report.display_text import relative_path, relative_to_cwd
 
 JOURNAL_FILE = "events.jsonl"
 JOURNAL_FORMAT = 2
+"""Version of the format. Journals with other versions are not read."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedRun:
-    """A run of a session that may not have started yet. `path` is the scenario file.
+    """A run of a session that may not have started yet.
 
-    `digest` is a hash of everything that the result depends on, so that a result is reused only if nothing has changed;
-    `definition` is a hash of the scenario without its stacks, so that versions of a stack can be compared.
-    `again`, `file`, and `stack` have the same meaning as in RunFinished and RunResult. `varied` has the varied values
-    by path.
+    Attributes:
+        path: Scenario file relative to the root.
+        digest: Hash of everything that the result depends on. A result is reused only if the digest is the same.
+        again: Command that repeats the run, as in RunFinished.
+        file: Scenario file relative to the working folder, as in RunFinished.
+        stack: NAME=VALUE of the chosen stack, as in RunResult; "" for the stack of the scenario.
+        definition: Hash of the scenario without its stacks, by which `simscen compare` detects a changed scenario.
+        varied: Varied values by path in the scenario.
     """
 
     key: RunKey
@@ -42,14 +46,14 @@ class PlannedRun:
 
 
 def planned_run_to_data(run: PlannedRun) -> dict[str, Any]:
-    """Return a planned run as JSON data."""
+    """Return a planned run as JSON data of the journal."""
     source = {"path": run.path, "file": run.file, "again": run.again, "stack": run.stack, "definition": run.definition}
     varied = {"varied": dict(run.varied)} if run.varied else {}
     return {**asdict(run.key), **source, "digest": run.digest, **varied}
 
 
 def planned_run_from_data(data: dict[str, Any]) -> PlannedRun:
-    """Read the data of `planned_run_to_data`. Raises KeyError or TypeError if they are invalid."""
+    """Read the data of `planned_run_to_data`. Raises KeyError or TypeError if the data is invalid."""
     stack, definition = intern(data.get("stack", "")), intern(data.get("definition", ""))
     return PlannedRun(
         read_key(data),
@@ -64,7 +68,7 @@ def planned_run_from_data(data: dict[str, Any]) -> PlannedRun:
 
 
 def study_plan_to_data(plan: StudyPlan) -> dict[str, Any]:
-    """Return a plan as JSON data, without the values, which the planned runs have."""
+    """Return the plan of a study as JSON data, without the varied values, which are in the planned runs."""
     claim = None if plan.claim is None else plan.claim.model_dump(exclude_unset=True)
     return {
         "scenario": plan.scenario,
@@ -77,6 +81,7 @@ def study_plan_to_data(plan: StudyPlan) -> dict[str, Any]:
 
 
 def _study_plan_from_data(data: dict[str, Any], planned: Sequence[PlannedRun]) -> StudyPlan:
+    """Read the data of `study_plan_to_data`, and take the varied values from the planned runs."""
     claim = None if data["claim"] is None else PassRate.model_validate(data["claim"])
     values = {run.key: run.varied for run in planned if run.varied}
     return StudyPlan(
@@ -91,15 +96,18 @@ def _study_plan_from_data(data: dict[str, Any], planned: Sequence[PlannedRun]) -
 
 
 def finished_run_to_data(run: RunFinished, folder: Path) -> dict[str, Any]:
-    """Return a finished run as JSON data, with files relative to `folder`."""
-    files = {name: relative(path, str(folder)) if path else "" for name, path in asdict(run.artifacts).items()}
+    """Return a finished run as JSON data. Paths of its files are relative to the output `folder`."""
+    files = {name: relative_path(path, str(folder)) if path else "" for name, path in asdict(run.artifacts).items()}
     data = {"wall": run.wall, "again": run.again, "file": run.file, "tags": list(run.tags)}
     data |= {"resumed": True} if run.resumed else {}
     return {**data, "files": files, "result": result_data(run.result)}
 
 
 def finished_run_from_data(data: dict[str, Any], folder: Path) -> RunFinished:
-    """Read the data of `finished_run_to_data`, with files in `folder`. Raises KeyError, TypeError or ValueError."""
+    """Read the data of `finished_run_to_data`, and prepend the output `folder` to the paths of the files.
+
+    Raises KeyError, TypeError, or ValueError if the data is invalid.
+    """
     files = {name: str(folder / path) if path else "" for name, path in data["files"].items()}
     result, tags = from_data(data["result"]), tuple(data.get("tags", ()))
     return RunFinished(
@@ -115,13 +123,15 @@ class JournaledSession:
     """The last session in a journal.
 
     Attributes:
-        shard: Part i of n of the selected scenarios that it ran.
+        version: Version of simscen that wrote the journal.
+        workers: Number of worker processes.
+        shard: (i, n): the session ran part i of n of the selected scenarios; (1, 1) for all of them.
         planned: All runs of the session.
         finished: Finished runs by key.
-        started: Runs that had at least started.
-        wall: Seconds from the start of the session to its end, or to the last line if it did not end.
+        started: Keys of runs that started, whether or not they finished.
+        wall: Seconds of wall time from the start of the session to its end, or to the last line if it did not end.
         interrupted: Whether the session ended before all runs were finished.
-        study: Plan of a session of `simscen study`.
+        study: Plan of a session of `simscen study`; None for other sessions.
     """
 
     version: str
@@ -136,22 +146,23 @@ class JournaledSession:
 
     @property
     def runs(self) -> RunStore:
-        """All planned runs; those that were not finished have an error."""
+        """Results of all planned runs in order; the result of a run that was not finished is an error."""
         if len(self.finished) == len(self.planned):
             indices = (self.finished.index(run.key) for run in self.planned)
             return self.finished.store.select(index for index in indices if index is not None)
         return RunStore(self.finished.get(run.key) or self._unfinished(run) for run in self.planned)
 
     def start_event(self, folder: Path) -> SessionStarted:
-        """Return the event at the start of the session."""
+        """Return the first event of the session as reporters expect it; `folder` is the output folder."""
         return session_started(self.version, [run.key for run in self.planned], self.workers, folder, self.stacks)
 
     @property
     def stacks(self) -> tuple[str, ...]:
-        """NAME=VALUE of each stack that was chosen, in order."""
+        """NAME=VALUE of each stack that was chosen by --stack, in the order of the runs."""
         return tuple(dict.fromkeys(run.stack for run in self.planned if run.stack))
 
     def _unfinished(self, run: PlannedRun) -> RunFinished:
+        """Return the result of a run that was not finished: the error `interrupted` or `not-run`."""
         has_started = run.key in self.started
         kind = "interrupted" if has_started else "not-run"
         failure = RunFailure(kind, f"simscen ended before the run {'was finished' if has_started else 'started'}")
@@ -159,7 +170,7 @@ class JournaledSession:
 
 
 def read_journal(folder: Path) -> JournaledSession:
-    """Read the last session of the journal in `folder`. Raises InvalidInput if there is no valid one."""
+    """Read the last session of the journal in `folder`. Raises InvalidInput if there is no valid journal."""
     if not (folder / JOURNAL_FILE).is_file():
         hint = "name the folder that `simscen run` wrote, e.g. simscen-out/latest"
         raise _invalid(folder, f"the folder has no {JOURNAL_FILE}", hint)
@@ -195,13 +206,16 @@ def _last_session_lines(folder: Path) -> Iterator[dict[str, Any]]:
 
 
 def session_process(folder: Path) -> int | None:
-    """Return the id of the process that wrote the last session, or None. Raises OSError or ValueError."""
+    """Return the ID of the process that wrote the last session; None if the journal has no session.
+
+    Raises OSError or ValueError if the journal cannot be read.
+    """
     first = next(_last_session_lines(folder), None)
     return None if first is None else int(first["pid"])
 
 
 class _SessionReader:
-    """Reads the lines of one session."""
+    """Reads the lines of one session. `first` is its first line, with the plan; `folder` is the output folder."""
 
     def __init__(self, first: dict[str, Any], folder: Path) -> None:
         if first["format"] != JOURNAL_FORMAT:
@@ -231,7 +245,7 @@ class _SessionReader:
         self._planned += [_relocate(planned_run_from_data(run), self._cwd) for run in runs]
 
     def result(self) -> JournaledSession:
-        """Return the session."""
+        """Return the session after all lines were read."""
         planned, first, last = tuple(self._planned), self._first, self._last
         return JournaledSession(
             version=first["version"],
@@ -247,69 +261,9 @@ class _SessionReader:
 
 
 def _relocate(run: Run, cwd: str) -> Run:
-    """Return the run with the path of its scenario file relative to the current working folder."""
+    """Return the run with the path of its scenario file relative to the current working folder instead of `cwd`."""
     return replace(run, file=intern(relative_to_cwd(run.file, cwd)))
 
 
 def _invalid(path: Path, message: str, hint: str = "") -> InvalidInput:
     return InvalidInput([Problem(str(path), 0, 0, "SC810", message, hint)])
-
-
-MAX_SESSIONS = 50
-"""Maximum number of sessions to search for failures."""
-UNDECIDED_KINDS = frozenset({"interrupted", "not-run"})
-"""Kinds of errors after which the outcome of the previous session still counts."""
-
-
-@dataclass(frozen=True)
-class LastFailed:
-    """Runs whose latest outcome was a failure, and the `folder` of the newest session."""
-
-    folder: Path
-    runs: frozenset[RunKey]
-
-
-def sessions_in(folder: Path) -> list[Path]:
-    """Return the output folders of sessions in `folder`, newest first, without links such as `latest`."""
-    if not folder.is_dir():
-        return []
-    sessions = [each for each in folder.iterdir() if (each / JOURNAL_FILE).is_file() and not each.is_symlink()]
-    return sorted(
-        sessions,
-        key=lambda each: (_session_time(each), (each / JOURNAL_FILE).stat().st_mtime_ns, each.name),
-        reverse=True,
-    )
-
-
-def last_failed(folder: Path) -> LastFailed | None:
-    """Return the runs that failed when they were last run in a session of `folder`, or None without any session."""
-    sessions = sessions_in(folder)
-    if not sessions:
-        return None
-    known: dict[RunKey, bool] = {}
-    for session in islice(sessions, MAX_SESSIONS):
-        outcomes: dict[RunKey, bool] = {}
-        for key, good in _outcomes(session):
-            outcomes[key.first] = outcomes.get(key.first, True) and good
-        known = {**outcomes, **known}
-    return LastFailed(sessions[0], frozenset(key for key, good in known.items() if not good))
-
-
-def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
-    """Yield each finished run and whether it passed or failed as expected. Yields nothing for an invalid journal."""
-    try:
-        runs = read_journal(session).runs
-    except InvalidInput:
-        return
-    for run in runs:
-        if run.result.error is None or run.result.error.kind not in UNDECIDED_KINDS:
-            yield run.key, run.outcome.good
-
-
-def _session_time(session: Path) -> str:
-    """Return the time of the session from run.json (ISO 8601), or "" if it is unknown."""
-    try:
-        document = json.loads((session / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return ""
-    return str(document.get("written", "")) if isinstance(document, dict) else ""

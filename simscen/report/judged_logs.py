@@ -1,4 +1,4 @@
-"""Output of `simscen judge`: details of one log, a line per log, or a table of margins for several logs."""
+"""Console lines of `simscen judge`: details of one log, a line per log, or a table of margins for several logs."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -13,26 +13,29 @@ from simscen.report.violations import error_summary, first_violation, reason_wit
 
 
 def full_log_lines(run: RunFinished, name: str) -> Iterator[StyledLine]:
-    """Yield the length and outcome of a log, then all violations."""
+    """Yield the outcome and the length of a log in s, then all violations. `name` is the name of the log."""
     tightest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
     note = f"tightest: {one_line(tightest)}" if tightest else reason_without_failure(run)
-    yield (*_head(run.result, name), *((StyledText(f"   {note}", "quiet"),) if note else ()))
+    yield (*_outcome_and_length(run.result, name), *((StyledText(f"   {note}", "quiet"),) if note else ()))
     yield from violation_lines(run)
 
 
 def short_log_line(run: RunFinished, name: str) -> StyledLine:
-    """Return a line with the length of a log, and its tightest margin or the first reason for the failure."""
+    """Return a line with the outcome and length of a log, and its tightest margin or the first reason for a failure."""
     if run.outcome is Outcome.ERROR:
-        return (*_head(run.result, name), StyledText(f"   {error_summary(run)}", "warning"))
+        return (*_outcome_and_length(run.result, name), StyledText(f"   {error_summary(run)}", "warning"))
     if excuse := reason_without_failure(run):
-        return (*_head(run.result, name), StyledText(f"   {excuse}", "quiet"))
+        return (*_outcome_and_length(run.result, name), StyledText(f"   {excuse}", "quiet"))
     tightest = one_line(tightest_margin(run.result.verdicts))
     reason = first_violation(run) or (f"tightest: {tightest}" if tightest else "")
-    return (*_head(run.result, name), StyledText(f"   {reason}".rstrip(), "quiet"))
+    return (*_outcome_and_length(run.result, name), StyledText(f"   {reason}".rstrip(), "quiet"))
 
 
 def margin_table(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[StyledLine]:
-    """Yield a table with the margin of each criterion in each log, then the reasons for missing margins."""
+    """Yield a table with a row per log and a column per criterion that contains margins.
+
+    Lines with the reasons for missing margins follow. `runs` are pairs of the name of a log and its result.
+    """
     ids = list(dict.fromkeys(verdict.id for _, run in runs for verdict in run.result.verdicts))
     rows = [[one_line(name), *(_cell(run.result, verdict_id) for verdict_id in ids)] for name, run in runs]
     columns = list(zip(["log", *ids], *rows, strict=True))
@@ -58,7 +61,7 @@ def summary_line(runs: Sequence[RunFinished]) -> StyledLine:
     return (StyledText(", ".join(parts)),)
 
 
-def _head(result: RunResult, name: str) -> tuple[StyledText, ...]:
+def _outcome_and_length(result: RunResult, name: str) -> tuple[StyledText, ...]:
     symbol, role = SYMBOLS[result.outcome]
     length = f"   {result.simulated:.1f} s recorded" if result.simulated else ""
     return (
@@ -69,8 +72,9 @@ def _head(result: RunResult, name: str) -> tuple[StyledText, ...]:
     )
 
 
-def _cell(result: RunResult, name: str) -> str:
-    verdict = next((verdict for verdict in result.verdicts if verdict.id == name), None)
+def _cell(result: RunResult, verdict_id: str) -> str:
+    """Return the margin of a verdict; without one, "holds", "fails", "?", "error", or "-" for a missing verdict."""
+    verdict = next((verdict for verdict in result.verdicts if verdict.id == verdict_id), None)
     if verdict is None:
         return "-"
     if verdict.status in (Status.INCONCLUSIVE, Status.ERROR):
@@ -78,11 +82,11 @@ def _cell(result: RunResult, name: str) -> str:
     finding = verdict.tightest
     word = "holds" if verdict.status is Status.PASS else "fails"
     margin = None if finding is None else finding.margin
-    text = word if finding is None or margin is None else _margin(margin, finding.unit)
+    text = word if finding is None or margin is None else _margin_text(margin, finding.unit)
     return f"{text} (warning)" if verdict.severity == "warn" and verdict.status is Status.FAIL else text
 
 
-def _margin(margin: float, unit: str) -> str:
+def _margin_text(margin: float, unit: str) -> str:
     """Format a margin with its sign: integers for counts, and enough digits to show that a margin is not zero."""
     if not unit and margin == round(margin):
         return f"{margin:+.0f}"
@@ -90,8 +94,10 @@ def _margin(margin: float, unit: str) -> str:
 
 
 def _reasons(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[str]:
-    """Yield each reason why a criterion is undecided or a log could not be judged, once."""
-    reasons = Counter(reason for _, run in runs for verdict in run.result.verdicts for reason in _undecided(verdict))
+    """Yield each reason why a criterion is undecided, once, and then why logs could not be judged."""
+    reasons = Counter(
+        reason for _, run in runs for verdict in run.result.verdicts for reason in _undecided_reason(verdict)
+    )
     for reason, number in reasons.items():
         yield f"{reason} ({number} logs)" if number > 1 else reason
     for name, run in runs:
@@ -99,7 +105,8 @@ def _reasons(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[str]:
             yield one_line(f"{name}: {error_summary(run)}")
 
 
-def _undecided(verdict: Verdict) -> Iterator[str]:
+def _undecided_reason(verdict: Verdict) -> Iterator[str]:
+    """Yield the reason of an inconclusive verdict or an error; nothing for other verdicts."""
     if verdict.status in (Status.INCONCLUSIVE, Status.ERROR) and verdict.tightest is not None:
         symbol = "?" if verdict.status is Status.INCONCLUSIVE else "error:"
         reasons = "; ".join(verdict.tightest.detail)

@@ -1,7 +1,6 @@
 """Writer of junit.xml, with one testsuite per scenario file and one testcase per run.
 
-Jenkins, GitLab, GitHub actions and junitparser support all elements. The family "xunit2" omits what junit-10.xsd of
-Jenkins forbids: `file`, `line` and properties of a testcase.
+Jenkins, GitLab, GitHub Actions, and junitparser support all elements that are used.
 """
 
 import re
@@ -30,6 +29,7 @@ from simscen.report.violations import (
 )
 
 Family = Literal["simscen", "xunit2"]
+"""Variant of the format. "xunit2" omits what junit-10.xsd of Jenkins forbids in a testcase: file, line, properties."""
 MAX_CLAIM_FAILURES = 100
 """Maximum number of failed runs that the testcase of a claim lists."""
 
@@ -37,9 +37,10 @@ MAX_CLAIM_FAILURES = 100
 def to_xml(
     runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen", study: Study | None = None
 ) -> bytes:
-    """Return the document in UTF-8, with runs sorted by file, scenario and seed.
+    """Return the document in UTF-8, with runs sorted by file, scenario, and seed. `name` is the name of the document.
 
-    A `study` with a claim has a single testcase, the claim, and one for each run that could not be completed.
+    For a `study` with a claim, the document has one testcase for the claim, and one for each run that could not be
+    completed.
     """
     return b"".join(xml_parts(runs, family, name, study))
 
@@ -47,7 +48,7 @@ def to_xml(
 def xml_parts(
     runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen", study: Study | None = None
 ) -> Iterator[bytes]:
-    """Yield the parts of the document, one for each run."""
+    """Yield the document of `to_xml` in parts that are joined without a separator, to save memory with many runs."""
     root = Element("testsuites", {"name": escape_control(name)})
     ordered = in_order(runs)
     if study is not None and study.claim is not None and ordered:
@@ -57,7 +58,7 @@ def xml_parts(
     total = SuiteCounts()
     for suite in counts.values():
         total.add(suite)
-    total.write(root)
+    total.write_to(root)
     yield b"<?xml version='1.0' encoding='utf-8'?>\n"
     if not counts:
         yield ElementTree.tostring(root) + b"\n"
@@ -69,7 +70,7 @@ def xml_parts(
             yield b"" if path is None else b"\n  </testsuite>"
             path, used_names = run.result.path, set()
             element = Element("testsuite", {"name": escape_control(scenario_file(run))})
-            counts[path].write(element)
+            counts[path].write_to(element)
             element.set("skipped", str(counts[path].skipped))
             yield b"\n  " + _opening_tag(element)
         parent = Element("testsuite")
@@ -82,7 +83,7 @@ def xml_parts(
 
 @dataclass
 class SuiteCounts:
-    """Numbers of runs, and their wall time in s."""
+    """Numbers of runs by outcome, and the sum of their wall times in s, for the attributes of a testsuite."""
 
     tests: int = 0
     failures: int = 0
@@ -99,14 +100,14 @@ class SuiteCounts:
         self.seconds += run.wall
 
     def add(self, other: "SuiteCounts") -> None:
-        """Add the runs of another suite."""
+        """Add the numbers of another suite, except `skipped`, which is written for single suites only."""
         self.tests += other.tests
         self.failures += other.failures
         self.errors += other.errors
         self.seconds += other.seconds
 
-    def write(self, element: Element) -> None:
-        """Set the attributes of a suite."""
+    def write_to(self, element: Element) -> None:
+        """Set the attributes of a suite, except `skipped`, which the root element must not have."""
         element.set("tests", str(self.tests))
         element.set("failures", str(self.failures))
         element.set("errors", str(self.errors))
@@ -126,16 +127,16 @@ def _opening_tag(element: Element) -> bytes:
     return text.removesuffix(b" />") + b">"
 
 
-def _document(root: Element) -> bytes:
+def _indented_document(root: Element) -> bytes:
     ElementTree.indent(root)
     body: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return body + b"\n"
 
 
 def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[RunFinished], family: Family) -> bytes:
-    """Return the document of a study with a claim. Runs that failed are part of the claim, not failures of their own.
+    """Return the document of a study with a claim. A failed run has no testcase, but is listed in that of the claim.
 
-    An undecided claim is an error of the type `simscen.undecided`, since JUnit has no other element for it.
+    An undecided claim is an error of the type `simscen.undecided`, because JUnit has no other element for it.
     """
     incomplete = [run for run in runs if run.outcome is Outcome.ERROR]
     suite = SubElement(root, "testsuite", {"name": escape_control(scenario_file(runs[0]))})
@@ -164,14 +165,14 @@ def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[R
         element.set("errors", str(int(undecided) + len(incomplete)))
         element.set("time", seconds)
     suite.set("skipped", "0")
-    return _document(root)
+    return _indented_document(root)
 
 
 def _add_case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
     case = SubElement(suite, "testcase", {"classname": _classname(run), "name": name, "time": f"{run.wall:.3f}"})
     if family == "simscen":
         case.set("file", escape_control(scenario_file(run)))
-        lines = (each.line for each in reported_violations(run) if each.line and not each.warning)
+        lines = (each.line for each in reported_violations(run) if each.line and not each.is_warning)
         case.set("line", str(next(lines, 1)))
         _add_properties(case, run)
     match run.outcome:
@@ -213,7 +214,7 @@ def _add_properties(case: Element, run: RunFinished) -> None:
 
 
 def _add_failure(case: Element, run: RunFinished) -> None:
-    failures = [violation for violation in reported_violations(run) if not violation.warning]
+    failures = [violation for violation in reported_violations(run) if not violation.is_warning]
     element = SubElement(case, "failure")
     element.set("type", escape_control(failures[0].verdict.criterion) if failures else "criterion")
     element.set("message", first_violation(run) or "failed")
@@ -223,12 +224,13 @@ def _add_failure(case: Element, run: RunFinished) -> None:
 def _add_error(case: Element, run: RunFinished) -> None:
     kind, message, tail = error_details(run)
     element = SubElement(case, "error", {"type": escape_control(kind), "message": message})
-    failures = [violation for violation in reported_violations(run) if not violation.warning]
+    failures = [violation for violation in reported_violations(run) if not violation.is_warning]
     parts = [f"{source_location(run)}: {message}", tail, _details(run, failures)]
     element.text = "\n".join(part for part in parts if part)
 
 
 def _details(run: RunFinished, violations: list[Violation]) -> str:
+    """Return the lines of the violations, and the command that repeats the run."""
     lines = []
     for violation in violations:
         lines.append(f"{source_location(run, violation.line)}: {violation.message}")
@@ -237,8 +239,8 @@ def _details(run: RunFinished, violations: list[Violation]) -> str:
 
 
 def _output(run: RunFinished) -> str:
-    """Return warnings, disturbances, and attachments in the syntax of Jenkins and GitLab."""
-    warnings = [violation for violation in reported_violations(run) if violation.warning]
+    """Return a line for each warning, disturbance, and artifact; artifacts are attachments for Jenkins and GitLab."""
+    warnings = [violation for violation in reported_violations(run) if violation.is_warning]
     lines = [f"{source_location(run, warning.line)}: warning: {warning.message}" for warning in warnings]
     files = (run.artifacts.picture, run.artifacts.replay, run.artifacts.mcap, run.artifacts.result)
     for each in run.result.disturbances:
@@ -248,16 +250,19 @@ def _output(run: RunFinished) -> str:
 
 
 def _classname(run: RunFinished) -> str:
+    """Return the scenario ID with dots instead of slashes, for example "scenarios.faults.lidar_off"."""
     parts = [re.sub(r"[.\s]+", "_", part) for part in run.key.scenario.split("/") if part not in ("", ".", "..")]
     return escape_control(".".join(parts)) or "simscen"
 
 
 def _case_name(run: RunFinished) -> str:
+    """Return a name such as "lidar_off [seed 7]", with the variation and the stack if there are several."""
     parts = [run.key.variation, f"seed {run.key.seed}", run.key.stack_name]
     return one_line(f"{run.key.scenario.rpartition('/')[2]} [{', '.join(part for part in parts if part)}]")
 
 
 def _unique(name: str, used_names: set[str]) -> str:
+    """Return the name with a number if it is used already, such as "name #2", and add it to `used_names`."""
     candidate, number = name, 2
     while candidate in used_names:
         candidate, number = f"{name} #{number}", number + 1

@@ -1,4 +1,4 @@
-"""Reporters with color and with live progress, based on rich."""
+"""Reporters for terminals, based on rich: one with color, and one with color and live progress."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -28,9 +28,9 @@ MIN_FINISHED_RUNS = 2
 
 
 class ProgressEstimate:
-    """Estimates the remaining time of a session from its events. `clock` returns seconds.
+    """Estimates the remaining time of a session from its events. `clock` returns seconds of wall time.
 
-    Runs that are reused from an earlier session do not count.
+    Results that are reused from an earlier session do not count for the mean time of a run.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -40,7 +40,7 @@ class ProgressEstimate:
         self._total, self._finished, self._executed = 0, 0, 0
 
     def __call__(self, event: SessionEvent) -> None:
-        """Process one event."""
+        """Count the runs of one event."""
         match event:
             case SessionStarted():
                 self._total = event.total
@@ -64,7 +64,7 @@ class ProgressEstimate:
 
     @property
     def remaining_s(self) -> float | None:
-        """Estimated remaining time in seconds; None if too few runs have ended."""
+        """Estimated remaining wall time in s; None before MIN_FINISHED_RUNS runs have finished."""
         if self._start is None or self._executed < MIN_FINISHED_RUNS:
             return None
         return (self._clock() - self._start) / self._executed * (self._total - self._finished)
@@ -79,12 +79,14 @@ def _round_duration(seconds: float) -> str:
 
 
 STYLES = {"plain": "", "name": "bold", "good": "green", "bad": "red", "warning": "yellow", "quiet": "dim"}
+"""Style of each role of a text, in the syntax of rich."""
 
 
 class ColorReporter(PlainReporter):
-    """Prints the lines of PlainReporter in color, except for lines that a CI system could read as a command.
+    """Prints the lines of PlainReporter in color.
 
-    `slow` is the number of slowest runs to list at the end; 0 lists all, None none.
+    Lines that a CI system could read as a command are escaped and have no color. `slow` is the number of slowest runs
+    to list at the end; 0 lists all, None none.
     """
 
     def __init__(self, out: TextIO, style: TerminalStyle, slow: int | None = None) -> None:
@@ -99,9 +101,10 @@ class ColorReporter(PlainReporter):
 
 
 class LiveReporter:
-    """Prints the lines in color, and below them one line per running scenario with its simulated time.
+    """Prints the lines in color, and below them one line per current run with its simulated time.
 
-    `slow` is the number of slowest runs to list at the end; 0 lists all, None none. `clock` returns seconds.
+    The lines of the current runs are updated in place. `slow` is the number of slowest runs to list at the end; 0 lists
+    all, None none. `clock` returns seconds of wall time.
     """
 
     def __init__(
@@ -123,7 +126,7 @@ class LiveReporter:
         self._live.stop()
 
     def __call__(self, event: SessionEvent) -> None:
-        """Print finished runs above, and update the running ones below."""
+        """Print the lines for an event, and update the lines of the current runs."""
         self._estimate(event)
         match event:
             case RunStarted():
@@ -134,13 +137,13 @@ class LiveReporter:
                 self._running.pop(event.key, None)
             case _:
                 pass
-        self._live.update(self._status())
+        self._live.update(self._current_runs())
         if isinstance(event, SessionFinished):
             self._live.stop()
         for line in self._formatter(event):
             self._console.print(_rich_text(line, links=True))
 
-    def _status(self) -> Group:
+    def _current_runs(self) -> Group:
         rows = [self._row(*state) for _, state in sorted(self._running.items())]
         progress = self._estimate.text
         return Group(*rows, *([Text(f"  {progress}", style="dim")] if progress and rows else []))
@@ -157,8 +160,8 @@ def _console(out: TextIO, style: TerminalStyle) -> Console:
     return Console(
         file=out,
         force_terminal=True,
-        color_system="standard" if style.color else None,
-        no_color=not style.color,
+        color_system="standard" if style.has_color else None,
+        no_color=not style.has_color,
         highlight=False,
         soft_wrap=True,
         emoji=False,
@@ -167,11 +170,14 @@ def _console(out: TextIO, style: TerminalStyle) -> Console:
 
 
 def _rich_text(line: StyledLine, links: bool = False) -> Text:
-    """Convert a line to rich.Text. Text of users is never interpreted as markup."""
+    """Convert a line to rich.Text without interpreting markup in it, with links to files if `links` is true."""
     return Text.assemble(*((piece.text, _style(STYLES[piece.role], piece.file if links else "")) for piece in line))
 
 
 def _style(definition: str, file: str) -> Style:
-    """Return a style, with a link to a file for terminals with support for OSC 8."""
+    """Return the rich style of a definition such as "bold", with a link to the file unless it is "".
+
+    Terminals with support for OSC 8 show the link.
+    """
     style = Style.parse(definition)
     return style + Style(link=Path(file).absolute().as_uri()) if file else style

@@ -1,4 +1,7 @@
-"""Merging of output folders of shards into one."""
+"""Merging of the output folders of shards into the output folder of one session.
+
+A shard is a session that ran part i of n of the selected scenarios, for example on one of several machines.
+"""
 
 import os
 import shutil
@@ -14,9 +17,10 @@ from simscen.report.journal_reader import JournaledSession, read_journal
 
 
 def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, JournaledSession]:
-    """Read the journals of shards, by folder.
+    """Return the sessions of shards by their output folders.
 
-    Raises InvalidInput if they are not shards of one session, or if a shard is missing and not `allow_missing`.
+    Raises InvalidInput if they cannot be merged: they were written by different versions of simscen, several of them
+    contain the same run, or a shard is missing and `allow_missing` is false.
     """
     sessions = {folder: read_journal(folder) for folder in folders}
     folders_by_key: dict[RunKey, Path] = {}
@@ -36,7 +40,7 @@ def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, Jour
 
 
 def _missing_shards(sessions: dict[Path, JournaledSession]) -> list[Problem]:
-    """Return a problem for each shard that no session ran."""
+    """Return a problem for each shard i of n that none of the sessions ran."""
     count = max(session.shard[1] for session in sessions.values())
     present = {session.shard[0] for session in sessions.values() if session.shard[1] == count}
     folder = next(folder for folder, session in sessions.items() if session.shard[1] == count)
@@ -50,9 +54,10 @@ def _problem(folder: Path, message: str, hint: str = "") -> Problem:
 
 
 def merge_shards(sessions: dict[Path, JournaledSession], folder: Path, runs_folder: str) -> None:
-    """Write the journal of all shards to `folder`, and copy their run folders. Raises OSError.
+    """Write one journal for all shards to `folder`, and copy the folders of their runs. Raises OSError.
 
-    Files are hard links if the file system supports them. The session took as long as the longest shard.
+    `runs_folder` is the name of the folder in each output folder that contains the folders of the runs. Files are hard
+    links if the file system supports them. The wall time of the merged session is that of the longest shard.
     """
     planned = sorted((run for session in sessions.values() for run in session.planned), key=lambda run: run.key)
     journal = Journal(folder, sync=False)

@@ -1,4 +1,7 @@
-"""Results as two Parquet tables, for pandas, DuckDB, and other tools: `runs.parquet` and `verdicts.parquet`."""
+"""Writer of results as Parquet tables, for pandas and DuckDB: runs.parquet with a row per run, and verdicts.parquet.
+
+In verdicts.parquet, each row is a finding.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -11,15 +14,16 @@ from simscen.core.records.session_events import RunFinished
 from simscen.report.results_json import in_order
 from simscen.spec.quantities import si_number
 
-RUNS, VERDICTS = "runs.parquet", "verdicts.parquet"
+RUNS_FILE, VERDICTS_FILE = "runs.parquet", "verdicts.parquet"
 RUNS_PER_GROUP = 10_000
-"""Maximum number of runs whose rows are in memory."""
+"""Number of runs whose rows are written together. Larger groups need more memory."""
 
 
 def write_parquet(folder: Path, runs: Sequence[RunFinished], values: Mapping[RunKey, Mapping[str, Any]]) -> list[Path]:
-    """Write both tables into `folder`. `values` are the varied values by run. Returns the files.
+    """Write both tables into `folder`, and return the paths of the files.
 
-    Raises UsageError if pyarrow is not installed, and OSError.
+    `values` are the varied values of each run, by path in the scenario. Raises UsageError if pyarrow is not installed,
+    and OSError if a file cannot be written.
     """
     try:
         import pyarrow as pa
@@ -32,14 +36,14 @@ def write_parquet(folder: Path, runs: Sequence[RunFinished], values: Mapping[Run
     paths = sorted({path for own in values.values() for path in own})
     numeric = {path for path in paths if all(_is_number(own[path]) for own in values.values() if path in own)}
     tables = {
-        RUNS: pa.schema([
+        RUNS_FILE: pa.schema([
             *_fields(pa, "run:int64 scenario:string variation:string seed:int64 stack:string outcome:string"),
             *_fields(pa, "ended:string simulated_seconds:float64 wall_seconds:float64"),
             *_fields(pa, "error_kind:string error_message:string"),
             *[pa.field(f"metric_{name}", pa.float64()) for name in metrics],
             *[pa.field(f"value_{path}", pa.float64() if path in numeric else pa.string()) for path in paths],
         ]),
-        VERDICTS: pa.schema([
+        VERDICTS_FILE: pa.schema([
             *_fields(pa, "run:int64 id:string criterion:string severity:string status:string what:string"),
             *_fields(pa, "margin:float64 value:float64 unit:string time:float64 x:float64 y:float64"),
         ]),
@@ -49,7 +53,7 @@ def write_parquet(folder: Path, runs: Sequence[RunFinished], values: Mapping[Run
             for group in _groups(ordered):
                 rows = (
                     [_run_row(number, run, values.get(run.key, {}), numeric) for number, run in group]
-                    if name == RUNS
+                    if name == RUNS_FILE
                     else [row for number, run in group for row in _verdict_rows(number, run)]
                 )
                 writer.write_table(pa.Table.from_pylist(rows, schema=schema))
@@ -57,17 +61,18 @@ def write_parquet(folder: Path, runs: Sequence[RunFinished], values: Mapping[Run
 
 
 def _fields(pa: Any, text: str) -> list[Any]:
-    """Return the fields that a text such as "seed:int64 outcome:string" lists."""
+    """Return the columns that a text such as "seed:int64 outcome:string" lists. `pa` is the module pyarrow."""
     return [pa.field(name, getattr(pa, kind)()) for name, _, kind in (word.partition(":") for word in text.split())]
 
 
 def _groups(runs: RunStore) -> Iterator[Iterator[tuple[int, RunFinished]]]:
-    """Yield groups of runs with their numbers; one empty group if there are none."""
+    """Yield groups of at most RUNS_PER_GROUP pairs of a run's number and the run; one empty group without runs."""
     for start in range(0, max(len(runs), 1), RUNS_PER_GROUP):
         yield enumerate(runs[start : start + RUNS_PER_GROUP], start)
 
 
 def _run_row(number: int, run: RunFinished, values: Mapping[str, Any], numeric: set[str]) -> dict[str, Any]:
+    """Return the row of a run. The varied values whose paths are `numeric` are in SI units, others are texts."""
     result, error = run.result, run.result.error
     return {
         "run": number,
@@ -90,7 +95,7 @@ def _run_row(number: int, run: RunFinished, values: Mapping[str, Any], numeric: 
 
 
 def _verdict_rows(number: int, run: RunFinished) -> Iterator[dict[str, Any]]:
-    """Yield a row for each finding."""
+    """Yield a row for each finding of a run. `number` is the number of the run's row in runs.parquet."""
     for verdict in run.result.verdicts:
         for finding in verdict.findings:
             x, y = (None, None) if finding.place is None else finding.place
@@ -111,5 +116,6 @@ def _verdict_rows(number: int, run: RunFinished) -> Iterator[dict[str, Any]]:
 
 
 def _is_number(value: Any) -> bool:
+    """Return whether a varied value is a number or a quantity with a unit."""
     number = si_number(value)
     return isinstance(number, int | float) and not isinstance(number, bool)

@@ -1,4 +1,7 @@
-"""Writer of results.json, without wall-clock times so that two sessions can be compared."""
+"""Writer of results.json: the numbers of outcomes, session statistics, and the result of each run.
+
+The document has no wall-clock times, so that equal sessions give equal documents.
+"""
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,44 +17,49 @@ from simscen.judge.metrics.comparison import comparison_data
 from simscen.judge.metrics.session_summary import SessionFigures, SessionSummary, session_summary_data
 from simscen.judge.result_json import result_data
 from simscen.judge.study import study_data
-from simscen.report.display_text import escape_ci_markers_in_json, relative
-from simscen.report.text_reporters import Reporter
+from simscen.report.display_text import escape_ci_markers_in_json, relative_path
 
 FORMAT = 1
+"""Version of the format, which is a key of the document."""
 
 
 def to_json(
     runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
 ) -> str:
-    """Return the document with sorted runs. Paths of artifacts are relative to the `folder` of the session."""
+    """Return the document with runs sorted by file, scenario, and seed.
+
+    Paths of artifacts are relative to the output `folder` of the session. `comparison` is that of several stacks,
+    `study` the result of `simscen study`.
+    """
     return "".join(json_parts(runs, folder, comparison, study))
 
 
 def json_parts(
     runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
 ) -> Iterator[str]:
-    """Yield the parts of the document, one for each run."""
+    """Yield the document of `to_json` in parts that are joined without a separator, to save memory with many runs."""
     ordered = in_order(runs)
-    head, tail = _dump(_document(ordered, comparison, study)).split(_NO_RUNS)
+    head, tail = _json_text(_document(ordered, comparison, study)).split(_NO_RUNS)
     yield head + _NO_RUNS[:-1]
     separator = "\n    "
     for run in ordered:
-        yield separator + _dump(_run_data(run, folder)).replace("\n", "\n    ")
+        yield separator + _json_text(_run_data(run, folder)).replace("\n", "\n    ")
         separator = ",\n    "
     yield f"{'' if not ordered else chr(10) + '  '}]{tail}\n"
 
 
 _NO_RUNS = '\n  "runs": []'
+"""Text of an empty list of runs in the document, into which `json_parts` inserts the runs."""
 
 
-def _dump(data: dict[str, Any]) -> str:
+def _json_text(data: dict[str, Any]) -> str:
     return json.dumps(data, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def as_document(
     runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
 ) -> dict[str, Any]:
-    """Return the document as data: counts, and one entry per run in the format of its result.json."""
+    """Return the document of `to_json` as data instead of text."""
     ordered = in_order(runs)
     return {**_document(ordered, comparison, study), "runs": [_run_data(run, folder) for run in ordered]}
 
@@ -80,7 +88,10 @@ def _run_data(run: RunFinished, folder: str) -> dict[str, Any]:
 
 
 def _summaries(runs: Iterable[RunFinished]) -> dict[str, Any]:
-    """Return `suite`, or `suites` by name for several stacks, which are never pooled."""
+    """Return the key `suite` with the statistics of all runs, or for several stacks `suites` with those of each stack.
+
+    Runs of different stacks are never pooled.
+    """
     summaries = {stack: session_summary_data(summary) for stack, summary in summaries_by_stack(runs).items()}
     if len(summaries) > 1:
         return {"suites": summaries}
@@ -88,7 +99,10 @@ def _summaries(runs: Iterable[RunFinished]) -> dict[str, Any]:
 
 
 def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]:
-    """Return the statistics by stack in order of appearance, without the second runs of --check-determinism."""
+    """Return the statistics of the runs of each stack, without the second runs of --check-determinism.
+
+    The keys are the names of the stacks in order of appearance; "" if there is only one stack.
+    """
     figures_by_stack: dict[str, SessionFigures] = {}
     for run in runs:
         if not run.key.repeats:
@@ -97,7 +111,7 @@ def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]
 
 
 def in_order(runs: Sequence[RunFinished]) -> RunStore:
-    """Return the runs sorted by file, scenario and seed."""
+    """Return the runs sorted by file, scenario, variation, seed, and stack."""
     return (runs if isinstance(runs, RunStore) else RunStore(runs)).in_order()
 
 
@@ -109,20 +123,17 @@ def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
     artifacts = run.artifacts
     names = "mcap", "picture", "replay", "result"
     files = {name: getattr(artifacts, name) for name in names}
-    return {name: relative(path, folder) for name, path in files.items() if path}
+    return {name: relative_path(path, folder) for name, path in files.items() if path}
 
 
-def json_reporter(out: TextIO) -> Reporter:
-    """Return a reporter that writes the document at the end of the session."""
-    return _JsonReporter(out)
+class JsonReporter:
+    """Writes the document to `out` at the end of the session."""
 
-
-class _JsonReporter:
     def __init__(self, out: TextIO) -> None:
         self._out = out
         self._runs = RunStore()
 
-    def __enter__(self) -> "_JsonReporter":
+    def __enter__(self) -> "JsonReporter":
         return self
 
     def __exit__(
@@ -131,7 +142,7 @@ class _JsonReporter:
         self._out.flush()
 
     def __call__(self, event: SessionEvent) -> None:
-        """Collect a finished run, or write the document."""
+        """Collect a finished run, or write the document at the end of the session."""
         if isinstance(event, RunFinished):
             self._runs.append(event)
         if isinstance(event, SessionFinished):

@@ -7,7 +7,7 @@ from heapq import nsmallest
 from simscen.core.records.run_result import REPEAT_SUFFIX, Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionFinished, SessionStarted
 from simscen.judge.finding_text import disturbance_line, tightest_margin
-from simscen.report.display_text import Role, StyledLine, StyledText, one_line, shell_command_text
+from simscen.report.display_text import Role, StyledLine, StyledText, number_with_noun, one_line, shell_command_text
 from simscen.report.violations import (
     error_details,
     error_summary,
@@ -20,10 +20,13 @@ from simscen.report.violations import (
 )
 
 ERROR_TAIL_LINES = 12
+"""Number of last lines of a worker's output that are printed below an error."""
 FIXED_COLUMNS = 33
-"""Columns of a line without the name of the run. Names are padded to the rest of the terminal."""
+"""Columns of the line of a run besides its name. Names are padded to at most the remaining columns."""
 MIN_NAME_COLUMNS = 16
+"""Minimum width to which names are padded in a narrow terminal."""
 MAX_DISTURBANCES = 8
+"""Maximum number of disturbances that are listed below a run."""
 SYMBOLS: dict[Outcome, tuple[str, Role]] = {
     Outcome.PASSED: ("✓", "good"),
     Outcome.FAILED: ("✗", "bad"),
@@ -35,35 +38,36 @@ SYMBOLS: dict[Outcome, tuple[str, Role]] = {
 
 @dataclass(frozen=True)
 class RunNaming:
-    """Short unique names of the runs of a session, padded to `width` characters.
+    """Rule for short unique names of the runs of a session, which are padded to `width` characters.
 
-    If `every_seed` is true, each name contains the seed. `prefix` is removed from the scenario IDs. `columns` is the
-    width of the terminal; None for no limit.
+    If `has_seeds` is true, each name contains the seed. `prefix` is removed from the scenario IDs.
     """
 
-    every_seed: bool = False
+    has_seeds: bool = False
     prefix: str = ""
     width: int = 0
-    columns: int | None = None
 
     @classmethod
-    def of(cls, session: SessionStarted, columns: int | None = None) -> "RunNaming":
-        """Choose the naming of a session. Names contain seeds and stacks only if there are several."""
+    def for_session(cls, session: SessionStarted, columns: int | None = None) -> "RunNaming":
+        """Choose the names of a session. They contain seeds and stacks only if there are several.
+
+        `columns` is the width of the terminal; None for no limit.
+        """
         stacks = [text.partition("=")[0] for text in session.stacks] if len(session.stacks) > 1 else []
-        every_seed = session.total != (len(session.ids) or session.scenarios) * max(1, len(stacks))
+        has_seeds = session.total != (len(session.ids) or session.scenarios) * max(1, len(stacks))
         prefix = _common_folder(session.ids)
         longest = max((len(scenario_id) for scenario_id in session.ids), default=0) - len(prefix)
         stack = ".".join(
             part for part in (max(stacks, key=len, default=""), REPEAT_SUFFIX if session.twice else "") if part
         )
-        extra = [*(["seed 1234"] if every_seed else []), *([stack] if stack else [])]
+        extra = [*(["seed 1234"] if has_seeds else []), *([stack] if stack else [])]
         width = longest + (len(f" ({', '.join(extra)})") if extra else 0)
         available = width if columns is None else max(MIN_NAME_COLUMNS, columns - FIXED_COLUMNS)
-        return cls(every_seed, prefix, min(width, available), columns)
+        return cls(has_seeds, prefix, min(width, available))
 
     def name(self, key: RunKey) -> str:
         """Return the padded name of a run."""
-        return f"{short_run_name(key, self.every_seed, self.prefix):{self.width}}"
+        return f"{short_run_name(key, self.has_seeds, self.prefix):{self.width}}"
 
 
 def _common_folder(ids: Sequence[str]) -> str:
@@ -77,42 +81,45 @@ def _common_folder(ids: Sequence[str]) -> str:
 
 def session_header(started: SessionStarted) -> StyledLine:
     """Return the header, for example "simscen 0.1.0 · 14 scenarios · 2 workers"."""
-    runs = "" if started.total == started.scenarios else f" · {_count(started.total, 'run')}"
-    workers = _count(started.workers, "worker")
-    head = f"simscen {started.version} · {_count(started.scenarios, 'scenario')}{_stacks_text(started.stacks)}"
+    runs = "" if started.total == started.scenarios else f" · {number_with_noun(started.total, 'run')}"
+    workers = number_with_noun(started.workers, "worker")
+    head = (
+        f"simscen {started.version} · {number_with_noun(started.scenarios, 'scenario')}{_stacks_text(started.stacks)}"
+    )
     return (StyledText(f"{head}{runs} · {workers}", "quiet"),)
 
 
 def _stacks_text(stacks: Sequence[str]) -> str:
-    """Return the name of the stack that was chosen, or the number of several stacks."""
+    """Return " · stack NAME=VALUE" for one stack of --stack, " · 2 stacks" for several, and "" for none."""
     text = f"stack {one_line(stacks[0])}" if len(stacks) == 1 else f"{len(stacks)} stacks"
     return f" · {text}" if stacks else ""
 
 
 def run_lines(run: RunFinished, naming: RunNaming) -> Iterator[StyledLine]:
-    """Yield a line with the outcome of a run, and for failures the violations, artifacts and command to repeat it."""
+    """Yield a line with the outcome of a run, followed by the lines of `violation_lines`."""
     symbol, role = SYMBOLS[run.outcome]
     yield (
         StyledText("  "),
         StyledText(symbol, role),
         StyledText(f" {naming.name(run.key)} ", "name"),
-        *_summary(run),
+        *_times_and_reason(run),
     )
     yield from violation_lines(run)
 
 
 def violation_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """Yield violations, disturbances, artifacts and the command to repeat a run. If it passed, yield only warnings.
+    """Yield violations, disturbances, artifacts, and the command that repeats a run that did not pass.
 
-    Expected failures and skipped runs have no lines, because the reason is next to their name.
+    Yields only warnings for a passed run, and nothing for a skipped run or an expected failure, whose reason is in the
+    first line of `run_lines`.
     """
     if run.outcome in (Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED):
         return
     if run.outcome is Outcome.ERROR:
         yield from _error_lines(run)
     for violation in reported_violations(run):
-        role: Role = "warning" if violation.warning or violation.verdict.status.value != "fail" else "bad"
-        prefix = "warning: " if violation.warning else ""
+        role: Role = "warning" if violation.is_warning or violation.verdict.status.value != "fail" else "bad"
+        prefix = "warning: " if violation.is_warning else ""
         yield (StyledText("      "), StyledText(f"{prefix}{violation.message}", role))
         yield from (((StyledText(f"        {text}", "quiet")),) for text in violation.detail)
     if run.outcome is not Outcome.PASSED:
@@ -122,10 +129,9 @@ def violation_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
-    """Yield a line such as "13 passed, 1 failed · 402 s simulated in 4.1 s · junit.xml", and a line with the page.
+    """Yield a line such as "13 passed, 1 failed · 402 s simulated in 4.1 s · junit.xml", and the path of report.html.
 
-    `unfinished` is the number of runs that did not start or did not finish, by a description such as "not run". The
-    page is report.html.
+    `unfinished` is the number of runs that did not start or did not finish, by a description such as "not run".
     """
     yield (*outcome_counts(session, unfinished), *_timing_and_junit(session))
     if session.page:
@@ -135,8 +141,8 @@ def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> I
 def outcome_counts(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledText]:
     """Yield the numbers of outcomes, for example "13 passed, 1 failed, 2 errors, 3 not run".
 
-    `unfinished` is the number of runs that did not start or did not finish, by a description such as "not run". They
-    are part of `session.errors`, but this line counts them separately.
+    `unfinished` is the number of runs that did not start or did not finish, by a description such as "not run". These
+    runs are part of `session.errors`, but are counted separately here.
     """
     counts: list[tuple[int, str, Role]] = [
         (session.passed, "passed", "good"),
@@ -154,6 +160,7 @@ def outcome_counts(session: SessionFinished, unfinished: Mapping[str, int]) -> I
 
 
 def _timing_and_junit(session: SessionFinished) -> Iterator[StyledText]:
+    """Yield the simulated and wall time of a session, and the path of junit.xml if it was written."""
     speed = f" ({session.simulated / session.wall:.0f}x)" if session.wall > 0 else ""
     yield StyledText(f" · {session.simulated:.0f} s simulated in {session.wall:.1f} s{speed}", "quiet")
     if session.junit:
@@ -161,7 +168,8 @@ def _timing_and_junit(session: SessionFinished) -> Iterator[StyledText]:
         yield StyledText(one_line(session.junit), "quiet", file=session.junit)
 
 
-def _summary(run: RunFinished) -> tuple[StyledText, ...]:
+def _times_and_reason(run: RunFinished) -> tuple[StyledText, ...]:
+    """Return the simulated and wall time of a run, and its tightest margin or why it is not a failure."""
     if run.outcome is Outcome.SKIPPED:
         return (StyledText(reason_without_failure(run), "quiet"),)
     if run.outcome is Outcome.ERROR and not run.result.simulated:
@@ -184,7 +192,7 @@ def _error_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def _disturbance_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """Yield the disturbances that happened. Missing ones are among the violations."""
+    """Yield the disturbances that happened. Those that did not happen are among the violations."""
     happened = [each for each in run.result.disturbances if each.happened]
     texts = [one_line(disturbance_line(each, run.result.tick_rate)) for each in happened]
     more = [f"and {len(texts) - MAX_DISTURBANCES} more"] if len(texts) > MAX_DISTURBANCES else []
@@ -193,18 +201,19 @@ def _disturbance_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def artifact_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """Yield the paths of replay, picture or log, and the command to repeat a run."""
+    """Yield the paths of replay and picture, or of the log without a picture, and the command that repeats a run."""
     files = run.artifacts
     paths = [("replay", files.replay), ("picture", files.picture)] if files.picture else [("log", files.mcap)]
     for name, path in paths:
         if path:
             yield (_label(name), StyledText(one_line(path), file=path))
     if run.again:
-        yield (_label("again"), StyledText(shell_command_text(run.again), shell=True))
+        yield (_label("again"), StyledText(shell_command_text(run.again), is_shell=True))
 
 
 def _scenario_line(run: RunFinished) -> StyledLine:
-    first = next((violation.line for violation in reported_violations(run) if not violation.warning), 0)
+    """Return the scenario file with the line of the first violation."""
+    first = next((violation.line for violation in reported_violations(run) if not violation.is_warning), 0)
     return (_label("scenario"), StyledText(source_location(run, first), file=scenario_file(run)))
 
 
@@ -212,19 +221,17 @@ def _label(name: str) -> StyledText:
     return StyledText(f"      {name:9} ", "quiet")
 
 
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
 MAX_DETAILED_FAILURES = 20
-"""Maximum number of failures with paths. Further failures have only their cause."""
+"""Maximum number of failures that are listed with paths. Further failures have only their cause."""
 NONDETERMINISTIC = "nondeterministic"
+"""Kind of the error of a run whose log differs from that of its repetition."""
 
 Name = Callable[[RunKey], str]
+"""Function that returns the name of a run in lists."""
 
 
-def failed_runs(runs: Sequence[RunFinished], name: Name) -> Iterator[StyledLine]:
-    """Yield each failure with its first cause, paths, and the command to repeat it.
+def failure_lines(runs: Sequence[RunFinished], name: Name) -> Iterator[StyledLine]:
+    """Yield each failure with its first cause, its artifacts, and the command that repeats it.
 
     Yields nothing for a session with a single run, whose lines were printed just before. Runs that were repeated by
     --check-determinism are listed once.
@@ -243,8 +250,8 @@ def failed_runs(runs: Sequence[RunFinished], name: Name) -> Iterator[StyledLine]
             yield from artifact_lines(run)
 
 
-def slowest_runs(runs: Sequence[RunFinished], max_count: int, name: Name) -> Iterator[StyledLine]:
-    """Yield the runs with the longest wall time, the longest first; `max_count` 0 lists all."""
+def slowest_run_lines(runs: Sequence[RunFinished], max_count: int, name: Name) -> Iterator[StyledLine]:
+    """Yield the runs with the longest wall times, the longest first; `max_count` 0 lists all."""
     ordered = nsmallest(max_count or len(runs), (run for run in runs if run.wall), key=lambda run: (-run.wall, run.key))
     yield (StyledText("slowest:", "quiet"),)
     for run in ordered:
@@ -253,8 +260,11 @@ def slowest_runs(runs: Sequence[RunFinished], max_count: int, name: Name) -> Ite
         yield (StyledText(wall), StyledText(f"  {name(run.key)}", "name"), StyledText(simulated, "quiet"))
 
 
-def log_comparison(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
-    """Yield the result of --check-determinism: whether the logs of repeated runs are equal."""
+def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
+    """Yield the result of --check-determinism: whether the logs of repeated runs are equal.
+
+    Yields nothing if no run was repeated.
+    """
     if not any(run.key.repeats for run in runs):
         return
     first_runs = {run.key: run for run in runs if not run.key.repeats}
@@ -262,8 +272,8 @@ def log_comparison(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
     compared = [pair for pair in pairs if all(run.artifacts.mcap for run in pair)]
     if not compared:
         return
-    differ = sum(any(_differs(run) for run in pair) for pair in compared)
-    pairs_text = f"{len(compared)} pair{'s' if len(compared) > 1 else ''} of runs, byte for byte"
+    differ = sum(any(_is_nondeterministic(run) for run in pair) for pair in compared)
+    pairs_text = f"{number_with_noun(len(compared), 'pair')} of runs, byte for byte"
     if differ:
         yield (StyledText(f"logs differ: in {differ} of {pairs_text}", "warning"),)
         yield (StyledText(f"  {_difference_text(compared)}", "quiet"),)
@@ -272,7 +282,7 @@ def log_comparison(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
 
 
 def _difference_text(pairs: Sequence[tuple[RunFinished, RunFinished]]) -> str:
-    """Return by how much the runs of each pair differ, e.g. for a stack that is not deterministic."""
+    """Return by how much the runs of each pair differ: verdicts, time to the goal, and path length."""
     equal = sum(_statuses(first) == _statuses(second) for first, second in pairs)
     parts = [f"verdicts equal in {equal} of {len(pairs)}"]
     for metric, name, unit in (("time_to_goal", "time to goal", "s"), ("path_length", "path length", "m")):
@@ -291,8 +301,7 @@ def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) 
     """Yield the two last lines of an interrupted session.
 
     The first line has the numbers of outcomes, with `unfinished` as in `outcome_counts`. The second line has the path
-    of report.html and the option --resume that continues the session; each is omitted if there is no such file or
-    folder.
+    of report.html, if it was written, and the option --resume that continues the session, if it has an output folder.
     """
     yield (StyledText("interrupted: ", "warning"), *outcome_counts(session, unfinished))
     page = (
@@ -307,5 +316,5 @@ def _first_cause(run: RunFinished) -> str:
     return error_summary(run) if run.outcome is Outcome.ERROR else first_violation(run) or "failed"
 
 
-def _differs(run: RunFinished) -> bool:
+def _is_nondeterministic(run: RunFinished) -> bool:
     return run.result.error is not None and run.result.error.kind == NONDETERMINISTIC

@@ -1,16 +1,17 @@
-"""Texts and console lines of the result of a study."""
+"""Result of a study as console lines, and the texts that the HTML report and JUnit use as well."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from simscen.core.records.study import ClaimResult, ClaimStatus, ParameterEffect, RateRow, Study
-from simscen.report.display_text import Role, StyledLine, StyledText, one_line
+from simscen.report.display_text import Role, StyledLine, StyledText, number_with_noun, one_line
 
 MAX_ROWS = 60
-"""Maximum number of rows of pass rates to list."""
+"""Maximum number of listed rows with pass rates."""
 MAX_EFFECTS = 10
-"""Maximum number of significant effects to list."""
+"""Maximum number of listed significant effects."""
 SIGNIFICANCE_LEVEL = 0.05
+"""Maximum p-value, corrected for the number of tests, of a significant effect."""
 CLAIM_ROLES: dict[ClaimStatus, Role] = {
     ClaimStatus.HELD: "good",
     ClaimStatus.REFUTED: "bad",
@@ -20,29 +21,29 @@ CLAIM_ROLES: dict[ClaimStatus, Role] = {
 
 
 def study_lines(study: Study) -> Iterator[StyledLine]:
-    """Yield pass rates by parameter, effects, smallest margins, and finally the pass rate and the claim."""
+    """Yield pass rates by parameter, effects of parameters on margins, smallest margins, total pass rate, and claim."""
     yield from _rate_table(study.rates)
     yield from _effect_table(study)
     yield from _worst_margins(study)
     yield ()
     yield (StyledText(pass_rate_text(study)),)
-    for text in notes(study):
+    for text in pass_rate_notes(study):
         yield (StyledText(text, "quiet"),)
     if study.claim is not None:
         yield (StyledText(claim_text(study.claim), CLAIM_ROLES[study.claim.status]),)
 
 
 def pass_rate_text(study: Study) -> str:
-    """Return the pass rate of all runs, with its interval if the runs are random."""
+    """Return the pass rate of all runs, with its 95 % interval if the runs are random."""
     runs = study.passed + study.failed
-    text = f"study of {one_line(study.scenario)}: {study.passed} of {runs_text(runs)} passed"
+    text = f"study of {one_line(study.scenario)}: {study.passed} of {number_with_noun(runs, 'run')} passed"
     if runs:
         text += f" ({100 * study.passed / runs:.1f} %{interval_text(study.limits)})"
-    return text + (f", {runs_text(study.errors)} could not be completed" if study.errors else "")
+    return text + (f", {number_with_noun(study.errors, 'run')} could not be completed" if study.errors else "")
 
 
-def notes(study: Study) -> list[str]:
-    """Return remarks on how to interpret the pass rate."""
+def pass_rate_notes(study: Study) -> list[str]:
+    """Return remarks on how to interpret the pass rate: how the values were chosen, and what they cover."""
     texts = []
     if not study.is_random:
         texts.append(
@@ -56,14 +57,14 @@ def notes(study: Study) -> list[str]:
 
 
 def claim_title(claim: ClaimResult) -> str:
-    """Return a short form of the claim: "pass rate >= 95 % (confidence 95 %)"."""
+    """Return a short form of the claim, such as "pass rate >= 0.95 (confidence 0.95)"."""
     return f"pass rate >= {claim.min_rate:.6g} (confidence {claim.confidence:.6g})"
 
 
 def claim_text(claim: ClaimResult) -> str:
     """Return the claim and its result in one sentence."""
     statement = f"claim: pass rate of at least {_percent(claim.min_rate)} with {_percent(claim.confidence)} confidence"
-    runs = f"{claim.passed} of {runs_text(claim.runs)} passed{limits_text(claim)}"
+    runs = f"{claim.passed} of {number_with_noun(claim.runs, 'run')} passed{limits_text(claim)}"
     match claim.status:
         case ClaimStatus.HELD:
             return f"{statement}: held, {runs}"
@@ -72,7 +73,7 @@ def claim_text(claim: ClaimResult) -> str:
         case ClaimStatus.UNDECIDED:
             return f"{statement}: undecided, {runs}; {undecided_hint(claim)}"
         case ClaimStatus.BLOCKED:
-            return f"{statement}: open, because {runs_text(claim.errors)} could not be completed; {runs}"
+            return f"{statement}: open, because {number_with_noun(claim.errors, 'run')} could not be completed; {runs}"
 
 
 def undecided_hint(claim: ClaimResult) -> str:
@@ -83,7 +84,7 @@ def undecided_hint(claim: ClaimResult) -> str:
 
 
 def limits_text(claim: ClaimResult) -> str:
-    """Return the confidence limits of a claim, or ""."""
+    """Return the confidence limits, such as ", which shows a rate of 94.12 … 99.80 %"; "" without limits."""
     if claim.limits is None:
         return ""
     low, high = claim.limits
@@ -91,28 +92,24 @@ def limits_text(claim: ClaimResult) -> str:
 
 
 def interval_text(limits: tuple[float, float] | None) -> str:
-    """Return ", 95 % interval 94 … 100 %", or "" without limits."""
+    """Return a 95 % interval, such as ", 95 % interval 94.1 … 99.8 %"; "" without limits. `limits` are from 0 to 1."""
     return "" if limits is None else f", 95 % interval {100 * limits[0]:.1f} … {100 * limits[1]:.1f} %"
 
 
-def runs_text(number: int) -> str:
-    """Return "1 run" or "3 runs"."""
-    return f"{number} run" if number == 1 else f"{number} runs"
-
-
 def effect_text(effect: ParameterEffect) -> str:
-    """Return what a larger value of a parameter does, or that values differ."""
+    """Return whether a larger value of a parameter raises or lowers the margin, if its values have an order."""
     if not effect.is_ordered:
         return "the margin depends on the value"
     return "a larger value lowers the margin" if effect.effect < 0 else "a larger value raises the margin"
 
 
 def significant_effects(study: Study) -> Sequence[ParameterEffect]:
-    """Return the effects that are significant after the correction for the number of tests."""
+    """Return the effects with a p-value of at most SIGNIFICANCE_LEVEL."""
     return [effect for effect in study.effects if effect.p <= SIGNIFICANCE_LEVEL]
 
 
 def _rate_table(rates: Sequence[RateRow]) -> Iterator[StyledLine]:
+    """Yield a heading for each parameter, and below it the pass rate for each of its values."""
     if not rates:
         return
     listed = rates[:MAX_ROWS]
@@ -151,6 +148,7 @@ def _effect_table(study: Study) -> Iterator[StyledLine]:
 
 
 def _worst_margins(study: Study) -> Iterator[StyledLine]:
+    """Yield the smallest margin of each criterion, with the run in which it occurred."""
     if not study.worst:
         return
     yield ()
@@ -167,4 +165,5 @@ def _worst_margins(study: Study) -> Iterator[StyledLine]:
 
 
 def _percent(rate: float) -> str:
+    """Return a rate from 0 to 1 in percent."""
     return f"{100 * rate:.6g} %"

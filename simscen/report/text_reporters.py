@@ -1,4 +1,4 @@
-"""Formatting of session events as console lines, and the reporter for plain text."""
+"""Formatting of session events as console lines, the interface of all reporters, and the reporter for plain text."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -29,22 +29,22 @@ from simscen.report.display_text import (
 )
 from simscen.report.session_lines import (
     RunNaming,
-    failed_runs,
+    determinism_lines,
+    failure_lines,
     interruption_lines,
-    log_comparison,
     run_lines,
     session_footer,
     session_header,
-    slowest_runs,
+    slowest_run_lines,
 )
 from simscen.report.study import study_lines
 
 INTERRUPTED, NOT_RUN = "interrupted", "not-run"
-"""Kinds of errors of runs that were not finished. They are counted at the end, but not printed."""
+"""Error kinds of runs that were not finished. These runs are counted at the end, but not printed."""
 
 
 class SessionFormatter:
-    """Formats events as lines.
+    """Formats the events of a session as console lines with styles. Call it with each event in order.
 
     `slow` is the number of slowest runs to list at the end: 0 lists all runs, as with pytest's `--durations=0`, and
     None lists none. `columns` returns the current width of the terminal, or None for no limit.
@@ -57,13 +57,13 @@ class SessionFormatter:
         self._warned: set[str] = set()
 
     def __call__(self, event: SessionEvent) -> list[StyledLine]:
-        """Return the lines for an event."""
+        """Return the lines for an event, wrapped to the width of the terminal."""
         return [part for line in self._lines(event) for part in wrap_line(line, self._columns())]
 
     def _lines(self, event: SessionEvent) -> Iterator[StyledLine]:
         match event:
             case SessionStarted():
-                self.naming = RunNaming.of(event, self._columns())
+                self.naming = RunNaming.for_session(event, self._columns())
                 yield session_header(event)
             case RunFinished():
                 self._runs.append(event)
@@ -71,18 +71,18 @@ class SessionFormatter:
                     yield from run_lines(event, self.naming)
                     yield from self._new_warnings(event)
             case SessionFinished():
-                yield from self._end(event)
+                yield from self._final_lines(event)
             case RunStarted() | RunProgress():
                 pass
 
     def _new_warnings(self, run: RunFinished) -> Iterator[StyledLine]:
-        """Yield the warnings of an external stack, each once in a session."""
+        """Yield the warnings of the external stack in this run, except those of earlier runs of the session."""
         for text in run.warnings:
             if text not in self._warned:
                 self._warned.add(text)
                 yield (StyledText(f"      warning: {one_line(text)}", "warning"),)
 
-    def _end(self, event: SessionFinished) -> Iterator[StyledLine]:
+    def _final_lines(self, event: SessionFinished) -> Iterator[StyledLine]:
         kinds = Counter(_error_kind(run) for run in self._runs)
         if event.interrupted:
             yield from interruption_lines(event, {"unfinished": kinds[INTERRUPTED], "not started": kinds[NOT_RUN]})
@@ -90,14 +90,14 @@ class SessionFormatter:
         if event.comparison is not None:
             yield from comparison_lines(event.comparison, self.naming.prefix, self._columns())
         done = self._runs.select(index for index, run in enumerate(self._runs) if _error_kind(run) != NOT_RUN)
-        slow = [] if self._slow is None else list(slowest_runs(done, self._slow, self._name))
-        sections = [section for section in (slow, list(failed_runs(done, self._name))) if section]
+        slow = [] if self._slow is None else list(slowest_run_lines(done, self._slow, self._name))
+        sections = [section for section in (slow, list(failure_lines(done, self._name))) if section]
         for section in sections:
             yield from ((), *section)
         if event.study is not None:
             yield from study_lines(event.study)
         yield from ((),) if sections or event.study is not None else ()
-        yield from log_comparison(done)
+        yield from determinism_lines(done)
         yield from session_footer(event, {"not run": kinds[NOT_RUN]})
 
     def _name(self, key: RunKey) -> str:
@@ -109,25 +109,28 @@ def _error_kind(run: RunFinished) -> str:
 
 
 class Reporter(Protocol):
-    """Receives the events of a session. It is a context manager, so that it can restore the terminal."""
+    """Prints or writes the events of a session. It is a context manager, so that it can restore the terminal."""
 
     def __call__(self, event: SessionEvent) -> None:
-        """Process one event."""
+        """Print or write one event. The events come in the order in which they happen."""
         ...
 
     def __enter__(self) -> "Reporter":
-        """Start."""
+        """Prepare the output before the first event."""
         ...
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Restore the terminal."""
+        """Flush the output and restore the terminal."""
         ...
 
 
 class PlainReporter:
-    """Prints lines without color and cursor movement, in ASCII if the stream supports nothing else."""
+    """Prints lines without color and cursor movement, in ASCII if the stream supports nothing else.
+
+    `slow` is the number of slowest runs to list at the end; 0 lists all, None none.
+    """
 
     def __init__(self, out: TextIO, style: TerminalStyle, slow: int | None = None) -> None:
         self._out, self._style = out, style

@@ -1,4 +1,4 @@
-"""Layouts for viewing logs in Foxglove, Lichtblick and RViz."""
+"""Layouts for the programs Foxglove, Lichtblick, and RViz, which show the MCAP log of a run."""
 
 import copy
 import json
@@ -11,8 +11,9 @@ from simscen.record.frame_names import RobotFrames
 from simscen.record.log_reader import Log
 
 _SCAN, _ROBOT = "/scan", "robot"
+"""Topic of the lidar and key of the robot model in the shipped layout, which is for a single robot."""
 _SHARED_TOPICS = (topics.MAP.name, topics.GLOBAL_COSTMAP.name, topics.OBJECT_MARKERS.name)
-"""Topics of each robot that are visible for the first robot only."""
+"""Topics that each robot has with the same content. Only those of the first robot are visible."""
 
 
 def rviz_config() -> str:
@@ -21,7 +22,7 @@ def rviz_config() -> str:
 
 
 def foxglove_layout(log: Log | None = None) -> str:
-    """Return a layout for Foxglove and Lichtblick (JSON), with the robots and lidars of a log if given."""
+    """Return a layout for Foxglove and Lichtblick (JSON): for the robots and lidars of a log, or for a single robot."""
     layout = json.loads(_read_shipped("foxglove.json"))
     if log is not None:
         logs = log.robots or {"": log}
@@ -35,7 +36,10 @@ def _read_shipped(name: str) -> str:
 
 
 def _show_robots(panels: dict[str, Any], scans: Mapping[str, Sequence[str]]) -> None:
-    """Change the panels to show these robots. `scans` are lidar topics without namespace by robot."""
+    """Change `panels` (settings by panel name) to show all robots.
+
+    `scans` maps the name of each robot, "" for a single one, to its lidar topics without namespace.
+    """
     first = next(iter(scans))
     scene = panels["3D!scene"]
     scene["followTf"] = RobotFrames(first).log_frame(frame_names.TRUTH)
@@ -66,9 +70,11 @@ def _robot_topics(defaults: Mapping[str, Any], lidars: Sequence[str]) -> Iterato
 
 
 def _plot_path(path: Mapping[str, Any], robot: str) -> dict[str, Any]:
+    """Return the settings of a plotted value for a robot."""
     label = f"{robot}: {path['label']}" if robot else path["label"]
     return {**path, "value": _with_namespace(robot, path["value"]), "label": label}
 
 
 def _with_namespace(robot: str, topic: str) -> str:
+    """Return the topic in the namespace of a robot, for example "/r1/scan"; "" is a single robot without namespace."""
     return f"/{robot}{topic}" if robot else topic

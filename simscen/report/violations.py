@@ -1,4 +1,4 @@
-"""Texts about a finished run that all reporters share: violations, errors, names and locations."""
+"""Texts about a finished run that all reporters use: violations, errors, names, and locations in the scenario file."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,14 @@ from simscen.report.display_text import escape_control, one_line
 
 @dataclass(frozen=True)
 class Violation:
-    """One violated limit: its line in the scenario (0 = unknown), the message, and an explanation."""
+    """A finding that did not pass.
+
+    Attributes:
+        verdict: Verdict that contains the finding.
+        line: Line of the criterion in the scenario file; 0 if unknown.
+        message: Sentence with the value, the limit, the time, and the position.
+        detail: Lines that explain the cause.
+    """
 
     verdict: Verdict
     line: int
@@ -19,30 +26,34 @@ class Violation:
     detail: tuple[str, ...]
 
     @property
-    def warning(self) -> bool:
+    def is_warning(self) -> bool:
         """Whether the criterion only warns. Errors of a criterion are never warnings."""
         return self.verdict.severity == "warn" and self.verdict.status is not Status.ERROR
 
 
 def reported_violations(run: RunFinished) -> list[Violation]:
-    """Return everything that did not pass, in the order of the scenario."""
+    """Return all findings that did not pass, including warnings, in the order of the verdicts."""
     lines = run.result.lines or (0,) * len(run.result.verdicts)
     return [
         _violation(run, verdict, line, finding)
         for verdict, line in zip(run.result.verdicts, lines, strict=True)
-        for finding in violations(verdict) or _nothing_checked(verdict)
+        for finding in violations(verdict) or _finding_of_unchecked(verdict)
     ]
 
 
-def short_run_name(key: RunKey, every_seed: bool = True, prefix: str = "") -> str:
-    """Return the name of a run in a list: its ID without `prefix`, variation, seed with `every_seed`, and stack."""
-    extra = ", ".join(part for part in (f"seed {key.seed}" if every_seed else "", key.stack_name) if part)
+def short_run_name(key: RunKey, with_seed: bool = True, prefix: str = "") -> str:
+    """Return the name of a run in a list, such as "faults/lidar_off[speed=0.5] (seed 7, slow)".
+
+    It consists of the scenario ID without `prefix`, the variation, the seed if `with_seed` is true, and the stack if
+    there are several.
+    """
+    extra = ", ".join(part for part in (f"seed {key.seed}" if with_seed else "", key.stack_name) if part)
     name = key.test.removeprefix(prefix)
     return one_line(f"{name} ({extra})" if extra else name)
 
 
 def source_location(run: RunFinished, line: int = 0) -> str:
-    """Return path:line of a criterion, or of the scenario."""
+    """Return path:line of a criterion in the scenario file. For `line` 0 (unknown), return that of the first line."""
     return one_line(f"{scenario_file(run)}:{line or 1}")
 
 
@@ -52,7 +63,10 @@ def scenario_file(run: RunFinished) -> str:
 
 
 def error_details(run: RunFinished) -> tuple[str, str, str]:
-    """Return kind, message and last output of a run that could not be completed."""
+    """Return the error of a run that could not be completed or judged: kind, message, and end of the worker's output.
+
+    Without an error of the simulation, the kind is "invalid", and the message consists of the errors of criteria.
+    """
     if run.result.error is not None:
         return run.result.error.kind, one_line(run.result.error.message), escape_control(run.result.error.tail)
     assert run.outcome is Outcome.ERROR
@@ -61,19 +75,22 @@ def error_details(run: RunFinished) -> tuple[str, str, str]:
 
 
 def error_summary(run: RunFinished) -> str:
-    """Return kind and message of a run that could not be completed, without repeating the kind."""
+    """Return "kind: message" of a run that could not be completed, or the message if it starts with the kind."""
     kind, message, _ = error_details(run)
     return message if message.startswith(kind) else f"{kind}: {message}"
 
 
 def first_violation(run: RunFinished, more: str = " (and {} more)") -> str:
-    """Return the message of the first violation that is not a warning, with the number of others, or ""."""
-    messages = [violation.message for violation in reported_violations(run) if not violation.warning]
+    """Return the message of the first violation that is not a warning; "" if there is none.
+
+    `more` is the format of the text that follows if there are further violations; {} is their number.
+    """
+    messages = [violation.message for violation in reported_violations(run) if not violation.is_warning]
     return messages[0] + (more.format(len(messages) - 1) if len(messages) > 1 else "") if messages else ""
 
 
 def reason_without_failure(run: RunFinished) -> str:
-    """Return why a skipped or expectedly failed run is not a failure, or "" for other runs."""
+    """Return why a skipped run or an expected failure does not count as a failure; "" for other outcomes."""
     match run.outcome:
         case Outcome.SKIPPED:
             return one_line(f"skipped: {run.result.reason}")
@@ -84,9 +101,11 @@ def reason_without_failure(run: RunFinished) -> str:
 
 
 def _violation(run: RunFinished, verdict: Verdict, line: int, finding: Finding) -> Violation:
+    """Return a finding as a violation whose texts are safe for terminals."""
     detail = tuple(one_line(text) for text in finding.detail)
     return Violation(verdict, line, one_line(sentence(verdict, finding, run.result.tick_rate)), detail)
 
 
-def _nothing_checked(verdict: Verdict) -> tuple[Finding, ...]:
+def _finding_of_unchecked(verdict: Verdict) -> tuple[Finding, ...]:
+    """Return an error for a verdict that has no findings, because its criterion checked nothing; otherwise ()."""
     return () if verdict.findings else (Finding(Status.ERROR, verdict.criterion, "it checked nothing", ""),)

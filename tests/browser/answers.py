@@ -9,7 +9,7 @@ from simscen.core.records.events import Disturbance, DisturbanceOutcome
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.report.suite.history import PastOutcome, PastSession
+from simscen.report.session_history import PastOutcome, PastSession
 
 EVIL = "\"'><script>document.title='owned'</script><img src=x onerror=alert(1)>"
 

@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from answers import past, run, session
 from rig import Opened, Opener
 
-from simscen.report.suite import RunningSession, Session, to_html
+from simscen.report.suite import RunningSession, SessionReport, to_html
 
 SHOWN = (
     "[...document.querySelectorAll('.run:not([hidden])')].filter(run => !run.closest('[hidden]')).map(run => run.id)"
@@ -36,7 +36,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     answers = session(folder)
     page = folder / "report.html"
     page.write_text(
-        to_html(Session(answers, past(answers), folder=str(folder), files=("junit.xml",))), encoding="utf-8"
+        to_html(SessionReport(answers, past(answers), folder=str(folder), files=("junit.xml",))), encoding="utf-8"
     )
     return page
 
@@ -149,10 +149,10 @@ def test_names_from_scenarios_are_escaped(open_page: Opener, report: Path) -> No
 def test_page_of_a_running_session_reloads_until_it_ends(open_page: Opener, report: Path, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     answers = [run("a/first"), run("a/second", left=-0.1)]
-    page.write_text(to_html(Session(answers[:1], live=RunningSession(2, (answers[1].key,)))), encoding="utf-8")
+    page.write_text(to_html(SessionReport(answers[:1], live=RunningSession(2, (answers[1].key,)))), encoding="utf-8")
     opened = open_page(page)
     assert "1 of 2 runs done, running: a/second, seed 1" in opened.page.locator("#live").inner_text()
-    page.write_text(to_html(Session(answers)), encoding="utf-8")
+    page.write_text(to_html(SessionReport(answers)), encoding="utf-8")
     opened.page.locator(".run").nth(1).wait_for(state="attached")
     assert opened.page.locator("#live").count() == 0
 
@@ -169,7 +169,7 @@ def test_page_is_readable_without_javascript(browser: object, report: Path) -> N
 def test_report_of_two_thousand_runs_is_usable(open_page: Opener, tmp_path: Path) -> None:
     answers = [run(f"many/{k // 20}", k % 20 + 1, 0.01 * (k % 97) - 0.02, k % 60) for k in range(2000)]
     page = tmp_path / "report.html"
-    page.write_text(to_html(Session(answers)), encoding="utf-8")
+    page.write_text(to_html(SessionReport(answers)), encoding="utf-8")
     assert page.stat().st_size < 8 * 2**20
     opened = open_page(page)
     opened.page.locator("[name=find]").fill("many/77")

@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 from simscen.record.log_reader import read_run
 from simscen.report.replay.packed_columns import PackedColumns
-from simscen.report.replay.stack_report import parameters_of, tree_of
+from simscen.report.replay.stack_report import behavior_tree_data, parameters_data
 
 pytestmark = pytest.mark.slow
 GOAL = "navigation/goal.scenario.yaml"
@@ -79,10 +79,10 @@ def test_the_replay_page_has_the_behavior_tree_and_the_parameters(run) -> None:
     ended = run(GOAL)
     assert ended.code == 0, ended.said
     log, columns = read_run(next(ended.out.rglob("run.mcap")), with_sensors=True), PackedColumns()
-    tree = tree_of(log, columns)
+    tree = behavior_tree_data(log, columns)
     assert tree is not None and {"NavigateRecovery", "ComputePathToPose", "FollowPath"} <= set(tree["nodes"])
     assert {"idle", "running", "success"} <= set(tree["statuses"])
-    values = {node["node"]: {name: text for name, text, _ in node["values"]} for node in parameters_of(log, columns)}
+    values = {node["node"]: {name: text for name, text, _ in node["values"]} for node in parameters_data(log, columns)}
     assert values["/controller_server"]["FollowPath.desired_linear_vel"] == "0.4"
 
 

@@ -22,7 +22,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.log_reader import read_log
 from simscen.report.display_text import plain_text
 from simscen.report.journal import Journal
-from simscen.report.journal_reader import UNDECIDED_KINDS
+from simscen.report.session_history import UNDECIDED_KINDS
 from simscen.report.session_lines import RunNaming, run_lines
 from simscen.run.process.jobs import Job
 from simscen.run.sessions.output_folder import run_folder
@@ -155,7 +155,7 @@ class _Progress:
             print_progress("")
             repeatable = replace(event, again=repeat_command(self._jobs[event.key]))
             print_text(
-                "\n".join(plain_text(line) for line in run_lines(repeatable, RunNaming(every_seed=True))), sys.stderr
+                "\n".join(plain_text(line) for line in run_lines(repeatable, RunNaming(has_seeds=True))), sys.stderr
             )
         print_progress(f"{self._done} of {self._total} runs" if self._done < self._total else "")
 

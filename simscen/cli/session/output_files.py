@@ -28,8 +28,8 @@ from simscen.core.records.study import ClaimStatus, Study
 from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.report.junit import Family, xml_parts
 from simscen.report.results_json import json_parts
-from simscen.report.suite import RunningSession, Session, to_html
-from simscen.report.suite.history import PastSession, past_sessions
+from simscen.report.session_history import PastSession, past_sessions
+from simscen.report.suite import RunningSession, SessionReport, to_html
 from simscen.run.reproducibility import arithmetic_fingerprints, cpu_flags, software_versions
 from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, write_atomically
 
@@ -97,12 +97,14 @@ class Reports:
 
     def write_live(self, finished_runs: Sequence[RunFinished], live: RunningSession) -> bool:
         """Write the HTML report of a session that is still running, and return whether it was written."""
-        page = to_html(Session(finished_runs, self._past, folder=str(self.folder), live=live))
+        page = to_html(SessionReport(finished_runs, self._past, folder=str(self.folder), live=live))
         return _write(self.folder / PAGE, page.encode())
 
     def _page(self, finished_runs: Sequence[RunFinished], comparison: Comparison | None, study: Study | None) -> bytes:
         files = ("results.json", "junit.xml", "run.json")
-        return to_html(Session(finished_runs, self._past, comparison, str(self.folder), files, study=study)).encode()
+        return to_html(
+            SessionReport(finished_runs, self._past, comparison, str(self.folder), files, study=study)
+        ).encode()
 
     @cached_property
     def _past(self) -> Sequence[PastSession]:

@@ -12,7 +12,8 @@ from simscen.core.version import __version__
 from simscen.judge.result_json import result_data
 from simscen.loading.loaded import LoadedScenario
 from simscen.report.journal import Journal
-from simscen.report.journal_reader import PlannedRun, last_failed, read_journal
+from simscen.report.journal_reader import PlannedRun, read_journal
+from simscen.report.session_history import last_failed
 from simscen.run.process.jobs import Job
 from simscen.run.reproducibility import ScenarioDigests, scenario_digests
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER

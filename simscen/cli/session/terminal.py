@@ -16,8 +16,8 @@ from simscen.cli.process import discard_output
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.session_events import SessionEvent
 from simscen.report.console_reporter import text_reporter
-from simscen.report.github import github_reporter
-from simscen.report.results_json import json_reporter
+from simscen.report.github import GitHubReporter
+from simscen.report.results_json import JsonReporter
 from simscen.report.text_reporters import Reporter
 from simscen.run.sessions.output_folder import probe_writable
 
@@ -113,9 +113,9 @@ def _printer(format_: Format, summary: TextIO | None, slow: int | None) -> Repor
         case Format.TEXT:
             return text_reporter(sys.stdout, slow=slow)
         case Format.JSON:
-            return json_reporter(sys.stdout)
+            return JsonReporter(sys.stdout)
         case Format.GITHUB:
-            return github_reporter(sys.stdout, summary, slow, os.environ.get(PICTURES_URL, ""))
+            return GitHubReporter(sys.stdout, summary, slow, os.environ.get(PICTURES_URL, ""))
 
 
 def _step_summary() -> StringIO | None:

@@ -1,6 +1,6 @@
 // Requests to the program that serves this page.
 
-/** An answer that says why the program refused a request; `data` is what came with it. */
+/** Error for a request that the program refused; the message is the reason, `data` are the other keys of the answer. */
 export class Refused extends Error {
   constructor(status, data) {
     super(data.error ?? "simscen edit does not answer as expected");
@@ -9,7 +9,7 @@ export class Refused extends Error {
   }
 }
 
-/** Ask for something; throws Refused, also if the program has ended. */
+/** Send a request, and return the answer. Throws Refused, also if the program has ended. */
 export async function ask(name, data = {}) {
   let answer;
   try {

@@ -5,21 +5,21 @@ import { snapped, wrapped } from "./geometry.js";
 const TURN_STEP = (5 * Math.PI) / 180;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
-/** The handles that move together: all of a wall, a door, or a region, otherwise one. */
+/** Return the handles that move together: all handles of a wall, a door, or a region; otherwise one. */
 export function movedHandles(one, handle) {
   if (one.whole && handle < 0) return one.handles;
   const moved = one.handles[Math.max(handle, 0)];
   return moved ? [moved] : [];
 }
 
-/** The edit that writes the position of a handle, and its heading if that has changed or is written anew. */
+/** Return the edit that sets the position of a handle, and its heading if it has changed or is not in the text yet. */
 export function handleEdit(handle, turned) {
   const edit = { op: handle.form, keys: handle.keys, x: snapped(handle.x, 0.001), y: snapped(handle.y, 0.001) };
   if (handle.yaw !== null && (turned || handle.place)) edit.yaw = handle.yaw;
   return edit;
 }
 
-/** Follows one gesture of the pointer on an object. `edits` are those that it amounts to so far. */
+/** One gesture of the pointer on an object. `edits` are the edits for its movement so far. */
 export class Drag {
   constructor(view, hit, point) {
     Object.assign(this, { view, ...hit, from: point, moved: false });
@@ -57,7 +57,7 @@ export class Drag {
   }
 }
 
-/** Move or turn an object for an arrow key; null if the key does nothing, otherwise whether it was turned. */
+/** Move or turn an object with an arrow key. Returns null if the key does nothing, otherwise whether it was turned. */
 export function moveByKey(one, handle, event) {
   const arrow = ARROWS[event.key];
   if (!arrow || event.altKey || event.metaKey) return null;

@@ -1,16 +1,16 @@
-// The form of the selected object, made from what the schema says about its values.
+// Form of the selected object, made from the fields that editor/forms.py returns.
 
 import { el, fill } from "./dom.js";
 
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)$/;
 
-/** What the text of a number field means: a number, or a text with a unit. */
+/** Return the value of a number field: a number, or a text with a unit. */
 export function fieldValue(text) {
   const plain = text.trim();
   return NUMBER.test(plain) ? Number(plain) : plain;
 }
 
-/** Whether a list holds the coordinates of a point: of a line, or of a trigger or an action at a place. */
+/** Return whether a list contains the coordinates of a point of a line, a trigger, or an action. */
 function isPoint(field) {
   const key = field.keys.at(-1);
   return field.type === "list" && field.fields.length === 2 && field.fields.every((one) => one.type === "number") && (Number.isInteger(key) || key === "of" || key === "at");
@@ -23,7 +23,7 @@ export class Form {
     this.change = change;
   }
 
-  /** Show a form under a heading, with `more` elements after it; the focus stays in the same field. */
+  /** Show a form below a heading, followed by the elements `more`. The focus stays in the same field. */
   show(heading, form, editable, more = []) {
     const focused = this.element.contains(document.activeElement) ? document.activeElement.dataset.path : null;
     this.editable = editable;
@@ -33,7 +33,7 @@ export class Form {
     if (same) same.focus();
   }
 
-  /** The help of the whole form, folded if it is long. */
+  /** Return the help of the form, collapsed if it is long. */
   about(form) {
     if (form.help.length < 140) return el("p", { class: "help quiet" }, form.help);
     return el("details", {}, el("summary", {}, "What this is"), ...form.help.split("\n\n").map((part) => el("p", {}, part)));

@@ -24,7 +24,7 @@ export class History {
     this.time = now;
   }
 
-  /** Go back by one step; the text, or null if there is none. */
+  /** Go back by one step. Returns the text, or null if there is no earlier one. */
   undo() {
     if (!this.before.length) return null;
     this.after.push(this.text);
@@ -33,7 +33,7 @@ export class History {
     return this.text;
   }
 
-  /** Go forward by one step; the text, or null if there is none. */
+  /** Go forward by one step. Returns the text, or null if there is no later one. */
   redo() {
     if (!this.after.length) return null;
     this.before.push(this.text);

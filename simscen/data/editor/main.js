@@ -1,4 +1,4 @@
-// The page: its text is the only state that counts; the map, the list, and the forms follow from it.
+// The page. The text of the file is the only state; the map, the list, and the forms are derived from it.
 
 import { Refused, ask } from "./api.js";
 import { el, fill } from "./dom.js";
@@ -47,7 +47,7 @@ class Page {
 
   say(text) { $("live").textContent = ""; setTimeout(() => { $("live").textContent = text; }, 50); }
 
-  /** Make a text the current one, and show what follows from it. */
+  /** Make a text the current one, and update the map, the list, and the forms. */
   async changed(text, group = "") {
     this.history.push(text, group);
     await this.refresh();
@@ -62,7 +62,7 @@ class Page {
     try {
       const scene = await ask("scene", { text, known: this.view.background.id });
       if (text !== this.text) return;
-      if (this.drag || this.keyMove || this.waiting) { this.isStale = true; return; }  // what moves now would jump back
+      if (this.drag || this.keyMove || this.waiting) { this.isStale = true; return; }  // an object that is being moved would jump back
       this.isStale = false;
       this.scene = scene;
       this.view.show(scene);
@@ -74,7 +74,7 @@ class Page {
     document.documentElement.dataset.ready = "";
   }
 
-  /** Ask for the problems and the paths of the current text. */
+  /** Request the problems and the paths of the current text. */
   async check() {
     const text = this.text;
     try {
@@ -93,7 +93,7 @@ class Page {
     }
   }
 
-  /** Show paths and clearances as they are after some edits. While one request is under way, only the last one waits. */
+  /** Show the paths and clearances after some edits. During a request, only the last further one waits. */
   async showPreview(edits) {
     if (this.previewing) { this.nextPreview = edits; return; }
     this.previewing = true;
@@ -110,7 +110,7 @@ class Page {
     if (next) await this.showPreview(next);
   }
 
-  /** The length of the path and the clearance at the selected stop, below the map. */
+  /** Show the length of the path and the clearance at the selected stop below the map. */
   showFacts() {
     const preview = this.view.preview, parts = [];
     if (preview.reason) parts.push(preview.reason);
@@ -125,7 +125,7 @@ class Page {
     $("facts").textContent = parts.join(" · ");
   }
 
-  /** The number of the selected stop of a robot: 0 is its start; -1 if none is selected. */
+  /** Return the number of the selected stop of a robot: 0 is its start; -1 if none is selected. */
   stopOf(key) {
     const goals = key === "robot" ? "goals" : `${key}/goals`;
     if (this.selected === key) return 0;
@@ -138,7 +138,7 @@ class Page {
     $("facts").classList.add("bad");
   }
 
-  /** Change values of the text, after all changes before. */
+  /** Change values of the text after all earlier changes have been made. */
   edit(edits, what = "", group = "") {
     this.waiting++;
     this.queue = this.queue.then(async () => {
@@ -167,7 +167,7 @@ class Page {
     return this.showSelection();
   }
 
-  /** Select what is written in a line of the text. */
+  /** Select the object that a line of the text defines. */
   selectLine(line) {
     const found = this.scene.objects.filter((one) => one.at === line && one.editable).at(-1);
     if (found && found.id !== this.selected) this.select(found.id);
@@ -193,7 +193,7 @@ class Page {
     }
   }
 
-  /** Buttons of the selected object: its points, adding a point, and removing it. */
+  /** Return buttons for the selected object: its points, adding a point, and removing the object. */
   tools(one) {
     if (!one.editable) return [this.elsewhere(one)];
     const points = one.handles.length > 1 ? one.handles.map((_, k) => el("button", { "aria-pressed": k === this.handle ? "true" : "false", onclick: () => this.select(one.id, k), "aria-label": `Point ${k + 1} of ${one.handles.length}` }, String(k + 1))) : [];
@@ -204,7 +204,7 @@ class Page {
       removable ? el("button", { onclick: () => this.remove() }, isOnePoint ? "Delete this point" : "Delete") : null)];
   }
 
-  /** Where a thing is written that this file only refers to. */
+  /** Return a note on the file that contains an object if the edited file only refers to it. */
   elsewhere(one) {
     const isWorld = one.keys[0] === "world" && this.scene.world_page;
     if (!isWorld) return el("p", {}, "This is written in a file that this one extends. Edit that file to change it.");
@@ -229,7 +229,7 @@ class Page {
     $("place").disabled = !names.length;
   }
 
-  /** Add the chosen thing at a point, and select it. */
+  /** Add an object of the chosen kind at a point, and select it. */
   async add(point) {
     const region = this.object?.kind === "region" ? this.object.label : this.object?.region ?? "";
     const name = $("add").value, before = new Set(this.scene.objects.map((one) => one.id));
@@ -246,7 +246,7 @@ class Page {
     if (name) { $("facts").textContent = `Click where to place: ${name}. Escape cancels.`; this.say($("facts").textContent); }
   }
 
-  /** Write a move by keys that still waits. */
+  /** Write a move by keys that is not in the text yet. */
   async flush() {
     this.keyMove?.write();
     await this.queue;
@@ -402,7 +402,7 @@ class Page {
     return turned === null ? undefined : act(() => this.movedByKey(one, turned));
   }
 
-  /** Show a move by a key at once, and write it when the keys pause. */
+  /** Show a move by a key at once, and write it to the text when no key was pressed for a while. */
   movedByKey(one, turned) {
     this.view.draw();
     const target = `${one.id} ${this.handle}`;
@@ -420,7 +420,7 @@ class Page {
   }
 }
 
-/** Whether an element has an undo of its own: a field of a form, but not the text of the file. */
+/** Return whether an element has an undo of its own: a field of a form, but not the text of the file. */
 function isField(element) {
   return element !== $("text") && ["INPUT", "TEXTAREA"].includes(element.tagName);
 }

@@ -1,4 +1,4 @@
-// The map: a canvas that shows the scene, and what is under a point of it.
+// Map: a canvas that shows the scene, and finds the object at a point.
 
 import { Camera, roundLength } from "./camera.js";
 import { bounds, distanceToLine, inside, placed } from "./geometry.js";
@@ -71,7 +71,7 @@ export class MapView {
 
   get object() { return this.scene.objects.find((one) => one.id === this.selected) ?? null; }
 
-  /** What the robots' outline is: that of the preview, or a disc until there is one. */
+  /** Return the outline of a robot from the preview, or a disc before there is a preview. */
   footprint(one) {
     const key = one.kind === "estimate" ? one.id.replace("/initial_estimate", "") : one.id;
     return this.preview.robots[key]?.footprint ?? FALLBACK_FOOTPRINT;
@@ -84,7 +84,7 @@ export class MapView {
 
   anyFootprint() { return Object.values(this.preview.robots)[0]?.footprint ?? FALLBACK_FOOTPRINT; }
 
-  /** The center of the circle of an object: its first handle, or the object that it follows. */
+  /** Return the center of the circle of an object: its first handle, or the object that it follows. */
   center(one) {
     if (one.follows) return this.scene.objects.find((other) => other.label === one.follows || other.id === `robots/${one.follows}`)?.handles[0] ?? null;
     return one.handles[0] ?? null;
@@ -107,7 +107,7 @@ export class MapView {
     return center ? [center.x + one.radius, center.y] : null;
   }
 
-  /** What is under a point: {object, handle, part}, part is "body", "turn", or "radius"; null for nothing. */
+  /** Return what is at a point: {object, handle, part}; part is "body", "turn", or "radius". Returns null for nothing. */
   hit([x, y]) {
     const reach = REACH / this.camera.scale, near = (point) => point && Math.hypot(point[0] - x, point[1] - y) <= reach;
     const selected = this.object;

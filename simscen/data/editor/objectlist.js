@@ -1,4 +1,4 @@
-// The list of all objects as buttons, by kind.
+// List of all objects as buttons, grouped by kind.
 
 import { el, fill } from "./dom.js";
 
@@ -6,7 +6,7 @@ const GROUPS = [["Scenario", ["settings"]], ["Robots", ["robot", "estimate"]], [
   ["Triggers", ["trigger"]], ["Zones", ["keepout", "speed zone"]], ["Events", ["event"]], ["Faults", ["fault"]], ["Criteria", ["criterion"]], ["Places", ["place"]], ["Regions", ["region"]],
   ["Doors", ["door"]], ["Paths", ["path"]], ["Objects of the world", ["object"]], ["Obstacles", ["obstacle"]], ["Ramps", ["ramp"]], ["Walls", ["wall"]]];
 
-/** Where an object is, for its button: " at 3.00, 2.00". */
+/** Return the position of an object for its button, such as " at 3.00, 2.00". */
 export function positionText(one) {
   const handle = one.handles[0];
   if (!handle) return one.region ? ` in ${one.region}` : "";

@@ -1,4 +1,4 @@
-// Running the text, its verdicts, and the replay page beside the map.
+// Panel for running the text, with the verdicts and the replay page.
 
 import { Refused, ask } from "./api.js";
 import { el, fill } from "./dom.js";
@@ -46,7 +46,7 @@ export class RunPanel {
     const what = this.stack ? `The run with the stack ${this.stack}` : "The run";
     const head = `${what} ${run.state === "error" ? "could not be completed" : run.state === "canceled" ? "was stopped" : run.state} after ${run.seconds.toFixed(1)} s simulated${run.message ? `: ${run.message}` : ""}`;
     fill(this.element, el("p", { id: "outcome", class: good ? "good" : "bad" }, head), rows.length ? el("table", { "aria-label": "Verdicts" }, el("tbody", {}, ...rows)) : null,
-      run.replay ? el("p", {}, el("a", { href: page, target: "_blank", rel: "noreferrer" }, "Open the replay in a tab of its own")) : null,
+      run.replay ? el("p", {}, el("a", { href: page, target: "_blank", rel: "noreferrer" }, "Open the replay in a new tab")) : null,
       run.replay ? el("iframe", { src: page, title: "Replay of the run" }) : null);
     this.say(head);
   }

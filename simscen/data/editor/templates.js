@@ -1,8 +1,8 @@
-// What can be added to a file, and how each new thing is written.
+// Kinds of objects that can be added to a file, and the edits that add or remove them.
 
 import { snapped } from "./geometry.js";
 
-/** A name that no object has yet: "goal 2". */
+/** Return a name that no object has yet, such as "goal 2". */
 function freeName(scene, base) {
   const taken = new Set(scene.objects.flatMap((one) => [one.label, one.label.replace(/^goal /, ""), String(one.keys.at(-1) ?? "")]));
   if (!taken.has(base)) return base;
@@ -11,7 +11,7 @@ function freeName(scene, base) {
 
 const event = (name, when, action) => ({ name, when, do: action });
 
-/** Things by name: `make(scene, x, y, region)` returns the edits; `needs` is "inline" (a world in this file) or "region". */
+/** Kinds of objects by name. `make(scene, x, y, region)` returns the edits; `needs` is "inline" (a world in this file) or "region". */
 const THINGS = {
   Goal: { scenario: true, make: (scene, x, y) => [{ op: "add", keys: goalKeys(scene), value: { name: freeName(scene, "target"), pose: { x, y, yaw: "0 deg" } } }] },
   Person: { scenario: true, make: (scene, x, y) => {
@@ -50,25 +50,25 @@ function inWorld(scene, key, value) { return [{ op: "add", keys: [...worldKeys(s
 
 function addEvent(value) { return [{ op: "add", keys: ["events"], value }]; }
 
-/** Goals of the only robot, or of the first one of several. */
+/** Return the keys of the goals of the only robot, or of the first of several robots. */
 function goalKeys(scene) {
   const robot = scene.objects.find((one) => one.kind === "robot");
   return robot && robot.keys[0] === "robots" ? [...robot.keys, "goals"] : ["goals"];
 }
 
-/** The names of what can be added now; `region` is the selected one, or "". */
+/** Return the kinds of objects that can be added now. `region` is the selected region, or "". */
 export function addable(scene, region) {
   return Object.entries(THINGS)
     .filter(([, thing]) => (!thing.scenario || scene.kind === "scenario") && (thing.needs !== "inline" || scene.inline) && (thing.needs !== "region" || region))
     .map(([name]) => name);
 }
 
-/** The edits that add a thing at a point. */
+/** Return the edits that add an object at a point. */
 export function addEdits(name, scene, [x, y], region) {
   return THINGS[name].make(scene, snapped(x, 0.05), snapped(y, 0.05), region);
 }
 
-/** The keys of what Delete removes for an object, or for one point of it; null if it has to stay. */
+/** Return the keys of the value that Delete removes for an object or one of its points; null if it cannot be removed. */
 export function removalKeys(one, handle, scene = { objects: [] }) {
   const least = one.kind === "person" ? 0 : one.line === "closed" ? 3 : 2;
   const points = one.handles.filter((each) => isPoint(one, each));
@@ -84,12 +84,12 @@ export function removalKeys(one, handle, scene = { objects: [] }) {
   return one.keys;
 }
 
-/** Whether a handle is one of the points of the object's list. */
+/** Return whether a handle is one of the points in the list of the object. */
 export function isPoint(one, handle) {
   return Boolean(handle) && one.points_keys.length > 0 && handle.keys.length === one.points_keys.length + 1 && one.points_keys.every((key, k) => handle.keys[k] === key);
 }
 
-/** The edit that adds a point after the selected one, or at the end of the line. */
+/** Return the edit that adds a point after the selected one, or at the end of the line. */
 export function pointEdit(one, handle) {
   const points = one.handles.filter((each) => isPoint(one, each)), chosen = one.handles[handle];
   const at = isPoint(one, chosen) ? points.indexOf(chosen) : points.length - 1;

@@ -1,4 +1,4 @@
-// The text of the file beside the map, with line numbers and problems.
+// Text of the file beside the map, with line numbers and problems.
 
 import { el, fill } from "./dom.js";
 
@@ -16,7 +16,7 @@ export class TextPane {
 
   get caretLine() { return this.area.value.slice(0, this.area.selectionStart).split("\n").length; }
 
-  /** Show another text; the caret and the view stay where they are. */
+  /** Show another text. The caret and the scroll position stay where they are. */
   setText(text) {
     if (this.area.value === text) return;
     const { scrollTop, scrollLeft } = this.area, before = this.area.value, caret = this.area.selectionStart;
@@ -39,7 +39,7 @@ export class TextPane {
     this.drawGutter();
   }
 
-  /** Mark a line, and show it without taking the focus. */
+  /** Mark a line, and scroll to it without taking the focus. */
   mark(line) {
     this.line = line;
     this.drawGutter();

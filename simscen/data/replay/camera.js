@@ -1,8 +1,8 @@
-// Which part of the plane a map shows: meters, y up, to pixels, y down.
+// Camera of a map: conversion of meters (y up) to pixels (y down) and back.
 
 export const NEAREST = 2000, FURTHEST = 0.5;
 
-/** Looks at (x, y) in the middle, at `scale` pixels a meter. */
+/** Shows the point (x, y) in the middle, with `scale` pixels per meter. */
 export class Camera {
   constructor(x = 0, y = 0, scale = 40) {
     this.x = x;
@@ -10,23 +10,23 @@ export class Camera {
     this.scale = scale;
   }
 
-  /** The pixel of a point, on a canvas of that size. */
+  /** Return the pixel of a point on a canvas of the given size. */
   pixel(x, y, width, height) {
     return [width / 2 + (x - this.x) * this.scale, height / 2 - (y - this.y) * this.scale];
   }
 
-  /** The point under a pixel. */
+  /** Return the point at a pixel. */
   point(u, v, width, height) {
     return [this.x + (u - width / 2) / this.scale, this.y - (v - height / 2) / this.scale];
   }
 
-  /** Move what is shown by pixels. */
+  /** Move the shown part by pixels. */
   pan(du, dv) {
     this.x -= du / this.scale;
     this.y += dv / this.scale;
   }
 
-  /** Nearer by a factor; the point under the pixel stays where it is. */
+  /** Zoom in by a factor. The point at the pixel stays where it is. */
   zoom(factor, u, v, width, height) {
     const [x, y] = this.point(u, v, width, height);
     this.scale = Math.min(Math.max(this.scale * factor, FURTHEST), NEAREST);
@@ -34,7 +34,7 @@ export class Camera {
     this.pan(u - nu, v - nv);
   }
 
-  /** Show all of [x0, y0, x1, y1], with a margin in pixels. */
+  /** Show the rectangle [x0, y0, x1, y1] with a margin in pixels. */
   fit([x0, y0, x1, y1], width, height, margin = 24) {
     this.x = (x0 + x1) / 2;
     this.y = (y0 + y1) / 2;
@@ -44,7 +44,7 @@ export class Camera {
   }
 }
 
-/** A round length of which about `most` pixels show one: 1, 2 or 5 times a power of ten. */
+/** Return a round length (1, 2, or 5 times a power of ten) that is at most about `most` pixels long. */
 export function roundLength(scale, most) {
   const power = 10 ** Math.floor(Math.log10(most / scale));
   return [5, 2, 1].map((times) => times * power).find((length) => length * scale <= most) ?? power;

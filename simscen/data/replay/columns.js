@@ -1,8 +1,8 @@
-// Columns of numbers as report/replay/columns.py writes them: whole steps, differences, seven bits a byte.
+// Decoding of the arrays that report/replay/packed_columns.py encodes: differences of multiples of a step, as varints.
 
 export const LARGEST = 2 ** 30;
 
-/** The numbers of a column [begin, count, step]; infinite and nan where they were. */
+/** Return the numbers of an array [offset, count, step], including infinity and nan. */
 export function readColumn(bytes, [begin, count, step]) {
   const values = new Float64Array(count);
   let at = begin, whole = 0;

@@ -1,4 +1,4 @@
-// Below the map: controls, the scrubber, lanes and strips over one axis of time, and the line of now through all of them.
+// Area below the map: buttons, scrubber, lanes, and signal plots with a common time axis, and a line at the shown time.
 import { clockText, el, fill } from "./dom.js";
 import { icon } from "./icons.js";
 import { Lanes } from "./lanes.js";
@@ -6,7 +6,7 @@ import { StripView, firstShown } from "./strips.js";
 
 const SHORTEST = 0.5;
 
-/** `act` has the functions that the buttons call: see main.js. */
+/** `act` contains the functions that the buttons call; see main.js. */
 export class Deck {
   constructor(runs, player, act) {
     this.runs = runs;
@@ -28,12 +28,12 @@ export class Deck {
     for (const name of firstShown(runs)) this.#add(name);
   }
 
-  /** Pixels of the axis. */
+  /** Width of the time axis in pixels. */
   get width() {
     return this.axis.clientWidth;
   }
 
-  /** Draw everything anew: after a change of size, stretch, colors or selection. */
+  /** Draw everything again after a change of the size, the shown time span, the colors, or the selection. */
   layOut(colors, selected) {
     this.colors = colors;
     const { width } = this;
@@ -53,7 +53,7 @@ export class Deck {
     this.tell();
   }
 
-  /** Show the time of now. */
+  /** Update everything that depends on the shown time. */
   tell() {
     const { time, end, playing, speed } = this.player;
     this.range.value = time;
@@ -76,7 +76,7 @@ export class Deck {
     this.act.laidOut();
   }
 
-  /** Show a longer or a shorter stretch; the time at `share` of it stays where it is. */
+  /** Show a longer or shorter time span. The time at the fraction `share` of the span stays where it is. */
   zoom(factor, share = (this.player.time - this.from) / (this.to - this.from)) {
     const span = Math.min(Math.max((this.to - this.from) * factor, SHORTEST), this.player.end || 1), still = this.from + share * (this.to - this.from);
     this.from = Math.min(Math.max(still - share * span, 0), Math.max((this.player.end || 1) - span, 0));
@@ -129,7 +129,7 @@ function button(name, sign, act, key) {
   return el("button", { type: "button", "aria-label": name, title: `${name} (${key})`, onclick: act }, sign);
 }
 
-/** Arrow keys on the scrubber are the page's own: a step is the same everywhere. */
+/** Let the page handle arrow keys on the scrubber, so that a step has the same length everywhere. */
 function ownKeys(event) {
   if (event.key.startsWith("Arrow") || event.key === "Home" || event.key === "End") event.preventDefault();
 }

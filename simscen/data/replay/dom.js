@@ -1,13 +1,13 @@
-// Elements made of code. Text is only ever text: nothing that a scenario says can become markup.
+// Creation of HTML and SVG elements. Text is never interpreted as markup, whatever a scenario contains.
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** An element with attributes, properties (`on…` are listeners), and children that are elements or text. */
+/** Return an HTML element with attributes, properties (`on…` are listeners), and children (elements or text). */
 export function el(tag, given = {}, ...children) {
   return filled(document.createElement(tag), given, children);
 }
 
-/** The same in SVG. */
+/** Return an SVG element in the same way. */
 export function svg(tag, given = {}, ...children) {
   return filled(document.createElementNS(SVG, tag), given, children);
 }
@@ -22,13 +22,13 @@ function filled(element, given, children) {
   return element;
 }
 
-/** Put these in place of all that is in an element. */
+/** Replace all children of an element. */
 export function fill(element, ...children) {
   element.replaceChildren(...children.filter((child) => child !== null && child !== undefined && child !== false));
   return element;
 }
 
-/** 14.60 s, or 2:14.60 from a minute on. */
+/** Return a time such as "14.60 s", or "2:14.60" from one minute on. */
 export function clockText(seconds) {
   const shown = Math.max(0, seconds);
   if (shown < 60) return `${shown.toFixed(2)} s`;

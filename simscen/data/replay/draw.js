@@ -1,11 +1,11 @@
-// A run at a tick, drawn on a canvas in meters.
+// Drawing of the state of a run at a tick on the canvas of a map, in meters.
 import { roundLength } from "./camera.js";
 import { layerOf } from "./layers.js";
 
 const UNKNOWN_RADIUS = 0.2;
 const images = new WeakMap();
 
-/** Draw all that is wanted. `view` has context, width, height (CSS pixels), camera, colors, layers and marked. */
+/** Draw all visible layers. `view` has context, width, height (CSS pixels), camera, colors, layers, and marked. */
 export function drawRun(view, run, tick) {
   const { context: c, width, height, colors } = view;
   c.fillStyle = colors.unknown;
@@ -37,7 +37,7 @@ function drawRobot(view, robot, number, tick, run) {
   if (run.robots.length > 1 && true_) label(view, robot.name, true_.x, true_.y, color, 22);
 }
 
-/** Follow the points of a polygon in the frame of a pose. */
+/** Add a polygon, whose points are in the frame of a pose, to the path of the canvas. */
 function outline(view, points, pose) {
   const { context: c } = view, cos = Math.cos(pose.yaw), sin = Math.sin(pose.yaw);
   c.beginPath();
@@ -94,7 +94,7 @@ function rgb(text) {
   return [number >> 16, (number >> 8) & 255, number & 255];
 }
 
-/** Lines a round length apart, with their coordinates at the edges. */
+/** Draw grid lines at round coordinates, with their coordinates at the edges. */
 function drawLines(view) {
   const { context: c, camera, width, height, colors } = view, step = roundLength(camera.scale, 130);
   const [x0, y1] = camera.point(0, 0, width, height), [x1, y0] = camera.point(width, height, width, height);
@@ -152,7 +152,7 @@ function drawCostmaps(view, robot, run, tick) {
   }
 }
 
-/** The edge of a window that rolls with the robot. */
+/** Draw the edge of a costmap that moves with the robot. */
 function drawEdge(view, { origin: [x, y, yaw], width, height, resolution }) {
   const { context: c } = view, [across, along] = [width * resolution, height * resolution];
   outline(view, [[0, 0], [across, 0], [across, along], [0, along]], { x, y, yaw });
@@ -161,7 +161,7 @@ function drawEdge(view, { origin: [x, y, yaw], width, height, resolution }) {
   c.stroke();
 }
 
-/** The newest grid of a costmap, whole: changes are put on what was before. */
+/** Return the newest complete grid of a costmap, to which the stored differences have been added. */
 function costmapAt(costmap, run, tick) {
   let k = costmap.grids.length - 1;
   while (k >= 0 && costmap.grids[k].tick > tick) k--;
@@ -177,7 +177,7 @@ function costmapAt(costmap, run, tick) {
   return costmap.grids[k];
 }
 
-/** Ramps and floors, then the zones in force; what only some of the time is a zone is not drawn otherwise. */
+/** Draw ramps, floors, and enabled zones. Regions of zones that are not enabled now are not drawn. */
 function drawZones(view, run, tick) {
   const { colors } = view;
   for (const ground of run.scenery.ground) drawArea(view, ground.outline, colors.ground, "");
@@ -221,7 +221,7 @@ function drawHatched(view, points, color, said) {
   if (said) corner(view, said, points, color);
 }
 
-/** A name inside the upper left of an area: its middle is where things happen. */
+/** Draw a name in the upper left corner of an area, so that its middle stays free. */
 function corner(view, text, points, color) {
   const { context: c } = view, [u, v] = spot(view, Math.min(...points.map((p) => p[0])), Math.max(...points.map((p) => p[1])));
   c.font = "600 11px system-ui, sans-serif";
@@ -311,7 +311,7 @@ function drawThing(view, thing) {
   nameThing(view, thing, parts, color);
 }
 
-/** Its name above it; small and quiet where it belongs to the world, as doors do. */
+/** Draw the name of an object above it. Names of objects of the world, such as doors, are small and faint. */
 function nameThing(view, thing, parts, color) {
   const { context: c, colors } = view, cos = Math.cos(thing.pose.yaw), sin = Math.sin(thing.pose.yaw);
   const corners = parts.flat().map(([x, y]) => spot(view, thing.pose.x + cos * x - sin * y, thing.pose.y + sin * x + cos * y));
@@ -336,7 +336,7 @@ function circle(radius) {
   return Array.from({ length: 24 }, (_, k) => [radius * Math.cos((k * Math.PI) / 12), radius * Math.sin((k * Math.PI) / 12)]);
 }
 
-/** The way it truly drove: what is over strong, what is to come faint. */
+/** Draw the true path of a robot: its past strong, its future faint. */
 function drawTrail(view, robot, tick, color) {
   const { context: c } = view, { ticks, x, y } = robot.truth;
   for (const past of [false, true]) {
@@ -414,7 +414,7 @@ function drawPoints(view, points, color) {
   }
 }
 
-/** Where something went wrong: contacts that have begun, and what did not hold; what is selected in a ring. */
+/** Draw collisions that have begun, violations, and a ring around the selected one. */
 function drawMarks(view, run, tick) {
   const { colors } = view;
   for (const event of run.events) {
@@ -446,7 +446,7 @@ function star(view, [x, y], color) {
   c.stroke();
 }
 
-/** A cross on a pin, so that what stands at the place is seen. */
+/** Draw a cross on a pin, so that the object at this position remains visible. */
 function crossed(view, [x, y], color) {
   const { context: c } = view, [u, foot] = spot(view, x, y), v = foot - Math.max(0.35 * view.camera.scale, 10) - 16;
   c.beginPath();

@@ -1,4 +1,4 @@
-// Signs on buttons, drawn: fonts lack some of them.
+// Icons of buttons, which are drawn, because fonts lack some of the symbols.
 import { svg } from "./dom.js";
 
 const PATHS = {
@@ -14,7 +14,7 @@ const PATHS = {
   theme: "M8 1.5a6.5 6.5 0 1 0 0 13a6.5 6.5 0 1 0 0-13ZM8 3.3v9.4a4.7 4.7 0 1 1 0-9.4Z",
 };
 
-/** An icon of 16 by 16 pixels. */
+/** Return an icon of 16 by 16 pixels. */
 export function icon(name) {
   return svg("svg", { class: "icon", viewBox: "0 0 16 16", width: 16, height: 16, "aria-hidden": "true", focusable: "false" }, svg("path", { d: PATHS[name], "fill-rule": "evenodd" }));
 }

@@ -1,4 +1,4 @@
-// Deflate (RFC 1951) undone, for browsers without DecompressionStream (before 2023).
+// Decompression of deflate (RFC 1951), for browsers without DecompressionStream (before 2023).
 
 const LENGTHS = [3, 4, 5, 6, 7, 8, 9, 10, 11, 13, 15, 17, 19, 23, 27, 31, 35, 43, 51, 59, 67, 83, 99, 115, 131, 163, 195, 227, 258];
 const LENGTH_BITS = [0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 0];
@@ -7,7 +7,7 @@ const DISTANCES = [1, 2, 3, 4, 5, 7, 9, 13, 17, 25, 33, 49, 65, 97, 129, 193, 25
 const DISTANCE_BITS = [0, 0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8, 9, 9, 10, 10, 11, 11, 12, 12, 13, 13];
 const ORDER = [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15];
 
-/** The bytes that were deflated. Throws an Error where they were not. */
+/** Return the decompressed bytes. Throws an Error if the input is not valid. */
 export function inflate(data) {
   const bits = new BitReader(data);
   let out = new Uint8Array(data.length * 4 + 64);

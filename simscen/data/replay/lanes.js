@@ -1,4 +1,4 @@
-// The timeline: a lane for each kind of thing that happens, over a stretch of the run.
+// Timeline: lanes with the events of the run, one lane for each kind of event.
 import { clockText, el, fill, svg } from "./dom.js";
 import { entriesOf } from "./stacklog.js";
 
@@ -14,17 +14,17 @@ export const LANES = [
 const QUIET = new Set(["goal.reached", "goal.passed", "goal.canceled", "recovery.ended", "collision.ended", "fault.ended",
   "fault.took_effect", "event.ended", "object.moved"]);
 
-/** What an event is called in a list: its kind's last word, its name, what is said of it. */
+/** Return the text of an event in a list: the last word of its kind, its name, and its details. */
 export function told(event) {
   return [event.kind.replace(".", " ").replace("_", " "), event.name].filter(Boolean).join(" ");
 }
 
-/** Whether it deserves a sign of its own; what only ends something is the end of its bar. */
+/** Return whether an event has a mark of its own. An event that only ends an interval has none. */
 export function isShown(event) {
   return !QUIET.has(event.kind);
 }
 
-/** Lanes for one run or two; `chosen` is called with what is clicked on, `showLog` with seconds. */
+/** Lanes of one run or two. A click on an entry calls `chosen` with it, a click on the log calls `showLog` with the time in s. */
 export class Lanes {
   constructor(runs, chosen, showLog) {
     this.runs = runs;
@@ -38,7 +38,7 @@ export class Lanes {
     this.element = el("div", { class: "lanes" }, ...this.rows.map((lane, k) => el("div", { class: "row" }, el("span", { class: "gutter" }, lane.name), runs.length > 1 ? letters(runs) : null, this.tracks[k])));
   }
 
-  /** Draw them anew for the stretch [from, to] in seconds. */
+  /** Draw the lanes again for the time span [from, to] in seconds. */
   layOut(from, to, width, selected) {
     this.tracks.forEach((track, k) => {
       const at = (seconds) => ((seconds - from) / (to - from)) * width;
@@ -47,7 +47,7 @@ export class Lanes {
     });
   }
 
-  /** Those of a robot; what happens to the world and has no robot is in the row of the first. */
+  /** Return the entries of a robot. Events of the world, which have no robot, are in the row of the first robot. */
   #signs({ run, robot, first }, lane, at, top, width, selected) {
     const mine = (whose) => (whose ?? "") === robot || (first && !whose);
     const events = run.events.filter((event) => event.lane === lane && isShown(event) && mine(event.robot)).map((event) => this.#event(run, event, at, top, width, selected));
@@ -56,7 +56,7 @@ export class Lanes {
     return [...events, ...failures, ...problems].filter(Boolean);
   }
 
-  /** The failures of a behavior tree, errors and warnings; of several at one place, the first. */
+  /** Draw the failures of a behavior tree, errors, and warnings; of several at the same pixel, only the first. */
   #problems(run, robot, at, top, width) {
     const places = new Map();
     for (const entry of this.problems) {
@@ -95,7 +95,7 @@ export class Lanes {
   }
 }
 
-/** Which row is whose, where two runs share a lane. */
+/** Return the letters of the runs, which label the rows of a lane. */
 function letters(runs) {
   return el("span", { class: "letters", "aria-hidden": "true" }, ...runs.map((run) => el("span", {}, run.letter)));
 }

@@ -1,6 +1,6 @@
-// The address of a moment: #t=12.4, and what is selected: &v=2 (a verdict) or &e=17 (an event).
+// Hash of the address: #t=12.4 is the shown time in s; &v=2 (a verdict) or &e=17 (an event) is the selection.
 
-/** {time, selected} of a hash; null for what it does not say. */
+/** Return {time, selected} from a hash; null for what it does not contain. */
 export function fromHash(hash) {
   const said = new URLSearchParams(hash.replace(/^#/, ""));
   const time = said.has("t") && said.get("t") !== "" ? Number(said.get("t")) : NaN;
@@ -8,7 +8,7 @@ export function fromHash(hash) {
   return { time: Number.isFinite(time) && time >= 0 ? time : null, selected: selected[0] ?? null };
 }
 
-/** The hash of a moment in seconds and of what is selected. */
+/** Return the hash for a time in s and a selection. */
 export function toHash(time, selected) {
   const moment = `#t=${Number(time.toFixed(3))}`;
   return selected ? `${moment}&${selected.kind}=${selected.number}` : moment;

@@ -1,4 +1,4 @@
-// The page: data, views, keys and the address put together.
+// The page: connects the data, the views, the keyboard, and the address.
 import { Camera } from "./camera.js";
 import { Deck } from "./deck.js";
 import { clockText, el, fill } from "./dom.js";
@@ -56,7 +56,7 @@ class Page {
     else this.#goTo(asked);
   }
 
-  /** Select a verdict or an event, and go to its moment. */
+  /** Select a verdict or an event, and show its time. */
   choose(run, selected, finding = null) {
     const one = selected.kind === "v" ? run.verdicts[selected.number] : run.events[selected.number];
     if (!one) return;
@@ -70,7 +70,7 @@ class Page {
     this.#say(selected.kind === "v" ? `${this.selected.finding?.what ?? one.id}: ${this.selected.finding?.said ?? one.status}` : told(one));
   }
 
-  /** Draw everything anew. */
+  /** Draw everything again. */
   laidOut() {
     this.colors = colorsNow();
     this.theme = `${root.dataset.theme ?? ""}${matchMedia("(prefers-color-scheme: dark)").matches}`;
@@ -78,7 +78,7 @@ class Page {
     this.#changed();
   }
 
-  /** Show all of the map. */
+  /** Zoom out to the complete map. */
   fit() {
     const [width, height] = this.maps[0].size, bounds = this.maps.map((map) => map.bounds());
     const all = [0, 1, 2, 3].map((k) => (k < 2 ? Math.min : Math.max)(...bounds.map((one) => one[k])));
@@ -126,7 +126,7 @@ class Page {
   #address(hash) {
     if (hash === location.hash) return;
     clearTimeout(this.addressing);
-    this.addressing = setTimeout(() => history.replaceState(null, "", hash), 120); // browsers allow few changes a second
+    this.addressing = setTimeout(() => history.replaceState(null, "", hash), 120); // browsers allow only few changes per second
   }
 
   #say(text) {
@@ -152,13 +152,13 @@ class Page {
     });
     const tool = (name, sign, act) => el("button", { type: "button", "aria-label": name, title: name, onclick: act }, sign);
     this.follow = el("button", { type: "button", "aria-pressed": "false", title: "Keep the robot in view (c)", onclick: () => this.#follow() }, "Follow");
-    return el("div", { class: "tools" }, tool("Nearer (+)", "+", () => this.maps[0].zoom(1.4)), tool("Further (−)", "−", () => this.maps[0].zoom(1 / 1.4)), tool("Fit all (0)", "Fit", () => this.fit()), this.follow,
+    return el("div", { class: "tools" }, tool("Zoom in (+)", "+", () => this.maps[0].zoom(1.4)), tool("Zoom out (−)", "−", () => this.maps[0].zoom(1 / 1.4)), tool("Fit all (0)", "Fit", () => this.fit()), this.follow,
       el("details", { class: "menu" }, el("summary", {}, "Layers"), el("div", { class: "choice" }, ...boxes, this.#missing())));
   }
 
-  /** What there was no room for, in words. */
+  /** Return a note on the data that was omitted to limit the size of the page. */
   #missing() {
-    return this.leftOut.length ? el("p", { class: "quiet left-out" }, "Of a long log the page keeps a choice. ", ...this.leftOut.flatMap((text) => [text, el("br")])) : null;
+    return this.leftOut.length ? el("p", { class: "quiet left-out" }, "The log is long, so this page contains only a part of: ", ...this.leftOut.flatMap((text) => [text, el("br")])) : null;
   }
 
   #follow() {
@@ -190,7 +190,7 @@ class Page {
     };
   }
 
-  /** The moments of all that is worth a stop, in order. */
+  /** Return the sorted times of events and violations, between which keys jump. */
   #stops() {
     const events = this.runs.flatMap((run) => run.events.filter(isShown).map((event) => ({ time: event.tick / run.rate, run, kind: "e", number: event.number })));
     const failures = this.runs.flatMap((run) => run.failures.filter(({ finding }) => finding.tick !== null).map(({ verdict, finding }) => ({ time: finding.tick / run.rate, run, kind: "v", number: verdict.number, finding })));
@@ -240,7 +240,7 @@ class Page {
   }
 }
 
-/** The finding of a verdict that decides; none of an event. */
+/** Return the finding of a selected verdict to show: a violated one, if possible with a time; null for an event. */
 function worst(one) {
   return one.findings?.find((finding) => finding.status !== "pass" && finding.tick !== null) ?? one.findings?.find((finding) => finding.status !== "pass") ?? one.findings?.[0] ?? null;
 }

@@ -1,10 +1,10 @@
-// A map that can be moved: drag, wheel, pinch, keys. Maps side by side share their camera.
+// Map that can be moved by dragging, wheel, pinch, and keys. Two maps side by side have the same camera.
 import { drawRun } from "./draw.js";
 import { el, fill } from "./dom.js";
 
 const STEP = 60;
 
-/** The canvas of a run; `told` is called when the camera was moved by hand. */
+/** Canvas with the map of a run. `told` is called when the user has moved the camera. */
 export class MapView {
   constructor(run, camera, told) {
     this.run = run;
@@ -30,7 +30,7 @@ export class MapView {
     this.element = el("div", { class: "map" }, this.canvas, this.spot, el("div", { class: "corner" }, letter, this.chips));
   }
 
-  /** Pixels of the page. */
+  /** Size of the map in CSS pixels. */
   get size() {
     return [this.canvas.clientWidth, this.canvas.clientHeight];
   }
@@ -45,7 +45,7 @@ export class MapView {
     drawRun({ context, width, height, camera: this.camera, colors, theme, layers, marked }, this.run, tick);
   }
 
-  /** Faults at work and recoveries under way, in words. */
+  /** Return the text of the active faults and recoveries. */
   #tell(tick) {
     const going = ["faults", "recoveries"].flatMap((lane) => this.run.going(lane, tick)), key = going.map((event) => event.number).join(" ");
     if (key === this.told_) return;
@@ -53,7 +53,7 @@ export class MapView {
     fill(this.chips, ...going.map((event) => el("span", { class: `chip ${event.lane}` }, [event.robot, event.name].filter(Boolean).join(": "))));
   }
 
-  /** Everything worth seeing: the known part of the map, the ways, the goals. */
+  /** Return the rectangle around the known part of the map, the paths, and the goals. */
   bounds() {
     const xs = [], ys = [];
     for (const robot of this.run.robots) {
@@ -129,7 +129,7 @@ function minmax(values) {
   return least <= most ? [least, most] : [];
 }
 
-/** The corners of the part of a map that is known. */
+/** Return the corners of the known part of a map. */
 function knownCorners(grid, column) {
   const cells = column(grid.cells);
   let [left, right, low, high] = [grid.width, 0, grid.height, 0];

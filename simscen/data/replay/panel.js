@@ -1,4 +1,4 @@
-// Beside the map: how each criterion came out, what is going on now, the scenario's text, all events.
+// Panel beside the map: verdicts, the present state, the text of the scenario, and all events.
 import { clockText, el, fill } from "./dom.js";
 import { isShown, told } from "./lanes.js";
 import { ParameterList } from "./parameters.js";
@@ -7,7 +7,7 @@ import { StackLog, runningAt } from "./stacklog.js";
 const SIGNS = { pass: "✓", fail: "✗", inconclusive: "?", error: "!" };
 const WORDS = { pass: "passed", fail: "failed", inconclusive: "undecided", error: "error" };
 
-/** Verdicts above, and views of the rest below; `chosen` is called with what is clicked on, `seek` with seconds. */
+/** Verdicts at the top, other views in tabs below. A click calls `chosen` with the entry, or `seek` with a time in s. */
 export class Panel {
   constructor(runs, chosen, seek) {
     this.runs = runs;
@@ -44,7 +44,7 @@ export class Panel {
     this.views.parameters = ["Parameters", view];
   }
 
-  /** Bring a view to the front, if there is such a view. */
+  /** Show the tab of a view, if there is such a view. */
   show(id) {
     if (!this.views[id]) return;
     for (const tab of this.tabs) {
@@ -58,7 +58,7 @@ export class Panel {
     this.tell(this.seconds ?? 0);
   }
 
-  /** Light up what is selected: its card, its row, its line. */
+  /** Highlight the card, the row, and the line of the selected verdict or event. */
   select(run, selected, line) {
     for (const { element, run: whose, number } of this.cards) {
       const lit = selected?.kind === "v" && whose === run && number === selected.number;
@@ -80,7 +80,7 @@ export class Panel {
     }
   }
 
-  /** What is going on at a time. */
+  /** Show the state at a time. */
   tell(seconds) {
     this.seconds = seconds;
     if (this.front === "log") this.log.tell(seconds);
@@ -148,7 +148,7 @@ export class Panel {
       this.lines.set(number, row);
       return row;
     });
-    fill(this.text, ...(run.text.join("") ? rows : [el("p", { class: "quiet" }, "This log holds no scenario.")]));
+    fill(this.text, ...(run.text.join("") ? rows : [el("p", { class: "quiet" }, "This log contains no scenario.")]));
   }
 
   #events(run) {
@@ -191,12 +191,12 @@ export class Panel {
   }
 }
 
-/** The box of a view, which its tab shows. */
+/** Return the element of a view, which its tab shows. */
 function viewBox(id, look = "") {
   return el("div", { class: `view ${look}`, id: `view-${id}`, role: "tabpanel", "aria-labelledby": `tab-${id}`, tabindex: "0" });
 }
 
-/** Scroll a box, and nothing around it, so that something in it is seen. */
+/** Scroll only this box, not the page, so that an element in it is visible. */
 function reveal(element, box) {
   const inner = element.getBoundingClientRect(), outer = box.getBoundingClientRect();
   if (inner.top >= outer.top && inner.bottom <= outer.bottom) return;
@@ -207,7 +207,7 @@ function poseText({ x, y, yaw }) {
   return `${x.toFixed(2)}, ${y.toFixed(2)} m, ${((yaw * 180) / Math.PI).toFixed(0)}°`;
 }
 
-/** A line of YAML: its comment and its keys in colors of their own. */
+/** Return a line of YAML with colors for its comment and its keys. */
 function colored(text) {
   const comment = text.search(/(^|\s)#/), plain = comment < 0 ? text : text.slice(0, comment);
   const parts = plain.split(/([\w.-]+:(?=\s|$))/).map((part, k) => (k % 2 ? el("span", { class: "key" }, part) : part));

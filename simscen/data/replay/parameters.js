@@ -1,7 +1,7 @@
-// The parameters of an external stack, node by node; of two runs also what differs between them.
+// Parameters of an external stack by node. For two runs, also the parameters that differ between them.
 import { el, fill } from "./dom.js";
 
-/** All parameters of the runs: of which robot and node, its name, whether it is a main one, and its value in each run. */
+/** Return all parameters of the runs: robot and node, name, whether it is a main parameter, and its value in each run. */
 export function parametersOf(runs) {
   const found = new Map();
   const reporting = runs.filter((run) => run.robots.some((robot) => robot.parameters.length));
@@ -19,7 +19,7 @@ export function parametersOf(runs) {
   return { letters: reporting.length > 1 ? reporting.map((run) => run.letter) : [""], rows: [...found.values()] };
 }
 
-/** A list with a filter; its rows are made when it is first shown. */
+/** List of parameters with a filter. Its rows are made when it is first shown. */
 export class ParameterList {
   constructor(runs) {
     const { letters, rows } = parametersOf(runs);
@@ -31,7 +31,7 @@ export class ParameterList {
     this.elements = [el("div", { class: "bar" }, this.filter, this.count), this.body];
   }
 
-  /** Make the rows, once. */
+  /** Make the rows if they do not exist yet. */
   show() {
     if (this.groups) return;
     const differing = this.letters.length > 1 ? this.rows.filter((row) => new Set(row.values).size > 1) : [];

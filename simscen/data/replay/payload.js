@@ -1,15 +1,15 @@
-// The data of the page: base64 of deflated bytes, a length, JSON and columns.
+// Data of the page: base64 of compressed bytes, which are the length of a JSON document, the document, and arrays.
 import { inflate } from "./inflate.js";
 import { readColumn } from "./columns.js";
 
-/** {about, column}: the JSON, and a function that reads a column once and keeps it. */
+/** Return {about, column}: the JSON document, and a function that decodes an array and caches it. */
 export async function unpack(text) {
   const bytes = await inflated(fromBase64(text.trim()));
   const size = new DataView(bytes.buffer, bytes.byteOffset).getUint32(0, true);
   const about = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + size)));
   const numbers = bytes.subarray(4 + size), kept = new Map();
   const column = (where) => {
-    const key = where.join(" "); // an empty column begins where the next one does
+    const key = where.join(" "); // an empty array has the same offset as the next one
     if (!kept.has(key)) kept.set(key, readColumn(numbers, where));
     return kept.get(key);
   };
@@ -28,7 +28,7 @@ async function inflated(packed) {
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
     return new Uint8Array(await new Response(stream).arrayBuffer());
   } catch (error) {
-    if (error instanceof TypeError) return inflate(packed); // knows streams, but not "deflate-raw"
+    if (error instanceof TypeError) return inflate(packed); // the browser has DecompressionStream, but without "deflate-raw"
     throw error;
   }
 }

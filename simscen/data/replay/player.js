@@ -1,8 +1,8 @@
-// The time that is shown, and how it goes on.
+// Player: the shown time, and its progress while the run plays.
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
 
-/** Simulated seconds from 0 to `end`; `changed` is called whenever they are others. */
+/** Time from 0 to `end` in simulated seconds. `changed` is called whenever it changes. */
 export class Player {
   constructor(end, changed) {
     this.end = end;
@@ -39,7 +39,7 @@ export class Player {
     this.changed();
   }
 
-  /** One speed faster (1) or slower (-1). */
+  /** Select the next faster (1) or slower (-1) speed. */
   pace(step) {
     this.speed = SPEEDS[Math.min(Math.max(SPEEDS.indexOf(this.speed) + step, 0), SPEEDS.length - 1)];
     this.changed();

@@ -1,9 +1,9 @@
-// A run to ask: what was where at a tick, and what went on.
+// Data of a run: positions of robots and objects at a tick, and what happened.
 import { ellipse, newest, poseAt } from "./series.js";
 
 const SCAN_AGE = 0.5, LOCAL_AGE = 1.0, MOTION_GAP = 0.15;
 
-/** A recorded run; `letter` is "A" or "B" where there are two. */
+/** Recorded run. `letter` is "A" or "B" if there are two. */
 export class Run {
   constructor(data, column, letter) {
     Object.assign(this, data);
@@ -22,7 +22,7 @@ export class Run {
     return Math.min(Math.max(seconds, 0) * this.rate, this.end);
   }
 
-  /** Everything that can move and is there: its name, its outlines in its own frame, and its pose. */
+  /** Return the movable objects that exist at a tick: name, outlines in the frame of the object, and pose. */
   thingsAt(tick) {
     const found = [];
     for (const name of new Set([...this.shapes.keys(), ...this.things.keys(), ...this.spawned.map((one) => one.name)])) {
@@ -45,12 +45,12 @@ export class Run {
     return pose && { name, pose, parts: (spawn ?? known)?.parts ?? null, person: (spawn ?? known)?.person ?? false, brought: Boolean(spawn?.tick) };
   }
 
-  /** What lasts and goes on at a tick, of one lane. */
+  /** Return the intervals of a lane that contain a tick. */
   going(lane, tick) {
     return this.events.filter((event) => event.lane === lane && event.until !== undefined && event.tick <= tick && tick < event.until);
   }
 
-  /** The zones in force at a tick: those of the start, switched by what happened since. */
+  /** Return the zones that are enabled at a tick: those of the start, changed by the events until then. */
   zonesAt(tick) {
     const zones = new Map(this.scenery.zones.map((zone) => [`${zone.filter} ${zone.region}`, zone]));
     for (const event of this.events) {
@@ -64,7 +64,7 @@ export class Run {
     return [...zones.values()];
   }
 
-  /** The findings that did not hold, the gravest first: which verdict, which finding, and when. */
+  /** Return the violated findings, the most severe first: verdict, finding, and tick. */
   get failures() {
     const order = { error: 0, fail: 0, inconclusive: 1 };
     return this.verdicts
@@ -73,20 +73,20 @@ export class Run {
       .sort((a, b) => (a.verdict.severity === "warn") - (b.verdict.severity === "warn") || order[a.finding.status] - order[b.finding.status]);
   }
 
-  /** Every strip of every robot, by name. */
+  /** Return the data of a signal for all robots that have it. */
   strip(name) {
     return this.robots.map((robot) => robot.strips.get(name)).filter(Boolean);
   }
 }
 
-/** The changes of a behavior tree in order: tick, node, its status before, and its status. */
+/** Return the changes of a behavior tree in order: tick, node, previous status, and status. */
 function changesOf(column, tree) {
   if (!tree) return [];
   const [node, before, status] = [tree.node, tree.before, tree.status].map(column);
   return Array.from(column(tree.ticks), (tick, k) => ({ tick, node: tree.nodes[node[k]], before: tree.statuses[before[k]], status: tree.statuses[status[k]] }));
 }
 
-/** One of the robots of a run. */
+/** Data of one robot of a run. */
 class Robot {
   constructor(data, run) {
     Object.assign(this, data);
@@ -100,18 +100,18 @@ class Robot {
     this.strips = new Map(data.strips.map((strip) => [strip.name, new Strip(strip, this, column)]));
   }
 
-  /** Where it truly is; null where the log does not say. */
+  /** Return the true pose; null if the log does not contain it. */
   truthAt(tick) {
     if (!this.truth.ticks.length) return null;
     return poseAt(this.truth, tick, 3 * this.run.rate) ?? { x: this.truth.x[0], y: this.truth.y[0], yaw: this.truth.yaw[0] };
   }
 
-  /** Where it truly is, else where it thinks it is, else the origin. */
+  /** Return the true pose, without it the estimated pose, and without both the origin. */
   placeAt(tick) {
     return this.truthAt(tick) ?? this.beliefAt(tick) ?? { x: 0, y: 0, yaw: 0 };
   }
 
-  /** Where it thinks it is, its 95 % ellipse, and how old that is in seconds. */
+  /** Return the estimated pose, its 95 % ellipse, and the age of the estimate in s. */
   beliefAt(tick) {
     if (!this.belief) return null;
     const k = newest(this.belief.ticks, tick);
@@ -129,7 +129,7 @@ class Robot {
     return pathAt(this.local, tick, LOCAL_AGE * this.run.rate);
   }
 
-  /** The newest scan of each lidar, as points of the map: x, y, x, y, … seen from where the robot thought it was. */
+  /** Return the newest scan of each lidar as points x, y, x, y, … on the map, according to the estimated pose. */
   scansAt(tick) {
     return this.scans.flatMap((lidar) => {
       const { column } = this.run, k = newest(column(lidar.ticks), tick);
@@ -139,7 +139,7 @@ class Robot {
     });
   }
 
-  /** x, y, yaw columns of the newest cloud. */
+  /** Return the x, y, and yaw arrays of the newest particle cloud. */
   particlesAt(tick) {
     if (!this.particles) return null;
     const { column } = this.run, ticks = column(this.particles.ticks), k = newest(ticks, tick);
@@ -151,7 +151,7 @@ class Robot {
     return { x: cut("x"), y: cut("y"), yaw: cut("yaw") };
   }
 
-  /** The goal that it drives to; null between goals. */
+  /** Return the goal to which the robot drives; null between goals. */
   goalAt(tick) {
     const events = this.run.events.filter((one) => one.kind === "goal.accepted" && (one.robot ?? "") === this.name && one.tick <= tick);
     const event = events.at(-1);
@@ -159,7 +159,7 @@ class Robot {
   }
 }
 
-/** A signal over the clock of its robot, or over ticks of its own. */
+/** Signal over time: at the ticks of the robot, or at ticks of its own. */
 class Strip {
   constructor(data, robot, column) {
     Object.assign(this, data);

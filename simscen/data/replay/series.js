@@ -1,6 +1,6 @@
-// Samples over time: which one counts at a tick, and what lies between two of them.
+// Samples over time: the sample at a tick, and interpolation between samples.
 
-/** The number of the newest sample at `tick`; -1 before the first. */
+/** Return the index of the newest sample at `tick`; -1 before the first. */
 export function newest(ticks, tick) {
   let low = 0, high = ticks.length;
   while (low < high) {
@@ -11,9 +11,9 @@ export function newest(ticks, tick) {
   return low - 1;
 }
 
-/** Poses {ticks, x, y, yaw}: where it is at `tick`, between samples on the straight line; null before the first.
+/** Return the pose of {ticks, x, y, yaw} at `tick`, with linear interpolation; null before the first sample.
  *
- * A pause of more than `gap` ticks and a jump of more than `jump` meters are no motion: the older sample holds. */
+ * After a pause of more than `gap` ticks or a jump of more than `jump` meters, the older sample is returned instead. */
 export function poseAt(poses, tick, gap, jump = 0.5) {
   const k = newest(poses.ticks, tick);
   if (k < 0) return null;
@@ -25,12 +25,12 @@ export function poseAt(poses, tick, gap, jump = 0.5) {
   return { x: here.x + share * dx, y: here.y + share * dy, yaw: here.yaw + share * turned(here.yaw, poses.yaw[k + 1]) };
 }
 
-/** The shorter turn from one heading to another. */
+/** Return the difference between two headings in (-π, π]. */
 export function turned(from, to) {
   return Math.atan2(Math.sin(to - from), Math.cos(to - from));
 }
 
-/** The half-axes and the heading of the ellipse that holds 95 % of a normal distribution in the plane. */
+/** Return the half-axes and the heading of the ellipse that contains 95 % of a normal distribution in the plane. */
 export function ellipse(xx, xy, yy) {
   const middle = (xx + yy) / 2, spread = Math.hypot((xx - yy) / 2, xy), far = Math.sqrt(5.991);
   return {
@@ -40,7 +40,7 @@ export function ellipse(xx, xy, yy) {
   };
 }
 
-/** The least and the greatest of values[from … to), nan left out; null where there is none. */
+/** Return the minimum and the maximum of values[from … to) without nan; null if there are no values. */
 export function extremes(values, from, to) {
   let least = Infinity, most = -Infinity;
   for (let k = from; k < to; k++) {

@@ -1,4 +1,4 @@
-// The log of an external stack: changes of its behavior tree, and its log lines, around the time that is shown.
+// Log of an external stack: changes of its behavior tree, and its log lines, around the shown time.
 import { clockText, el, fill } from "./dom.js";
 import { newest } from "./series.js";
 
@@ -12,7 +12,7 @@ const KINDS = {
 };
 const knownEntries = new WeakMap();
 
-/** All entries of the stacks of the runs, in order of time. */
+/** Return all log entries of the runs, sorted by time. */
 export function entriesOf(runs) {
   if (knownEntries.has(runs)) return knownEntries.get(runs);
   const entries = runs.flatMap((run) => run.robots.flatMap((robot) => {
@@ -24,10 +24,10 @@ export function entriesOf(runs) {
   return entries;
 }
 
-/** The changes of a behavior tree, with how long a node ran that ends. Several nodes may have one name.
+/** Return the changes of a behavior tree, with the time that an ending node was running. Several nodes may have the same name.
  *
  * Minor are conditions, which never run, resets to idle, and what a recovery node does before it ends: it becomes idle.
- * It is a problem if a node fails that was running; for a condition, to fail is an answer. */
+ * A failure is a problem only if the node was running before, because a condition fails without running. */
 function changesOfTree(robot, rate) {
   const everRun = new Set(robot.changes.filter(({ status }) => status === "running").map(({ node }) => node));
   const begun = new Map(), halted = new Map();
@@ -47,7 +47,7 @@ function changesOfTree(robot, rate) {
   return found;
 }
 
-/** The nodes of a behavior tree that run at a tick, in the order in which they began. */
+/** Return the nodes of a behavior tree that run at a tick, in the order in which they started. */
 export function runningAt(robot, tick) {
   const running = new Map();
   for (const { tick: when, node, before, status } of robot.changes) {
@@ -59,7 +59,7 @@ export function runningAt(robot, tick) {
   return [...running.keys()];
 }
 
-/** A list that follows the time; `seek` is called with the seconds of the entry that is clicked on. */
+/** List that follows the shown time. A click on an entry calls `seek` with its time in s. */
 export class StackLog {
   constructor(runs, seek) {
     this.runs = runs;
@@ -88,7 +88,7 @@ export class StackLog {
     this.#mark();
   }
 
-  /** Say which nodes run, if that may have changed. */
+  /** Show which nodes run, if this may have changed. */
   #tellRunning(seconds) {
     const passed = newest(this.allTimes, seconds + 1e-9);
     if (passed === this.passed) return;
@@ -102,7 +102,7 @@ export class StackLog {
     return el("p", {}, el("span", { class: "quiet" }, whose ? `${whose} running now: ` : "Running now: "), nodes.length ? nodes.join(" · ") : "nothing");
   }
 
-  /** Show what matches the filter, around the time that is shown. */
+  /** Show the entries that match the filter, around the shown time. */
   #choose() {
     this.#pick();
     [this.at, this.begin] = [undefined, undefined];
@@ -118,7 +118,7 @@ export class StackLog {
     this.count.textContent = `${found.length} of ${this.entries.length}`;
   }
 
-  /** Put the rows around an entry into the list; the entry that has the focus keeps it. */
+  /** Make the rows around an entry. The focused entry keeps the focus. */
   #show(middle) {
     const focused = this.list.contains(document.activeElement) ? document.activeElement.closest("li").dataset.k : null;
     this.begin = Math.max(0, Math.min(middle - ROWS_SHOWN / 2, this.shown.length - ROWS_SHOWN));
@@ -138,7 +138,7 @@ export class StackLog {
       entry.took ? el("span", { class: "took", title: "how long it ran" }, clockText(entry.took)) : null));
   }
 
-  /** Light up the newest entries, and scroll to them. */
+  /** Highlight the newest entries, and scroll to them. */
   #mark(scroll = true) {
     const newestTime = this.times[this.at];
     let last = null;
@@ -152,7 +152,7 @@ export class StackLog {
     if (scroll) this.#reveal(last ?? this.list.firstElementChild);
   }
 
-  /** Scroll the view, and nothing around it, so that a row is seen below the bar. */
+  /** Scroll only the list, not the page, so that a row is visible below the bar. */
   #reveal(row) {
     const box = this.list.parentElement;
     if (!row || !box || box.hidden) return;
@@ -161,7 +161,7 @@ export class StackLog {
     box.scrollTop += inner.top - top - Math.max(outer.bottom - top - inner.height, 0) / 2;
   }
 
-  /** Up and down go from entry to entry, also beyond the rows that are shown. */
+  /** Move the focus with the up and down keys, also beyond the rows that are shown. */
   #key(event) {
     const step = { ArrowUp: -1, ArrowDown: 1 }[event.key], here = event.target.closest("li")?.dataset.k;
     if (!step || here === undefined) return;
@@ -172,7 +172,7 @@ export class StackLog {
     this.#focus(next);
   }
 
-  /** Move the focus to an entry, and show the rows around it if it is not among those that are shown. */
+  /** Move the focus to an entry, and make the rows around it if they do not exist. */
   #focus(k) {
     if (k < this.begin || k >= this.end) {
       this.#show(k);
@@ -184,7 +184,7 @@ export class StackLog {
   }
 }
 
-/** The entries, with equal ones at one time that follow each other joined. */
+/** Return the entries, in which successive equal entries at the same time are joined. */
 function joined(entries) {
   const found = [];
   for (const entry of entries) {

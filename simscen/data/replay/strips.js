@@ -1,11 +1,11 @@
-// Signals over time, with the bounds that criteria set on them.
+// Plots of signals over time, with the limits that criteria set on them.
 import { el } from "./dom.js";
 import { extremes, newest } from "./series.js";
 
 export const HEIGHT = 46;
 const DASHES = [[], [5, 3], [2, 2], [8, 3, 2, 3]];
 
-/** Signals to show first: those with a bound, what failed before what held, and then what is always of interest. */
+/** Return the signals to show first: those with a limit, violated ones before others, and then the usual ones. */
 export function firstShown(runs) {
   const bounds = runs.flatMap((run) => run.robots.flatMap((robot) => robot.limits));
   const bound = [...bounds.filter((one) => one.status !== "pass"), ...bounds.filter((one) => one.status === "pass")].map((one) => one.signal);
@@ -15,7 +15,7 @@ export function firstShown(runs) {
   return [...new Set(wanted)].filter((name) => known.has(name)).slice(0, 4);
 }
 
-/** The strip of one signal, of all robots of all runs. */
+/** Plot of one signal for all robots of all runs. */
 export class StripView {
   constructor(name, runs) {
     this.name = name;
@@ -29,7 +29,7 @@ export class StripView {
     this.#measure();
   }
 
-  /** What the signal is at a time, in words. */
+  /** Return the text of the value of the signal at a time. */
   tell(seconds) {
     const unit = this.about.unit && !this.about.asks ? ` ${this.about.unit}` : "";
     this.value.textContent = this.lines.map(({ run, strip }) => shown(strip, strip.at(run.tick(seconds)))).join(" · ") + unit;
@@ -108,7 +108,7 @@ export class StripView {
   }
 }
 
-/** The bounds of a signal, each once, broken where any run broke it. */
+/** Return the different limits of a signal; a limit is violated if it is violated in any run. */
 function boundsOf(name, runs) {
   const found = new Map();
   for (const limit of runs.flatMap((run) => run.robots.flatMap((robot) => robot.limits))) {

@@ -5,7 +5,7 @@
   const field = name => form.elements[name];
   const statuses = [...form.querySelectorAll("[name=status]")];
   const texts = new Map();
-  function words(run) { // gathered when somebody searches: thousands of runs open sooner
+  function words(run) { // collected at the first search, so that a page with thousands of runs opens faster
     if (!texts.has(run)) texts.set(run, run.textContent.toLowerCase() + " " + run.id);
     return texts.get(run);
   }
@@ -119,7 +119,7 @@
   document.addEventListener("keydown", key);
   document.getElementById("all").addEventListener("click", () => { form.reset(); update(); field("find").focus(); });
   addEventListener("hashchange", () => location.hash.startsWith("#run-") && recall());
-  addEventListener("load", () => requestAnimationFrame(() => location.hash.startsWith("#run-") && recall())); // the browser takes the focus
+  addEventListener("load", () => requestAnimationFrame(() => location.hash.startsWith("#run-") && recall())); // after the browser has moved the focus
   recall();
   update();
   if (document.documentElement.hasAttribute("data-live")) live();

@@ -1,1 +1,1 @@
-"""What the map of the editor shows of a file, and what a change on the map means for its text."""
+"""The map of the editor: the objects of a file on it, its background, and edits of the text by changes on the map."""

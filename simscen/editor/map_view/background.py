@@ -1,4 +1,4 @@
-"""What the map shows below the things that can be edited: a ROS map as an image, an SDF world as lines."""
+"""Background of the map, below the objects that can be edited: a ROS map as an image, or an SDF world as lines."""
 
 import base64
 from dataclasses import dataclass, field, replace
@@ -15,24 +15,30 @@ from simscen.loading.builders import load_map, world_from_file
 from simscen.loading.loaded import LoadedWorld
 
 SECTION_HEIGHT_M = 0.2
-"""Height of the cross section of an SDF world: that of a usual lidar."""
-MAX_IMAGE_SIDE = 2048
-"""Maximum number of pixels of the image of a map; larger maps are scaled down."""
+"""Height of the cross section through an SDF world: a usual height of a lidar."""
+MAX_IMAGE_SIDE_PX = 2048
+"""Maximum width and height of the image of a map. Larger maps are scaled down."""
 MAX_SEGMENTS = 40_000
+"""Maximum number of lines of an SDF world."""
 UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY = 128, 255, 0
 
 
 @dataclass
 class Backgrounds:
-    """Makes backgrounds and keeps the last one, because most edits do not change it."""
+    """Makes backgrounds, and caches the last one, because most edits do not change it."""
 
     root: Path
     world_path: tuple[Path, ...] = ()
-    _key: object = None
-    _made: dict[str, Any] = field(default_factory=dict)
+    _cached_files: object = None
+    _cached: dict[str, Any] = field(default_factory=dict)
 
-    def of(self, source: LoadedWorld | None) -> dict[str, Any]:
-        """Return the background of a world: `id`, `bounds`, and perhaps `image` and `segments`."""
+    def background(self, source: LoadedWorld | None) -> dict[str, Any]:
+        """Return the background of a world as JSON data.
+
+        Its `id` changes with the files of the map or SDF world; "" for a world without such files. `bounds` are the
+        lowest x and y and the highest x and y in m; None if there is nothing to show. `image` is a map, `segments` are
+        lines (x, y, x, y) in m.
+        """
         files = (
             ()
             if source is None
@@ -48,12 +54,12 @@ class Backgrounds:
         )
         if not files or source is None:
             return {"id": "", "bounds": None}
-        if self._key != files:
-            self._made = {"id": str(hash(files)), "bounds": None, **self._parts(source)}
-            self._key = files
-        return self._made
+        if self._cached_files != files:
+            self._cached = {"id": str(hash(files)), "bounds": None, **self._image_or_segments(source)}
+            self._cached_files = files
+        return self._cached
 
-    def _parts(self, source: LoadedWorld) -> dict[str, Any]:
+    def _image_or_segments(self, source: LoadedWorld) -> dict[str, Any]:
         try:
             if source.map is not None:
                 return _image_part(load_map(source.map))
@@ -80,13 +86,13 @@ class Backgrounds:
 
 
 def _image_part(grid: OccupancyGrid) -> dict[str, Any]:
-    """Return the image of a grid as a PNG in a data URL, with its size in m and the pose of its lower left corner."""
+    """Return the bounds of a grid and its image: a PNG in a data URL, the size in m, and the pose of its origin."""
     from PIL import Image
 
     shades = np.array([UNKNOWN_GRAY, FREE_GRAY, OCCUPIED_GRAY], dtype=np.uint8)
     kind = np.where(grid.cells < 0, 0, np.where(grid.cells == FREE, 1, 2))
     image = Image.fromarray(shades[kind][::-1])
-    image.thumbnail((MAX_IMAGE_SIDE, MAX_IMAGE_SIDE))
+    image.thumbnail((MAX_IMAGE_SIDE_PX, MAX_IMAGE_SIDE_PX))
     data = BytesIO()
     image.save(data, "PNG")
     height, width = (cells * grid.resolution for cells in grid.shape)

@@ -1,32 +1,32 @@
-"""Translate what a person does on the map into edits of values of the file."""
+"""Conversion of changes that the user makes on the map or in a form into edits of the text."""
 
 import math
 from collections.abc import Iterator
 from typing import Any
 
 from simscen.editor.forms import schema_of_kind
+from simscen.editor.map_view.map_objects import Keys
 from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import AddItem, Edit, RemovePart, SetValue
 from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at
-from simscen.loading.yaml.tree import Key
-
-Keys = tuple[Key, ...]
 
 
-def edits_of(request: Any, text: str, kind: str) -> list[Edit]:
-    """Return the edits that a request of the page describes. Raises EditRefused for a malformed request.
+def read_edits(request: Any, text: str, kind: str) -> list[Edit]:
+    """Return the edits of a `text` that a request of the page describes. `kind` is "scenario" or "world".
 
-    Each is a mapping with `op` and `keys`: `set`, `add`, and `remove` change any value; `pose`, `point`, and
-    `keyframe` set a position in m and a heading in rad.
+    Each change in the list `request` is a mapping with `op` and `keys`. `set`, `add`, and `remove` change any value;
+    `pose`, `point`, and `keyframe` set a position in m and a heading in rad. Raises EditRefused for a malformed
+    request.
     """
     if not isinstance(request, list):
         raise EditRefused("the request has no list of edits")
     order = tuple(schema_of_kind(kind)["properties"])
     source = parse_source(text)
-    return [edit for one in request for edit in _edits_of_one(one, source, order)]
+    return [edit for one in request for edit in _read_change(one, source, order)]
 
 
-def _edits_of_one(one: Any, source: SourceNode | None, order: tuple[str, ...]) -> Iterator[Edit]:
+def _read_change(one: Any, source: SourceNode | None, order: tuple[str, ...]) -> Iterator[Edit]:
+    """Yield the edits for one change. `source` is the syntax tree of the text, `order` as in SetValue."""
     if not isinstance(one, dict):
         raise EditRefused("an edit must be a mapping")
     keys = _keys(one.get("keys"))
@@ -39,20 +39,24 @@ def _edits_of_one(one: Any, source: SourceNode | None, order: tuple[str, ...]) -
         case "remove":
             yield RemovePart(keys)
         case "pose":
-            yield from _pose(keys, _number(one, "x"), _number(one, "y"), _yaw(one), source, order)
+            yield from _pose_edits(keys, _number(one, "x"), _number(one, "y"), _yaw(one), source, order)
         case "point":
-            yield from _point(keys, {0: _number(one, "x"), 1: _number(one, "y")}, source)
+            yield from _list_edits(keys, {0: _number(one, "x"), 1: _number(one, "y")}, source)
         case "keyframe":
             yaw = _yaw(one)
             axes = {1: _number(one, "x"), 2: _number(one, "y")}
-            yield from _point(keys, axes if yaw is None else {**axes, 3: yaw}, source)
+            yield from _list_edits(keys, axes if yaw is None else {**axes, 3: yaw}, source)
         case _:
             raise EditRefused("unknown kind of edit")
 
 
-def _pose(
+def _pose_edits(
     keys: Keys, x: float, y: float, yaw: float | None, source: SourceNode | None, order: tuple[str, ...]
 ) -> Iterator[Edit]:
+    """Yield edits that set a pose: its x, y, and yaw if the text contains a mapping, otherwise a new mapping.
+
+    `yaw` None leaves the heading as it is.
+    """
     node = None if source is None else source_at(source, keys)
     if node is not None and node.kind == "mapping":
         yield SetValue((*keys, "x"), x)
@@ -68,7 +72,8 @@ def _pose(
         yield SetValue(keys, pose, order)
 
 
-def _point(keys: Keys, axes: dict[int, float], source: SourceNode | None) -> Iterator[Edit]:
+def _list_edits(keys: Keys, axes: dict[int, float], source: SourceNode | None) -> Iterator[Edit]:
+    """Yield edits that set numbers of a list, such as [x, y] or [t, x, y, yaw]. `axes` are the numbers by index."""
     node = None if source is None else source_at(source, keys)
     if node is not None and node.kind == "sequence":
         for index, value in axes.items():
@@ -78,11 +83,12 @@ def _point(keys: Keys, axes: dict[int, float], source: SourceNode | None) -> Ite
 
 
 def degrees_text(yaw: float) -> str:
-    """Return an angle in rad as text in degrees."""
+    """Return an angle in rad as text in degrees, for example "90 deg"."""
     return f"{round(math.degrees(yaw), 3):g} deg"
 
 
 def _keys(value: Any) -> Keys:
+    """Return the keys of a change. Raises EditRefused if they are not a list of strings and indices."""
     if not isinstance(value, list) or not all(
         isinstance(key, str) or (isinstance(key, int) and not isinstance(key, bool) and key >= 0) for key in value
     ):
@@ -91,6 +97,7 @@ def _keys(value: Any) -> Keys:
 
 
 def _number(one: dict[str, Any], key: str) -> float:
+    """Return the value of a key of a change. Raises EditRefused if it is not a finite number."""
     value = one.get(key)
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
         raise EditRefused(f"an edit needs a number `{key}`")
@@ -98,4 +105,5 @@ def _number(one: dict[str, Any], key: str) -> float:
 
 
 def _yaw(one: dict[str, Any]) -> float | None:
+    """Return the heading of a change in rad; None if it has none."""
     return None if one.get("yaw") is None else _number(one, "yaw")

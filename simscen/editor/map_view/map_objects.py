@@ -1,7 +1,7 @@
-"""Objects that a map of a scenario or a world can show: their handles, outlines, lines, circles, and regions.
+"""Objects on the map of the editor, their handles and shapes, and the reading of those of a world.
 
-They are read from plain data, not from a valid specification, so that the map also shows a file with problems. What
-cannot be read is left out.
+Objects are read from plain data, not from a valid specification, so that the map also shows a file with problems.
+Values that cannot be read are ignored. `keys` are always the path to a value in the file.
 """
 
 import math
@@ -15,35 +15,58 @@ from simscen.loading.yaml.tree import Key
 from simscen.spec.quantities import si_number
 
 Keys = tuple[Key, ...]
-Form = Literal["pose", "point", "keyframe"]
+"""Path to a value in a YAML file: keys of mappings and indices of lists."""
+Notation = Literal["pose", "point", "keyframe"]
+"""Notation of a position in the file: a mapping with x, y, and yaw; a list [x, y]; or a list [t, x, y, yaw]."""
 Corners = list[tuple[float, float]]
+"""Corners (x, y) of a polygon in m."""
 CIRCLE_CORNERS = 24
 PERSON_RADIUS_M = 0.25
+"""Radius of a pedestrian without the key `radius`."""
 MAX_OBJECTS = 3000
-"""Maximum number of things on a map."""
+"""Maximum number of objects on a map."""
 
 
 @dataclass(frozen=True)
 class Handle:
-    """Point that can be dragged: position in m, heading in rad if it has one, and what is written at `keys`."""
+    """Position on the map that can be dragged.
+
+    Attributes:
+        keys: Path to the position in the file.
+        notation: Notation of the position.
+        x: Position in m.
+        y: Position in m.
+        yaw: Heading in rad; None for a position without heading.
+        place: Name of the place if the file contains it instead of numbers; otherwise "".
+    """
 
     keys: Keys
-    form: Form
+    notation: Notation
     x: float
     y: float
     yaw: float | None = None
     place: str = ""
-    """Name of the place that is written instead of numbers."""
 
 
 @dataclass(frozen=True)
 class MapObject:
-    """Thing on the map; `keys` lead to the value that its form shows.
+    """Object on the map. An object without handles and region is only in the list of the page.
 
-    `parts` are outlines in the frame of the first handle, `line` connects the handles, `radius` is that of a circle
-    around the first handle and is written at `radius_keys`, `region` is the name of a region that it refers to, and
-    `follows` that of an object. With `whole`, dragging the object moves all its handles. `origin` is where the line
-    begins.
+    Attributes:
+        keys: Path to the value that the form of the object shows.
+        kind: Kind of the object, such as "robot" or "wall", by which the page chooses its color.
+        label: Name of the object on the map.
+        handles: Positions that can be dragged.
+        parts: Outlines in the frame of the first handle.
+        line: Whether a line connects the handles: "" for no line, "open", or "closed" from the last to the first.
+        radius: Radius in m of a circle around the first handle; None for no circle.
+        radius_keys: Path to the radius if it can be changed; otherwise ().
+        region: Name of the region that the object refers to; "" for none.
+        follows: Name of the moving object at which the circle is, instead of a handle; "" for none.
+        moves_as_one: Whether dragging the object moves all its handles.
+        origin: Point (x, y) in m at which the line begins, before the first handle; None for no such point.
+        points_keys: Path to the list of the handles if handles can be added and removed; otherwise ().
+        width: Width of the line in m.
     """
 
     keys: Keys
@@ -56,19 +79,18 @@ class MapObject:
     radius_keys: Keys = ()
     region: str = ""
     follows: str = ""
-    whole: bool = False
+    moves_as_one: bool = False
     origin: tuple[float, float] | None = None
     points_keys: Keys = ()
-    """Keys of the list of the handles, if points can be added and removed."""
     width: float = 0.0
-    """Width of the line in m."""
 
 
 Places = Mapping[str, tuple[float, float, float]]
+"""Pose (x, y, yaw) in m and rad of each place of the world by name."""
 
 
 def number(value: Any) -> float | None:
-    """Return a number, or a text with a unit in SI units; None for anything else."""
+    """Return a finite number, or a quantity such as "2 cm" in SI units; None for anything else."""
     found = si_number(value)
     usable = isinstance(found, int | float) and not isinstance(found, bool) and math.isfinite(found)
     return float(found) if usable else None
@@ -85,7 +107,7 @@ def mapping(value: Any) -> dict[str, Any]:
 
 
 def pose_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
-    """Return the handle of a pose or of the name of a place; () if there is no position."""
+    """Return one handle for a pose or the name of a place; () if the value is neither."""
     if isinstance(value, str):
         found = places.get(value)
         return (Handle(keys, "pose", *found, value),) if found else ()
@@ -94,14 +116,14 @@ def pose_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
 
 
 def point_handles(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
-    """Return the handles of a list of points; the unusable ones are left out."""
+    """Return the handles for a list of points [x, y] or names of places. Other items are ignored."""
     return tuple(
         handle for index, one in enumerate(items(value)) for handle in point_handle(one, (*keys, index), places)
     )
 
 
 def point_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
-    """Return the handle of a point [x, y] or of the name of a place; () if there is no position."""
+    """Return one handle for a point [x, y] or the name of a place; () if the value is neither."""
     if isinstance(value, str):
         found = places.get(value)
         return (Handle(keys, "point", found[0], found[1], None, value),) if found else ()
@@ -112,7 +134,7 @@ def point_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
 
 
 def keyframe_handles(value: Any, keys: Keys) -> tuple[Handle, ...]:
-    """Return the handles of keyframes [t, x, y, yaw]."""
+    """Return the handles for a list of keyframes [t, x, y, yaw]. Other items are ignored."""
     found = []
     for index, one in enumerate(items(value)):
         axes = [number(axis) for axis in items(one)]
@@ -122,7 +144,7 @@ def keyframe_handles(value: Any, keys: Keys) -> tuple[Handle, ...]:
 
 
 def outline(thing: Mapping[str, Any]) -> list[Corners]:
-    """Return the outline of a box, a cylinder, or a polygon in the frame of the object."""
+    """Return the outline of an object with the key `box`, `cylinder`, or `polygon` in its own frame; otherwise []."""
     box = [number(side) for side in items(thing.get("box"))]
     if len(box) == 3 and box[0] and box[1]:
         x, y = box[0] / 2, box[1] / 2
@@ -135,7 +157,7 @@ def outline(thing: Mapping[str, Any]) -> list[Corners]:
 
 
 def circle(radius: float) -> Corners:
-    """Return a circle around the origin as a polygon."""
+    """Return a circle with a radius in m around the origin as a polygon."""
     turns = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
     return [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]
 
@@ -143,7 +165,10 @@ def circle(radius: float) -> Corners:
 def motion_path(
     value: Any, keys: Keys, label: str, places: Places, origin: Handle | None = None
 ) -> Iterator[MapObject]:
-    """Yield the path of a motion through waypoints or keyframes."""
+    """Yield an object for the path of a motion through waypoints or keyframes; nothing for another motion.
+
+    `origin` is the position at which the moving object starts.
+    """
     motion = mapping(value)
     start = None if origin is None else (origin.x, origin.y)
     if through := point_handles(motion.get("through"), (*keys, "through"), places):
@@ -155,9 +180,10 @@ def motion_path(
 
 
 def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
-    """Return the id of the smallest thing whose text contains the position of a problem; "" if there is none.
+    """Return the ID of the object with the shortest text that contains the position of a problem.
 
-    If none contains it, this is the smallest one that begins later in the same line, such as behind a key.
+    If there is none, return the one with the shortest text that begins later in the same line, for a problem of a key,
+    or "". `source` is the syntax tree of the `text`.
     """
     if not problem.line or source is None:
         return ""
@@ -172,7 +198,7 @@ def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: So
 
 
 def world_places(world: Any) -> dict[str, tuple[float, float, float]]:
-    """Return the places of a world by name."""
+    """Return the places of a world, which is plain data, by name."""
     found = {}
     for name, pose in mapping(mapping(world).get("places")).items():
         for handle in pose_handle(pose, (), {}):
@@ -181,7 +207,7 @@ def world_places(world: Any) -> dict[str, tuple[float, float, float]]:
 
 
 def world_objects(world: Any, keys: Keys, places: Places) -> Iterator[MapObject]:
-    """Yield the things of a world whose data is at `keys`."""
+    """Yield the objects of a world, which is plain data at `keys` of the file."""
     data = mapping(world)
     yield from _regions(data, keys)
     yield from _lines(data, keys, places)
@@ -197,7 +223,7 @@ def _regions(data: dict[str, Any], keys: Keys) -> Iterator[MapObject]:
     for name, ring in mapping(data.get("regions")).items():
         own = (*keys, "regions", name)
         corners = point_handles(ring, own, {})
-        yield MapObject(own, "region", name, corners, line="closed", whole=True, points_keys=own)
+        yield MapObject(own, "region", name, corners, line="closed", moves_as_one=True, points_keys=own)
 
 
 def _lines(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObject]:
@@ -207,19 +233,19 @@ def _lines(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObje
         corners = point_handles(wall.get("points"), (*own, "points"), places)
         label, width = str(wall.get("name", f"wall_{index + 1}")), number(wall.get("thickness", 0.1)) or 0.1
         points = (*own, "points")
-        yield MapObject(own, "wall", label, corners, line="open", whole=True, points_keys=points, width=width)
+        yield MapObject(own, "wall", label, corners, line="open", moves_as_one=True, points_keys=points, width=width)
     for index, ramp in enumerate(map(mapping, items(data.get("ramps")))):
         own = (*keys, "ramps", index)
         ends = tuple(handle for end in ("start", "end") for handle in point_handle(ramp.get(end), (*own, end), places))
         width = number(ramp.get("width")) or 0.5
-        yield MapObject(own, "ramp", str(ramp.get("name", "ramp")), ends, line="open", whole=True, width=width)
+        yield MapObject(own, "ramp", str(ramp.get("name", "ramp")), ends, line="open", moves_as_one=True, width=width)
     for index, door in enumerate(map(mapping, items(data.get("doors")))):
         own = (*keys, "doors", index)
         posts, width = (
             point_handles(door.get("points"), (*own, "points"), places),
             number(door.get("thickness")) or 0.05,
         )
-        yield MapObject(own, "door", str(door.get("name", "door")), posts, line="open", whole=True, width=width)
+        yield MapObject(own, "door", str(door.get("name", "door")), posts, line="open", moves_as_one=True, width=width)
 
 
 def _object(thing: dict[str, Any], keys: Keys, kind: str, places: Places) -> Iterator[MapObject]:

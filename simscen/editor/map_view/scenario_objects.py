@@ -1,4 +1,7 @@
-"""The things of a scenario on the map: robots, goals, people, spawned objects, triggers, zones, and all other parts."""
+"""Objects of a scenario on the map and in the list of the page: robots, goals, events, triggers, zones, and faults.
+
+They are read from plain data, in which anything can be missing or wrong. `keys` are the path to a value in the file.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -21,13 +24,15 @@ from simscen.editor.map_view.map_objects import (
 )
 
 SETTINGS = "settings"
-"""Kind of the entry for the keys of the scenario itself."""
-POSE_ACTIONS = {"teleport": "teleport", "kidnap": "kidnap", "new_goal": "goal"}
-CONDITIONS = {"all", "any"}
+"""Kind of the object that stands for the keys of the scenario itself."""
+KIND_OF_POSE_ACTION = {"teleport": "teleport", "kidnap": "kidnap", "new_goal": "goal"}
+"""Kind of the object for each action with a pose."""
+COMBINED_TRIGGERS = {"all", "any"}
+"""Triggers that contain a list of triggers."""
 
 
 def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject]:
-    """Yield the things of a scenario without those of its world."""
+    """Yield the objects of a scenario without those of its world, in the order of the language."""
     yield MapObject((), SETTINGS, str(data.get("name", "scenario")))
     robots = mapping(data.get("robots"))
     if not robots:
@@ -52,7 +57,7 @@ def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject
     yield from _faults(data, (), places)
     for index, criterion in enumerate(map(mapping, items(data.get("pass")))):
         region = _region_of(criterion)
-        yield MapObject(("pass", index), "criterion", _title(criterion), region=region)
+        yield MapObject(("pass", index), "criterion", _first_key(criterion), region=region)
 
 
 def _robot(robot: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
@@ -63,6 +68,7 @@ def _robot(robot: dict[str, Any], keys: Keys, label: str, places: Places) -> Ite
 
 
 def _goals(value: Any, keys: Keys, prefix: str, places: Places) -> Iterator[MapObject]:
+    """Yield an object for each goal in a list. `prefix` is the beginning of its label."""
     for index, goal in enumerate(items(value)):
         own = (*keys, index)
         pose = goal if isinstance(goal, str) else mapping(goal).get("pose")
@@ -76,6 +82,7 @@ def _goals(value: Any, keys: Keys, prefix: str, places: Places) -> Iterator[MapO
 
 
 def _event(event: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
+    """Yield the triggers and actions of an event."""
     yield from _triggers(event.get("when"), (*keys, "when"), f"trigger of {label}", places)
     actions = event.get("do")
     written: list[tuple[Keys, Any]] = [(("do", index), action) for index, action in enumerate(items(actions))]
@@ -87,7 +94,7 @@ def _event(event: dict[str, Any], keys: Keys, label: str, places: Places) -> Ite
 
 
 def _action(kind: str, action: dict[str, Any], keys: Keys, event: str, places: Places) -> Iterator[MapObject]:
-    """Yield what an action shows on the map, at least an entry of the list."""
+    """Yield the objects for an action of the event with the name `event`; nothing for the key `robot`."""
     handle = pose_handle(action.get("pose"), (*keys, "pose"), places)
     name = str(action.get("name", ""))
     if kind == "spawn":
@@ -97,18 +104,18 @@ def _action(kind: str, action: dict[str, Any], keys: Keys, event: str, places: P
         body = [circle(number(action.get("radius")) or PERSON_RADIUS_M)]
         points = (*keys, "goals")
         yield MapObject(keys, "person", name or kind, (*handle, *goals), body, "open", points_keys=points)
-    elif kind in POSE_ACTIONS:
+    elif kind in KIND_OF_POSE_ACTION:
         label = f"goal {name}" if kind == "new_goal" else f"{kind} {name}".strip()
-        yield MapObject(keys, POSE_ACTIONS[kind], f"{label} of {event}", handle)
+        yield MapObject(keys, KIND_OF_POSE_ACTION[kind], f"{label} of {event}", handle)
     elif kind == "move":
         found = list(motion_path(action, keys, f"path of {name}", places))
         yield from found or [MapObject(keys, "action", f"move {name}")]
     elif kind != "robot":
-        yield replace(_patch(action, keys, places), label=f"{kind} {name}".strip())
+        yield replace(_area_action(action, keys, places), label=f"{kind} {name}".strip())
 
 
-def _patch(action: dict[str, Any], keys: Keys, places: Places) -> MapObject:
-    """Return an action on a region, or on a disc of floor."""
+def _area_action(action: dict[str, Any], keys: Keys, places: Places) -> MapObject:
+    """Return an object without label for an action on a region or on a disc of the floor."""
     region = action.get("region", action.get("start"))
     center = point_handle(action.get("at"), (*keys, "at"), places)
     radius = number(action.get("radius")) if center else None
@@ -118,10 +125,10 @@ def _patch(action: dict[str, Any], keys: Keys, places: Places) -> MapObject:
 
 
 def _triggers(value: Any, keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
-    """Yield the places at which a trigger, or a condition in it, becomes true."""
+    """Yield the regions and circles at which a trigger, or a trigger in a combined one, becomes true."""
     for kind, condition in mapping(value).items():
         own, said = (*keys, kind), mapping(condition)
-        if kind in CONDITIONS:
+        if kind in COMBINED_TRIGGERS:
             for index, part in enumerate(items(condition)):
                 yield from _triggers(part, (*own, index), label, places)
         elif kind == "not":
@@ -143,6 +150,7 @@ def _triggers(value: Any, keys: Keys, label: str, places: Places) -> Iterator[Ma
 
 
 def _zones(data: dict[str, Any], keys: Keys, prefix: str) -> Iterator[MapObject]:
+    """Yield the keepout and speed zones of the stack in the data of a scenario or robot."""
     stack = mapping(data.get("stack"))
     for index, region in enumerate(items(stack.get("keepout"))):
         own = (*keys, "stack", "keepout", index)
@@ -155,16 +163,18 @@ def _zones(data: dict[str, Any], keys: Keys, prefix: str) -> Iterator[MapObject]
 def _faults(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObject]:
     for index, fault in enumerate(map(mapping, items(data.get("faults")))):
         own = (*keys, "faults", index)
-        label = str(fault.get("name", f"{fault.get('sensor', 'fault')} {_title(fault, ('name', 'sensor'))}"))
+        label = str(fault.get("name", f"{fault.get('sensor', 'fault')} {_first_key(fault, ('name', 'sensor'))}"))
         yield MapObject(own, "fault", label)
         yield from _triggers(fault.get("when"), (*own, "when"), f"trigger of {label}", places)
 
 
-def _title(entry: dict[str, Any], without: tuple[str, ...] = ("id", "severity", "robot")) -> str:
+def _first_key(entry: dict[str, Any], without: tuple[str, ...] = ("id", "severity", "robot")) -> str:
+    """Return the first key that is not in `without`: the name of the criterion or the fault."""
     return next((key for key in entry if key not in without), "entry")
 
 
 def _region_of(criterion: dict[str, Any]) -> str:
-    chosen = mapping(criterion.get(_title(criterion)))
+    """Return the name of the region that a criterion refers to; "" for none."""
+    chosen = mapping(criterion.get(_first_key(criterion)))
     region = chosen.get("region", chosen.get("in"))
     return region if isinstance(region, str) else ""

@@ -1,4 +1,4 @@
-"""What the page shows of a text: the things on the map, the robots, the background, and where each thing is written."""
+"""Scene of a text, which the page shows: objects of the scenario and its world, background, and lines in the text."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -26,7 +26,16 @@ from simscen.model.world import WorldSpec
 
 @dataclass(frozen=True)
 class SceneParts:
-    """A text with the files that it names, as far as they can be read."""
+    """A text with the files that it refers to, as far as they can be read.
+
+    Attributes:
+        file: File that is edited.
+        text: Its text in the editor.
+        tree: Syntax tree of the text, with the content that it inherits from other files.
+        assets: Reader of the files that the text refers to.
+        world: World of the scenario, or the edited world; None if it cannot be read.
+        is_inline: Whether the world is in the text itself, because it is a world file or an inline world.
+    """
 
     file: EditedFile
     text: str
@@ -37,7 +46,7 @@ class SceneParts:
 
     @property
     def world_data(self) -> dict[str, Any]:
-        """The data of the world file or of the inline world."""
+        """Plain data of the world file or of the inline world; {} if it cannot be read."""
         if self.is_inline:
             return mapping(self.tree.plain if self.file.kind == "world" else mapping(self.tree.plain).get("world"))
         tree = None if self.world is None else self.world.tree
@@ -45,7 +54,7 @@ class SceneParts:
 
 
 def scene_parts(file: EditedFile, text: str) -> SceneParts | None:
-    """Read a text and the world that it names; None if it is not a YAML mapping."""
+    """Read a text and the world that it refers to. Return None if the text is not a YAML mapping."""
     library = file.library(text)
     tree, _ = library.read(file.path, defaults=file.kind == "scenario")
     if not isinstance(tree, MappingNode):
@@ -66,12 +75,13 @@ def scene_parts(file: EditedFile, text: str) -> SceneParts | None:
 
 
 def _inline_world(assets: Assets, node: MappingNode, file: EditedFile) -> LoadedWorld | None:
+    """Return the world in a scenario file; None if it is invalid."""
     spec = check(WorldSpec, node)
     return None if isinstance(spec, list) else assets.complete_world(spec, node, file.path)
 
 
 def map_objects(parts: SceneParts) -> list[MapObject]:
-    """Return everything that the map or the list of the page shows, in the order of the language."""
+    """Return at most MAX_OBJECTS objects that the map or the list of the page shows, in the order of the language."""
     data, places = parts.tree.plain, world_places(parts.world_data)
     found: list[MapObject] = []
     if parts.file.kind == "scenario":
@@ -81,12 +91,12 @@ def map_objects(parts: SceneParts) -> list[MapObject]:
 
 
 def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
-    """Return what the page shows, as JSON data."""
-    own = parse_source(parts.text)
+    """Return the objects, regions, places, and background as JSON data, and the name of the world file."""
+    source = parse_source(parts.text)
     display_name = parts.file.display_name
     return {
         "kind": parts.file.kind,
-        "objects": [_object_data(map_object, parts, own) for map_object in map_objects(parts)],
+        "objects": [_object_data(map_object, parts, source) for map_object in map_objects(parts)],
         "regions": {
             name: [[handle.x, handle.y] for handle in world_object.handles]
             for world_object in world_objects(parts.world_data, (), {})
@@ -95,7 +105,7 @@ def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
         "places": sorted(world_places(parts.world_data)),
         "inline": parts.is_inline,
         "world_file": _world_file(parts, display_name),
-        "background": backgrounds.of(parts.world),
+        "background": backgrounds.background(parts.world),
     }
 
 
@@ -104,15 +114,18 @@ def _world_keys(parts: SceneParts) -> Keys:
 
 
 def _world_file(parts: SceneParts, shown: str) -> str:
-    """Return the name of the world file if the things of the world are written there; "" otherwise."""
+    """Return the name of the world file if the objects of the world are written there; otherwise "".
+
+    `shown` is the name of the edited file.
+    """
     if parts.is_inline or parts.world is None:
         return ""
     name = parts.assets.library.sandbox.display_name(parts.world.path)
     return "" if name == shown or parts.world.spec is None else name
 
 
-def _object_data(one: MapObject, parts: SceneParts, own: SourceNode | None) -> dict[str, Any]:
-    is_here, line = _own_line(one.keys, parts, own)
+def _object_data(one: MapObject, parts: SceneParts, source: SourceNode | None) -> dict[str, Any]:
+    is_here, line = _own_line(one.keys, parts, source)
     return {
         "id": "/".join(map(str, one.keys)) or "settings",
         "keys": list(one.keys),
@@ -125,7 +138,7 @@ def _object_data(one: MapObject, parts: SceneParts, own: SourceNode | None) -> d
         "radius_keys": list(one.radius_keys),
         "region": one.region,
         "follows": one.follows,
-        "whole": one.whole,
+        "whole": one.moves_as_one,
         "origin": one.origin,
         "points_keys": list(one.points_keys),
         "width": one.width,
@@ -137,7 +150,7 @@ def _object_data(one: MapObject, parts: SceneParts, own: SourceNode | None) -> d
 def _handle_data(handle: Handle) -> dict[str, Any]:
     return {
         "keys": list(handle.keys),
-        "form": handle.form,
+        "form": handle.notation,
         "x": round(handle.x, 6),
         "y": round(handle.y, 6),
         "yaw": None if handle.yaw is None else round(handle.yaw, 8),
@@ -145,17 +158,21 @@ def _handle_data(handle: Handle) -> dict[str, Any]:
     }
 
 
-def _own_line(keys: Keys, parts: SceneParts, own: SourceNode | None) -> tuple[bool, int]:
-    """Return whether the thing is written in this text, or can be, and its line (0: elsewhere)."""
-    if own is None or (not parts.is_inline and parts.file.kind == "scenario" and keys[:1] == ("world",)):
+def _own_line(keys: Keys, parts: SceneParts, source: SourceNode | None) -> tuple[bool, int]:
+    """Return whether the object at `keys` can be edited in this text, and its line; 0 if it is in another file.
+
+    `source` is the syntax tree of the text without inherited content; None if the text is invalid.
+    """
+    if source is None or (not parts.is_inline and parts.file.kind == "scenario" and keys[:1] == ("world",)):
         return False, 0
-    place = _written_at(parts.tree, keys)
-    here = place.path == parts.file.display_name and source_at(own, keys) is not None
-    line = place.line if here and keys else 0
-    if any(isinstance(key, int) for key in keys):
-        return here, line
+    position = _position(parts.tree, keys)
+    is_here = position.path == parts.file.display_name and source_at(source, keys) is not None
+    line = position.line if is_here and keys else 0
+    if any(isinstance(key, int) for key in keys):  # an item of an inherited list cannot be changed here
+        return is_here, line
     return True, line
 
 
-def _written_at(tree: MappingNode, keys: Keys) -> Position:
+def _position(tree: MappingNode, keys: Keys) -> Position:
+    """Return the position of a key, or of a list item, in the file that contains it."""
     return key_position(tree, keys) if keys and isinstance(keys[-1], str) else value_position(tree, keys)

@@ -1,1 +1,1 @@
-"""Changes of single values of a YAML text that leave every other character as it is."""
+"""Edits of single values of a YAML text that preserve every other character, such as comments and line breaks."""

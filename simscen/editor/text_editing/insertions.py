@@ -1,19 +1,26 @@
-"""Insert keys and items into a YAML text in the style of their siblings, and remove them with their line breaks."""
+"""Insertion of keys and list items into a YAML text in the style of their siblings, and their removal.
+
+Functions return a Splice of the text, which they do not change themselves. A block mapping or list has one entry per
+line; a flow mapping or list is in braces or brackets.
+"""
 
 from collections.abc import Sequence
 from typing import Any
 
 from simscen.editor.text_editing.splices import EditRefused, Splice, column, line_end, line_start, path_text
-from simscen.editor.text_editing.value_text import flow_text, key_text
+from simscen.editor.text_editing.value_text import flow_text, string_text
 from simscen.loading.yaml.source_nodes import SourceNode, source_at
 from simscen.loading.yaml.tree import Key
 
 INDENT = 2
-"""Spaces by which the items of a new list are indented."""
+"""Number of spaces by which nested lines are indented."""
 
 
-def inserted_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Sequence[str] = ()) -> Splice:
-    """Return the splice that adds a key to a mapping: after the last key that comes before it in `order`."""
+def insert_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Sequence[str] = ()) -> Splice:
+    """Return the splice that adds a key with a value to a mapping.
+
+    The new key follows the last key of the mapping that comes before it in `order`, or the last key if there is none.
+    """
     if not mapping.entries:
         return Splice(mapping.start, mapping.end, flow_text({key: value}))
     entries = list(mapping.entries.items())
@@ -21,17 +28,17 @@ def inserted_entry(text: str, mapping: SourceNode, key: str, value: Any, order: 
     after = max(before, key=lambda entry: entry.start) if before else entries[-1][1]
     end = max(after.value.end, after.end)
     if mapping.flow and text[mapping.start] != "{":  # one pair in brackets: [key: value]
-        pair = f"{text[mapping.start : end]}, {key_text(key)}: {flow_text(value)}"
+        pair = f"{text[mapping.start : end]}, {string_text(key)}: {flow_text(value)}"
         return Splice(mapping.start, end, f"{{{pair}}}")
     if mapping.flow:
-        return Splice(end, end, f", {key_text(key)}: {flow_text(value)}")
+        return Splice(end, end, f", {string_text(key)}: {flow_text(value)}")
     place = line_end(text, end)
     indent = column(text, entries[0][1].start)
     return Splice(place, place, "\n" + " " * indent + _block_entry(key, value, indent))
 
 
-def added_item(text: str, sequence: SourceNode, value: Any, index: int | None = None) -> Splice:
-    """Return the splice that inserts an item into a list before the item `index`; None: at the end."""
+def insert_item(text: str, sequence: SourceNode, value: Any, index: int | None = None) -> Splice:
+    """Return the splice that inserts an item into a list: before the item `index`, or for None at the end."""
     items = sequence.items
     if not items:
         return Splice(sequence.start, sequence.end, f"[{flow_text(value)}]")
@@ -53,20 +60,20 @@ def added_item(text: str, sequence: SourceNode, value: Any, index: int | None = 
 
 
 def dash_before(text: str, start: int) -> int:
-    """Return the index of the dash of the list item that starts at `start`."""
+    """Return the index in the text of the dash before the list item that starts at `start`."""
     return text.rfind("-", 0, start)
 
 
 def _block_entry(key: str, value: Any, indent: int) -> str:
-    """Return a new key of a block mapping; a list of mappings gets one line for each item."""
+    """Return the text of a new entry of a block mapping. A list that contains mappings gets one line for each item."""
     if isinstance(value, list) and any(isinstance(item, dict) for item in value):
         items = [f"\n{' ' * (indent + INDENT)}- {flow_text(item)}" for item in value]
-        return f"{key_text(key)}:{''.join(items)}"
-    return f"{key_text(key)}: {flow_text(value)}"
+        return f"{string_text(key)}:{''.join(items)}"
+    return f"{string_text(key)}: {flow_text(value)}"
 
 
 def _block_value(text: str, value: Any, like: SourceNode, indent: int) -> str:
-    """Return the text of a new item: a block mapping if its sibling is one, otherwise on one line."""
+    """Return the text of a new list item: in block style if its sibling `like` is a block mapping, else on one line."""
     if like.kind != "mapping" or like.flow or not isinstance(value, dict) or not value:
         return flow_text(value)
     lines = []
@@ -74,24 +81,28 @@ def _block_value(text: str, value: Any, like: SourceNode, indent: int) -> str:
         entry = like.entries.get(key)
         if entry is not None and not entry.value.flow and entry.value.kind == "mapping" and isinstance(part, dict):
             inner = _block_value(text, part, entry.value, indent + INDENT)
-            lines.append(f"{key_text(key)}:\n{' ' * (indent + INDENT)}{inner}")
+            lines.append(f"{string_text(key)}:\n{' ' * (indent + INDENT)}{inner}")
         else:
-            lines.append(f"{key_text(key)}: {flow_text(part)}")
+            lines.append(f"{string_text(key)}: {flow_text(part)}")
     return f"\n{' ' * indent}".join(lines)
 
 
 def _separator(text: str, items: Sequence[SourceNode]) -> str:
-    """Return what stands between the last two items, which may be a line break; `, ` if there is a comment."""
+    """Return the text between the last two items, such as a comma and a line break; ", " if it contains a comment."""
     between = text[items[-2].end : items[-1].start] if len(items) > 1 else ", "
     return between if between.count(",") == 1 and not between.replace(",", "").strip() else ", "
 
 
 def _has_blank_line(text: str, start: int, end: int) -> bool:
+    """Return whether there is a blank line between two indices of a text."""
     return any(not line.strip() for line in text[start:end].split("\n")[1:-1])
 
 
-def removed_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice:
-    """Return the splice that removes a key or an item. Raises EditRefused if it is not in this text."""
+def remove_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice:
+    """Return the splice that removes the entry or item at `keys`. Raises EditRefused if the text does not contain it.
+
+    `source` is the syntax tree of the text.
+    """
     parent, node = source_at(source, keys[:-1]), source_at(source, keys)
     if not keys or parent is None or node is None:
         raise EditRefused(f"{path_text(keys)} is not written out in this file; edit the text, or the file that has it")
@@ -105,17 +116,20 @@ def removed_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice
         parts = [(entry.start, max(entry.end, entry.value.end)) for entry in parent.entries.values()]
         number = list(parent.entries).index(str(keys[-1]))
     if parent.flow:
-        return _from_flow(parent, parts, number)
+        return _remove_from_flow(parent, parts, number)
     if len(parts) == 1:
         begin = len(text[: parent.start].rstrip())
         empty = "[]" if parent.kind == "sequence" else "{}"
         is_behind_key = text[begin - 1 : begin] == ":"
         return Splice(begin if is_behind_key else parent.start, parent.end, f" {empty}" if is_behind_key else empty)
-    return _from_block(text, parts, number)
+    return _remove_from_block(text, parts, number)
 
 
-def _from_flow(parent: SourceNode, parts: list[tuple[int, int]], number: int) -> Splice:
-    """Remove a part of a list or mapping in brackets with the comma before it; of the first part, the one after it."""
+def _remove_from_flow(parent: SourceNode, parts: list[tuple[int, int]], number: int) -> Splice:
+    """Return the splice that removes a part of a flow list or mapping, with the comma before or after it.
+
+    `parts` are the start and end of all parts, and `number` is the index of the part to remove.
+    """
     start, end = parts[number]
     if len(parts) == 1:
         return Splice(parent.start + 1, parent.end - 1, "")
@@ -124,8 +138,11 @@ def _from_flow(parent: SourceNode, parts: list[tuple[int, int]], number: int) ->
     return Splice(parts[number - 1][1], end, "")
 
 
-def _from_block(text: str, parts: list[tuple[int, int]], number: int) -> Splice:
-    """Remove the lines of a part; of one that begins within a line, all up to the next part."""
+def _remove_from_block(text: str, parts: list[tuple[int, int]], number: int) -> Splice:
+    """Return the splice that removes the lines of a part of a block list or mapping.
+
+    If the part begins within a line, such as the first key after a dash, the text up to the next part is removed.
+    """
     start, end = parts[number]
     begin = line_start(text, start)
     if text[begin:start].strip():

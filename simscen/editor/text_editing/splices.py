@@ -1,4 +1,4 @@
-"""Replacements of parts of a text."""
+"""Splices, which are replacements of parts of a text, and positions of lines in a text."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,36 +7,36 @@ from simscen.loading.yaml.tree import Key, dotted_path
 
 
 class EditRefused(Exception):
-    """An edit is impossible without changing other parts of the text; the message says why."""
+    """The edit cannot be made, or not without changing other parts of the text. The message says why."""
 
 
 class Splice(NamedTuple):
-    """Replacement of `text[start:end]`."""
+    """Replacement of the characters `start` to `end` (exclusive) of a text by the new `text`."""
 
     start: int
     end: int
     text: str
 
 
-def spliced(text: str, splices: Sequence[Splice]) -> str:
-    """Return a text with all splices, which are indices of the old text and do not overlap."""
+def apply_splices(text: str, splices: Sequence[Splice]) -> str:
+    """Return a text after all replacements. They must not overlap; all indices refer to the old text."""
     for splice in sorted(splices, reverse=True):
         text = text[: splice.start] + splice.text + text[splice.end :]
     return text
 
 
 def path_text(keys: Sequence[Key]) -> str:
-    """Return keys as messages show them."""
+    """Return the path to a value as messages show it, for example "`goals[0].pose`" with the quotes."""
     return f"`{dotted_path(keys)}`"
 
 
 def line_start(text: str, index: int) -> int:
-    """Return the index of the first character of a line."""
+    """Return the index of the first character of the line that contains `index`."""
     return text.rfind("\n", 0, index) + 1
 
 
 def line_end(text: str, index: int) -> int:
-    """Return the index of the line break of a line, or the end of the text."""
+    """Return the index of the line break at the end of the line that contains `index`, or the end of the text."""
     found = text.find("\n", index)
     return len(text) if found < 0 else found
 

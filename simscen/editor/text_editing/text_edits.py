@@ -1,7 +1,6 @@
-"""Change single values of a YAML text and leave every other character of it as it is.
+"""Edits of a YAML text that set a value, insert a list item, or remove a part, and preserve every other character.
 
-An edit replaces the text of a node, inserts a key or an item, or removes one. Each new text is parsed again: if it does
-not mean exactly the old content with the edit, the edit is refused, and the text stays as it was.
+Each new text is parsed again. If its content is not exactly the old content with the edit, the edit is refused.
 """
 
 import copy
@@ -9,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from simscen.editor.text_editing.insertions import added_item, inserted_entry, removed_part
-from simscen.editor.text_editing.splices import EditRefused, Splice, path_text, spliced
-from simscen.editor.text_editing.value_text import flow_text, replacing_text, same_value
+from simscen.editor.text_editing.insertions import insert_entry, insert_item, remove_part
+from simscen.editor.text_editing.splices import EditRefused, Splice, apply_splices, path_text
+from simscen.editor.text_editing.value_text import flow_text, is_same_value, replacement_text
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at
 from simscen.loading.yaml.tree import Key
@@ -19,9 +18,9 @@ from simscen.loading.yaml.tree import Key
 
 @dataclass(frozen=True)
 class SetValue:
-    """Set the value at `keys`; mappings on the way that are missing are created.
+    """Edit that sets the value at `keys`, and creates the missing mappings around it.
 
-    `order` lists keys in the order of the language, for a key that does not exist yet.
+    `order` are all possible keys of the file in the order of the language, which determines the position of a new key.
     """
 
     keys: tuple[Key, ...]
@@ -31,7 +30,10 @@ class SetValue:
 
 @dataclass(frozen=True)
 class AddItem:
-    """Insert an item into the list at `keys`, before the item `index`; None: at the end."""
+    """Edit that inserts an item into the list at `keys`: before the item `index`, or for None at the end.
+
+    A missing list is created. `order` is as in SetValue.
+    """
 
     keys: tuple[Key, ...]
     value: Any
@@ -41,7 +43,7 @@ class AddItem:
 
 @dataclass(frozen=True)
 class RemovePart:
-    """Remove a key or an item."""
+    """Edit that removes the entry or the item at `keys`."""
 
     keys: tuple[Key, ...]
 
@@ -50,31 +52,35 @@ Edit = SetValue | AddItem | RemovePart
 
 
 class EditedText(NamedTuple):
-    """A text after some edits, and what was replaced, in the order in which it happened."""
+    """A text after some edits, and the replacements in the order in which they were made.
+
+    The indices of a splice refer to the text before it.
+    """
 
     text: str
     splices: tuple[Splice, ...]
 
 
 def apply_edits(text: str, edits: Sequence[Edit]) -> EditedText:
-    """Return the text after the edits, one after the other. Raises EditRefused if one of them is impossible."""
+    """Make edits one after the other, and return the new text. Raises EditRefused if one of them is impossible."""
     done: list[Splice] = []
     remaining = list(edits)
     while remaining:
-        source = _source(text)
+        source = _parse(text)
         splices = _independent_splices(text, source, remaining)
         taken = len(splices)
         if not splices:
             splices, taken = [_splice(text, source, remaining[0])], 1
         splices = [splice for splice in splices if text[splice.start : splice.end] != splice.text]
-        new = spliced(text, splices)
-        _require_meaning(text, new, remaining[:taken])
+        new = apply_splices(text, splices)
+        _require_content(text, new, remaining[:taken])
         done += splices
         text, remaining = new, remaining[taken:]
     return EditedText(text, tuple(done))
 
 
-def _source(text: str) -> SourceNode:
+def _parse(text: str) -> SourceNode:
+    """Return the syntax tree of a text. Raises EditRefused if it is not valid."""
     source = parse_source(text)
     if source is None:
         raise EditRefused("the text is not valid YAML; correct it first")
@@ -82,7 +88,7 @@ def _source(text: str) -> SourceNode:
 
 
 def _independent_splices(text: str, source: SourceNode, edits: Sequence[Edit]) -> list[Splice]:
-    """Return the splices of the first edits as far as each replaces a scalar of its own: they cannot disturb others."""
+    """Return the splices of the first edits that each replace another scalar, so that one parse is enough for them."""
     found: list[Splice] = []
     for edit in edits:
         node = source_at(source, edit.keys) if isinstance(edit, SetValue) else None
@@ -101,22 +107,23 @@ def _independent_splices(text: str, source: SourceNode, edits: Sequence[Edit]) -
 
 
 def _splice(text: str, source: SourceNode, edit: Edit) -> Splice:
+    """Return the splice that makes an edit. Raises EditRefused if it is impossible."""
     match edit:
         case SetValue(keys, value, order):
-            return _set(text, source, keys, value, order)
+            return _set_value(text, source, keys, value, order)
         case AddItem(keys, value, index, order):
             node = source_at(source, keys)
             if node is not None and node.kind == "sequence":
-                return added_item(text, node, value, index)
+                return insert_item(text, node, value, index)
             if node is not None and text[node.start : node.end] not in ("", "~", "null"):
                 raise EditRefused(f"{path_text(keys)} is not written out as a list here; edit the text")
-            return _set(text, source, keys, [value], order)
+            return _set_value(text, source, keys, [value], order)
         case RemovePart(keys):
-            return removed_part(text, source, keys)
+            return remove_part(text, source, keys)
 
 
-def _set(text: str, source: SourceNode, keys: tuple[Key, ...], value: Any, order: tuple[str, ...]) -> Splice:
-    """Return the splice that sets a value, in the deepest node on the way that exists."""
+def _set_value(text: str, source: SourceNode, keys: tuple[Key, ...], value: Any, order: tuple[str, ...]) -> Splice:
+    """Return the splice that replaces a value, or inserts it into the deepest mapping around it that exists."""
     if (node := source_at(source, keys)) is not None:
         return _replacement(text, node, value)
     for depth in range(len(keys) - 1, -1, -1):
@@ -129,9 +136,7 @@ def _set(text: str, source: SourceNode, keys: tuple[Key, ...], value: Any, order
         for key in reversed(missing[1:]):
             value = {key: value}
         if parent.kind == "mapping":
-            return inserted_entry(
-                text, parent, str(missing[0]), value, order if len(missing) == 1 or depth == 0 else ()
-            )
+            return insert_entry(text, parent, str(missing[0]), value, order if len(missing) == 1 or depth == 0 else ())
         if parent.kind == "scalar" and text[parent.start : parent.end] in ("", "~", "null"):
             return _replacement(text, parent, {missing[0]: value})
         break
@@ -139,33 +144,33 @@ def _set(text: str, source: SourceNode, keys: tuple[Key, ...], value: Any, order
 
 
 def _replacement(text: str, node: SourceNode, value: Any) -> Splice:
-    """Return the splice that replaces the text of a node."""
+    """Return the splice that replaces the text of a node by a value."""
     old = text[node.start : node.end]
     if isinstance(value, dict | list):
         new = flow_text(value)
     elif node.kind == "scalar":
-        new = replacing_text(value, old, node.style)
+        new = replacement_text(value, old, node.style)
     else:
-        new = replacing_text(value, "", "")
+        new = replacement_text(value, "", "")
     if node.start == node.end and text[node.start - 1 : node.start] in (":", "-"):
         new = f" {new}"
     return Splice(node.start, node.end, new)
 
 
-def _require_meaning(old: str, new: str, edits: Sequence[Edit]) -> None:
-    """Raise EditRefused unless the new text means the old content with the edits."""
-    before, after = parse_yaml(old, "")[0], parse_yaml(new, "")
-    if before is None or after[0] is None:
+def _require_content(old: str, new: str, edits: Sequence[Edit]) -> None:
+    """Raise EditRefused unless the content of the new text is that of the old text with the edits."""
+    before, after = parse_yaml(old, "")[0], parse_yaml(new, "")[0]
+    if before is None or after is None:
         raise EditRefused("this cannot be changed on the map without changing other text; edit the text")
     wanted = before.plain
     for edit in edits:
-        wanted = _changed(wanted, edit)
-    if not same_value(after[0].plain, wanted):
+        wanted = _edited_data(wanted, edit)
+    if not is_same_value(after.plain, wanted):
         raise EditRefused("this cannot be changed on the map without changing other values; edit the text")
 
 
-def _changed(plain: Any, edit: Edit) -> Any:
-    """Return plain data with an edit."""
+def _edited_data(plain: Any, edit: Edit) -> Any:
+    """Return a copy of the plain content of a text after an edit."""
     plain = copy.deepcopy(plain)
     holder = {"": plain}
     node: Any = holder

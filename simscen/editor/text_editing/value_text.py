@@ -1,4 +1,4 @@
-"""Write values as YAML text, in the notation of the text that they replace."""
+"""Conversion of values to YAML text, if possible in the notation of the text that they replace."""
 
 import json
 import math
@@ -9,53 +9,53 @@ from typing import Any
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.spec.quantities import NUMBER_AND_UNIT, UNITS, si_number
 
-WIDTH = 120
-"""Longest line of a folded text."""
-DECIMALS = 6
-"""Decimal places of numbers, in their unit."""
+LINE_WIDTH = 120
+"""Maximum length of the lines of a folded text (`>`), in characters."""
+MAX_DECIMALS = 6
+"""Maximum number of decimal places of a number, in the unit of its text."""
 MAX_PADDED_DECIMALS = 3
-"""Numbers keep the decimal places of the number that they replace, up to this many: 1.50 becomes 2.00."""
-SAME_NUMBER = 2e-6
-"""Largest difference between a number and its text, in the unit of the text."""
+"""Maximum number of decimal places that a number keeps from the number that it replaces: 1.50 becomes 2.00."""
+NUMBER_TOLERANCE = 2e-6
+"""Maximum difference between equal numbers, in the unit of their text; more than rounding to MAX_DECIMALS causes."""
 
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.([0-9]*))?|\.([0-9]+))")
 _UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
 
 
 def flow_text(value: Any) -> str:
-    """Return a value of numbers, texts, lists, and mappings as YAML on one line."""
+    """Return a value as YAML on one line, with lists in brackets and mappings in braces."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_text(str(key))}: {flow_text(one)}" for key, one in value.items()) + "}"
+        return "{" + ", ".join(f"{string_text(str(key))}: {flow_text(one)}" for key, one in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(flow_text(one) for one in value) + "]"
     return scalar_text(value)
 
 
 def scalar_text(value: Any) -> str:
-    """Return a scalar as YAML that is valid everywhere on one line."""
+    """Return a scalar as YAML on one line that is valid in block and flow style."""
     if value is None:
         return "null"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int | float):
         return number_text(float(value)) if isinstance(value, float) else str(value)
-    return _text(str(value))
+    return string_text(str(value))
 
 
-def replacing_text(value: Any, old: str, style: str) -> str:
+def replacement_text(value: Any, old: str, style: str) -> str:
     """Return a scalar as YAML in the notation of the text `old`: with its unit, its decimal places, and its quotes.
 
-    `style` is that of the node of `old`. Numbers are in SI units.
+    Numbers are in SI units. `style` is the YAML style of `old`: a quote, `>`, `|`, or "" for plain text.
     """
     if isinstance(value, int | float) and not isinstance(value, bool):
         quote = style if style in ("'", '"') else ""
         inner = old[1:-1] if quote else old
-        text = number_in_unit(float(value), inner)
+        text = quantity_text(float(value), inner)
         return f"{quote}{text}{quote}" if _unit(inner) else text
     if isinstance(value, str) and style in (">", "|"):
         lines = [line for line in old.split("\n")[1:] if line.strip()]
         indent = len(lines[0]) - len(lines[0].lstrip()) if lines else 0
-        return (block_text(value, old, indent) if indent else None) or scalar_text(value)
+        return (block_scalar_text(value, old, indent) if indent else None) or scalar_text(value)
     if isinstance(value, str) and style == "'" and not _UNSAFE.search(value):
         return "'" + value.replace("'", "''") + "'"
     if isinstance(value, str) and style == '"':
@@ -63,8 +63,8 @@ def replacing_text(value: Any, old: str, style: str) -> str:
     return scalar_text(value)
 
 
-def number_in_unit(value: float, old: str) -> str:
-    """Return a number in SI units as text with the unit and the decimal places of the text `old`."""
+def quantity_text(value: float, old: str) -> str:
+    """Return a number in SI units as text with the unit and the decimal places of the text `old`, e.g. "1.50 m"."""
     match = NUMBER_AND_UNIT.fullmatch(old)
     scale = _scale(_unit(old))
     if match is None or not scale:
@@ -76,21 +76,21 @@ def number_in_unit(value: float, old: str) -> str:
 
 
 def number_text(value: float, decimals: int = 0) -> str:
-    """Return a number with at least this many decimal places, up to MAX_PADDED_DECIMALS, and no more than needed."""
-    if not math.isfinite(value) or abs(value) >= 1e9 or 0 < abs(value) < 10.0 ** (1 - DECIMALS):
-        return _words(value)
-    number, _, places = f"{value:.{DECIMALS}f}".partition(".")
+    """Return a number with the decimal places that it needs, padded to `decimals`, but at most MAX_PADDED_DECIMALS."""
+    if not math.isfinite(value) or abs(value) >= 1e9 or 0 < abs(value) < 10.0 ** (1 - MAX_DECIMALS):
+        return _special_number_text(value)
+    number, _, places = f"{value:.{MAX_DECIMALS}f}".partition(".")
     places = places.rstrip("0").ljust(min(decimals, MAX_PADDED_DECIMALS), "0")
     text = f"{number}.{places}" if places else number
     return text.removeprefix("-") if float(text) == 0 else text
 
 
-def same_value(found: Any, wanted: Any) -> bool:
-    """Return whether two values are equal, with numbers and texts with units compared as numbers."""
+def is_same_value(found: Any, wanted: Any) -> bool:
+    """Return whether two values are equal. Numbers and quantities with units are compared with a tolerance."""
     if isinstance(found, dict) and isinstance(wanted, dict):
-        return found.keys() == wanted.keys() and all(same_value(found[key], wanted[key]) for key in found)
+        return found.keys() == wanted.keys() and all(is_same_value(found[key], wanted[key]) for key in found)
     if isinstance(found, list) and isinstance(wanted, list):
-        return len(found) == len(wanted) and all(map(same_value, found, wanted))
+        return len(found) == len(wanted) and all(map(is_same_value, found, wanted))
     if found == wanted or found is wanted:
         return isinstance(found, bool) == isinstance(wanted, bool)
     if isinstance(found, bool) or isinstance(wanted, bool):
@@ -98,8 +98,8 @@ def same_value(found: Any, wanted: Any) -> bool:
     numbers = si_number(found), si_number(wanted)
     if not all(isinstance(number, int | float) for number in numbers):
         return False
-    scale = max((_unit_scale(one) for one in (found, wanted)), default=1.0)
-    return math.isclose(*numbers, rel_tol=1e-9, abs_tol=SAME_NUMBER * scale)
+    scale = max(_scale_of_value(found), _scale_of_value(wanted))
+    return math.isclose(*numbers, rel_tol=1e-9, abs_tol=NUMBER_TOLERANCE * scale)
 
 
 def quoted_text(text: str) -> str:
@@ -107,13 +107,8 @@ def quoted_text(text: str) -> str:
     return _UNSAFE.sub(lambda found: f"\\u{ord(found[0]):04x}", json.dumps(text, ensure_ascii=False))
 
 
-def key_text(key: str) -> str:
-    """Return the key of a mapping as YAML."""
-    return _text(key)
-
-
-def _text(text: str) -> str:
-    """Return a text without quotes if YAML then reads the same text, also inside of brackets and braces."""
+def string_text(text: str) -> str:
+    """Return a string as YAML: without quotes if a parser then reads the same string, also in brackets and braces."""
     if "\n" in text or _UNSAFE.search(text) or text != text.strip():
         return quoted_text(text)
     tree, problems = parse_yaml(f"[{{k: {text}}}, {{{text}: 1}}]", "")
@@ -123,21 +118,24 @@ def _text(text: str) -> str:
 
 
 def _unit(text: str) -> str:
-    """Return the known unit of a text such as "2.5 m"; "" if it has none."""
+    """Return the unit of a text such as "2.5 m"; "" if it has no unit or an unknown one."""
     match = NUMBER_AND_UNIT.fullmatch(text)
     return match[2] if match and _scale(match[2]) else ""
 
 
 def _scale(unit: str) -> float:
+    """Return the factor from a unit to the SI unit; 0 for an unknown unit."""
     return next((units[unit] for units in UNITS.values() if unit in units), 0.0)
 
 
-def _unit_scale(value: Any) -> float:
+def _scale_of_value(value: Any) -> float:
+    """Return the factor from the unit of a quantity to the SI unit; 1 for a value without a unit."""
     unit = _unit(value) if isinstance(value, str) else ""
     return _scale(unit) if unit else 1.0
 
 
-def _words(value: float) -> str:
+def _special_number_text(value: float) -> str:
+    """Return a number that is not finite, very large, or very small as YAML."""
     if math.isnan(value):
         return ".nan"
     if math.isinf(value):
@@ -145,17 +143,17 @@ def _words(value: float) -> str:
     return repr(value)
 
 
-def block_text(value: str, old: str, indent: int) -> str | None:
-    """Return a text in the style of the block scalar `old` (`>` or `|`), or None if that style cannot hold it.
+def block_scalar_text(value: str, old: str, indent: int) -> str | None:
+    """Return a string in the style of the block scalar `old` (`>` or `|`); None if this style cannot represent it.
 
-    `indent` is the number of spaces before its lines in the file.
+    `indent` is the number of spaces before the lines of the string.
     """
     header = old.split("\n", 1)[0].split("#", maxsplit=1)[0].strip()
     body = value.removesuffix("\n")
     if not body.strip() or header[1:] not in ("", "-"):
         return None
     header = header[0] if value.endswith("\n") else f"{header[0]}-"
-    lines = body.split("\n") if header[0] == "|" else _folded_lines(body, WIDTH - indent)
+    lines = body.split("\n") if header[0] == "|" else _folded_lines(body, LINE_WIDTH - indent)
     text = "\n".join([header, *(" " * indent + line if line else "" for line in lines)])
     tree, problems = parse_yaml(f"{' ' * (indent - 1)}? key\n{' ' * (indent - 1)}: {text}\n", "")
     is_same = not problems and tree is not None and tree.plain == {"key": value}
@@ -163,7 +161,7 @@ def block_text(value: str, old: str, indent: int) -> str | None:
 
 
 def _folded_lines(text: str, width: int) -> list[str]:
-    """Return the lines of a folded text: an empty line stands for a line break."""
+    """Return the lines of a folded text (`>`), in which an empty line stands for a line break."""
     lines: list[str] = []
     for number, paragraph in enumerate(text.split("\n")):
         lines += [""] if number else []

@@ -1,6 +1,6 @@
-"""Drawing of anti-aliased shapes and text in world coordinates with Pillow.
+"""Canvas for drawing anti-aliased shapes and text in world coordinates with Pillow.
 
-The canvas also lists the drawn parts, so that tests can compare pictures by their contents.
+The canvas also keeps a list of what was drawn, from which the legend is made, and by which tests compare pictures.
 """
 
 import math
@@ -18,12 +18,14 @@ from simscen.report.picture.palette import Color
 
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 Bounds = tuple[float, float, float, float]
+"""Rectangle in world coordinates: lowest x, lowest y, highest x, highest y in m."""
 Fill = tuple[int, ...]
+"""Red, green, and blue from 0 to 255, optionally followed by the opacity from 0 to 255."""
 
 SUPERSAMPLING = 2
 """Shapes are drawn at this scale and reduced at the end. A scale of 3 takes twice the time without a visible gain."""
 LABEL_CELL_PX = 4
-"""Size in pixels of the cells in which free space for labels is tracked."""
+"""Size of the square label cells, in which the canvas tracks what labels should not cover."""
 
 MAX_ELLIPSE_RADIUS_PX = 4000.0
 """Larger discs are drawn as polygons: Pillow's time for an ellipse grows with its area, also outside of the image."""
@@ -38,7 +40,7 @@ def font(size: int) -> Font:
 
 @dataclass(frozen=True)
 class TextItem:
-    """Text at pixel (x, y) with an `anchor` as in Pillow.
+    """Text of a font size in pixels at pixel (x, y), which is the point of the text that `anchor` names as in Pillow.
 
     `box` is the color of a box behind the text, `halo` the color of an outline around the letters.
     """
@@ -54,46 +56,46 @@ class TextItem:
 
 
 class DrawnPart(NamedTuple):
-    """Part of a picture: a name such as "door meeting room", and points (n, 2) in world coordinates."""
+    """Entry in the list of what was drawn: a name such as "door meeting room", and points (n, 2) in m."""
 
     name: str
     points: Array
 
 
 class Canvas:
-    """Image of the rectangle `bounds` (x0, y0, x1, y1) in m, y up, with `scale` pixels per meter.
+    """Image of the rectangle `bounds` of the world, with `scale` pixels per meter; y points up.
 
-    Shapes drawn with `busy=True` are not covered by labels.
+    Points of shapes are in m, widths and radii in pixels. Labels avoid shapes that are drawn with `busy=True`.
     """
 
     def __init__(self, bounds: Bounds, scale: float, background: Color | None) -> None:
-        """Without a `background` color, set an image before drawing."""
+        """Create an image with a `background` color; None: call `set_image` before drawing."""
         self.bounds, self.scale = bounds, scale
         x0, y0, x1, y1 = bounds
         self.width, self.height = max(1, math.ceil((x1 - x0) * scale)), max(1, math.ceil((y1 - y0) * scale))
         if background is not None:
-            self.set_image(Image.new("RGB", self.samples, background))
+            self.set_image(Image.new("RGB", self.supersampled_size, background))
         self._busy = Image.new("L", (-(-self.width // LABEL_CELL_PX), -(-self.height // LABEL_CELL_PX)), 0)
         self._busy_draw = ImageDraw.Draw(self._busy)
         self.texts: list[TextItem] = []
         self.parts: list[DrawnPart] = []
 
     def set_image(self, image: Image.Image) -> None:
-        """Draw on this image, which has the size `samples`. The image is not copied."""
+        """Draw on this image, which must have the size `supersampled_size`. The image is not copied."""
         self._image, self._draw = image, ImageDraw.Draw(image, "RGBA")
 
     @property
-    def samples(self) -> tuple[int, int]:
-        """Width and height of the supersampled image."""
+    def supersampled_size(self) -> tuple[int, int]:
+        """Width and height in pixels of the image before it is reduced by SUPERSAMPLING."""
         return self.width * SUPERSAMPLING, self.height * SUPERSAMPLING
 
     @property
     def busy(self) -> Array:
-        """Share 0 to 1 of each label cell that labels should not cover, rows from the top."""
+        """Fraction, from 0 to 1, of each label cell that labels should not cover; rows from the top of the image."""
         return np.asarray(self._busy, dtype=np.float64) / 255
 
     def pixel(self, x: float, y: float) -> tuple[float, float]:
-        """Return the pixel of a point in m."""
+        """Return the pixel (column, row) of a point in m. It can be outside of the image."""
         return (x - self.bounds[0]) * self.scale, (self.bounds[3] - y) * self.scale
 
     def shows(self, x: float, y: float) -> bool:
@@ -102,7 +104,7 @@ class Canvas:
         return 0 <= u < self.width and 0 <= v < self.height
 
     def add_part(self, name: str, points: Array | Sequence[tuple[float, float]]) -> None:
-        """Add an entry to the list of parts."""
+        """Add an entry to the list of what was drawn."""
         self.parts.append(DrawnPart(name, np.array(points, dtype=np.float64).reshape(-1, 2)))
 
     def polygon(
@@ -122,14 +124,18 @@ class Canvas:
     def hatch(
         self, outlines: Sequence[Array], color: Fill, rising: bool, gap: float = 11.0, width: float = 1.2
     ) -> None:
-        """Draw slanted lines in polygons, `gap` pixels apart, `rising` or falling to the right."""
+        """Fill polygons with slanted lines, `gap` pixels apart, that rise to the right if `rising`, or else fall."""
         corners = [self._corners(outline) for outline in outlines]
         points = np.array([corner for outline in corners for corner in outline]).reshape(-1, 2)
         if not len(points):
             return
+        max_right, max_bottom = self.supersampled_size
         (left, top), (right, bottom) = np.floor(points.min(axis=0)), np.ceil(points.max(axis=0))
         left, top = max(left, 0), max(top, 0)
-        width_px, height_px = int(min(right, self.samples[0]) - left) + 1, int(min(bottom, self.samples[1]) - top) + 1
+        width_px, height_px = (
+            int(min(right, max_right) - left) + 1,
+            int(min(bottom, max_bottom) - top) + 1,
+        )
         if width_px < 1 or height_px < 1:
             return
         inside, lines = Image.new("L", (width_px, height_px), 0), Image.new("L", (width_px, height_px), 0)
@@ -177,7 +183,7 @@ class Canvas:
         width: float = 1.5,
         busy: bool = False,
     ) -> None:
-        """Draw a disc of `radius` pixels at a point in meters."""
+        """Draw a disc of `radius` pixels around a point in meters."""
         if radius > MAX_ELLIPSE_RADIUS_PX:
             angles = np.linspace(0.0, 2.0 * math.pi, _SIDES_OF_LARGE_DISC, endpoint=False)
             ring = radius / self.scale * np.column_stack((np.cos(angles), np.sin(angles)))
@@ -191,19 +197,19 @@ class Canvas:
             self._busy_draw.ellipse([part / SUPERSAMPLING / LABEL_CELL_PX for part in box], fill=255)
 
     def symbol(self, x: float, y: float, offsets: Sequence[tuple[float, float]], fill: Color) -> None:
-        """Draw a filled symbol at a point in meters; `offsets` are its corners in pixels, y down."""
+        """Draw a filled polygon at a point in meters. Its corners are at `offsets` in pixels from the point, y down."""
         u, v = self.pixel(x, y)
         self._draw.polygon([((u + dx) * SUPERSAMPLING, (v + dy) * SUPERSAMPLING) for dx, dy in offsets], fill=fill)
         self._busy_draw.polygon([((u + dx) / LABEL_CELL_PX, (v + dy) / LABEL_CELL_PX) for dx, dy in offsets], fill=255)
 
     def leader(self, start: tuple[float, float], end: tuple[float, float], color: Color) -> None:
-        """Draw a thin line between two pixels, from a label to its object."""
+        """Draw a thin line that connects a label with its object. `start` and `end` are pixels."""
         self._draw.line(
             [(u * SUPERSAMPLING, v * SUPERSAMPLING) for u, v in (start, end)], fill=color, width=_line_width(0.8)
         )
 
     def text(self, item: TextItem) -> None:
-        """Add text, which is drawn on top of all shapes."""
+        """Add a text, which `finish` draws on top of all shapes."""
         self.texts.append(item)
 
     def finish(self) -> Image.Image:
@@ -215,18 +221,19 @@ class Canvas:
         return image
 
     def _corners(self, points: Array) -> list[tuple[float, float]]:
+        """Return the pixels of points (n, 2) in m in the supersampled image."""
         u = (points[:, 0] - self.bounds[0]) * self.scale * SUPERSAMPLING
         v = (self.bounds[3] - points[:, 1]) * self.scale * SUPERSAMPLING
         return list(zip(u.tolist(), v.tolist(), strict=True))
 
 
 def printable(text: str) -> str:
-    """Return text on one line with characters of the built-in font only."""
+    """Return a text on one line, in which simscen's symbols that the built-in font lacks are replaced by ASCII."""
     return one_line(text).replace("≤", "<=").replace("≥", ">=")
 
 
 def draw_text(draw: ImageDraw.ImageDraw, item: TextItem) -> None:
-    """Draw one text."""
+    """Draw a text with its box and halo. `draw` draws on an image of the final size."""
     if item.box is not None:
         left, top, right, bottom = draw.textbbox((item.x, item.y), item.text, font(item.size), anchor=item.anchor)
         draw.rounded_rectangle((left - 5, top - 4, right + 5, bottom + 4), 4, fill=(*item.box, 235))
@@ -248,4 +255,5 @@ def text_size(text: str, size: int) -> tuple[float, float]:
 
 
 def _line_width(width: float) -> int:
+    """Return the width of a line in the supersampled image, at least one pixel."""
     return max(1, round(width * SUPERSAMPLING))

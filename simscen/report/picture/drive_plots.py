@@ -1,4 +1,4 @@
-"""Pictures of test drives for `simscen robot`, and of estimated and reference paths on a map for `simscen localize`."""
+"""Pictures of paths: test drives of `simscen robot`, and the estimated path on the map of `simscen localize`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,39 +9,41 @@ from PIL import Image
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array, Pose2
-from simscen.report.picture import map_picture, palette
+from simscen.report.picture import map_layer, palette
 from simscen.report.picture.canvas import Canvas, TextItem, printable
-from simscen.report.picture.map_picture import MAX_MAP_SIZE_PX
 from simscen.report.picture.palette import AMBER, FAINT_INK, GREEN, INK, PAGE, ROBOT, RULE
 
-DriveTrial = tuple[str, Sequence[Pose2], Sequence[Pose2], Sequence[Pose2]]
+DrivePaths = tuple[str, Sequence[Pose2], Sequence[Pose2], Sequence[Pose2]]
 """Name of a test drive, and three paths: as commanded, as estimated by odometry, and the true one."""
 PANEL_SIZE_PX, PANEL_MARGIN_M = 420, 0.25
+"""Width and height of a panel, and minimum distance of paths from its edges."""
 GRID_SPACING_M = 0.5
 
 
-def draw_drives(title: str, trials: Sequence[DriveTrial], footprint: Polygon) -> Image.Image:
-    """Draw panels with the commanded (dashed), estimated (amber) and true path (green), which start at the origin."""
-    panels = [_panel(title, trial, np.array(footprint)) for trial in trials]
+def draw_drives(title: str, drives: Sequence[DrivePaths], footprint: Polygon) -> Image.Image:
+    """Draw a panel for each test drive, from left to right.
+
+    A panel shows the commanded path (dashed), the path estimated by odometry (amber), the true path (green), and the
+    footprint of the robot at the start and at the end.
+    """
+    panels = [_panel(title, drive, np.array(footprint)) for drive in drives]
     image = Image.new("RGB", (PANEL_SIZE_PX * len(panels), PANEL_SIZE_PX), PAGE)
     for k, panel in enumerate(panels):
         image.paste(panel, (k * PANEL_SIZE_PX, 0))
     return image
 
 
-def _panel(
-    title: str, trial: DriveTrial, footprint: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]"
-) -> Image.Image:
-    name, *paths = trial
+def _panel(title: str, drive: DrivePaths, footprint: Array) -> Image.Image:
+    name, *paths = drive
     footprints = [end.apply(footprint) for end in (paths[2][0], paths[2][-1])]
     points = np.concatenate([*footprints, *(_points(path) for path in paths)])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     half = float(np.ptp(points, axis=0).max()) / 2 + PANEL_MARGIN_M
     x, y = middle.tolist()
     canvas = Canvas((x - half, y - half, x + half, y + half), PANEL_SIZE_PX / (2 * half), PAGE)
-    for line in map_picture.grid_coordinates(x - half, x + half, GRID_SPACING_M):
+    for line in map_layer.grid_coordinates(x - half, x + half, GRID_SPACING_M):
         canvas.line(np.array([(line, y - half), (line, y + half)]), RULE, 0.5)
-    for line in map_picture.grid_coordinates(y - half, y + half, GRID_SPACING_M):
+    for line in map_layer.grid_coordinates(y - half, y + half, GRID_SPACING_M):
         canvas.line(np.array([(x - half, line), (x + half, line)]), RULE, 0.5)
     for corners in footprints:
         canvas.polygon(corners, None, ROBOT, 1.0)
@@ -55,16 +57,19 @@ def _panel(
     return canvas.finish().resize((PANEL_SIZE_PX, PANEL_SIZE_PX)) if canvas.width != PANEL_SIZE_PX else canvas.finish()
 
 
-def _points(path: Sequence[Pose2]) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
+def _points(path: Sequence[Pose2]) -> Array:
+    """Return the positions (n, 2) of poses."""
     return np.array([(pose.x, pose.y) for pose in path])
 
 
 def write_localization_picture(grid: OccupancyGrid, belief: Array, reference: Array, path: Path) -> None:
-    """Draw the map with the `reference` (n, 2) as a wide line and the `belief` (m, 2) as a dashed line."""
-    bounds = map_picture.map_extent(grid, np.vstack((belief, reference)))
-    x0, y0, x1, y1 = bounds
-    canvas = Canvas(bounds, min(MAX_MAP_SIZE_PX[0] / (x1 - x0), MAX_MAP_SIZE_PX[1] / (y1 - y0)), palette.UNKNOWN)
-    map_picture.draw_map(canvas, grid)
+    """Draw two paths on a map, and save the picture as PNG at `path`.
+
+    The `reference` (n, 2) is a wide line, the `belief` (m, 2) a dashed line; both are positions in the map frame in m.
+    """
+    bounds = map_layer.map_extent(grid, np.vstack((belief, reference)))
+    canvas = Canvas(bounds, map_layer.map_scale(bounds), palette.UNKNOWN)
+    map_layer.draw_map(canvas, grid)
     canvas.line(reference, palette.PLAN, 5.0)
     canvas.dashes(belief, palette.RED, 2.0)
     for row, (text, color) in enumerate((("belief", palette.RED), ("reference", palette.PLAN))):

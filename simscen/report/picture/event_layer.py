@@ -1,4 +1,7 @@
-"""Goals, faults, events, collisions and violations on a run picture."""
+"""Goals, faults, events, marks, collisions, violations, and places on the picture of a run.
+
+Each function draws one kind of thing on the canvas, and yields labels that are placed later.
+"""
 
 import math
 from collections.abc import Iterator
@@ -22,7 +25,11 @@ _GOAL_END_KINDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL
 
 @dataclass(frozen=True)
 class GoalOutcome:
-    """Outcome of a goal as a word, its color, and a text for the label."""
+    """Outcome of a goal on the picture.
+
+    `word` is reached, failed, canceled, "not reached", or "not tried". `text` is shown behind the name of the goal; ""
+    for a goal that was reached.
+    """
 
     word: str
     color: Color
@@ -30,7 +37,7 @@ class GoalOutcome:
 
 
 def error_code_text(event: Event) -> str:
-    """Return the error of Nav2 in an event, for example "NO_VALID_PATH (208)", or ""."""
+    """Return the error of Nav2 in an event, for example "NO_VALID_PATH (208)"; "" if there is none."""
     name, code = event.data.get("error_name"), event.data.get("error_code")
     if not name or name == "NONE":
         return ""
@@ -38,9 +45,9 @@ def error_code_text(event: Event) -> str:
 
 
 def goal_outcome(goal: Goal, scene: Scene) -> GoalOutcome:
-    """Return the outcome of a goal.
+    """Return the outcome of a goal according to its last event.
 
-    The goal counts as failed if the robot reports success, but the criterion on reaching the goal is violated.
+    A goal that the stack reported as reached counts as failed if the criterion goals_reached found the robot elsewhere.
     """
     ends = [event for event in scene.trace.of_kind(*_GOAL_END_KINDS) if event.name == goal.name]
     if not ends:
@@ -61,12 +68,16 @@ def goal_outcome(goal: Goal, scene: Scene) -> GoalOutcome:
 
 
 def _is_false_success(goal: Goal, scene: Scene) -> bool:
+    """Return whether the criterion goals_reached has a violated finding about the goal."""
     findings = [f for v in scene.result.verdicts if v.criterion == "goals_reached" for f in v.findings]
     return any(f.status is Status.FAIL and f.what.endswith(f"goal {goal.name}") for f in findings)
 
 
 def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw each goal with its tolerance as a ring, heading, name, and outcome."""
+    """Draw each goal with its tolerance as a ring, and with its heading and outcome.
+
+    Goals at the same position have one label. Goals of events that were not sent are omitted.
+    """
     sent = {event.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)}
     goals = [goal for goal in scene.case.every_goal if goal.name in sent or goal not in scene.case.sent]
     names: dict[tuple[float, float], list[str]] = {}
@@ -97,6 +108,7 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             yield Label(1, x, y, printable(scene.label(", ".join(texts))), outcome.color, 14, rim)
 
 
+# The corners of symbols, in pixels from their center (x right, y down).
 _STAR = [(r * math.cos(a), r * math.sin(a)) for k in range(16) for r, a in [((16, 7)[k % 2], k * math.pi / 8)]]
 _CROSS = [(1.6, 0), (5.4, 3.8), (3.8, 5.4), (0, 1.6), (-3.8, 5.4), (-5.4, 3.8), (-1.6, 0)]
 _CROSS += [(-5.4, -3.8), (-3.8, -5.4), (0, -1.6), (3.8, -5.4), (5.4, -3.8)]
@@ -106,7 +118,7 @@ _DIAMOND = [(0, -6), (6, 0), (0, 6), (-6, 0)]
 
 
 def draw_fault_bands(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw a wide band under the path where a fault was active."""
+    """Draw a wide band along the part of the path on which a fault was active."""
     for start, ended, name in _faults(scene):
         for piece in driven_segments(scene):
             is_active = (piece.ticks >= start) & (piece.ticks <= ended)
@@ -117,7 +129,7 @@ def draw_fault_bands(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw a bolt where the robot was when a fault started, and a gray one for its end."""
+    """Draw an amber bolt where the robot was when a fault started, and a gray one where it was when the fault ended."""
     trace = scene.trace
     for start, ended, name in _faults(scene):
         ends = [(start, f"{name} from", palette.AMBER), (ended, f"{name} over,", palette.FAINT_INK)]
@@ -130,7 +142,7 @@ def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def _faults(scene: Scene) -> list[tuple[int, int, str]]:
-    """Return the start tick, end tick and name of each fault."""
+    """Return the start tick, end tick, and name of each fault; the end of the run if the fault did not end before."""
     ended = list(scene.trace.of_kind(EventKind.FAULT_ENDED))
     faults = []
     for event in scene.trace.of_kind(EventKind.FAULT_STARTED):
@@ -164,7 +176,7 @@ def draw_marks(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_collisions(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw a star at each collision."""
+    """Draw a star at each collision: at the contact point if it is known, otherwise at the robot."""
     for event in scene.trace.of_kind(EventKind.COLLISION_STARTED):
         x, y = event.data.get("x"), event.data.get("y")
         if not isinstance(x, int | float) or not isinstance(y, int | float):
@@ -175,7 +187,7 @@ def draw_collisions(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_violations(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw a cross where each criterion was violated, with the finding."""
+    """Draw a cross at the tightest finding of each criterion that did not pass, if the finding has a position."""
     for verdict in scene.result.verdicts:
         finding = verdict.tightest
         if verdict.status is Status.PASS or finding is None or finding.place is None:
@@ -189,7 +201,7 @@ def draw_violations(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw a small diamond with the name for each place that is not a goal."""
+    """Draw a small diamond with the name for each place of the world at which no goal is."""
     goals = [goal.pose for robot in scene.per_robot for goal in robot.case.every_goal]
     goal_positions = {(round(pose.x, 3), round(pose.y, 3)) for pose in goals}
     for name, pose in sorted(scene.scenery.places.items()):
@@ -200,5 +212,5 @@ def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def _truncate(text: str, limit: int = 60) -> str:
-    """Truncate a text. The sidebar has the whole text."""
+    """Truncate a text to `limit` characters. The sidebar contains the full text."""
     return text if len(text) <= limit else f"{text[: limit - 1].rstrip()}…"

@@ -11,22 +11,24 @@ from simscen.report.picture.canvas import LABEL_CELL_PX, Canvas, TextItem, text_
 from simscen.report.picture.palette import Color
 
 _DISTANCES_PX = (4.0, 12.0, 22.0, 36.0, 54.0, 76.0, 104.0, 140.0)
-"""Distances between an object and its label, in the order in which they are tried."""
-_ANGLES = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 150, 330, 210, 60, 120, 300, 240))
+"""Distances between the rim of an object and its label, in the order in which they are tried."""
+_ANGLES_RAD = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 150, 330, 210, 60, 120, 300, 240))
 _LEADER_DISTANCE_PX = 16.0
-"""Distance from which a line connects the label with its object."""
-_WALL_WEIGHT, _DISTANCE_WEIGHT = 0.25, 0.0015
-"""Costs of covering walls, and of each pixel of distance, relative to covering a path."""
-_MAX_COVERED_SHARE = 0.2
+"""If a label is further away, a line connects it with its object."""
+_WALL_COST, _COST_PER_PX = 0.25, 0.0015
+"""Cost of a label on walls only, and of each pixel of distance. A label on busy cells only has cost 1."""
+_OCCUPIED_BY_LABEL = 3.0
+"""Cost of a label on another label only."""
+_MAX_OPTIONAL_COST = 0.2
 """Maximum cost of an optional label; more expensive ones are omitted."""
 
 
 @dataclass(frozen=True)
 class Label:
-    """Text for an object at (x, y) in meters with a radius of `rim` pixels.
+    """Text in font size `size` px for an object at (x, y) in m, which has a radius of `rim` pixels.
 
-    Labels with a low `rank` are placed first. `box` is the color of a box behind the text. An `optional` label is
-    omitted if there is no free space.
+    Labels with a low `rank` are placed first. `box` is the color of a box behind the text; None for an outline around
+    the letters. An `optional` label is omitted if there is no free space.
     """
 
     rank: int
@@ -41,25 +43,28 @@ class Label:
 
 
 def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
-    """Place all labels. `walls` is the share 0 to 1 of walls in each label cell of the canvas."""
-    occupied = canvas.busy + _WALL_WEIGHT * walls
+    """Choose a position for each label, and draw it. Labels of objects outside of the canvas are omitted.
+
+    `walls` is the fraction, from 0 to 1, of walls in each label cell of the canvas.
+    """
+    occupied = canvas.busy + _WALL_COST * walls
     for label in sorted(labels, key=lambda label: label.rank):
         if not canvas.shows(label.x, label.y):
             continue
         cost, (left, top, right, bottom) = _best_box(canvas, label, occupied)
-        if label.optional and cost > _MAX_COVERED_SHARE:
+        if label.optional and cost > _MAX_OPTIONAL_COST:
             continue
         rows, columns = (
             slice(int(top // LABEL_CELL_PX), int(bottom // LABEL_CELL_PX) + 1),
             slice(int(left // LABEL_CELL_PX), int(right // LABEL_CELL_PX) + 1),
         )
-        occupied[rows, columns] = 3.0
+        occupied[rows, columns] = _OCCUPIED_BY_LABEL
         u, v = canvas.pixel(label.x, label.y)
         end = min(max(u, left), right), min(max(v, top), bottom)
         distance = math.dist((u, v), end)
         if distance > label.rim + _LEADER_DISTANCE_PX:
-            share = label.rim / distance
-            canvas.leader((u + share * (end[0] - u), v + share * (end[1] - v)), end, label.box or label.color)
+            fraction = label.rim / distance
+            canvas.leader((u + fraction * (end[0] - u), v + fraction * (end[1] - v)), end, label.box or label.color)
         halo = None if label.box else palette.FREE
         middle = (left + right) / 2, (top + bottom) / 2
         canvas.text(TextItem(*middle, label.text, label.size, label.color, "mm", label.box, halo))
@@ -71,7 +76,7 @@ Box = tuple[float, float, float, float]
 
 
 def _best_box(canvas: Canvas, label: Label, occupied: Array) -> tuple[float, Box]:
-    """Return the box of a label with the lowest cost, and the cost."""
+    """Return the lowest cost of a label, and its box with this cost. `occupied` is the cost of each label cell."""
     sums = np.zeros((occupied.shape[0] + 1, occupied.shape[1] + 1))
     sums[1:, 1:] = occupied.cumsum(axis=0).cumsum(axis=1)
     width, height = text_size(label.text, label.size)
@@ -79,18 +84,21 @@ def _best_box(canvas: Canvas, label: Label, occupied: Array) -> tuple[float, Box
     u, v = canvas.pixel(label.x, label.y)
     best: tuple[float, Box] = (math.inf, (u, v, u + width, v + height))
     for distance in _DISTANCES_PX:
-        if best[0] <= _DISTANCE_WEIGHT * distance:
+        if best[0] <= _COST_PER_PX * distance:
             break  # boxes at larger distances cannot be better
-        for number, angle in enumerate(_ANGLES):
+        for number, angle in enumerate(_ANGLES_RAD):
             box = _box(canvas, (u, v), angle, label.rim + distance, (width, height))
-            cost = _covered_share(sums, box) + _DISTANCE_WEIGHT * (distance + number / 4)
+            cost = _mean_cost(sums, box) + _COST_PER_PX * (distance + number / 4)
             if cost < best[0]:
                 best = (cost, box)
     return best
 
 
 def _box(canvas: Canvas, center: tuple[float, float], angle: float, distance: float, size: tuple[float, float]) -> Box:
-    """Return the box at a distance and angle from a pixel, moved onto the canvas."""
+    """Return the box of a `size` (width, height) at a distance in px and an angle in rad from the pixel `center`.
+
+    A box that extends beyond the canvas is moved onto it.
+    """
     c, s = math.cos(angle), -math.sin(angle)
     middle = center[0] + c * (distance + abs(c) * size[0] / 2), center[1] + s * (distance + abs(s) * size[1] / 2)
     if abs(c) > 0.1 and abs(s) > 0.1:  # diagonal: next to the object, not above it
@@ -100,8 +108,8 @@ def _box(canvas: Canvas, center: tuple[float, float], angle: float, distance: fl
     return left, top, left + size[0], top + size[1]
 
 
-def _covered_share(sums: Array, box: Box) -> float:
-    """Return the share of a box that is occupied. `sums` are cumulative sums over the label cells."""
+def _mean_cost(sums: Array, box: Box) -> float:
+    """Return the mean cost of the label cells in a box. `sums[r, c]` is the cost of all cells above r and left of c."""
     left, top, right, bottom = (int(part // LABEL_CELL_PX) for part in box)
     right, bottom = min(right + 1, sums.shape[1] - 1), min(bottom + 1, sums.shape[0] - 1)
     inside = float(sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left])

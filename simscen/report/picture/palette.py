@@ -1,14 +1,15 @@
-"""Colors of pictures and pages, which are distinguishable in grayscale and with color blindness.
+"""Colors of pictures and pages.
 
-The hues are those of Okabe and Ito (2008), darkened for a text contrast of 4.5 to 1 on white: bluish green for good,
-vermilion for bad, amber for warnings. The path of a robot changes with time from dark blue to light orange. Colors are
-always combined with symbols.
+The hues are those of Okabe and Ito (2008), which are distinguishable with color blindness: bluish green for good,
+vermilion for bad, amber for warnings. They are darkened for a text contrast of 4.5 to 1 on white. Pictures and pages
+always combine colors with symbols.
 """
 
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
 
 Color = tuple[int, int, int]
+"""Red, green, and blue from 0 to 255."""
 
 PAGE: Color = (255, 255, 255)
 FREE: Color = (252, 251, 249)
@@ -16,9 +17,11 @@ UNKNOWN: Color = (226, 223, 216)
 WALL: Color = (58, 63, 71)
 INK: Color = (38, 42, 48)
 FAINT_INK: Color = (98, 103, 111)
+"""Colors of text, and of less important text."""
 RULE: Color = (222, 224, 227)
+"""Color of separating lines."""
 GRID = (38, 42, 48, 24)
-"""Visible on the floor, but not on walls."""
+"""Color of grid lines with an opacity of 24, so that they are visible on free space, but not on walls."""
 BELIEF: Color = (20, 20, 24)
 PLAN: Color = (176, 203, 232)
 PLACE: Color = (112, 116, 124)
@@ -33,28 +36,27 @@ RED: Color = (194, 48, 16)
 AMBER: Color = (150, 98, 0)
 GREEN: Color = (0, 113, 86)
 GRAY: Color = (98, 103, 111)
-GOAL = GREEN
 ROBOTS: tuple[Color, ...] = ((30, 34, 40), (0, 113, 86), (122, 62, 130), (150, 98, 0), (0, 105, 148))
-"""Outlines of the paths of several robots, in the order of their names."""
+"""Colors of the paths' outlines with several robots, in the order of their names; further robots repeat them."""
 
-OUTCOMES = {
+OUTCOME_COLORS = {
     Outcome.PASSED: GREEN,
     Outcome.FAILED: RED,
     Outcome.ERROR: AMBER,
     Outcome.FAILED_AS_EXPECTED: GRAY,
     Outcome.SKIPPED: GRAY,
 }
-STATUSES = {Status.PASS: GREEN, Status.FAIL: RED, Status.INCONCLUSIVE: AMBER, Status.ERROR: AMBER}
-SIGNS = {Status.PASS: "✓", Status.FAIL: "✗", Status.INCONCLUSIVE: "?", Status.ERROR: "!"}
+STATUS_COLORS = {Status.PASS: GREEN, Status.FAIL: RED, Status.INCONCLUSIVE: AMBER, Status.ERROR: AMBER}
 
-_STOPS = ((40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 150, 30))
+_TIME_COLORS = ((40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 150, 30))
 
 
-def time_color(share: float) -> Color:
-    """Return the color for a share 0 to 1 of the duration of the run, from dark blue to orange."""
-    position = min(max(share, 0.0), 1.0) * (len(_STOPS) - 1)
-    low = min(int(position), len(_STOPS) - 2)
-    r, g, b = (round(a + (position - low) * (z - a)) for a, z in zip(_STOPS[low], _STOPS[low + 1], strict=True))
+def time_color(fraction: float) -> Color:
+    """Return the color for a time in the run: dark blue at its start (0), orange at its end (1)."""
+    position = min(max(fraction, 0.0), 1.0) * (len(_TIME_COLORS) - 1)
+    low = min(int(position), len(_TIME_COLORS) - 2)
+    ends = zip(_TIME_COLORS[low], _TIME_COLORS[low + 1], strict=True)
+    r, g, b = (round(start + (position - low) * (end - start)) for start, end in ends)
     return r, g, b
 
 
@@ -66,11 +68,14 @@ DARK = {
     "page": "#15181c", "panel": "#1e2329", "rule": "#363d46", "ink": "#e7eaee", "quiet": "#a3abb6",
     "good": "#4fc9a2", "bad": "#ff8a66", "odd": "#e9b44c", "link": "#7cc4f5", "focus": "#7cc4f5",
 }  # fmt: skip
-"""Light and dark theme of the pages; `odd` is the color of warnings and errors. Text has a contrast of 4.5 to 1."""
+"""Light and dark theme of the pages. `odd` is the color of warnings and errors. Text has a contrast of 4.5 to 1."""
 
 
 def css_variables() -> str:
-    """Return both themes as CSS variables (`--good`, …). The system settings of the reader select the theme."""
+    """Return both themes as CSS variables (`--good`, …).
+
+    The attribute `data-theme` of the root element selects a theme, and without it the settings of the system.
+    """
     light, dark = ("".join(f"--{name}:{value};" for name, value in theme.items()) for theme in (LIGHT, DARK))
     return (
         f":root{{color-scheme:light dark;{light}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"

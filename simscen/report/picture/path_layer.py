@@ -1,4 +1,7 @@
-"""Paths on a run picture: true path, belief, plans, and the robot at start and end."""
+"""Paths on the picture of a run: true path, belief, plans, and the robot at the start and the end.
+
+Each function `draw_…` draws one kind of thing on the canvas, and yields labels that are placed later.
+"""
 
 import math
 from collections.abc import Iterator
@@ -15,15 +18,19 @@ from simscen.report.picture.labels import Label
 from simscen.report.picture.scene import Scene
 
 MAX_SPEED_M_S, MIN_JUMP_M = 8.0, 0.3
-"""A larger distance at a higher speed between two samples is a jump and not a motion."""
-_BANDS = 48
+"""Two samples with a larger distance and a higher speed between them are a jump and not a motion."""
+_TIME_COLOR_COUNT = 48
+"""Number of colors of the true path, each for an equal part of the duration of the run."""
 _DOT = 0.15 * np.column_stack((np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)))
 _LIFTED_SYMBOL = [(-6, -2), (0, -9), (6, -2), (2, -2), (2, 6), (-2, 6), (-2, -2)]
 _SET_DOWN_SYMBOL = [(-6, 2), (0, 9), (6, 2), (2, 2), (2, -6), (-2, -6), (-2, 2)]
 
 
 def split_at_jumps(samples: Samples, tick_rate: int, placement_ticks: tuple[int, ...] = ()) -> list[Samples]:
-    """Split poses at jumps, and at the ticks at which the object was placed elsewhere."""
+    """Split poses at jumps, and at `placement_ticks`, at which the robot was moved to another place.
+
+    `tick_rate` is the number of ticks per second.
+    """
     if len(samples) < 2:
         return [samples] if len(samples) else []
     distances = np.hypot(*np.diff(samples.values[:, :2], axis=0).T)
@@ -37,13 +44,13 @@ def split_at_jumps(samples: Samples, tick_rate: int, placement_ticks: tuple[int,
 
 
 def driven_segments(scene: Scene) -> list[Samples]:
-    """Split the true path where the robot was moved elsewhere."""
+    """Return the true path, split where the robot jumped or was moved to another place."""
     placement_ticks = tuple(event.tick for event in scene.trace.of_kind(EventKind.ROBOT_PLACED))
     return split_at_jumps(scene.trace.truth, scene.trace.tick_rate, placement_ticks)
 
 
 def draw_plans(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw all plans; newer ones have stronger colors."""
+    """Draw all plans; newer plans have stronger colors."""
     plans = scene.trace.plans
     for k, plan in enumerate(plans):
         weight = 0.45 + 0.55 * (k + 1) / len(plans)
@@ -53,9 +60,9 @@ def draw_plans(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw the true path, colored by time, with dots at round seconds and gaps where the robot was kidnapped."""
+    """Draw the true path, colored by time, with dots at round times and gaps where the robot was kidnapped."""
     trace, pieces = scene.trace, driven_segments(scene)
-    edges = np.linspace(0, trace.end, _BANDS + 1)
+    edges = np.linspace(0, trace.end, _TIME_COLOR_COUNT + 1)
     for piece in pieces:
         points = piece.values[:, :2]
         canvas.add_part(scene.label("path"), points[[0, -1]])
@@ -63,10 +70,12 @@ def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             canvas.line(
                 _drop_close_points(points, canvas), palette.ROBOTS[scene.robot_index % len(palette.ROBOTS)], 6.4
             )
-        for k in range(_BANDS):
+        for k in range(_TIME_COLOR_COUNT):
             first, last = np.searchsorted(piece.ticks, (edges[k], edges[k + 1]), side="left")
             band = points[max(first - 1, 0) : last + 1]
-            canvas.line(_drop_close_points(band, canvas), palette.time_color((k + 0.5) / _BANDS), 3.2, busy=True)
+            canvas.line(
+                _drop_close_points(band, canvas), palette.time_color((k + 0.5) / _TIME_COLOR_COUNT), 3.2, busy=True
+            )
     step = round_time_step(trace.seconds(trace.end))
     for number in range(1, int(trace.seconds(trace.end) / step) + 1) if pieces else ():
         tick = round(number * step * trace.tick_rate)
@@ -117,7 +126,7 @@ def draw_robot(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def round_time_step(seconds: float) -> float:
-    """Return a round number of seconds that divides a run into at most ten parts: 1, 2, 5, 10, …"""
+    """Return the smallest round time in s (1, 2, 5, 10, …) that divides a run of this length into at most ten parts."""
     if seconds <= 0:
         return 1.0
     power = 10 ** math.floor(math.log10(seconds / 10)) if seconds > 10 else 1.0
@@ -125,7 +134,7 @@ def round_time_step(seconds: float) -> float:
 
 
 def _drop_close_points(points: Array, canvas: Canvas) -> Array:
-    """Return points at least one pixel apart, and the last one, to save time."""
+    """Return the points without successive points in the same pixel, to save time; the last point is kept."""
     if len(points) < 3:
         return points
     pixels = np.floor(points * canvas.scale)

@@ -1,4 +1,4 @@
-"""Contents of a run picture, and the outlines of its objects."""
+"""Data that the picture of a run is drawn from, and the outlines of the objects in it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,12 +16,12 @@ from simscen.core.records.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A finished run to draw, as seen by one robot.
+    """A finished run to draw: its world and the data of one robot.
 
-    With several robots, each of them has a scene of its own, and one common scene contains these scenes.
+    With several robots, each robot has a scene of its own, and a common scene contains these scenes in `robots`.
 
     Attributes:
-        trace: Recorded run.
+        trace: Recorded run of the robot.
         case: Goals, regions, and masks of the scenario, by which the run was judged.
         map: Map of the world, which can differ from the robot's map.
         result: Result of the run with the verdicts.
@@ -45,16 +45,16 @@ class Scene:
 
     @property
     def robot_index(self) -> int:
-        """Index of the robot in the sorted names; 0 for a single robot."""
+        """Index of the robot in the order of the names; 0 for a single robot."""
         return sorted(self.robots).index(self.robot_name) if self.robot_name in self.robots else 0
 
     def label(self, text: str) -> str:
-        """Return a label, with the name of the robot if there are several."""
+        """Return a text, preceded by the name of the robot if there are several."""
         return f"{self.robot_name}: {text}" if self.robot_name else text
 
 
 def scene_with_robots(scene: Scene, robots: Mapping[str, tuple[Trace, Case]]) -> Scene:
-    """Return the scene with a scene of its own for each of the `robots`."""
+    """Return a common scene with a scene for each robot; `robots` are the trace and the case of each by name."""
     parts = {name: replace(scene, trace=trace, case=case, robot_name=name) for name, (trace, case) in robots.items()}
     return replace(scene, robots={name: replace(part, robots=parts) for name, part in parts.items()})
 
@@ -62,10 +62,14 @@ def scene_with_robots(scene: Scene, robots: Mapping[str, tuple[Trace, Case]]) ->
 _DEFAULT_RADIUS_M = 0.2
 """Radius of an object whose shape is unknown."""
 Outlines = tuple[Array, ...]
+"""Polygons (n, 2) in m in the frame of an object, one for each of its parts."""
 
 
 def object_outlines(trace: Trace, world_objects: Sequence[MovableObject]) -> dict[str, Outlines]:
-    """Return the outlines (n, 2) of all spawned objects and of `world_objects`, in their own frames."""
+    """Return the outlines of `world_objects` and of all spawned objects by name.
+
+    An object whose shape is unknown has a circle.
+    """
     outlines = {thing.name: tuple(map(np.array, thing.outlines)) for thing in world_objects if thing.outlines}
     outlines.update({event.name: outlines_of_event(event) for event in trace.of_kind(EventKind.OBJECT_SPAWNED)})
     for name in trace.objects:
@@ -74,7 +78,7 @@ def object_outlines(trace: Trace, world_objects: Sequence[MovableObject]) -> dic
 
 
 def outlines_of_event(event: Event) -> Outlines:
-    """Return the outlines in an object.spawned event: one for each part, or one from `shape`, `size`, `points`."""
+    """Return the outlines in an object.spawned event: from `parts`, or from `shape` with `size` or `points`."""
     size, points = _floats(event.data, "size"), event.data.get("points")
     parts = event.data.get("parts")
     if isinstance(parts, list) and parts:

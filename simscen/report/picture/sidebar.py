@@ -1,4 +1,4 @@
-"""Sidebar of a run picture: reason of an error, criteria with their results, and legend."""
+"""Sidebar of the picture of a run: reason of an error, criteria with their results, and legend."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ from simscen.report.picture.scene import Scene
 WIDTH_PX = 360
 _PADDING_PX = 18
 _LINE_HEIGHT_PX = 17
-_ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
+_STATUS_ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
 Pen = ImageDraw.ImageDraw
 DrawSymbol = Callable[[Pen, float, float], None]
 """Function that draws the symbol of a legend entry: pen, x of its left edge and y of its center in px."""
@@ -25,8 +25,11 @@ Row = tuple[Status, Color, list[str]]
 """Status of a criterion, its color, and lines of text."""
 
 
-def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
-    """Draw the sidebar with at least `height` pixels. `parts` are the names of the drawn parts, for the legend."""
+def draw_sidebar(scene: Scene, parts: Sequence[str], min_height: int) -> Image.Image:
+    """Return the sidebar, which is at least `min_height` pixels high.
+
+    `parts` are the names of what was drawn on the map; the legend explains only these.
+    """
     reasons, rows = _reasons(scene), _criteria(scene)
     legend = [entry[1:] for entry in _legend(round_time_step(scene.result.simulated)) if _is_drawn(parts, entry[0])]
     text_height = (
@@ -34,30 +37,30 @@ def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
         + (14 if reasons else 0)
         + sum(_LINE_HEIGHT_PX * len(lines) + 8 for _, _, lines in rows)
     )
-    min_height = 54 + text_height + 26 + 20 * len(legend) + 62
-    image = Image.new("RGB", (WIDTH_PX, max(height, min_height)), palette.PAGE)
+    height = max(min_height, 54 + text_height + 26 + 20 * len(legend) + 62)
+    image = Image.new("RGB", (WIDTH_PX, height), palette.PAGE)
     draw = ImageDraw.Draw(image, "RGBA")
-    _criteria_list(draw, reasons, rows)
+    _draw_criteria(draw, reasons, rows)
     top = image.height - 20 * len(legend) - 50
     for number, (text, draw_symbol) in enumerate(legend):
         y = top + 20 * number
         draw_symbol(draw, _PADDING_PX, y)
         draw_text(draw, TextItem(_PADDING_PX + 34, y, text, 12, palette.FAINT_INK))
-    _time_bar(draw, scene, image.height - 30)
+    _draw_time_bar(draw, scene, image.height - 30)
     return image
 
 
 def _is_drawn(parts: Sequence[str], word: str) -> bool:
-    """Return whether the picture has a part that an entry of the legend explains.
+    """Return whether something was drawn that the entry of the legend with this `word` explains.
 
-    `parts` are the names of the drawn parts. The name of a part starts or ends with the `word` of its legend entry; the
-    word "" belongs to every part.
+    This is the case if a name in `parts` starts or ends with the word. The word "" stands for an entry that is always
+    in the legend.
     """
     return any(part.startswith(word) or part.endswith(f" {word}") for part in parts)
 
 
 def _reasons(scene: Scene) -> list[str]:
-    """Return the lines with an error, or the reason of a skipped or expectedly failed run."""
+    """Return the lines with the error of a run, or the reason of a skipped run or expected failure; otherwise []."""
     result = scene.result
     if result.error is not None:
         return _wrap(printable(f"{result.error.kind}: {result.error.message}"), _PADDING_PX)
@@ -67,12 +70,12 @@ def _reasons(scene: Scene) -> list[str]:
 
 
 def _criteria(scene: Scene) -> list[Row]:
-    """Return a row per criterion, failures first."""
+    """Return a row for each criterion, failures first."""
     rows: list[Row] = []
-    for verdict in sorted(scene.result.verdicts, key=lambda verdict: _ORDER.index(verdict.status)):
+    for verdict in sorted(scene.result.verdicts, key=lambda verdict: _STATUS_ORDER.index(verdict.status)):
         finding = verdict.tightest
         is_warning = verdict.severity == "warn" and verdict.status is not Status.PASS
-        color = palette.AMBER if is_warning else palette.STATUSES[verdict.status]
+        color = palette.AMBER if is_warning else palette.STATUS_COLORS[verdict.status]
         if finding is None:
             rows.append((verdict.status, color, _wrap(f"{printable(verdict.id)}: checked nothing")))
             continue
@@ -84,7 +87,7 @@ def _criteria(scene: Scene) -> list[Row]:
     return rows
 
 
-def _criteria_list(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
+def _draw_criteria(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
     y = 24.0
     for line in reasons:
         draw_text(draw, TextItem(_PADDING_PX, y, line, 13, palette.INK))
@@ -93,7 +96,7 @@ def _criteria_list(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
     draw_text(draw, TextItem(_PADDING_PX, y, "criteria", 12, palette.FAINT_INK))
     y += 22
     for status, color, lines in rows:
-        (_check_mark if status is Status.PASS else _cross)(draw, _PADDING_PX + 5, y, color)
+        (_draw_check_mark if status is Status.PASS else _draw_cross)(draw, _PADDING_PX + 5, y, color)
         for line in lines:
             draw_text(draw, TextItem(_PADDING_PX + 20, y, line, 13, palette.INK))
             y += _LINE_HEIGHT_PX
@@ -101,7 +104,7 @@ def _criteria_list(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
 
 
 def _wrap(text: str, left: int = _PADDING_PX + 20, size: int = 13) -> list[str]:
-    """Wrap a text. Words that are longer than a line are split."""
+    """Wrap a text in the font `size`, starting at the pixel `left`. Words that are longer than a line are split."""
     available = WIDTH_PX - left - 12
     lines, current = [], ""
     for word in text.split(" "):
@@ -119,109 +122,114 @@ def _wrap(text: str, left: int = _PADDING_PX + 20, size: int = 13) -> list[str]:
     return [*lines, current]
 
 
-def _check_mark(draw: Pen, x: float, y: float, color: Color) -> None:
+def _draw_check_mark(draw: Pen, x: float, y: float, color: Color) -> None:
     draw.line([(x - 5, y), (x - 1, y + 4), (x + 5, y - 5)], fill=color, width=2)
 
 
-def _cross(draw: Pen, x: float, y: float, color: Color) -> None:
+def _draw_cross(draw: Pen, x: float, y: float, color: Color) -> None:
     draw.line([(x - 4, y - 4), (x + 4, y + 4)], fill=color, width=2)
     draw.line([(x - 4, y + 4), (x + 4, y - 4)], fill=color, width=2)
 
 
 def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
-    """Return the entries of the legend: word in the names of the parts (see `_is_drawn`), text, and symbol."""
+    """Return the entries of the legend: word by which `_is_drawn` selects the entry, text, and symbol.
+
+    `step` is the time between two dots on the true path in s.
+    """
     return [
-        ("", f"true path, a dot every {step:g} s", _path),
-        ("belief", "estimated path", _dashes),
+        ("", f"true path, a dot every {step:g} s", _draw_path),
+        ("belief", "estimated path", _draw_dashes),
         ("", "plans", lambda d, x, y: d.line([(x, y), (x + 24, y)], fill=palette.PLAN, width=4)),
-        ("set down", "robot lifted and set down elsewhere", _arrow),
-        ("goal", "goal, its tolerance and heading", _ring(palette.GREEN, False)),
-        ("failed", "goal that failed", _ring(palette.RED, True)),
-        ("robot", "robot at the end", _robot),
-        ("object", "object at the end; before: color of the time", _block(palette.OBJECT)),
-        ("door", "door at the end; dashed: open and closed", _door),
-        ("person", "person at the end, with heading", _pedestrian),
-        ("keepout zone", "keepout zone", _hatched(palette.RED, -6)),
-        ("speed zone", "zone with a speed limit", _hatched(palette.AMBER, 6)),
-        ("ground", "ramp or sill; chevrons point uphill", _block(palette.GROUND)),
-        ("floor", "floor with different friction", _block(palette.SLIPPERY)),
-        ("fault", "start of a fault; band: fault active", _band),
-        ("event", "robot at an event", _diamond),
+        ("set down", "robot lifted and set down elsewhere", _draw_arrow),
+        ("goal", "goal, its tolerance and heading", _ring_symbol(palette.GREEN, False)),
+        ("failed", "goal that failed", _ring_symbol(palette.RED, True)),
+        ("robot", "robot at the end", _draw_robot),
+        ("object", "object at the end; before: color of the time", _block_symbol(palette.OBJECT)),
+        ("door", "door at the end; dashed: open and closed", _draw_door),
+        ("person", "person at the end, with heading", _draw_pedestrian),
+        ("keepout zone", "keepout zone", _hatched_symbol(palette.RED, -6)),
+        ("speed zone", "zone with a speed limit", _hatched_symbol(palette.AMBER, 6)),
+        ("ground", "ramp or sill; chevrons point uphill", _block_symbol(palette.GROUND)),
+        ("floor", "floor with different friction", _block_symbol(palette.SLIPPERY)),
+        ("fault", "start of a fault; band: fault active", _draw_band),
+        ("event", "robot at an event", _draw_diamond),
         ("collision", "collision", lambda d, x, y: d.regular_polygon((x + 12, y, 7), 5, fill=palette.RED)),
-        ("violation", "violated criterion", lambda d, x, y: _cross(d, x + 12, y, palette.RED)),
+        ("violation", "violated criterion", lambda d, x, y: _draw_cross(d, x + 12, y, palette.RED)),
     ]
 
 
-def _path(draw: Pen, x: float, y: float) -> None:
+def _draw_path(draw: Pen, x: float, y: float) -> None:
     for k in range(24):
         draw.line([(x + k, y), (x + k + 1, y)], fill=palette.time_color(k / 24), width=3)
     draw.ellipse((x + 8, y - 4, x + 16, y + 4), fill=palette.PAGE, outline=palette.time_color(0.5), width=2)
 
 
-def _robot(draw: Pen, x: float, y: float) -> None:
+def _draw_robot(draw: Pen, x: float, y: float) -> None:
     draw.rectangle((x + 4, y - 6, x + 20, y + 6), fill=palette.START, outline=palette.ROBOT)
     draw.polygon([(x + 13, y - 3), (x + 18, y), (x + 13, y + 3)], fill=palette.PAGE)
 
 
-def _dashes(draw: Pen, x: float, y: float) -> None:
+def _draw_dashes(draw: Pen, x: float, y: float) -> None:
     for k in range(3):
         draw.line([(x + 10 * k, y), (x + 10 * k + 5, y)], fill=palette.BELIEF, width=2)
 
 
-def _arrow(draw: Pen, x: float, y: float) -> None:
+def _draw_arrow(draw: Pen, x: float, y: float) -> None:
     draw.line([(x + 12, y + 6), (x + 12, y - 3)], fill=palette.AMBER, width=3)
     draw.polygon([(x + 7, y - 2), (x + 12, y - 8), (x + 17, y - 2)], fill=palette.AMBER)
 
 
-def _ring(color: Color, crossed: bool) -> DrawSymbol:
+def _ring_symbol(color: Color, is_crossed: bool) -> DrawSymbol:
     def draw_symbol(draw: Pen, x: float, y: float) -> None:
         draw.ellipse((x + 5, y - 7, x + 19, y + 7), fill=(*color, 46), outline=color, width=2)
-        if crossed:
-            _cross(draw, x + 12, y, color)
+        if is_crossed:
+            _draw_cross(draw, x + 12, y, color)
         else:
             draw.line([(x + 12, y), (x + 25, y)], fill=color, width=2)
 
     return draw_symbol
 
 
-def _block(color: Color) -> DrawSymbol:
+def _block_symbol(color: Color) -> DrawSymbol:
     def draw_symbol(draw: Pen, x: float, y: float) -> None:
         draw.rectangle((x + 3, y - 6, x + 21, y + 6), fill=(*color, 110), outline=color)
 
     return draw_symbol
 
 
-def _door(draw: Pen, x: float, y: float) -> None:
+def _draw_door(draw: Pen, x: float, y: float) -> None:
     draw.rectangle((x + 2, y - 2, x + 22, y + 2), fill=(*palette.OBJECT, 150), outline=palette.OBJECT)
     for k in range(3):
         draw.line([(x + 2, y - 2 - 3 * k), (x + 2, y - 3 - 3 * k)], fill=palette.OBJECT)
 
 
-def _pedestrian(draw: Pen, x: float, y: float) -> None:
+def _draw_pedestrian(draw: Pen, x: float, y: float) -> None:
     draw.ellipse((x + 6, y - 6, x + 18, y + 6), fill=(*palette.PEDESTRIAN, 150), outline=palette.PEDESTRIAN)
     draw.line([(x + 12, y), (x + 23, y)], fill=palette.PEDESTRIAN, width=2)
 
 
-def _hatched(color: Color, down: float) -> DrawSymbol:
+def _hatched_symbol(color: Color, rise: float) -> DrawSymbol:
+    """Return a function that draws slanted lines, which rise by 2 * `rise` px to the right, or fall if negative."""
+
     def draw_symbol(draw: Pen, x: float, y: float) -> None:
         for k in range(3):
-            draw.line([(x + 7 * k, y + down), (x + 7 * k + 9, y - down)], fill=color, width=1)
+            draw.line([(x + 7 * k, y + rise), (x + 7 * k + 9, y - rise)], fill=color, width=1)
 
     return draw_symbol
 
 
-def _band(draw: Pen, x: float, y: float) -> None:
+def _draw_band(draw: Pen, x: float, y: float) -> None:
     draw.line([(x, y), (x + 24, y)], fill=palette.FAULTY, width=10)
     draw.polygon([(x + 13, y - 8), (x + 8, y + 1), (x + 12, y + 1), (x + 11, y + 8), (x + 17, y - 2), (x + 13, y - 2)],
                  fill=palette.AMBER)  # fmt: skip
 
 
-def _diamond(draw: Pen, x: float, y: float) -> None:
+def _draw_diamond(draw: Pen, x: float, y: float) -> None:
     draw.polygon([(x + 12, y - 6), (x + 18, y), (x + 12, y + 6), (x + 6, y)], fill=palette.INK)
 
 
-def _time_bar(draw: Pen, scene: Scene, y: float) -> None:
-    """Draw the color scale of the path, from the start to the end of the run."""
+def _draw_time_bar(draw: Pen, scene: Scene, y: float) -> None:
+    """Draw the color scale of the true path, from the start to the end of the run, around the row `y`."""
     end = f"{scene.result.simulated:.0f} s"
     left, right = _PADDING_PX + 34, WIDTH_PX - _PADDING_PX - math.ceil(font(12).getlength(end)) - 8
     draw_text(draw, TextItem(_PADDING_PX, y, "0 s", 12, palette.FAINT_INK))

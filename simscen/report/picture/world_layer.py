@@ -1,4 +1,7 @@
-"""World on a run picture: ramps, floors, zones of costmap filters, objects, doors and pedestrians."""
+"""World on the picture of a run: ramps, floors, zones of costmap filters, objects, doors, and pedestrians.
+
+Each function `draw_…` draws one kind of thing on the canvas, and yields labels that are placed later.
+"""
 
 import math
 from collections.abc import Iterator
@@ -17,24 +20,25 @@ from simscen.report.picture.path_layer import split_at_jumps
 from simscen.report.picture.scene import Outlines, Scene, object_outlines, spawn_pose
 
 LABEL_RANK = 6
+"""Rank of the labels of ramps and floors: they are placed after those of robots, goals, and objects."""
 
 
 def draw_ground(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw ramps with chevrons that point uphill, sills and platforms, with their heights."""
+    """Draw ramps, sills, and platforms with their heights. Ramps have chevrons that point uphill."""
     for ground in scene.scenery.ground:
         outline = np.array(ground.outline)
         if len(outline) < 3:
             continue
         canvas.polygon(outline, (*palette.GROUND, 120), palette.GROUND)
         canvas.add_part(f"ground {ground.name}", outline)
-        _chevrons(canvas, ground, outline)
+        _draw_chevrons(canvas, ground, outline)
         x, y = outline.mean(axis=0).tolist()
         height = f"{ground.height:.2g} m" if ground.height >= 1 else f"{100 * ground.height:.2g} cm"
         text = printable(f"{ground.name}, {height} high" if ground.name else f"{height} high")
         yield Label(LABEL_RANK, x, y, text, palette.FAINT_INK, 11, _label_distance(canvas, outline), optional=True)
 
 
-def _chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> None:
+def _draw_chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> None:
     slope = math.hypot(*ground.uphill)
     if slope < 0.01:
         return
@@ -42,25 +46,25 @@ def _chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> None:
     across, middle = np.array((-up[1], up[0])), outline.mean(axis=0)
     length, width = np.ptp(outline @ up), np.ptp(outline @ across)
     size = min(width, length / 2) / 6
-    for share in (-0.25, 0.05, 0.35):
-        tip = middle + share * length * up
+    for position in (-0.25, 0.05, 0.35):
+        tip = middle + position * length * up
         canvas.line(np.array([tip - size * (up - across), tip, tip - size * (up + across)]), palette.FAINT_INK, 1.6)
 
 
 def draw_floors(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw floors with a friction that differs from dry concrete; changes during a run are labeled with their time."""
+    """Draw floors whose friction differs from that of dry concrete. Labels show the times of changes during the run."""
     for floor in scene.scenery.floors:
-        yield from _floor(canvas, floor.region, np.array(floor.outline), f"friction {floor.friction:g}")
+        yield from _draw_floor(canvas, floor.region, np.array(floor.outline), f"friction {floor.friction:g}")
     for event in scene.per_robot[0].trace.of_kind(EventKind.FLOOR_CHANGED):
         outline, friction = event.data.get("outline"), event.data.get("friction")
         assert isinstance(outline, list) and isinstance(friction, int | float)
         text = f"friction {friction:g} from {scene.trace.seconds(event.tick):.1f} s"
         until = event.data.get("until")
         text += f" to {until:.1f} s" if isinstance(until, int | float) else ""
-        yield from _floor(canvas, event.name, np.array(outline, dtype=np.float64), text)
+        yield from _draw_floor(canvas, event.name, np.array(outline, dtype=np.float64), text)
 
 
-def _floor(canvas: Canvas, name: str, outline: Array, text: str) -> Iterator[Label]:
+def _draw_floor(canvas: Canvas, name: str, outline: Array, text: str) -> Iterator[Label]:
     canvas.polygon(outline, (*palette.SLIPPERY, 40), palette.SLIPPERY, 1.0)
     canvas.add_part(f"floor {name}: {text}", outline)
     x, y = outline.mean(axis=0).tolist()
@@ -94,7 +98,7 @@ def draw_zones(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
-    """Yield the zones that were enabled at any time, each with its text."""
+    """Yield the zones of the robot that were enabled at any time, each with the text of its label."""
     initial = {(str(zone.filter), zone.region): zone for zone in scene.scenery.zones if zone.robot == scene.robot_name}
     switched: dict[tuple[str, str], list[Event]] = {}
     for event in scene.trace.of_kind(EventKind.ZONE_SWITCHED):
@@ -106,13 +110,16 @@ def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
 
 
 def _added_zone(scene: Scene, key: tuple[str, str]) -> FilterZone | None:
-    """Return a zone that was added during the run."""
+    """Return the zone (filter, region) that was added during the run; None if the region is unknown."""
     outline = scene.case.regions.get(key[1])
     return FilterZone("speed" if key[0] == "speed" else "keepout", key[1], outline) if outline else None
 
 
 def _zone_text(scene: Scene, zone: FilterZone, events: list[Event]) -> str:
-    """Return the text of a zone, for example "gate: keep out, on at 2.0 s" or "ward: at most 0.25 m/s"."""
+    """Return the text of a label, for example "gate: keep out, on at 2.0 s" or "ward: at most 0.25 m/s".
+
+    `events` are those that enabled or disabled the zone.
+    """
     limits = [zone.speed_limit, *(event.data.get("speed_limit") for event in events)]
     limit = next((value for value in reversed(limits) if isinstance(value, int | float) and value), 0.0)
     slow = f"at most {limit:g} m/s" if limit else "slow zone"
@@ -122,7 +129,7 @@ def _zone_text(scene: Scene, zone: FilterZone, events: list[Event]) -> str:
 
 
 def _mask_outlines(zone: FilterZone) -> list[Array]:
-    """Return the blocks of a mask in which the robot is restricted, as rectangles."""
+    """Return the blocks of a mask in which the robot is restricted, as rectangles (4, 2) in m."""
     cells = zone.cells or MaskBlocks(1.0)
     restricted = [block for block in cells.blocks if block[4] == 100 or zone.filter == "speed"]
     boxes = [[(c, r), (c + w, r), (c + w, r + h), (c, r + h)] for c, r, w, h, _ in restricted]
@@ -130,13 +137,14 @@ def _mask_outlines(zone: FilterZone) -> list[Array]:
 
 
 def _label_distance(canvas: Canvas, outline: Array) -> float:
-    """Return the pixels from the center of an outline to its nearest side."""
+    """Return half of the shorter side of the bounding box of an outline, in pixels."""
     return float(np.ptp(outline, axis=0).min()) * canvas.scale / 2
 
 
 _EARLIER_POSE_COUNT = 6
-_MIN_MOTION_M_RAD = 0.02
-"""Minimum motion in m or rad for drawing a path."""
+"""Maximum number of earlier poses at which a moving object is drawn."""
+_MIN_MOTION_M = 0.02
+"""Minimum motion of an object for which its path and earlier poses are drawn; a rotation counts 0.3 m per rad."""
 
 
 def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
@@ -155,9 +163,9 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         kind = "person" if person else "door" if name in doors else "object"
         color = palette.PEDESTRIAN if person else palette.OBJECT
         if samples is not None:
-            _object_path(canvas, scene, samples, shapes[name])
+            _draw_object_path(canvas, scene, samples, shapes[name])
         if name in doors:
-            _door_positions(canvas, doors[name], shapes[name])
+            _draw_door_positions(canvas, doors[name], shapes[name])
         if samples is not None and len(samples):
             last = _pose(samples, -1)
         elif event is not None:
@@ -172,7 +180,7 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             )
             canvas.add_part(f"{kind} {name}{' removed' if is_removed else ''}", outline)
         if person:
-            _heading_line(canvas, last, outlines[0])
+            _draw_heading(canvas, last, outlines[0])
         corners = np.concatenate(outlines)
         x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
         text = f"{name} (removed at {trace.seconds(removed[name]):.1f} s)" if is_removed else name
@@ -180,10 +188,10 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         yield Label(4, x, y, printable(text), color, 12, min(rim, 40.0))
 
 
-def _object_path(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines) -> None:
+def _draw_object_path(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines) -> None:
     """Draw the path of a moving object as a dotted line, and its earlier poses."""
     for segment in split_at_jumps(samples, scene.trace.tick_rate):
-        if np.ptp(segment.values[:, :2], axis=0).max() > _MIN_MOTION_M_RAD:
+        if np.ptp(segment.values[:, :2], axis=0).max() > _MIN_MOTION_M:
             canvas.dashes(segment.values[:, :2], palette.PLACE, 1.0, 2.5)
     for k in _earlier_poses(samples):
         color = palette.time_color(int(samples.ticks[k]) / max(scene.trace.end, 1))
@@ -191,7 +199,7 @@ def _object_path(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines
             canvas.polygon(_pose(samples, k).apply(outline), (*color, 30), color, 0.8)
 
 
-def _door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -> None:
+def _draw_door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -> None:
     """Draw the closed and open position of a door, and its hinge."""
     for end in (door.closed, door.opened):
         for corners in () if end is None else map(end.apply, shape):
@@ -200,21 +208,21 @@ def _door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -> Non
         canvas.disc(door.closed.x, door.closed.y, 2.6, palette.OBJECT)
 
 
-def _heading_line(canvas: Canvas, pose: Pose2, outline: Array) -> None:
+def _draw_heading(canvas: Canvas, pose: Pose2, outline: Array) -> None:
     """Draw the heading of a pedestrian."""
     radius = float(np.hypot(*(outline - (pose.x, pose.y)).T).max())
     canvas.line(pose.apply(np.array([(0.0, 0.0), (1.5 * radius, 0.0)])), palette.PEDESTRIAN, 2.0)
 
 
 def _earlier_poses(samples: Samples) -> list[int]:
-    """Return indices of samples that are evenly spread over the path of an object, except its end.
+    """Return the indices of samples that are evenly spread over the path of an object, without its end.
 
-    Empty if the object did not move.
+    Return [] if the object hardly moved.
     """
     steps = np.diff(samples.values[:, :3], axis=0)
     distances = np.hypot(steps[:, 0], steps[:, 1]) + 0.3 * np.abs(np.angle(np.exp(1j * steps[:, 2])))
     lengths = np.concatenate(([0.0], np.cumsum(distances)))
-    if lengths[-1] < _MIN_MOTION_M_RAD:
+    if lengths[-1] < _MIN_MOTION_M:
         return []
     indices = np.searchsorted(lengths, np.linspace(0, lengths[-1], _EARLIER_POSE_COUNT)[:-1], side="right") - 1
     return sorted(set(indices.tolist()))

@@ -1,4 +1,4 @@
-"""The replay page, replay.html, which plays a run from its log: world, sensors, belief, plans, and criteria."""
+"""The replay page, replay.html, which plays a run in a browser: world, sensors, belief, plans, and criteria."""
 
 from simscen.report.replay.page import replay_page, write_replay
 

@@ -1,7 +1,7 @@
-"""Compact encoding of columns of numbers for the replay page, and selection of samples.
+"""Compact encoding of arrays of numbers for the replay page, and selection of samples to limit its size.
 
-Numbers are rounded to multiples of a step, and the differences between them are stored as zigzag varints. The scripts
-of the page decode them.
+Numbers are rounded to multiples of a step. The differences between successive numbers are stored as zigzag varints, as
+in Protocol Buffers, and the scripts of the page decode them.
 """
 
 import numpy as np
@@ -14,19 +14,19 @@ INFINITE_STEPS = 2**30
 """Number of steps that stands for infinity; one more stands for nan."""
 
 Column = list[float]
-"""Offset of a column in the bytes, count of its numbers, and step."""
+"""Reference to an encoded array: offset of its first byte, number of its elements, and step."""
 
 
 class PackedColumns:
-    """Collects encoded columns. `left_out` lists the data that was reduced, for a note on the page."""
+    """Collects encoded arrays. `reductions` are notes for the page on data of which only a part was added."""
 
     def __init__(self) -> None:
-        self.left_out: list[str] = []
+        self.reductions: list[str] = []
         self._parts: list[bytes] = []
         self._size = 0
 
     def add(self, values: "npt.ArrayLike", step: float = 1.0) -> Column:
-        """Add numbers, rounded to multiples of `step`, and return the reference to the column."""
+        """Add the numbers of an array in C order, rounded to multiples of `step`, and return the reference to them."""
         steps = quantize(np.asarray(values, dtype=np.float64).ravel(), step)
         data = varints(zigzag(np.diff(steps, prepend=0)))
         start = self._size
@@ -35,18 +35,18 @@ class PackedColumns:
         return [start, len(steps), step]
 
     def note_reduction(self, name: str, count: int, total: int) -> None:
-        """Add a note to `left_out` if only `count` of `total` items are on the page."""
+        """Add a note to `reductions` if only `count` of `total` items are on the page."""
         if count < total:
-            self.left_out.append(f"{name}: {count} of {total}")
+            self.reductions.append(f"{name}: {count} of {total}")
 
     @property
     def data(self) -> bytes:
-        """The bytes of all columns."""
+        """The bytes of all arrays, one after the other."""
         return b"".join(self._parts)
 
 
 def quantize(values: Array, step: float) -> npt.NDArray[np.int64]:
-    """Return the numbers of steps, with INFINITE_STEPS for infinity and INFINITE_STEPS + 1 for nan."""
+    """Return the values divided by `step` and rounded; INFINITE_STEPS for infinity, INFINITE_STEPS + 1 for nan."""
     bounded = np.clip(
         np.nan_to_num(values / step, nan=0.0, posinf=INFINITE_STEPS, neginf=-INFINITE_STEPS),
         -INFINITE_STEPS,
@@ -80,7 +80,7 @@ def varints(numbers: npt.NDArray[np.uint64]) -> bytes:
 
 
 Indices = npt.NDArray[np.int64]
-"""Indices of samples."""
+"""Sorted indices of samples."""
 
 
 def evenly_spaced(count: int, max_count: int) -> Indices:
@@ -91,7 +91,10 @@ def evenly_spaced(count: int, max_count: int) -> Indices:
 
 
 def spaced_in_time(ticks: Ticks, period: int) -> Indices:
-    """Return samples at least `period` ticks apart, and also the last sample before each pause."""
+    """Return the indices of samples that are at least `period` ticks apart, and of the last sample before each pause.
+
+    A pause is a gap of more than two periods.
+    """
     indices: list[int] = []
     last = None
     for k, tick in enumerate(ticks.tolist()):
@@ -103,7 +106,10 @@ def spaced_in_time(ticks: Ticks, period: int) -> Indices:
 
 
 def keep_extremes(values: Array, max_count: int) -> Indices:
-    """Return at most `max_count` samples, with the minimum and the maximum of each segment."""
+    """Return the indices of at most `max_count` samples: the minimum and the maximum of segments of equal length.
+
+    In contrast to evenly spaced samples, these include short peaks.
+    """
     if len(values) <= max_count:
         return np.arange(len(values))
     segments = np.array_split(np.arange(len(values)), max(1, max_count // 2))

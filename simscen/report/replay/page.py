@@ -1,7 +1,7 @@
 """Replay page, replay.html: a single file that plays one run, or two runs side by side.
 
-HTML, CSS and JavaScript modules are package data. The modules are joined to one script in the order of their imports.
-Tests import them one by one.
+HTML, CSS, and JavaScript modules are files of the package. The modules are joined to one script in the order of their
+imports, because a page without a server cannot load modules.
 """
 
 import base64
@@ -25,23 +25,24 @@ from simscen.record.log_reader import Log
 from simscen.report.display_text import escape_control, one_line
 from simscen.report.picture.palette import css_variables
 from simscen.report.replay.packed_columns import PackedColumns
-from simscen.report.replay.robot_data import grid_of, moving_objects, robot_data
+from simscen.report.replay.robot_data import moving_objects, occupancy_grid_data, robot_data
 from simscen.report.replay.timeline import disturbance_data, read_source_lines, timeline_entries, verdict_data
 
-FOLDER = PACKAGE / "data" / "replay"
+PAGE_FOLDER = PACKAGE / "data" / "replay"
 FORMAT = 1
+"""Version of the data on the page."""
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./([a-z]+)\.js";\n', re.MULTILINE)
 _COMPRESSION_LEVEL = 6
 
 
 def replay_page(runs: Sequence[tuple[Log, RunResult]]) -> bytes:
-    """Return the page of one run, or of two runs to compare. Equal logs give equal bytes."""
+    """Return the page of one run, or of two runs to compare. Equal logs and results give equal bytes."""
     columns = PackedColumns()
     data_of_runs = [run_data(log, result, columns) for log, result in runs]
-    document = {"format": FORMAT, "runs": data_of_runs, "leftOut": list(dict.fromkeys(columns.left_out))}
+    document = {"format": FORMAT, "runs": data_of_runs, "leftOut": list(dict.fromkeys(columns.reductions))}
     data = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     title = " against ".join(_title(run) for run in data_of_runs)
-    return page(title, data.encode(), columns.data).encode()
+    return page_html(title, data.encode(), columns.data).encode()
 
 
 def write_replay(path: Path, runs: Sequence[tuple[Log, RunResult]]) -> None:
@@ -49,11 +50,14 @@ def write_replay(path: Path, runs: Sequence[tuple[Log, RunResult]]) -> None:
     path.write_bytes(replay_page(runs))
 
 
-def page(title: str, data: bytes, numbers: bytes) -> str:
-    """Return the HTML with compressed data, and a content security policy that allows only its own script and style."""
+def page_html(title: str, data: bytes, numbers: bytes) -> str:
+    """Return the HTML with a content security policy that allows only its own script and style.
+
+    `data` is a JSON document, `numbers` the bytes of PackedColumns. Both are compressed.
+    """
     compressed = zlib.compress(struct.pack("<I", len(data)) + data + numbers, _COMPRESSION_LEVEL)
     packed = compressed[2:-4]  # deflate without header
-    parts = {name: (FOLDER / f"page.{name}").read_text(encoding="utf-8") for name in ("html", "css")}
+    parts = {name: (PAGE_FOLDER / f"page.{name}").read_text(encoding="utf-8") for name in ("html", "css")}
     parts = {**parts, "css": css_variables() + parts["css"], "js": script()}
     policy = (
         f"default-src 'none'; script-src '{_digest(parts['js'])}'; style-src '{_digest(parts['css'])}'; "
@@ -66,14 +70,14 @@ def page(title: str, data: bytes, numbers: bytes) -> str:
 
 @lru_cache(maxsize=1)
 def script() -> str:
-    """Return all modules as one script."""
-    texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(FOLDER.glob("*.js"))}
+    """Return all JavaScript modules as one script."""
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(PAGE_FOLDER.glob("*.js"))}
     modules = [re.sub(r"^export ", "", _IMPORT.sub("", texts[name]), flags=re.MULTILINE) for name in _in_order(texts)]
     return "\n".join(modules)
 
 
 def _in_order(texts: Mapping[str, str]) -> list[str]:
-    """Return the names of the modules, each after the modules that it imports."""
+    """Return the names of the modules, each after the modules that it imports. `texts` is their source by name."""
     ordered: list[str] = []
 
     def visit(name: str) -> None:
@@ -92,6 +96,7 @@ def _title(run: Mapping[str, Any]) -> str:
 
 
 def _digest(text: str) -> str:
+    """Return the hash of a script or style as a source of the content security policy."""
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}"
 
 
@@ -100,26 +105,26 @@ MAX_MASK_BLOCKS = 2000
 
 
 def scenery_data(log: Log, columns: PackedColumns) -> dict[str, Any]:
-    """Return the objects, places, ramps, floors and zones of a log, and the map of the world."""
+    """Return the objects, places, ramps, floors, and zones of a log, and the map of the world, as JSON data."""
     scenery = scenery_from_header(log.header)
     return {
         "things": {
             one_line(thing.name): {
                 "pose": [round(part, 4) for part in thing.pose],
-                "parts": [points(outline) for outline in thing.outlines],
+                "parts": [corners_data(outline) for outline in thing.outlines],
             }
             for thing in scenery.things
         },
         "places": {one_line(name): [round(pose.x, 3), round(pose.y, 3)] for name, pose in scenery.places.items()},
-        "ground": [{"outline": points(one.outline), "height": one.height} for one in scenery.ground],
-        "floors": [{"outline": points(one.outline), "friction": one.friction} for one in scenery.floors],
+        "ground": [{"outline": corners_data(one.outline), "height": one.height} for one in scenery.ground],
+        "floors": [{"outline": corners_data(one.outline), "friction": one.friction} for one in scenery.floors],
         "zones": _zones(scenery),
-        "map": None if scenery.map is None else grid_of(scenery.map.grid, columns),
+        "map": None if scenery.map is None else occupancy_grid_data(scenery.map.grid, columns),
     }
 
 
 def _zones(scenery: Scenery) -> list[dict[str, Any]]:
-    """Return the zones of costmap filters, with masks as blocks."""
+    """Return the zones of costmap filters as JSON data. A mask is a list of blocks of equal cells."""
     zones = []
     for zone in scenery.zones:
         data: dict[str, Any] = {"filter": zone.filter, "region": one_line(zone.region), "limit": zone.speed_limit}
@@ -134,17 +139,20 @@ def _zones(scenery: Scenery) -> list[dict[str, Any]]:
     return zones
 
 
-def points(polygon: Iterable[Iterable[float]]) -> list[list[float]]:
-    """Return corners, rounded to millimeters."""
+def corners_data(polygon: Iterable[Iterable[float]]) -> list[list[float]]:
+    """Return the corners (x, y) of a polygon in m, rounded to millimeters."""
     return [[round(float(axis), 3) for axis in corner] for corner in polygon]
 
 
 MAX_SCENARIO_CHARACTERS = 400_000
-"""Maximum length of the text of a scenario."""
+"""Maximum length of the text of the scenario on the page."""
 
 
 def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, Any]:
-    """Return the data of a run, with the data of each robot in `robots`."""
+    """Return the JSON data of a run. Its key `robots` has the data of each robot.
+
+    References to encoded arrays are in `columns`, to which the arrays are added.
+    """
     parts: Mapping[str, Log] = log.robots or {"": log}
     sources = {name: read_source_lines(log.header.scenario, name) for name in parts}
     lines = {name: source_lines for name, (source_lines, _) in sources.items()}
@@ -175,7 +183,7 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
         "metrics": {name: value for name, value in sorted(result.metrics.items()) if value is not None},
         "events": sorted(events, key=lambda event: event["tick"]),
         "text": escape_control(log.header.scenario[:MAX_SCENARIO_CHARACTERS]).rstrip("\n").split("\n"),
-        "regions": {one_line(name): points(polygon) for name, polygon in log.header.case.regions.items()},
+        "regions": {one_line(name): corners_data(polygon) for name, polygon in log.header.case.regions.items()},
         "scenery": scenery_data(log, columns),
         "spawned": [
             _spawned(event) for event in log.trace.of_kind(EventKind.OBJECT_SPAWNED) if event.name not in robots
@@ -190,17 +198,18 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
 
 
 def _spawned(event: Event) -> dict[str, Any]:
-    """Return the data of a spawned object: tick, pose, and outlines in its own frame."""
+    """Return the JSON data of a spawned object: tick, pose, and outlines in its own frame."""
     parts: Any = event.data.get("parts")
     outlines = parts if isinstance(parts, list) and parts else []
     return {
         "name": one_line(event.name),
         "tick": event.tick,
         "pose": [_number(event.data.get(key)) for key in ("x", "y", "yaw")],
-        "parts": [points(outline) for outline in outlines],
+        "parts": [corners_data(outline) for outline in outlines],
         "person": bool(event.data.get("person")),
     }
 
 
 def _number(value: object) -> float:
+    """Return a number rounded to four digits, or 0 for anything else."""
     return round(float(value), 4) if isinstance(value, int | float) else 0.0

@@ -1,4 +1,8 @@
-"""Data of one robot for the replay page: poses, scans, particles, plans and costmaps, reduced to limit the size."""
+"""Data of one robot for the replay page: poses, scans, particles, plans, and costmaps.
+
+Functions return JSON data in which a long array is a reference to PackedColumns, to which the array is added. Data that
+exceeds a limit of this module is reduced, and the page gets a note about this.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -18,11 +22,11 @@ from simscen.record.sensor_messages import LoggedMessages, SensorMessages
 from simscen.report.display_text import one_line
 from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, spaced_in_time
 from simscen.report.replay.signal_plots import signal_limits, signal_plots
-from simscen.report.replay.stack_report import lines_of, parameters_of, tree_of
+from simscen.report.replay.stack_report import behavior_tree_data, log_lines_data, parameters_data
 from simscen.report.replay.timeline import SourceLines
 
 MAX_BEAMS, MAX_RANGES = 360, 300_000
-"""Maximum number of beams per scan, and of ranges per lidar."""
+"""Maximum number of beams per scan, and of ranges of all scans of a lidar together."""
 MAX_PARTICLES, MAX_CLOUDS = 250, 300
 """Maximum number of particles per cloud, and of clouds per robot."""
 MAX_PLAN_POINTS, MAX_PATH_POINTS = 120, 60_000
@@ -31,15 +35,17 @@ MAX_LOCAL_PLANS = 1500
 """Maximum number of local plans per robot."""
 MAX_GRID_CELLS = 2_000_000
 """Maximum number of cells of all grids on a costmap topic together."""
-_CENTIMETER = 0.01
+_POINT_STEP_M, _PARTICLE_YAW_STEP_RAD = 0.01, 0.02
+"""Steps to which positions and ranges, and the headings of particles, are rounded."""
 
 
-def scans_of(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str, Any]]:
-    """Return the scans of each lidar, with the ticks at which they were received and measured."""
+def scans_data(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str, Any]]:
+    """Return the scans of each lidar with the ticks at which they were received and measured."""
     return [_lidar(topic, messages, sensors, columns) for topic, messages in sorted(sensors.scans.items()) if messages]
 
 
 def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any]:
+    """Return the scans of one lidar. Scans whose number of beams differs from that of the first one are omitted."""
     first = sensors.scan(messages[0][1])
     stride = -(-max(1, len(first.ranges)) // MAX_BEAMS)
     beams = -(-len(first.ranges) // stride)
@@ -60,12 +66,12 @@ def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, column
         "beams": beams,
         "ticks": columns.add([tick for tick, _ in scans]),
         "measured": columns.add([scan.tick if sensors.stamped else tick for tick, scan in scans]),
-        "ranges": columns.add(ranges, _CENTIMETER),
+        "ranges": columns.add(ranges, _POINT_STEP_M),
     }
 
 
-def particles_of(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
-    """Return the particle clouds, each reduced to evenly spaced particles."""
+def particles_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
+    """Return the particle clouds, each reduced to MAX_PARTICLES; None if the log has none."""
     if not sensors.particles:
         return None
     indices = evenly_spaced(len(sensors.particles), MAX_CLOUDS).tolist()
@@ -77,25 +83,26 @@ def particles_of(sensors: SensorMessages, columns: PackedColumns) -> dict[str, A
     return {
         "ticks": columns.add([tick for tick, _ in clouds]),
         "numbers": columns.add([len(cloud) for cloud in subsets]),
-        "x": columns.add(table[:, 0], _CENTIMETER),
-        "y": columns.add(table[:, 1], _CENTIMETER),
-        "yaw": columns.add(table[:, 2], 0.02),
+        "x": columns.add(table[:, 0], _POINT_STEP_M),
+        "y": columns.add(table[:, 1], _POINT_STEP_M),
+        "yaw": columns.add(table[:, 2], _PARTICLE_YAW_STEP_RAD),
     }
 
 
-def plans_of(plans: Sequence[Path], columns: PackedColumns) -> dict[str, Any] | None:
-    """Return the plans with their planning ticks."""
+def plans_data(plans: Sequence[Path], columns: PackedColumns) -> dict[str, Any] | None:
+    """Return the plans with the ticks at which they were made; None without plans."""
     return _paths([(plan.tick, plan.points[:, :2]) for plan in plans], columns)
 
 
-def local_plans_of(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
-    """Return the local plans of the controller."""
+def local_plans_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
+    """Return the local plans of the controller; None without any."""
     indices = evenly_spaced(len(sensors.local_plans), MAX_LOCAL_PLANS).tolist()
     columns.note_reduction("local plans", len(indices), len(sensors.local_plans))
     return _paths([(sensors.local_plans[k][0], sensors.path(sensors.local_plans[k][1])) for k in indices], columns)
 
 
 def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, Any] | None:
+    """Return paths, each a tick and positions (n, 2) in m; None without paths."""
     if not paths:
         return None
     max_points = max(8, min(MAX_PLAN_POINTS, MAX_PATH_POINTS // len(paths)))
@@ -104,13 +111,13 @@ def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, 
     return {
         "ticks": columns.add([tick for tick, _ in paths]),
         "numbers": columns.add([len(path) for path in points]),
-        "x": columns.add(table[:, 0], _CENTIMETER),
-        "y": columns.add(table[:, 1], _CENTIMETER),
+        "x": columns.add(table[:, 0], _POINT_STEP_M),
+        "y": columns.add(table[:, 1], _POINT_STEP_M),
     }
 
 
-def grid_of(grid: OccupancyGrid, columns: PackedColumns) -> dict[str, Any]:
-    """Return a map, row by row from the lowest y."""
+def occupancy_grid_data(grid: OccupancyGrid, columns: PackedColumns) -> dict[str, Any]:
+    """Return a grid; its cells are listed row by row, starting at the pose of its origin."""
     rows, width = grid.shape
     return {
         "width": width,
@@ -121,8 +128,8 @@ def grid_of(grid: OccupancyGrid, columns: PackedColumns) -> dict[str, Any]:
     }
 
 
-def costmaps_of(sensors: SensorMessages, trace: Trace, columns: PackedColumns) -> list[dict[str, Any]]:
-    """Return the costmaps in the map frame."""
+def costmaps_data(sensors: SensorMessages, trace: Trace, columns: PackedColumns) -> list[dict[str, Any]]:
+    """Return the grids of each costmap topic in the map frame."""
     return [_costmap(topic, messages, sensors, trace, columns) for topic, messages in sorted(sensors.costmaps.items())]
 
 
@@ -140,7 +147,7 @@ def _costmap(
         is_same_grid = previous is not None and previous.shape == grid.shape and previous.origin == grid.origin
         cells = grid.cells.astype(np.int64) - previous.cells if previous is not None and is_same_grid else grid.cells
         origin = grid.origin if frame == frame_names.MAP else map_from_odom(trace, tick).compose(grid.origin)
-        grid_data = grid_of(OccupancyGrid(cells, grid.resolution, origin), columns)
+        grid_data = occupancy_grid_data(OccupancyGrid(cells, grid.resolution, origin), columns)
         grids.append({"tick": tick, "changes": is_same_grid, **grid_data})
         previous = grid
     return {"name": one_line(topic), "grids": grids}
@@ -161,12 +168,14 @@ def map_from_odom(trace: Trace, tick: int) -> Pose2:
 
 
 def _rounded(pose: Sequence[float]) -> list[float]:
+    """Return x, y, and yaw of a pose with six decimal places."""
     return [round(float(part), 6) for part in pose]
 
 
 MAX_POSES = 12_000
 """Maximum number of poses per robot: five minutes at 40 Hz."""
-MILLIMETER, MILLIRADIAN = 1e-3, 1e-3
+POSITION_STEP_M, YAW_STEP_RAD = 1e-3, 1e-3
+"""Steps to which the poses of robots and objects are rounded."""
 
 
 def robot_data(
@@ -177,7 +186,11 @@ def robot_data(
     verdicts: tuple[Verdict, ...],
     columns: PackedColumns,
 ) -> dict[str, Any]:
-    """Return the data of one robot; `name` is "" for a single robot."""
+    """Return the data of one robot.
+
+    `name` is "" for a single robot. `lines` are the positions of its goals in the scenario file. `spec` is the
+    specification of the scenario, whose temporal criteria select further signals; None if it is invalid.
+    """
     trace, case = log.trace, log.header.case
     return {
         "name": one_line(name),
@@ -186,15 +199,15 @@ def robot_data(
         "goals": _goals(case, lines),
         "truth": _poses(trace.truth, columns),
         "belief": _belief(trace.belief, columns),
-        "map": None if log.header.map is None else grid_of(log.header.map, columns),
-        "scans": scans_of(log.sensors, columns),
-        "particles": particles_of(log.sensors, columns),
-        "plans": plans_of(trace.plans, columns),
-        "local": local_plans_of(log.sensors, columns),
-        "costmaps": costmaps_of(log.sensors, trace, columns),
-        "tree": tree_of(log, columns),
-        "lines": lines_of(log, columns),
-        "parameters": parameters_of(log, columns),
+        "map": None if log.header.map is None else occupancy_grid_data(log.header.map, columns),
+        "scans": scans_data(log.sensors, columns),
+        "particles": particles_data(log.sensors, columns),
+        "plans": plans_data(trace.plans, columns),
+        "local": local_plans_data(log.sensors, columns),
+        "costmaps": costmaps_data(log.sensors, trace, columns),
+        "tree": behavior_tree_data(log, columns),
+        "lines": log_lines_data(log, columns),
+        "parameters": parameters_data(log, columns),
         "clock": columns.add(trace.truth.ticks),
         "strips": signal_plots(trace, case, spec, columns),
         "limits": signal_limits(verdicts, name),
@@ -221,18 +234,20 @@ def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
 
 
 def _poses(samples: Samples, columns: PackedColumns) -> dict[str, Any]:
+    """Return at most MAX_POSES of the poses with their ticks. Headings are continuous beyond 180 degrees."""
     indices = evenly_spaced(len(samples), MAX_POSES)
     columns.note_reduction("poses", len(indices), len(samples))
     x, y, yaw = samples.values[indices, :3].T
     return {
         "ticks": columns.add(samples.ticks[indices]),
-        "x": columns.add(x, MILLIMETER),
-        "y": columns.add(y, MILLIMETER),
-        "yaw": columns.add(np.unwrap(yaw) if np.isfinite(yaw).all() else yaw, MILLIRADIAN),
+        "x": columns.add(x, POSITION_STEP_M),
+        "y": columns.add(y, POSITION_STEP_M),
+        "yaw": columns.add(np.unwrap(yaw) if np.isfinite(yaw).all() else yaw, YAW_STEP_RAD),
     }
 
 
 def _belief(samples: Samples, columns: PackedColumns) -> dict[str, Any] | None:
+    """Return the estimated poses with their covariances; None without estimates."""
     if not len(samples):
         return None
     indices = evenly_spaced(len(samples), MAX_POSES)
@@ -242,7 +257,7 @@ def _belief(samples: Samples, columns: PackedColumns) -> dict[str, Any] | None:
 
 
 def moving_objects(trace: Trace, columns: PackedColumns, robots: frozenset[str]) -> list[dict[str, Any]]:
-    """Return the moving objects except for `robots`, with at most 20 poses per second."""
+    """Return the poses of moving objects, at most 20 per second, without the objects that are `robots`."""
     objects = []
     for name, samples in sorted(trace.objects.items()):
         if name in robots or not len(samples):

@@ -1,4 +1,4 @@
-"""Data of the signal plots on the replay page, with the limits of criteria."""
+"""Signal plots on the replay page: the signals over time, and the limits that criteria set on them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,8 +20,10 @@ from simscen.report.replay.packed_columns import PackedColumns, keep_extremes
 
 MAX_SAMPLES = 6000
 """Maximum number of samples per plot: twice the columns of a wide screen."""
-_RESOLUTION_OF_UNIT = {"m": 1e-3, "rad": 1e-3, "s": 1e-2, "m/s": 1e-3, "rad/s": 1e-3, "m/s²": 1e-2, "m/s2": 1e-2}
+_STEP_OF_UNIT = {"m": 1e-3, "rad": 1e-3, "s": 1e-2, "m/s": 1e-3, "rad/s": 1e-3, "m/s²": 1e-2, "m/s2": 1e-2}
+"""Step to which values are rounded, by their unit."""
 _EXCLUDED_SIGNALS = frozenset({"time", "started"})
+"""Signals without interest as a plot."""
 _SIGNAL_OF_CRITERION = {
     ("clearance", "m"): "clearance",
     ("speed", "m/s"): "speed",
@@ -39,7 +41,7 @@ _SIGNAL_OF_CRITERION = {
 
 @dataclass(frozen=True)
 class SignalPlot:
-    """A signal with its arguments."""
+    """Signal to plot, with its arguments by name, such as the object of a distance."""
 
     signal: SignalName
     arguments: SignalArguments
@@ -52,7 +54,10 @@ class SignalPlot:
 
 
 def signal_plots(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: PackedColumns) -> list[dict[str, Any]]:
-    """Return the plots of all signals without arguments, and of the signals with arguments in temporal criteria."""
+    """Return the data of all plots: signals without arguments, and signals with the arguments in temporal criteria.
+
+    Signals that the trace does not contain are omitted. `spec` is None if the scenario is not valid.
+    """
     in_criteria = dict.fromkeys(_signals_in_criteria(spec)) if spec is not None else {}
     without_arguments = [
         SignalPlot(name, {})
@@ -65,7 +70,7 @@ def signal_plots(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: P
 
 
 def signal_limits(verdicts: tuple[Verdict, ...], robot: str) -> list[dict[str, Any]]:
-    """Return the limits that findings of a robot set on signals, with their status."""
+    """Return the limits of signals in the findings about a robot ("" for a single one), with the verdict and status."""
     limits = []
     for verdict in verdicts:
         owner, _, _ = verdict.id.rpartition("/")
@@ -95,14 +100,15 @@ def _plot_data(plot: SignalPlot, trace: Trace, case: Case, columns: PackedColumn
 
 
 def _step(unit: str, values: Array) -> float:
-    """Return the resolution for a unit, or 1 for counts."""
+    """Return the step to which the values of a signal are rounded; 1 for whole numbers without a unit."""
     finite = values[np.isfinite(values)]
     if unit == "" and np.array_equal(finite, np.rint(finite)):
         return 1.0
-    return _RESOLUTION_OF_UNIT.get(unit, 1e-2)
+    return _STEP_OF_UNIT.get(unit, 1e-2)
 
 
 def _signals_in_criteria(spec: ScenarioSpec) -> Iterator[tuple[SignalName, tuple[tuple[str, Any], ...]]]:
+    """Yield each signal in temporal criteria, with the names and values of its arguments."""
     for entry in spec.pass_:
         chosen = entry.chosen
         for one in chosen.compared() if isinstance(chosen, TemporalCriterion) else ():
@@ -111,6 +117,7 @@ def _signals_in_criteria(spec: ScenarioSpec) -> Iterator[tuple[SignalName, tuple
 
 
 def _limit(verdict: Verdict, finding: Finding) -> dict[str, Any] | None:
+    """Return the signal and the limit of a finding; None if the finding limits no signal."""
     relation = finding.limit[:1]
     if finding.margin is None or finding.value is None or relation not in ("≤", "≥", "<", ">"):
         return None

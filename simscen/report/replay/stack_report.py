@@ -1,4 +1,4 @@
-"""What an external stack reported about itself, for the replay page: its behavior tree, log lines, and parameters."""
+"""Behavior tree, log lines, and parameters that an external stack reported, for the replay page."""
 
 import json
 import re
@@ -12,20 +12,21 @@ from simscen.report.display_text import escape_control, one_line
 from simscen.report.replay.packed_columns import PackedColumns
 
 MAX_TREE_CHANGES = 20_000
-"""Maximum number of changes of a behavior tree. If there are more, conditions are left out, then the first changes."""
+"""Maximum number of changes of a behavior tree. If there are more, conditions are omitted, then the first changes."""
 _RUNNING = "RUNNING"
 MAX_LINES, MAX_LINE_CHARACTERS = 1000, 400
-"""Maximum number of log lines, and the length of each."""
+"""Maximum number of log lines, and maximum length of each."""
 MAX_PARAMETERS, MAX_VALUE_CHARACTERS = 3000, 300
-"""Maximum number of parameters of all nodes, and the length of each value."""
+"""Maximum number of parameters of all nodes together, and maximum length of each value."""
 _WARNING, _ERROR = 30, 40
+"""Levels in rcl_interfaces/msg/Log."""
 _TREE_CHANGE = re.compile(r"(.*): (\w+) -> (\w+)", re.DOTALL)
 
 NODE_ORDER = (
     *("bt_navigator", "controller_server", "planner_server", "smoother_server", "behavior_server"),
     *("local_costmap", "global_costmap", "amcl", "map_server", "waypoint_follower"),
 )
-"""Nodes of Nav2 that come first, because most failures depend on their parameters."""
+"""Nodes of Nav2 that the page lists first, because most failures depend on their parameters."""
 MAIN_PARAMETERS = frozenset(
     (
         *("plugin", "plugins", "filters", "planner_plugins", "controller_plugins", "behavior_plugins"),
@@ -40,10 +41,10 @@ MAIN_PARAMETERS = frozenset(
         *("update_min_a", "update_min_d", "recovery_alpha_fast", "recovery_alpha_slow"),
     )
 )  # fmt: skip
-"""Last parts of the names of parameters that the page lists first: plug-ins, speeds, tolerances, sizes, and rates."""
+"""Last parts of the names of main parameters, which the page lists first: plugins, speeds, tolerances, and sizes."""
 
 
-def tree_of(log: Log, columns: PackedColumns) -> dict[str, Any] | None:
+def behavior_tree_data(log: Log, columns: PackedColumns) -> dict[str, Any] | None:
     """Return the changes of the behavior tree in order: tick, node, previous status, and status; None without any."""
     changes = list(_tree_changes(log))
     if not changes:
@@ -72,8 +73,8 @@ def _tree_changes(log: Log) -> Iterator[tuple[int, str, str, str]]:
             yield tick, found[1], found[2], found[3]
 
 
-def lines_of(log: Log, columns: PackedColumns) -> list[list[Any]]:
-    """Return the log lines of the stack besides its behavior tree: tick, severity, logger, and text of each."""
+def log_lines_data(log: Log, columns: PackedColumns) -> list[list[Any]]:
+    """Return the log lines of the stack without changes of its behavior tree: tick, severity, logger, and text."""
     lines = [(tick, line) for tick, line in log.sensors.stack_lines() if not _is_tree_change(line)]
     kept = lines[-MAX_LINES:]
     columns.note_reduction("log lines of the stack, the last ones", len(kept), len(lines))
@@ -91,8 +92,12 @@ def _severity(level: int) -> str:
     return "error" if level >= _ERROR else "warning" if level >= _WARNING else "info"
 
 
-def parameters_of(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
-    """Return the nodes with the names, values and importance of their parameters; empty if the stack reports none."""
+def parameters_data(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
+    """Return the parameters of each node; [] if the stack reported none.
+
+    The `values` of a node are lists of a name, a value as text, and whether it is a main parameter. Its `total` is the
+    number of its parameters, of which some may be omitted.
+    """
     nodes = _reported_parameters(log)
     total = sum(map(len, nodes.values()))
     budget = MAX_PARAMETERS
@@ -107,7 +112,7 @@ def parameters_of(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
 
 
 def _reported_parameters(log: Log) -> dict[str, Mapping[str, Any]]:
-    """Return the values by name and node that the stack reported in `about`, without what has another form."""
+    """Return the parameter values by node and name that the stack reported in `about`; malformed ones are ignored."""
     try:
         about = json.loads(log.stack.get("about", "{}"))
     except ValueError:
@@ -119,17 +124,18 @@ def _reported_parameters(log: Log) -> dict[str, Mapping[str, Any]]:
 
 
 def is_main_parameter(name: str) -> bool:
-    """Return whether a parameter is among the first that a reader looks for, e.g. `FollowPath.desired_linear_vel`."""
+    """Return whether the page lists a parameter first, for example `FollowPath.desired_linear_vel`."""
     return name.rpartition(".")[2] in MAIN_PARAMETERS
 
 
 def _node_rank(node: str) -> tuple[int, str]:
+    """Return a key for sorting nodes: the order of NODE_ORDER, then the name."""
     name = node.rpartition("/")[2]
     return NODE_ORDER.index(name) if name in NODE_ORDER else len(NODE_ORDER), node
 
 
 def _value_text(value: object) -> str:
-    """Return a value as in a YAML file: texts without quotes, except for empty ones."""
+    """Return a value as in a YAML file: strings without quotes, except for empty ones."""
     text = value if isinstance(value, str) and value.strip() else json.dumps(value, ensure_ascii=False)
     return _shortened(escape_control(text), MAX_VALUE_CHARACTERS)
 

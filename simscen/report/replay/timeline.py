@@ -1,4 +1,4 @@
-"""Timeline, verdicts and disturbances for the replay page, with the scenario lines that they come from."""
+"""Timeline, verdicts, and disturbances for the replay page, each with its line in the scenario file."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from simscen.model.scenario import ScenarioSpec
 from simscen.report.display_text import one_line
 
 K = EventKind
+# Lane of the timeline for each kind of event; others are in the lane "events".
 _LANES = {
     K.GOAL_ACCEPTED: "goals", K.GOAL_REACHED: "goals", K.GOAL_PASSED: "goals", K.GOAL_FAILED: "failures",
     K.GOAL_CANCELED: "goals", K.NAVIGATION_ENDED: "goals", K.PLAN_MADE: "plans", K.PLAN_FAILED: "plans",
@@ -36,7 +37,7 @@ _INTERVAL_KINDS = {
     K.FAULT_STARTED: (K.FAULT_ENDED,),
     K.EVENT_STARTED: (K.EVENT_ENDED,),
 }
-"""Events that start an interval, with the events that end it."""
+"""Kinds of events that start an interval, each with the kinds that end it."""
 _FAILURE_KINDS = {K.GOAL_FAILED, K.COLLISION_STARTED, K.PLAN_FAILED}
 _HIDDEN_KEYS = {"tick", "entry", "parts", "points", "waypoints", "times", "index", "effects"}
 """Keys of event data that are not shown as text."""
@@ -52,10 +53,12 @@ class TimelineEntry:
         lane: Name of the lane in which the entry is drawn.
         until: Last tick of an interval; None for a single event.
         ended: Kind of the event that ended the interval; "" if the run ended first.
-        bad: Whether the event is a failure, such as a collision.
+        is_failure: Whether the event is a failure, such as a collision.
         line: Line in the scenario file; 0 if unknown.
-        place: Position (x, y) in m if the event has one.
-        about: Data of the event that the page needs to draw the world.
+        name: Name of the goal, fault, object, or event that the entry is about.
+        text: Further data of the event as text.
+        place: Position (x, y) in m; () if the event has none.
+        about: Data of a zone.switched event, which the page needs to draw the zone; otherwise {}.
     """
 
     tick: int
@@ -65,21 +68,24 @@ class TimelineEntry:
     text: str
     until: int | None = None
     ended: str = ""
-    bad: bool = False
+    is_failure: bool = False
     line: int = 0
     place: Sequence[float] = field(default=())
     about: Mapping[str, Any] = field(default_factory=dict)
 
     def as_data(self, robot: str) -> dict[str, Any]:
-        """Return the entry as JSON data, without empty values."""
+        """Return the entry as JSON data without empty values. `robot` is the name of its robot; "" for a single one."""
         data = {"tick": self.tick, "kind": self.kind, "lane": self.lane, "name": self.name, "text": self.text}
-        more: dict[str, Any] = {"until": self.until, "ended": self.ended, "bad": self.bad, "line": self.line}
+        more: dict[str, Any] = {"until": self.until, "ended": self.ended, "bad": self.is_failure, "line": self.line}
         more |= {"place": self.place, "about": self.about}
         return data | {key: value for key, value in more.items() if value} | ({"robot": robot} if robot else {})
 
 
 def timeline_entries(trace: Trace, lines: SourceLines, with_world: bool) -> list[TimelineEntry]:
-    """Return the events of a robot in order, and with `with_world` also the events of the world."""
+    """Return the entries for the events of a robot in order, and with `with_world` also those of the world.
+
+    `lines` are the line numbers in the scenario file.
+    """
     entries: list[TimelineEntry] = []
     open_intervals: dict[tuple[EventKind, str], int] = {}
     for event in trace.events:
@@ -111,7 +117,7 @@ def _entry(event: Event, lines: SourceLines) -> TimelineEntry:
         lane=_LANES.get(event.kind, "events"),
         name=one_line(event.name),
         text=one_line(details),
-        bad=event.kind in _FAILURE_KINDS,
+        is_failure=event.kind in _FAILURE_KINDS,
         line=_line(event, lines),
         place=place,
         about=event.data if event.kind == K.ZONE_SWITCHED else {},
@@ -119,6 +125,7 @@ def _entry(event: Event, lines: SourceLines) -> TimelineEntry:
 
 
 def _details(event: Event) -> Iterator[str]:
+    """Yield the effects and the other data of an event as texts."""
     effects = event.data.get("effects")
     if isinstance(effects, list):
         yield from (str(one["what"]) for one in effects if isinstance(one, dict) and one.get("what"))
@@ -136,6 +143,7 @@ def _is_number(value: object) -> bool:
 
 
 def _line(event: Event, lines: SourceLines) -> int:
+    """Return the line of the event, fault, or goal of a scenario that an event is about; 0 if unknown."""
     entry = event.data.get("entry")
     if isinstance(entry, int):
         return (lines.faults if str(event.kind).startswith("fault.") else lines.events).get(entry, 0)
@@ -145,12 +153,12 @@ def _line(event: Event, lines: SourceLines) -> int:
 
 
 def verdict_data(result: RunResult, lines: dict[str, SourceLines]) -> list[dict[str, Any]]:
-    """Return all verdicts in order, each with its robot."""
+    """Return the JSON data of all verdicts in order, each with its robot. `lines` are the line numbers by robot."""
     return [_verdict(verdict, result, lines) for verdict in result.verdicts]
 
 
 def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[dict[str, Any]]:
-    """Return the events and faults of the scenario with their times and effects."""
+    """Return the JSON data of the events and faults of the scenario. `lines` are the line numbers by robot."""
     data, numbers = [], {"event": 0, "fault": 0}
     first = next(iter(lines.values()))
     for one in result.disturbances:
@@ -189,7 +197,7 @@ def _verdict(verdict: Verdict, result: RunResult, lines: dict[str, SourceLines])
 
 
 def _disturbance_line(verdict: Verdict, name: str, result: RunResult) -> int:
-    """Return the line of the event or fault of a verdict on a missing disturbance."""
+    """Return the line of the disturbance that a verdict on a missing disturbance is about; 0 for other verdicts."""
     if verdict.criterion != DISTURBANCE:
         return 0
     ordered = [one.disturbance for one in result.disturbances]
@@ -210,7 +218,7 @@ def _finding(verdict: Verdict, finding: Finding) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class SourceLines:
-    """Line numbers in the text of a scenario: criteria by verdict name, goals by name, events and faults by index."""
+    """Line numbers in the text of a scenario: of criteria and goals by name, of events and faults by index."""
 
     criteria: dict[str, int] = field(default_factory=dict)
     goals: dict[str, int] = field(default_factory=dict)
@@ -219,9 +227,10 @@ class SourceLines:
 
 
 def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, ScenarioSpec | None]:
-    """Return the line numbers and the specification of a scenario, or no specification if it is invalid.
+    """Return the line numbers of a robot and the specification of a scenario, from its text.
 
-    A scenario in a log can be invalid if a package that it needs is not installed.
+    Return no line numbers and None if the scenario is invalid, for example because a package that it needs is not
+    installed. `robot` is "" for a single robot.
     """
     if not text:
         return SourceLines(), None
@@ -245,7 +254,10 @@ def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, Scenario
 
 
 def _goal_names(spec: ScenarioSpec) -> list[str]:
-    """Return the names as ScenarioSpec.goal_names does, for a specification in which places are still names."""
+    """Return the names of all goals as ScenarioSpec.goal_names does.
+
+    In contrast to that function, the pose of a goal can still be the name of a place.
+    """
     used_names, names = {goal.name for goal in spec.goals}, list[str]()
     for number, goal in enumerate(spec.goals, start=1):
         pose: Any = goal.pose

@@ -1,5 +1,5 @@
-"""The HTML report of a session, report.html, with the history of earlier sessions."""
+"""The HTML report of a session, report.html."""
 
-from simscen.report.suite.page import RunningSession, Session, to_html
+from simscen.report.suite.page import RunningSession, SessionReport, to_html
 
-__all__ = ["RunningSession", "Session", "to_html"]
+__all__ = ["RunningSession", "SessionReport", "to_html"]

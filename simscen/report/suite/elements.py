@@ -1,15 +1,14 @@
-"""Small HTML elements of the report. All text from scenarios and logs is escaped."""
+"""Small HTML elements of report.html: links, outcome symbols, line charts, and pictures. All their text is escaped."""
 
 import base64
 import re
 from collections.abc import Sequence
-from html import escape
 from pathlib import Path, PurePath
 from urllib.parse import quote
 
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
-from simscen.report.display_text import one_line, relative
+from simscen.report.display_text import html_text, relative_path
 
 OUTCOME_SYMBOLS = {
     Outcome.PASSED: "✓",
@@ -20,18 +19,8 @@ OUTCOME_SYMBOLS = {
 }
 
 
-def html_text(text: str) -> str:
-    """Escape text for one line of HTML, also for attributes in double quotes."""
-    return escape(one_line(text), quote=True)
-
-
-def count(number: int, noun: str) -> str:
-    """Return a number with a noun: "1 run", "2 runs"."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
 def outcome_badge(outcome: Outcome) -> str:
-    """Return an outcome with its symbol, so that it does not depend on color."""
+    """Return an outcome as a word with a symbol, so that it can be recognized without color."""
     word = outcome.value.replace("-", " ")
     return (
         f'<span class="pill {outcome.value}"><span aria-hidden="true">{OUTCOME_SYMBOLS[outcome]} </span>{word}</span>'
@@ -39,27 +28,33 @@ def outcome_badge(outcome: Outcome) -> str:
 
 
 def outcome_symbols(outcomes: Sequence[Outcome | None], label: str) -> str:
-    """Return one symbol per outcome, oldest first; None is shown as a dot."""
+    """Return one symbol per outcome in this order; None (the run did not take place) is a dot.
+
+    Screen readers read `label` and the outcomes as words.
+    """
     symbols = "".join(OUTCOME_SYMBOLS[outcome] if outcome else "·" for outcome in outcomes)
     words = ", ".join(outcome.value.replace("-", " ") if outcome else "not run" for outcome in outcomes)
     return f'<span class="marks" role="img" aria-label="{label}: {words}">{symbols}</span>'
 
 
 def link(path: str, folder: str, label: str) -> str:
-    """Return a link to a file in the folder of the session, or "" for files outside of it."""
+    """Return a link to a file in the output `folder` of the session; "" for a file outside of it."""
     if not path or not folder or not PurePath(path).is_relative_to(folder) or ".." in PurePath(path).parts:
         return ""
-    return f'<a href="./{quote(relative(path, folder))}">{html_text(label)}</a>'
+    return f'<a href="./{quote(relative_path(path, folder))}">{html_text(label)}</a>'
 
 
 def anchor(key: RunKey) -> str:
-    """Return the unique HTML ID of a run: letters, digits and dashes."""
+    """Return the unique HTML ID of the entry of a run, such as "run-faults-lidar_off-seed-7"."""
     parts = [key.scenario, key.variation, f"seed-{key.seed}", key.stack_name]
     return "run-" + re.sub(r"[^\w.=]+", "-", "-".join(part for part in parts if part), flags=re.ASCII)
 
 
 def sparkline(values: Sequence[float], label: str, low: float, high: float) -> str:
-    """Return a small line chart of values between `low` and `high`."""
+    """Return a small line chart (SVG) of values from left to right, with an axis from `low` to `high`.
+
+    Screen readers read `label`.
+    """
     span, step = (high - low) or 1.0, 72 / max(1, len(values) - 1)
     points = [(4 + step * k, 18 - 14 * (value - low) / span) for k, value in enumerate(values)]
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
@@ -72,22 +67,26 @@ def sparkline(values: Sequence[float], label: str, low: float, high: float) -> s
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 MAX_EMBEDDED_BYTES = 6 * 2**20
-"""Maximum size of all pictures, of about 50 kB each. CI systems truncate larger pages."""
+"""Maximum size of all embedded pictures together. CI systems truncate larger pages."""
 
 
 def embedded_pictures(runs: Sequence[RunFinished], folder: str) -> dict[RunKey, str]:
-    """Return the picture of each run by key: embedded in this order until MAX_EMBEDDED_BYTES, then as links."""
+    """Return the HTML of the picture of each run by its key, without runs that have no picture.
+
+    The pictures are embedded in the order of `runs` until MAX_EMBEDDED_BYTES are reached; the others are links.
+    """
     pictures, available = {}, MAX_EMBEDDED_BYTES
     for run in runs:
         path = Path(run.artifacts.picture)
         size = path.stat().st_size if run.artifacts.picture and path.is_file() else 0
         available -= size
         if size:
-            pictures[run.key] = _picture(path, run) if available >= 0 else _picture_link(path, folder)
+            pictures[run.key] = _embedded_picture(path, run) if available >= 0 else _picture_link(path, folder)
     return pictures
 
 
-def _picture(path: Path, run: RunFinished) -> str:
+def _embedded_picture(path: Path, run: RunFinished) -> str:
+    """Return the picture as a data URL; "" for a file that is not a PNG."""
     content = path.read_bytes()
     if not content.startswith(PNG_MAGIC):
         return ""  # do not embed other files that a manipulated journal names

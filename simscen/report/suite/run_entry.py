@@ -1,4 +1,4 @@
-"""Entry of one run in the HTML report: a summary line that expands to all details."""
+"""Entry of one run in the HTML report: a summary line that expands to criteria, disturbances, picture, and metrics."""
 
 from collections.abc import Sequence
 from html import escape
@@ -16,10 +16,10 @@ from simscen.judge.finding_text import (
     tightest_margin,
     time_and_place,
 )
-from simscen.report.display_text import escape_control, plain_text, shell_command_text
+from simscen.report.display_text import escape_control, html_text, plain_text, shell_command_text
+from simscen.report.session_history import PastOutcome
 from simscen.report.session_lines import violation_lines
-from simscen.report.suite.elements import anchor, html_text, link, outcome_badge, outcome_symbols, sparkline
-from simscen.report.suite.history import PastOutcome
+from simscen.report.suite.elements import anchor, link, outcome_badge, outcome_symbols, sparkline
 from simscen.report.violations import (
     error_details,
     error_summary,
@@ -28,21 +28,22 @@ from simscen.report.violations import (
     source_location,
 )
 
-_FILES = (("scenario.yaml", "scenario"), ("worker.log", "worker's log"), ("stack.log", "stack's log"))
+_OTHER_FILES = (("scenario.yaml", "scenario"), ("worker.log", "worker's log"), ("stack.log", "stack's log"))
 
 
 def full_run_name(key: RunKey) -> str:
-    """Return the unique name of a run."""
+    """Return the unique name of a run, for example "faults/lidar_off[speed=0.5], seed 7, slow"."""
     return ", ".join(part for part in (key.test, f"seed {key.seed}", key.stack_name) if part)
 
 
 def run_element(
     run: RunFinished, folder: str, picture: str, past: Sequence[PastOutcome | None], is_one_of_many: bool = False
 ) -> str:
-    """Return the entry of a run. Failures are expanded.
+    """Return the entry of a run. Failures and errors are expanded.
 
-    `picture` is the source of its picture, `past` are its earlier outcomes. `is_one_of_many` shortens the name of a run
-    below the heading of its scenario.
+    `folder` is the output folder of the session. `picture` is the HTML of the picture of the run; "" for none. `past`
+    are the outcomes of the run in earlier sessions, oldest first; None for a session without the run. `is_one_of_many`
+    omits the scenario from the name, because a heading above several runs contains it.
     """
     extra = ", ".join(part for part in (f"seed {run.key.seed}", run.key.stack_name) if part)
     name = (run.key.variation or extra) if is_one_of_many else run.key.test
@@ -61,7 +62,7 @@ def run_element(
 
 
 def _data_attributes(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
-    """Return the attributes by which the script of the page filters and sorts."""
+    """Return the HTML attributes (`data-…`) by which the script of the page filters and sorts runs."""
     known = [one.outcome.good for one in past if one is not None]
     values = {
         "status": run.outcome.value,
@@ -71,21 +72,24 @@ def _data_attributes(run: RunFinished, past: Sequence[PastOutcome | None]) -> st
         "variation": run.key.variation,
         "simulated": f"{run.result.simulated:.3f}",
         "wall": f"{run.wall:.3f}",
-        "margin": "" if (share := smallest_margin(run)) is None else f"{share:.4f}",
+        "margin": "" if (margin := smallest_margin(run)) is None else f"{margin:.4f}",
         "changed": "1" if known and known[-1] != run.outcome.good else "",
     }
     return " ".join(f'data-{name}="{html_text(value)}"' for name, value in values.items() if value)
 
 
 def theme(key: RunKey) -> str:
-    """Return the name of the folder of a scenario: "faults" for "scenarios/faults/lidar_off"."""
+    """Return the theme of a scenario, a filter of the page: its folder, "faults" for "scenarios/faults/lidar_off"."""
     return key.scenario.rpartition("/")[0].rpartition("/")[2]
 
 
 def smallest_margin(run: RunFinished) -> float | None:
-    """Return the smallest margin of all criteria relative to the limit, negative if violated; None without margins."""
+    """Return the smallest margin of all findings, as a fraction of the limit; None if no finding has one.
+
+    It is negative if the limit is violated. Findings without a unit, such as counts, are ignored.
+    """
     findings = [finding for verdict in run.result.verdicts for finding in verdict.findings]
-    return min((share for finding in findings if (share := _relative_margin(finding)) is not None), default=None)
+    return min((margin for finding in findings if (margin := _relative_margin(finding)) is not None), default=None)
 
 
 def _relative_margin(finding: Finding) -> float | None:
@@ -95,7 +99,7 @@ def _relative_margin(finding: Finding) -> float | None:
 
 
 def _headline(run: RunFinished) -> str:
-    """Return the tightest margin of a passed run, or the first reason of a failure."""
+    """Return the tightest margin of a passed run, or the first reason why a run did not pass."""
     match run.outcome:
         case Outcome.PASSED:
             tightest = tightest_margin(run.result.verdicts)
@@ -118,7 +122,7 @@ def _error_section(run: RunFinished) -> str:
 
 
 def _criteria_table(run: RunFinished) -> str:
-    """Return a table with a row per checked limit, violations first, with explanations."""
+    """Return a table with a row per finding, violations first; "" without findings."""
     lines = run.result.lines or (0,) * len(run.result.verdicts)
     rows = [(v, f, n) for v, n in zip(run.result.verdicts, lines, strict=True) for f in v.findings]
     rows.sort(key=lambda row: row[1].status is Status.PASS)
@@ -144,7 +148,7 @@ def _criterion_row(run: RunFinished, verdict: Verdict, finding: Finding, line: i
 
 
 def _disturbance_table(run: RunFinished) -> str:
-    """Return a table of events and faults with their times and effects."""
+    """Return a table of events and faults with their times and effects; "" without any."""
     rows = "".join(
         f'<tr class="{"bad" if outcome.missing else ""}">'
         f"<td>{'happened' if outcome.happened else 'did not happen'}</td>"
@@ -158,7 +162,7 @@ def _disturbance_table(run: RunFinished) -> str:
 
 
 def _links(run: RunFinished, folder: str) -> str:
-    """Return links to the artifacts of a run."""
+    """Return links to the files of a run in the output folder of the session; "" without any."""
     files = run.artifacts
     named = [
         (files.replay, "replay"),
@@ -167,7 +171,7 @@ def _links(run: RunFinished, folder: str) -> str:
         (files.result, "result"),
     ]
     if files.folder:
-        others = [(str(Path(files.folder, name)), label) for name, label in _FILES]
+        others = [(str(Path(files.folder, name)), label) for name, label in _OTHER_FILES]
         named += [(path, label) for path, label in others if _has_content(path)]
     links = " · ".join(html for path, label in named if (html := link(path, folder, label)))
     return f"<p>{links}</p>" if links else ""
@@ -179,7 +183,7 @@ def _has_content(path: str) -> bool:
 
 
 def _details(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
-    """Return the command to repeat a run, its history, tags, metrics, and console output."""
+    """Return the command that repeats a run, its earlier durations, tags, metrics, and console output."""
     again = f'<p class="again">again: <code>{escape(shell_command_text(run.again))}</code></p>' if run.again else ""
     tags = "".join(f'<span class="tag">{html_text(tag)}</span> ' for tag in run.tags)
     known = [f"{name} {value:.4g}" for name, value in sorted(run.result.metrics.items()) if value is not None]
@@ -189,7 +193,7 @@ def _details(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
 
 
 def _console_output(run: RunFinished) -> str:
-    """Return the console output for a run, to be copied."""
+    """Return the lines that the console shows below a run, as text that can be copied; "" without lines."""
     text = "\n".join(plain_text(line).rstrip() for line in violation_lines(run))
     return (
         _collapsible("console output", f'<pre tabindex="0">{escape(escape_control(dedent(text)))}</pre>')
@@ -199,11 +203,12 @@ def _console_output(run: RunFinished) -> str:
 
 
 def _collapsible(title: str, inside: str) -> str:
+    """Return a section that is collapsed at first. `inside` is HTML."""
     return f'<details class="metrics"><summary>{title}</summary>{inside}</details>'
 
 
 def _duration_sparkline(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
-    """Return a line chart of simulated seconds in the last sessions, or "" for fewer than three."""
+    """Return a line chart of the simulated time in the last sessions and this one; "" for fewer than three values."""
     known = [one.simulated for one in past if one is not None] + [run.result.simulated]
     if len(known) < 3:
         return ""

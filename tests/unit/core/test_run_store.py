@@ -12,7 +12,7 @@ from simscen.core.records.session_events import RunFinished, SessionFinished
 from simscen.report import github
 from simscen.report.junit import to_xml
 from simscen.report.results_json import as_document, to_json
-from simscen.report.suite import Session, page, to_html
+from simscen.report.suite import SessionReport, page, to_html
 
 
 def run(seed: int, path: str = "a.scenario.yaml", outcome: Outcome = Outcome.PASSED) -> RunFinished:
@@ -77,10 +77,10 @@ def test_results_json_is_one_sorted_and_indented_document(number: int) -> None:
 
 
 def test_the_page_of_many_runs_lists_failures_first_and_counts_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(page, "MAX_LISTED", 4)
+    monkeypatch.setattr(page, "MAX_LISTED_RUNS", 4)
     runs = [run(seed) for seed in range(1, 10)]
     runs[6] = run(7, outcome=Outcome.FAILED)
-    html = to_html(Session(RunStore(runs)))
+    html = to_html(SessionReport(RunStore(runs)))
     assert "8 passed" in html
     assert "1 failed" in html
     assert "9 runs" in html
@@ -92,7 +92,7 @@ def test_the_page_of_many_runs_lists_failures_first_and_counts_all(monkeypatch: 
 def test_the_summary_on_github_is_limited_to_the_first_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(github, "MAX_ROWS", 2)
     runs = [run(1), run(2), run(3, outcome=Outcome.FAILED)]
-    text = github.markdown(RunStore(runs), SessionFinished(2, 1, 0, simulated=1.0, wall=1.0))
+    text = github.summary_markdown(RunStore(runs), SessionFinished(2, 1, 0, simulated=1.0, wall=1.0))
     rows = [line for line in text.splitlines() if "seed" in line or "more" in line]
     assert [("❌" in row, "✅" in row) for row in rows] == [(True, False), (False, True), (False, False)]
     assert "and 1 more" in rows[-1]
@@ -100,6 +100,6 @@ def test_the_summary_on_github_is_limited_to_the_first_rows(monkeypatch: pytest.
 
 @pytest.mark.parametrize(("number", "marks"), [(200, 200), (201, 0)])
 def test_the_heading_of_a_scenario_has_a_mark_for_each_run_unless_there_are_too_many(number: int, marks: int) -> None:
-    html = to_html(Session([run(seed) for seed in range(1, number + 1)]))
+    html = to_html(SessionReport([run(seed) for seed in range(1, number + 1)]))
     heading = html.partition('<details class="group many"')[2].partition("</summary>")[0]
     assert heading.count("✓") == marks

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import AddItem, Edit, RemovePart, SetValue, apply_edits
-from simscen.editor.text_editing.value_text import same_value
+from simscen.editor.text_editing.value_text import is_same_value
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.source_nodes import parse_source, source_at
 from simscen.loading.yaml.tree import Key
@@ -167,7 +167,7 @@ def test_any_edit_of_a_shipped_file_changes_only_its_span(data: st.DataObject) -
     assert node is not None
     after = edited(text, SetValue(keys, value))
     assert after.startswith(text[: node.start]) and after.endswith(text[node.end :])
-    assert same_value(_at(plain(after), keys), value)
+    assert is_same_value(_at(plain(after), keys), value)
     if isinstance(value, float):
         found = si_number(_at(plain(after), keys))
         assert math.isclose(found, value, rel_tol=1e-9, abs_tol=2e-6)

@@ -8,12 +8,12 @@ import pytest
 
 from simscen.core.records.comparison import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
 from simscen.core.records.session_events import SessionFinished, SessionStarted
-from simscen.report.comparison import comparison_lines, difference_columns, shorten
+from simscen.report.comparison import comparison_lines, difference_cells, shorten
 from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import plain_text
-from simscen.report.github import markdown
+from simscen.report.github import summary_markdown
 from simscen.report.results_json import to_json
-from simscen.report.suite import Session, to_html
+from simscen.report.suite import SessionReport, to_html
 
 FLIP = Flip("navigation/goal", 3, "ref", "mine", "clearance: 0.03 m < 0.05 m, at t = 4.10 s, (2.59, 4.42)")
 TIME = MetricDifference("time_to_goal", "s", 8, 25.341, 28.23, 2.889, (0.78, 4.954), 1, 0, 7, 0.070)
@@ -92,18 +92,18 @@ def test_piped_and_in_ascii_it_stands_before_the_last_line(comparison) -> None:
 
 
 def test_on_the_page_it_is_a_section_without_live_text_from_outside(comparison, passed) -> None:
-    html = to_html(Session([passed], comparison=comparison))
+    html = to_html(SessionReport([passed], comparison=comparison))
     for tag in ("section", "table", "tr", "td", "th", "h3", "p", "div"):
         assert len(re.findall(f"<{tag}[ >]", html)) == html.count(f"</{tag}>"), tag
     assert "mine against ref" in html
     assert "&lt;b&gt;" in html
     assert "time_to_goal, s" in html
-    assert '<section class="in"' not in to_html(Session([passed]))
+    assert '<section class="in"' not in to_html(SessionReport([passed]))
 
 
 def test_on_github_it_is_in_the_summary(comparison, passed) -> None:
     session = SessionFinished(1, 0, 0, 1.0, 1.0, comparison=comparison)
-    told = markdown([passed], session)
+    told = summary_markdown([passed], session)
     assert "| navigation/goal | 10/10 | 6/9 |" in told
     assert "- navigation/goal, seed 3: passed with ref, failed with mine: clearance" in told.replace("&#95;", "_")
     rows = [line for line in told.splitlines() if "time" in line and "28.23" in line]
@@ -117,6 +117,6 @@ def test_in_results_json_it_is_data(comparison, passed) -> None:
 
 def test_small_numbers_have_one_more_digit() -> None:
     near = MetricDifference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
-    assert difference_columns(near) == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
-    assert difference_columns(TIME) == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
-    assert difference_columns(REPLANS)[0] == "3.00"
+    assert difference_cells(near) == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
+    assert difference_cells(TIME) == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
+    assert difference_cells(REPLANS)[0] == "3.00"

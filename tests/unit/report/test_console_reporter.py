@@ -12,8 +12,8 @@ from simscen.core.errors import Problem
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import SessionStarted
 from simscen.report.console_reporter import text_reporter
-from simscen.report.github import annotations, github_reporter, markdown
-from simscen.report.results_json import json_reporter, to_json
+from simscen.report.github import GitHubReporter, annotations, summary_markdown
+from simscen.report.results_json import JsonReporter, to_json
 
 EXPECTED = """\
 simscen 0.1.0 · 3 scenarios · 2 workers
@@ -171,35 +171,35 @@ def test_github_annotations_name_files_from_the_checkout_wherever_the_command_wa
 
 
 def test_the_summary_of_a_github_job_lists_what_did_not_pass_first_and_holds_no_live_markup(session, passed, crashed):
-    summary = markdown([passed, crashed], session[-1])
+    summary = summary_markdown([passed, crashed], session[-1])
     rows = summary.splitlines()[4:]
     assert "crashed: SIGSEGV" in rows[0]
     assert "navigation/goal" in rows[1]
     evil = of(passed, key=RunKey("<script>|*x*[a](b)@me#1", 1))
-    (row,) = markdown([evil], session[-1]).splitlines()[4:5]
+    (row,) = summary_markdown([evil], session[-1]).splitlines()[4:5]
     assert not re.search(r"<script|\*x\*|\[a\]|@me", row)
     assert row.count("|") == 5
 
 
 def test_in_the_summary_every_criterion_has_its_own_line(session, failed):
-    (row,) = markdown([failed], session[-1]).splitlines()[4:5]
+    (row,) = summary_markdown([failed], session[-1]).splitlines()[4:5]
     stopped, fast = row.rsplit("|", 2)[1].split("<br>")
     assert stopped.startswith(" stopped&#95;within: 0.84 s &#62; 0.50 s") and fast.startswith("speed: 0.60 m/s")
 
 
 def test_the_summary_shows_the_pictures_of_failures_where_they_have_an_address(session, passed, failed):
     here = replace(failed, artifacts=replace(failed.artifacts, picture="out/runs/a b)/seed-7/map.png"))
-    told = markdown([passed, here], session[-1], "https://example.org/raw/pictures/1/")
+    told = summary_markdown([passed, here], session[-1], "https://example.org/raw/pictures/1/")
     assert told.endswith(
         "**faults/lidar&#95;off (seed 7)**\n\n"
         "![map of the run](https://example.org/raw/pictures/1/runs/a%20b%29/seed-7/map.png)\n\n"
     )
-    assert "![" not in markdown([passed, here], session[-1])
+    assert "![" not in summary_markdown([passed, here], session[-1])
 
 
 def test_github_output_holds_the_plain_lines_too(session):
     out, summary = io.StringIO(), io.StringIO()
-    told(github_reporter(utf8(out), summary), session)
+    told(GitHubReporter(utf8(out), summary), session)
     lines = [line for line in out.getvalue().splitlines() if not line.startswith("::")]
     assert "\n".join(lines) + "\n" == EXPECTED
     assert summary.getvalue().startswith("### simscen: 1 passed, 1 failed, 1 error\n")
@@ -207,7 +207,7 @@ def test_github_output_holds_the_plain_lines_too(session):
 
 def test_the_machine_format_is_the_results_file_and_nothing_else(session, passed, failed, crashed):
     out = io.StringIO()
-    told(json_reporter(out), session)
+    told(JsonReporter(out), session)
     assert json.loads(out.getvalue()) == json.loads(to_json([passed, failed, crashed], "out"))
     assert "##[" not in out.getvalue()
 

@@ -23,17 +23,25 @@ class Stream(io.StringIO):
 @pytest.mark.parametrize(
     ("terminal", "environ", "look"),
     [
-        (True, {}, TerminalStyle(color=True, live=True, terminal=True)),
-        (False, {}, TerminalStyle(color=False, live=False, terminal=False)),
-        (True, {"NO_COLOR": "1"}, TerminalStyle(color=False, live=True, terminal=True)),
-        (True, {"NO_COLOR": ""}, TerminalStyle(color=True, live=True, terminal=True)),
-        (True, {"TERM": "dumb"}, TerminalStyle(color=False, live=False, terminal=True)),
-        (True, {"CLICOLOR": "0"}, TerminalStyle(color=False, live=True, terminal=True)),
-        (False, {"FORCE_COLOR": "1"}, TerminalStyle(color=True, live=False, terminal=False)),
-        (False, {"FORCE_COLOR": "0"}, TerminalStyle(color=False, live=False, terminal=False)),
-        (False, {"CLICOLOR_FORCE": "1"}, TerminalStyle(color=True, live=False, terminal=False)),
-        (False, {"FORCE_COLOR": "1", "NO_COLOR": "1"}, TerminalStyle(color=False, live=False, terminal=False)),
-        (False, {"FORCE_COLOR": "1", "TERM": "dumb"}, TerminalStyle(color=True, live=False, terminal=False)),
+        (True, {}, TerminalStyle(has_color=True, has_live_progress=True, is_terminal=True)),
+        (False, {}, TerminalStyle(has_color=False, has_live_progress=False, is_terminal=False)),
+        (True, {"NO_COLOR": "1"}, TerminalStyle(has_color=False, has_live_progress=True, is_terminal=True)),
+        (True, {"NO_COLOR": ""}, TerminalStyle(has_color=True, has_live_progress=True, is_terminal=True)),
+        (True, {"TERM": "dumb"}, TerminalStyle(has_color=False, has_live_progress=False, is_terminal=True)),
+        (True, {"CLICOLOR": "0"}, TerminalStyle(has_color=False, has_live_progress=True, is_terminal=True)),
+        (False, {"FORCE_COLOR": "1"}, TerminalStyle(has_color=True, has_live_progress=False, is_terminal=False)),
+        (False, {"FORCE_COLOR": "0"}, TerminalStyle(has_color=False, has_live_progress=False, is_terminal=False)),
+        (False, {"CLICOLOR_FORCE": "1"}, TerminalStyle(has_color=True, has_live_progress=False, is_terminal=False)),
+        (
+            False,
+            {"FORCE_COLOR": "1", "NO_COLOR": "1"},
+            TerminalStyle(has_color=False, has_live_progress=False, is_terminal=False),
+        ),
+        (
+            False,
+            {"FORCE_COLOR": "1", "TERM": "dumb"},
+            TerminalStyle(has_color=True, has_live_progress=False, is_terminal=False),
+        ),
     ],
     ids=str,
 )
@@ -43,11 +51,11 @@ def test_the_environment_decides_before_the_terminal_does(terminal, environ, loo
 
 def test_a_stream_that_knows_only_ascii_gets_no_escapes():
     assert detect_style(Stream(True, "ascii"), {"FORCE_COLOR": "1"}) == TerminalStyle(
-        color=False, live=False, terminal=True
+        has_color=False, has_live_progress=False, is_terminal=True
     )
 
 
 def test_only_a_terminal_has_columns(monkeypatch):
     monkeypatch.setenv("COLUMNS", "57")
-    assert TerminalStyle(color=True, live=False, terminal=False).columns is None
-    assert TerminalStyle(color=True, live=True, terminal=True).columns == 57
+    assert TerminalStyle(has_color=True, has_live_progress=False, is_terminal=False).columns is None
+    assert TerminalStyle(has_color=True, has_live_progress=True, is_terminal=True).columns == 57

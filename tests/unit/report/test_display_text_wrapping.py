@@ -46,7 +46,7 @@ def test_behind_a_label_the_text_goes_on_below_itself():
 @pytest.mark.parametrize("columns", [40, 60, 80])
 def test_a_command_that_goes_on_in_the_next_line_is_still_the_command(columns):
     words = ["simscen", "run", "a b.yaml", "--stack", "mine=./my_nav --verbose", "--world-path", "worlds", "--lenient"]
-    lines = texts((StyledText("      again     ", "quiet"), StyledText(shlex.join(words), shell=True)), columns)
+    lines = texts((StyledText("      again     ", "quiet"), StyledText(shlex.join(words), is_shell=True)), columns)
     assert len(lines) > 1
     assert all(len(line) <= columns for line in lines)
     text = "\n".join(lines).replace("again", "", 1).strip()

@@ -11,7 +11,7 @@ from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.report.console_reporter import text_reporter
 from simscen.report.github import annotations
 from simscen.report.junit import to_xml
-from simscen.report.suite import Session, to_html
+from simscen.report.suite import SessionReport, to_html
 
 FELL = DisturbanceOutcome(
     Disturbance("pallet falls", "event", "time: 3 s", line=7), (720,), True, "spawned pallet", 720
@@ -71,6 +71,6 @@ def test_an_annotation_stands_at_the_line_of_the_entry(disturbed):
 
 
 def test_the_page_lists_them_as_text(disturbed):
-    page = to_html(Session([disturbed]))
+    page = to_html(SessionReport([disturbed]))
     assert "<td>happened</td><td>pallet falls</td><td>when time: 3 s</td><td>t = 3.00 s</td>" in page
     assert '<tr class="bad"><td>did not happen</td><td>&lt;b&gt;::error::</td>' in page

@@ -7,7 +7,8 @@ import pytest
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey
 from simscen.report.journal import Journal
-from simscen.report.journal_reader import PlannedRun, last_failed, sessions_in
+from simscen.report.journal_reader import PlannedRun
+from simscen.report.session_history import last_failed, sessions_in
 
 
 @pytest.fixture

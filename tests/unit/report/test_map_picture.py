@@ -12,15 +12,12 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
 from simscen.report.picture import map_picture, palette
 from simscen.report.picture.canvas import Canvas
+from simscen.report.picture.map_layer import MARGIN_M, MAX_MAP_SIZE_PX, draw_map, map_extent
 from simscen.report.picture.map_picture import (
     _MARGIN_PX,
     HEADER_HEIGHT_PX,
-    MARGIN_M,
-    MAX_MAP_SIZE_PX,
-    draw_map,
     draw_map_picture,
     drawn_parts,
-    map_extent,
     write_picture,
 )
 from simscen.report.picture.path_layer import round_time_step

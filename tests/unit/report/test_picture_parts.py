@@ -147,7 +147,7 @@ def test_a_failure_is_reported_with_the_code_and_name_that_nav2_gives_it():
 
 
 def test_labels_keep_off_ways_robots_goals_and_each_other():
-    canvas = map_picture._map(everything())
+    canvas = map_picture._map_canvas(everything())
     busy, boxes = canvas.busy, []
     for note in canvas.texts:
         wide = map_picture.font(note.size).getlength(note.text)

@@ -27,8 +27,8 @@ from simscen.record.sensor_messages import SensorMessages
 from simscen.record.topics import GLOBAL_COSTMAP
 from simscen.report.replay import replay_page
 from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, keep_extremes, spaced_in_time
-from simscen.report.replay.page import FOLDER, script
-from simscen.report.replay.robot_data import costmaps_of, map_from_odom
+from simscen.report.replay.page import PAGE_FOLDER, script
+from simscen.report.replay.robot_data import costmaps_data, map_from_odom
 from simscen.testing.synthetic_trace import synthetic_trace
 
 TEXT = """\
@@ -180,7 +180,7 @@ def test_script_is_one_module_and_never_creates_markup_from_text() -> None:
     assert not re.search(r"^(import|export) ", text, re.MULTILINE)
     assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function", text)
     assert "</script" not in text.lower()
-    for module in FOLDER.glob("*.js"):
+    for module in PAGE_FOLDER.glob("*.js"):
         for name in re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", module.read_text(), re.MULTILINE):
             assert len(re.findall(rf"^(?:async )?(?:function|class|const) {name}\b", text, re.MULTILINE)) == 1
 
@@ -206,7 +206,7 @@ def test_grids_of_one_place_are_kept_as_their_differences() -> None:
     take(720, occupancy_grid("map", (3, 0), OccupancyGrid(near, 0.05, Pose2(1.0, 2.0))))
     columns = PackedColumns()
     log = log_of({"seconds": 4, "truth": [[0, 0, 0], [4, 0, 0]]})
-    (costmap,) = costmaps_of(seen, log.trace, columns)
+    (costmap,) = costmaps_data(seen, log.trace, columns)
     read = Read.__new__(Read)
     read._numbers = columns.data
     grids = [(grid["tick"], grid["changes"], set(read.column(grid["cells"]))) for grid in costmap["grids"]]

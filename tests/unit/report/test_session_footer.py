@@ -205,14 +205,14 @@ def shown(events, look, reporter):
 
 
 def test_forced_colors_come_without_moving_the_cursor(session):
-    text = shown(session, TerminalStyle(color=True, live=False, terminal=False), ColorReporter)
+    text = shown(session, TerminalStyle(has_color=True, has_live_progress=False, is_terminal=False), ColorReporter)
     assert "\x1b[32m✓\x1b[0m" in text
     assert set(re.findall(r"\x1b\[[0-9;?]*([a-zA-Z])", text)) == {"m"}
     assert "\x1b]8" not in text
 
 
 def test_lines_that_ci_could_interpret_have_no_colors(session):
-    text = shown(session, TerminalStyle(color=True, live=False, terminal=False), ColorReporter)
+    text = shown(session, TerminalStyle(has_color=True, has_live_progress=False, is_terminal=False), ColorReporter)
     assert not re.search(r"^\s*::|##\[", text, re.MULTILINE)
 
 
@@ -223,21 +223,23 @@ def a_terminal_that_can(monkeypatch):
 
 
 def test_a_terminal_without_colors_is_live_all_the_same(session):
-    text = shown(session, TerminalStyle(color=False, live=True, terminal=True), LiveReporter)
+    text = shown(session, TerminalStyle(has_color=False, has_live_progress=True, is_terminal=True), LiveReporter)
     assert "\x1b[?25l" in text
     assert not re.search(r"\x1b\[[0-9;]*m", text)
 
 
 def test_paths_can_be_clicked_where_there_are_colors(session, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    text = shown(session, TerminalStyle(color=True, live=True, terminal=True), LiveReporter)
+    text = shown(session, TerminalStyle(has_color=True, has_live_progress=True, is_terminal=True), LiveReporter)
     assert re.search(rf"\x1b\]8;[^;]*;file://{re.escape(str(tmp_path))}/out/report.html\x1b\\", text)
 
 
 def test_progress_says_how_many_are_done(session, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
     text = shown(
-        [session[0], session[1], session[2]], TerminalStyle(color=True, live=True, terminal=True), LiveReporter
+        [session[0], session[1], session[2]],
+        TerminalStyle(has_color=True, has_live_progress=True, is_terminal=True),
+        LiveReporter,
     )
     rows = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "\n", text).splitlines()
     assert any("0 of 3" in row for row in rows)

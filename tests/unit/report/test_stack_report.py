@@ -22,7 +22,7 @@ from simscen.record.messages.event_text import EVENT_LOGGER
 from simscen.record.sensor_messages import SensorMessages
 from simscen.report.replay import stack_report
 from simscen.report.replay.packed_columns import PackedColumns
-from simscen.report.replay.stack_report import lines_of, parameters_of, tree_of
+from simscen.report.replay.stack_report import behavior_tree_data, log_lines_data, parameters_data
 from simscen.testing.synthetic_trace import synthetic_trace
 
 RATE = 240
@@ -59,7 +59,7 @@ def test_changes_of_a_behavior_tree_keep_their_order_within_a_tick() -> None:
         (12, WARNING, "amcl", "no transform"),
         change(24, "Root", "RUNNING", "FAILURE"),
     ]
-    tree = tree_of(log_with(*lines), Spy())
+    tree = behavior_tree_data(log_with(*lines), Spy())
     assert tree is not None
     names = [[tree["nodes"][k] for k in tree["node"]]]
     names += [[tree["statuses"][k] for k in tree[key]] for key in ("before", "status")]
@@ -77,7 +77,7 @@ def test_lines_of_the_stack_are_there_but_events_of_simscen_are_not() -> None:
         (6, ERROR, "controller_server", "x" * 1000),
         (7, INFO, BEHAVIOR_TREE_LOGGER, "not a change"),
     ]
-    read = lines_of(log_with(*lines), Spy())
+    read = log_lines_data(log_with(*lines), Spy())
     assert [line[:3] for line in read] == [
         [5, "warning", "planner_server"],
         [6, "error", "controller_server"],
@@ -89,7 +89,7 @@ def test_lines_of_the_stack_are_there_but_events_of_simscen_are_not() -> None:
 
 def test_parameters_are_shown_as_in_a_file_with_the_main_ones_marked() -> None:
     controller = {"FollowPath.vx_max": 1.0, "empty": "", "list": ["x"], "no": False}
-    nodes = parameters_of(reported({"/amcl": {"z_hit": 0.5}, "/controller_server": controller}), Spy())
+    nodes = parameters_data(reported({"/amcl": {"z_hit": 0.5}, "/controller_server": controller}), Spy())
     assert [(node["node"], node["total"]) for node in nodes] == [("/controller_server", 4), ("/amcl", 1)]
     assert nodes[0]["values"] == [
         ["FollowPath.vx_max", "1.0", True],
@@ -101,17 +101,18 @@ def test_parameters_are_shown_as_in_a_file_with_the_main_ones_marked() -> None:
 
 @pytest.mark.parametrize("nodes", [None, [], {"/amcl": 3}, {"/amcl": {}}, "text"])
 def test_parameters_in_another_form_are_not_shown(nodes: object) -> None:
-    assert parameters_of(reported(nodes), Spy()) == []
+    assert parameters_data(reported(nodes), Spy()) == []
 
 
 @pytest.mark.parametrize("about", ["{", "[]", "3"])
 def test_a_description_that_is_no_object_has_no_parameters(about: str) -> None:
-    assert parameters_of(log_with(stack={"about": about}), Spy()) == []
+    assert parameters_data(log_with(stack={"about": about}), Spy()) == []
 
 
 def test_a_log_without_an_external_stack_has_nothing_of_it() -> None:
     empty = log_with((0, INFO, EVENT_LOGGER, "goal.accepted shelf"))
-    assert (tree_of(empty, Spy()), lines_of(empty, Spy()), parameters_of(empty, Spy())) == (None, [], [])
+    assert behavior_tree_data(empty, Spy()) is None
+    assert log_lines_data(empty, Spy()) == parameters_data(empty, Spy()) == []
 
 
 def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,11 +128,11 @@ def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.M
     nodes = {"/amcl": {"a": 1, "max_particles": 2000}}
     log_ = replace(log_with(*lines), stack=reported(nodes).stack)
     columns = Spy()
-    tree, shown = tree_of(log_, columns), parameters_of(log_, columns)
+    tree, shown = behavior_tree_data(log_, columns), parameters_data(log_, columns)
     assert tree is not None and tree["ticks"] == [1, 2]
-    assert [text for *_, text in lines_of(log_, columns)] == ["last"]
+    assert [text for *_, text in log_lines_data(log_, columns)] == ["last"]
     assert shown == [{"node": "/amcl", "values": [["max_particles", "2000", True]], "total": 2}]
-    assert columns.left_out == [
+    assert columns.reductions == [
         "changes of the behavior tree, without conditions: 2 of 5",
         "parameters of the stack: 1 of 2",
         "log lines of the stack, the last ones: 1 of 2",
@@ -140,7 +141,7 @@ def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.M
 
 def test_the_stand_in_reports_all_of_it() -> None:
     log_ = with_nav2_report(log_with())
-    tree = tree_of(log_, Spy())
+    tree = behavior_tree_data(log_, Spy())
     assert tree is not None and "FollowPath" in tree["nodes"]
-    assert lines_of(log_, Spy()) == [[720, "error", "controller_server", "Failed to make progress"]]
-    assert [node["node"] for node in parameters_of(log_, Spy())] == [*list(PARAMETERS)[1:], "/amcl"]
+    assert log_lines_data(log_, Spy()) == [[720, "error", "controller_server", "Failed to make progress"]]
+    assert [node["node"] for node in parameters_data(log_, Spy())] == [*list(PARAMETERS)[1:], "/amcl"]

@@ -11,9 +11,9 @@ from PIL import Image
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import Artifacts
 from simscen.report.results_json import to_json
-from simscen.report.suite import RunningSession, Session, elements, to_html
+from simscen.report.session_history import past_sessions
+from simscen.report.suite import RunningSession, SessionReport, elements, to_html
 from simscen.report.suite.elements import anchor
-from simscen.report.suite.history import past_sessions
 from simscen.report.suite.run_entry import smallest_margin, theme
 
 VOID = ("meta", "img", "input", "rect", "polyline", "circle")
@@ -58,14 +58,14 @@ def runs_on(html):
 
 
 def test_failures_come_first_and_are_expanded(passed, failed, crashed):
-    html = to_html(Session([passed, failed, crashed]))
+    html = to_html(SessionReport([passed, failed, crashed]))
     assert ["open" in attributes for attributes in runs_on(html)] == [True, True, False]
     assert [attributes["data-status"] for attributes in runs_on(html)] == ["error", "failed", "passed"]
     assert "<h1>✓ 1 passed, ✗ 1 failed, ! 1 error</h1>" in html
 
 
 def test_each_violated_criterion_has_a_line_with_its_reason_and_where_it_is_written(failed):
-    html = to_html(Session([failed]))
+    html = to_html(SessionReport([failed]))
     row = html[html.index("<td>fail</td>") : html.index("</tr>", html.index("<td>fail</td>"))]
     assert "stopped_within" in row
     assert "0.84 s &gt; 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)" in row
@@ -75,8 +75,8 @@ def test_each_violated_criterion_has_a_line_with_its_reason_and_where_it_is_writ
 
 
 def test_console_text_of_a_failure_can_be_copied(passed, failed):
-    assert "console output" not in to_html(Session([passed]))
-    said = to_html(Session([failed])).partition("console output")[2].partition("</pre>")[0]
+    assert "console output" not in to_html(SessionReport([passed]))
+    said = to_html(SessionReport([failed])).partition("console output")[2].partition("</pre>")[0]
     assert "stopped_within: 0.84 s &gt; 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)\n" in said
     assert "again     simscen run" in said
 
@@ -90,8 +90,8 @@ def test_text_from_outside_makes_no_tag_no_attribute_and_no_link(passed, crashed
         tags=(evil, "javascript:1"),
         artifacts=Artifacts("javascript:1", "javascript:alert(1)", "/etc/passwd", "out/../../x"),
     )
-    harmless = {tag for tag, _ in parsed(to_html(Session([passed, crashed])))}
-    html = to_html(Session([bad, crashed], folder="out", title=evil))
+    harmless = {tag for tag, _ in parsed(to_html(SessionReport([passed, crashed])))}
+    html = to_html(SessionReport([bad, crashed], folder="out", title=evil))
     seen = parsed(html)
     assert {tag for tag, _ in seen} <= harmless | {"option", "select", "span"}
     assert [tag for tag, _ in seen].count("script") == 1
@@ -102,7 +102,7 @@ def test_text_from_outside_makes_no_tag_no_attribute_and_no_link(passed, crashed
 
 
 def test_nothing_but_the_pages_own_style_and_script_is_let_in(passed):
-    html = to_html(Session([passed]))
+    html = to_html(SessionReport([passed]))
     policy = next(a["content"] for tag, a in parsed(html) if a.get("http-equiv") == "Content-Security-Policy")
     assert policy.startswith("default-src 'none'; img-src data:; style-src 'sha256-")
     assert "unsafe" not in policy
@@ -111,12 +111,12 @@ def test_nothing_but_the_pages_own_style_and_script_is_let_in(passed):
 
 def test_the_same_results_give_the_same_bytes_in_whatever_order_they_came(passed, failed, crashed):
     runs = [replace(passed, tags=("b", "a")), failed, crashed]
-    assert to_html(Session(runs)) == to_html(Session(runs[::-1]))
+    assert to_html(SessionReport(runs)) == to_html(SessionReport(runs[::-1]))
 
 
 def test_a_scenario_that_runs_several_times_is_a_group_with_a_sign_for_each_run(passed, failed):
     group = [called(passed, "a/speeds", seed, variation) for seed in (1, 2) for variation in ("slow", "fast")]
-    html = to_html(Session([*group, called(failed, "a/speeds", 3, "slow"), called(passed, "b/alone")]))
+    html = to_html(SessionReport([*group, called(failed, "a/speeds", 3, "slow"), called(passed, "b/alone")]))
     assert "4 of 5 as expected" in html
     assert 'aria-label="runs: passed, passed, passed, passed, failed"' in html
     assert html.count('class="group many" open') == 1
@@ -124,7 +124,7 @@ def test_a_scenario_that_runs_several_times_is_a_group_with_a_sign_for_each_run(
 
 
 def test_runs_tell_what_they_are_filtered_and_sorted_by(failed):
-    (data,) = runs_on(to_html(Session([replace(failed, tags=("door", "smoke"))])))
+    (data,) = runs_on(to_html(SessionReport([replace(failed, tags=("door", "smoke"))])))
     found = {name: value for name, value in data.items() if name.startswith("data-")}
     assert found == {
         "data-status": "failed",
@@ -156,21 +156,21 @@ def test_links_lead_to_what_the_run_left_in_the_folder(failed, tmp_path):
     (folder / "runs/a b/worker.log").write_text("said")
     (folder / "runs/a b/stack.log").write_text("")
     run = replace(failed, artifacts=Artifacts(str(folder / "runs/a b"), str(folder / "runs/a b/run.mcap")))
-    links = [a["href"] for tag, a in parsed(to_html(Session([run], folder=str(folder)))) if tag == "a"]
+    links = [a["href"] for tag, a in parsed(to_html(SessionReport([run], folder=str(folder)))) if tag == "a"]
     assert links == ["./runs/a%20b/run.mcap", "./runs/a%20b/worker.log"]
 
 
 def test_the_picture_is_inside_the_page(failed, tmp_path):
     path = tmp_path / "map.png"
     Image.new("RGB", (4, 4)).save(path)
-    html = to_html(Session([replace(failed, artifacts=Artifacts(picture=str(path)))]))
+    html = to_html(SessionReport([replace(failed, artifacts=Artifacts(picture=str(path)))]))
     (image,) = [attributes for tag, attributes in parsed(html) if tag == "img"]
     assert image["src"].startswith("data:image/png;base64,")
     assert image["alt"] == "map of faults/lidar_off, seed 7: failed"
 
 
 def test_a_picture_that_is_gone_is_left_out(failed):
-    assert "<img" not in to_html(Session([failed]))
+    assert "<img" not in to_html(SessionReport([failed]))
 
 
 def test_pictures_fill_the_page_only_so_far_and_those_of_failures_first(passed, failed, tmp_path, monkeypatch):
@@ -178,7 +178,7 @@ def test_pictures_fill_the_page_only_so_far_and_those_of_failures_first(passed, 
     Image.new("L", (8, 8)).save(picture)
     monkeypatch.setattr(elements, "MAX_EMBEDDED_BYTES", picture.stat().st_size)
     runs = [replace(run, artifacts=Artifacts(picture=str(picture))) for run in (passed, failed)]
-    html = to_html(Session(runs))
+    html = to_html(SessionReport(runs))
     assert [tag for tag, _ in parsed(html)].count("img") == 1
     assert html.index("<img") < html.index(f"picture: <code>{picture}")
 
@@ -201,7 +201,7 @@ def sessions(tmp_path, passed, failed):
 def test_earlier_sessions_are_listed_with_changes(sessions, passed):
     past = past_sessions(sessions / "three")
     assert [session.name for session in past] == ["two", "one"]
-    html = to_html(Session([called(passed, "a/flaky"), called(passed, "a/steady")], past))
+    html = to_html(SessionReport([called(passed, "a/flaky"), called(passed, "a/steady")], past))
     assert "1 newly passing" in html
     assert html.index("../two/report.html") < html.index("../one/report.html")
     assert '<a href="#run-a-flaky-seed-1">a/flaky, seed 1</a>: passed, failed before' in html
@@ -217,16 +217,16 @@ def test_a_session_that_left_no_results_or_damaged_ones_is_passed_over(sessions,
 
 
 def test_a_page_of_a_session_that_goes_on_says_how_far_it_is_and_comes_again(passed, failed):
-    html = to_html(Session([passed], live=RunningSession(3, (failed.key,))))
+    html = to_html(SessionReport([passed], live=RunningSession(3, (failed.key,))))
     assert "1 of 3 runs done, running: faults/lidar_off, seed 7" in html
     assert "<noscript><meta http-equiv=refresh" in html
-    assert "refresh" not in to_html(Session([passed])).replace("refreshing", "").partition("<script>")[0]
+    assert "refresh" not in to_html(SessionReport([passed])).replace("refreshing", "").partition("<script>")[0]
 
 
 def test_a_session_without_a_run_has_a_page_too():
-    assert "<h1>✓ 0 passed</h1>" in to_html(Session([], live=RunningSession(5)))
+    assert "<h1>✓ 0 passed</h1>" in to_html(SessionReport([], live=RunningSession(5)))
 
 
 def test_every_outcome_has_a_sign_beside_its_color(passed):
-    page = to_html(Session([passed]))
+    page = to_html(SessionReport([passed]))
     assert f'class="pill {Outcome.PASSED.value}"><span aria-hidden="true">✓ </span>passed' in page

@@ -1,41 +1,44 @@
-"""Section of the HTML report about a study: claim, pass rates, effects, and plots that link to replays."""
+"""Section of the HTML report about a study: claim, pass rates, effects, and plots whose points link to replays."""
 
 from collections.abc import Sequence
 
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import Study
-from simscen.report.display_text import relative
+from simscen.report.display_text import html_text, relative_path
 from simscen.report.study import (
     claim_text,
     effect_text,
-    notes,
+    pass_rate_notes,
     pass_rate_text,
     significant_effects,
 )
-from simscen.report.suite.elements import html_text
 from simscen.spec.quantities import si_number
 
 MAX_PLOTS = 8
 """Maximum number of parameters with a plot, those with the strongest effects first."""
 MAX_POINTS = 2000
-"""Maximum number of runs in a plot; failures come first."""
+"""Maximum number of runs in a plot; runs that did not pass have priority."""
 WIDTH, HEIGHT, MARGIN = 420, 220, 44
+"""Size of a plot, and space for the axis labels to the left and below, in SVG units."""
 
 
 def study_html(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
-    """Return the section. Points of the plots are links to replay or log in `folder`."""
-    remarks = "".join(f'<p class="quiet">{html_text(text)}</p>' for text in notes(study))
+    """Return the section. Each point of a plot is a run, and links to its replay or log.
+
+    `folder` is the output folder of the session, to which the links are relative.
+    """
+    remarks = "".join(f'<p class="quiet">{html_text(text)}</p>' for text in pass_rate_notes(study))
     claim = ""
     if study.claim is not None:
         claim = f'<p class="claim {study.claim.status.value}">{html_text(claim_text(study.claim))}</p>'
     return (
         f'<section id="study" aria-label="study"><h2>Study</h2><p>{html_text(pass_rate_text(study))}</p>'
-        f"{remarks}{claim}{_rates(study)}{_effects(study)}{_plots(study, runs, folder)}</section>"
+        f"{remarks}{claim}{_rate_table(study)}{_effect_table(study)}{_plots(study, runs, folder)}</section>"
     )
 
 
-def _rates(study: Study) -> str:
+def _rate_table(study: Study) -> str:
     if not study.rates:
         return ""
     has_limits = any(row.limits is not None for row in study.rates)
@@ -50,7 +53,7 @@ def _rates(study: Study) -> str:
     )
 
 
-def _effects(study: Study) -> str:
+def _effect_table(study: Study) -> str:
     effects = significant_effects(study)
     if not study.effects:
         return ""
@@ -69,7 +72,7 @@ def _effects(study: Study) -> str:
 
 
 def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
-    """Return a plot of margin against parameter for the strongest effects, one for each parameter."""
+    """Return plots of a margin against a parameter: for each parameter, the margin on which it has most effect."""
     criterion_of = {effect.path: effect.criterion for effect in reversed(study.effects) if effect.is_ordered}
     order = [path for path in dict.fromkeys(effect.path for effect in study.effects) if path in criterion_of]
     plots = "".join(_plot(path, criterion_of[path], study, runs, folder) for path in order[:MAX_PLOTS])
@@ -77,6 +80,7 @@ def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
 
 
 def _plot(path: str, criterion: str, study: Study, runs: Sequence[RunFinished], folder: str) -> str:
+    """Return a plot of the margin of a criterion against the parameter at `path`; "" without points."""
     points = []
     for run in sorted(runs, key=lambda run: (run.outcome.good, run.key))[:MAX_POINTS]:
         value = si_number(study.values.get(run.key, {}).get(path))
@@ -113,19 +117,22 @@ def _plot(path: str, criterion: str, study: Study, runs: Sequence[RunFinished], 
 
 
 def _dot(x: float, y: float, run: RunFinished, folder: str) -> str:
+    """Return the point of a run at (x, y) in SVG units, with a link if the run has a replay or a log."""
     name = f"{run.key.variation or run.key.scenario}, seed {run.key.seed}: {run.outcome.value}"
     mark = (
         f'<circle class="{"good" if run.outcome is Outcome.PASSED else "bad"}" cx="{x:.1f}" cy="{y:.1f}" r="3.5">'
         f"<title>{html_text(name)}</title></circle>"
     )
     target = run.artifacts.replay or run.artifacts.mcap
-    return f'<a href="{html_text(relative(target, folder))}">{mark}</a>' if target else mark
+    return f'<a href="{html_text(relative_path(target, folder))}">{mark}</a>' if target else mark
 
 
 def _range(values: Sequence[float]) -> tuple[float, float]:
+    """Return the lowest and the highest value, or a range of length 1 around equal values."""
     low, high = min(values), max(values)
     return (low, high) if low < high else (low - 0.5, high + 0.5)
 
 
 def _scale(value: float, limits: tuple[float, float], start: float, end: float) -> float:
+    """Map a value linearly so that the two `limits` become `start` and `end`."""
     return start + (value - limits[0]) / (limits[1] - limits[0]) * (end - start)

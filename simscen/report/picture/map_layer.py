@@ -1,0 +1,128 @@
+"""Map of the world and coordinate grid, on which all pictures with a map draw."""
+
+import math
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw
+
+from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.geometry import Array
+from simscen.report.picture import palette
+from simscen.report.picture.canvas import SUPERSAMPLING, Bounds, Canvas, TextItem, draw_text
+
+MAX_MAP_SIZE_PX = (1000, 800)
+"""Maximum width and height of the map on a picture."""
+MARGIN_M = 0.4
+"""Margin around the map and the required points."""
+
+
+def map_extent(grid: OccupancyGrid, points: Array) -> Bounds:
+    """Return the rectangle that contains every known cell of the map and all `points` (n, 2) in m, with a margin."""
+    rows, columns = np.nonzero(grid.cells != UNKNOWN)
+    if len(rows):
+        corners = np.array([(r, c) for r in (rows.min(), rows.max() + 1) for c in (columns.min(), columns.max() + 1)])
+        known = grid.origin.apply(corners[:, ::-1].astype(np.float64) * grid.resolution)
+        points = np.vstack((points, known))
+    if not len(points):
+        return -1.0, -1.0, 1.0, 1.0
+    (x0, y0), (x1, y1) = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
+    return float(x0), float(y0), float(x1), float(y1)
+
+
+def map_scale(bounds: Bounds) -> float:
+    """Return the largest scale in pixels per meter with which a map is at most MAX_MAP_SIZE_PX large."""
+    x0, y0, x1, y1 = bounds
+    return min(MAX_MAP_SIZE_PX[0] / (x1 - x0), MAX_MAP_SIZE_PX[1] / (y1 - y0))
+
+
+def draw_map(canvas: Canvas, grid: OccupancyGrid) -> None:
+    """Set the image of the canvas to the map, with one affine transform from cells to pixels."""
+    image, resolution = _colored(grid, 1 / (canvas.scale * SUPERSAMPLING))
+    per_pixel = 1 / (canvas.scale * SUPERSAMPLING)
+    x0, _, _, y1 = canvas.bounds
+    corners = np.array([[x0, y1], [x0 + per_pixel, y1], [x0, y1 - per_pixel]])
+    origin, right, down = grid.origin.inverse().apply(corners) / resolution
+    affine = (
+        *(right[0] - origin[0], down[0] - origin[0], origin[0]),
+        *(right[1] - origin[1], down[1] - origin[1], origin[1]),
+    )
+    canvas.set_image(
+        image.transform(
+            canvas.supersampled_size, Image.Transform.AFFINE, tuple(map(float, affine)), fillcolor=palette.UNKNOWN
+        )
+    )
+
+
+def _colored(grid: OccupancyGrid, pixel_m: float) -> tuple[Image.Image, float]:
+    """Return the map as a colored image, and the size of its pixels in m.
+
+    Cells smaller than `pixel_m` are merged, so that thin walls have no gaps.
+    """
+    cells, merge = grid.cells, max(1, int(pixel_m / grid.resolution))
+    if merge > 1:
+        cells = _downsample(cells, merge)
+    return Image.fromarray(_colors()[cells.view(np.uint8)]), grid.resolution * merge
+
+
+@cache
+def _colors() -> npt.NDArray[np.uint8]:
+    """Return a table (256, 3) with the color for each cell value, read as an unsigned byte."""
+    table = np.empty((256, 3), dtype=np.uint8)
+    for value in range(256):
+        occupancy = min(value, OCCUPIED) / OCCUPIED
+        table[value] = [round(f + occupancy * (w - f)) for f, w in zip(palette.FREE, palette.WALL, strict=True)]
+    table[np.uint8(UNKNOWN % 256)] = palette.UNKNOWN
+    return table
+
+
+def _downsample(cells: npt.NDArray[np.int8], merge: int) -> npt.NDArray[np.int8]:
+    """Return the highest value of each block of merge x merge cells."""
+    height, width = (-(-side // merge) * merge for side in cells.shape)
+    padded = np.full((height, width), UNKNOWN, dtype=np.int8)
+    padded[: cells.shape[0], : cells.shape[1]] = cells
+    blocks: npt.NDArray[np.int8] = padded.reshape(height // merge, merge, width // merge, merge).max(axis=(1, 3))
+    return blocks
+
+
+LEFT_MARGIN_PX, BOTTOM_MARGIN_PX = 40, 26
+"""Space for the coordinates to the left of the map and below it."""
+_MIN_GRID_SPACING_PX = 55
+"""Minimum distance of two grid lines."""
+
+
+def grid_spacing(canvas: Canvas) -> float:
+    """Return the smallest round distance in m (1, 2, or 5 times a power of ten) with which grid lines are legible."""
+    min_spacing = _MIN_GRID_SPACING_PX / canvas.scale
+    power = 10.0 ** math.floor(math.log10(min_spacing))
+    return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= min_spacing)
+
+
+def grid_coordinates(low: float, high: float, step: float) -> list[float]:
+    """Return the multiples of `step` from `low` to `high`."""
+    return [round(k * step, 6) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
+
+
+def draw_grid(canvas: Canvas) -> None:
+    """Draw faint lines at round coordinates."""
+    x0, y0, x1, y1 = canvas.bounds
+    step = grid_spacing(canvas)
+    for x in grid_coordinates(x0, x1, step):
+        canvas.line(np.array([(x, y0), (x, y1)]), palette.GRID, 0.5)
+    for y in grid_coordinates(y0, y1, step):
+        canvas.line(np.array([(x0, y), (x1, y)]), palette.GRID, 0.5)
+    canvas.add_part(f"grid every {step:g} m", [(x0, y0), (x1, y1)])
+
+
+def write_coordinates(pen: ImageDraw.ImageDraw, canvas: Canvas, left: float, top: float) -> None:
+    """Write the coordinates of the grid lines next to the map, whose upper left corner is at pixel (left, top)."""
+    x0, y0, x1, y1 = canvas.bounds
+    step = grid_spacing(canvas)
+    for x in grid_coordinates(x0, x1, step):
+        u = left + canvas.pixel(x, y0)[0]
+        draw_text(pen, TextItem(u, top + canvas.height + 12, f"{x:g}", 11, palette.FAINT_INK, "mm"))
+    for y in grid_coordinates(y0, y1, step):
+        v = top + canvas.pixel(x0, y)[1]
+        draw_text(pen, TextItem(left - 7, v, f"{y:g}", 11, palette.FAINT_INK, "rm"))
+    draw_text(pen, TextItem(left - 7, top + canvas.height + 12, "x, y in m", 10, palette.FAINT_INK, "mm"))

@@ -1,0 +1,139 @@
+"""Earlier sessions: outcomes of their runs for the HTML report, and the runs that failed last, for `--last-failed`."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from simscen.core.errors import InvalidInput
+from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.session_events import RunFinished
+from simscen.judge.result_json import read_key
+from simscen.report.journal_reader import JOURNAL_FILE, read_journal
+
+MAX_SHOWN_SESSIONS = 10
+"""Maximum number of earlier sessions in the report."""
+MAX_RESULTS_BYTES = 64 << 20
+"""Maximum size of a results.json to read."""
+
+
+@dataclass(frozen=True)
+class PastOutcome:
+    """Outcome of a run in an earlier session, with the simulated time in s."""
+
+    outcome: Outcome
+    simulated: float
+
+
+@dataclass(frozen=True)
+class PastSession:
+    """An earlier session: the name of its folder, and the outcomes of its runs."""
+
+    name: str
+    runs: Mapping[RunKey, PastOutcome] = field(default_factory=dict)
+
+    def count(self, *outcomes: Outcome) -> int:
+        """Return the number of runs with one of these outcomes."""
+        return sum(run.outcome in outcomes for run in self.runs.values())
+
+
+def past_sessions(folder: Path) -> list[PastSession]:
+    """Return the earlier sessions, newest first: those whose output folders are next to `folder` and older."""
+    folders = sessions_in(folder.absolute().parent)
+    index = next((k for k, each in enumerate(folders) if each.name == folder.absolute().name), -1)
+    sessions = (past for each in folders[index + 1 :] if (past := _read(each)) is not None)
+    return list(islice(sessions, MAX_SHOWN_SESSIONS))
+
+
+def _read(folder: Path) -> PastSession | None:
+    """Read results.json of a session. Return None if it is missing, too large, or from another version."""
+    try:
+        file = folder / "results.json"
+        if file.stat().st_size > MAX_RESULTS_BYTES:
+            return None
+        document: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        runs = {
+            read_key(run): PastOutcome(Outcome(run["outcome"]), float(run["simulated_seconds"]))
+            for run in document["runs"]
+        }
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return PastSession(folder.name, runs)
+
+
+def past_outcomes(run: RunFinished, past: Sequence[PastSession]) -> list[PastOutcome | None]:
+    """Return the outcomes of a run in earlier sessions, oldest first; None for sessions without the run."""
+    return [session.runs.get(run.key) for session in reversed(past)]
+
+
+def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
+    """Return the previous outcome of a run, for example "failed before", if exactly one of both outcomes is good.
+
+    Return "" if the outcome has not changed, or if no earlier session has the run.
+    """
+    known = [outcome for outcome in past_outcomes(run, past) if outcome is not None]
+    if not known or known[-1].outcome.good == run.outcome.good:
+        return ""
+    return f"{known[-1].outcome.value.replace('-', ' ')} before"
+
+
+MAX_SEARCHED_SESSIONS = 50
+"""Maximum number of sessions to search for failures."""
+UNDECIDED_KINDS = frozenset({"interrupted", "not-run"})
+"""Error kinds of runs without an outcome. For such a run, the outcome in the session before it still counts."""
+
+
+@dataclass(frozen=True)
+class LastFailed:
+    """Runs whose latest outcome was a failure or an error, and the output `folder` of the newest session."""
+
+    folder: Path
+    runs: frozenset[RunKey]
+
+
+def sessions_in(folder: Path) -> list[Path]:
+    """Return the output folders of sessions in `folder`, newest first, without symbolic links such as `latest`."""
+    if not folder.is_dir():
+        return []
+    sessions = [each for each in folder.iterdir() if (each / JOURNAL_FILE).is_file() and not each.is_symlink()]
+    return sorted(
+        sessions,
+        key=lambda each: (_session_time(each), (each / JOURNAL_FILE).stat().st_mtime_ns, each.name),
+        reverse=True,
+    )
+
+
+def last_failed(folder: Path) -> LastFailed | None:
+    """Return the runs that failed when they last ran in a session of `folder`; None if there are no sessions."""
+    sessions = sessions_in(folder)
+    if not sessions:
+        return None
+    known: dict[RunKey, bool] = {}
+    for session in islice(sessions, MAX_SEARCHED_SESSIONS):
+        outcomes: dict[RunKey, bool] = {}
+        for key, good in _outcomes(session):
+            outcomes[key.first] = outcomes.get(key.first, True) and good
+        known = {**outcomes, **known}
+    return LastFailed(sessions[0], frozenset(key for key, good in known.items() if not good))
+
+
+def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
+    """Yield the key of each finished run, and whether its outcome is good. Yields nothing for an invalid journal."""
+    try:
+        runs = read_journal(session).runs
+    except InvalidInput:
+        return
+    for run in runs:
+        if run.result.error is None or run.result.error.kind not in UNDECIDED_KINDS:
+            yield run.key, run.outcome.good
+
+
+def _session_time(session: Path) -> str:
+    """Return the time in run.json at which the session was written (ISO 8601); "" if it is unknown."""
+    try:
+        document = json.loads((session / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ""
+    return str(document.get("written", "")) if isinstance(document, dict) else ""
