@@ -31,11 +31,16 @@ SHAPE_MARGIN_M = 0.05
 
 
 class _StaticNearest(NamedTuple):
-    """Pose of the robot at a tick at which every actor was farther away than the static world by `margin` m."""
+    """A measurement for which the static world was nearest: all else was farther away, by at least `margin` m.
+
+    tick, pose:  when and where the robot was
+    others:      positions of the other robots
+    """
 
     tick: int
     pose: Pose3
     margin: float
+    others: tuple[Vector, ...]
 
 
 class Clearance:
@@ -134,10 +139,23 @@ class Clearance:
             self.no_contact_before = tick + (0 if is_pushed else math.floor(free_s * self._tick_rate))
         self._actors.set_no_contact_before(self._base.id, self.no_contact_before)
         self._static_nearest, self._deferrable_until = None, -1
-        if not (self.others or self.may_be_enclosed) and self._obstacle_distance is self._static_distance:
-            margin = self._actors.free_distance(self._base.id, pose[:3], self._distance + self.size, tick)
-            self._static_nearest = None if margin is None else _StaticNearest(tick, pose, margin)
+        if not self.may_be_enclosed and self._obstacle_distance is self._static_distance:
+            self._static_nearest = self._find_static_nearest(tick, pose)
         return self._distance
+
+    def _find_static_nearest(self, tick: int, pose: Pose3) -> _StaticNearest | None:
+        """Return the measurement of this tick if the static world was nearest; None if that is not certain."""
+        reach, point = self._distance + self.size, pose[:3]
+        margin = self._actors.free_distance(self._base.id, point, reach, tick)
+        if margin is None:
+            return None
+        others = self._other_positions()
+        for robot, position in zip(self.others, others, strict=True):
+            margin = min(margin, math.dist(point, position) - reach - robot.size)
+        return _StaticNearest(tick, pose, margin, others)
+
+    def _other_positions(self) -> tuple[Vector, ...]:
+        return tuple([robot._state().pose.position for robot in self.others])
 
     def can_defer(self, tick: int, period: int, pose: Pose3) -> bool:
         """Return whether `static_clearance` equals `measure` at the current `tick`, without contact for `period` ticks.
@@ -146,15 +164,15 @@ class Clearance:
         """
         if tick + period <= self._deferrable_until:
             return True
-        if self._static_nearest is None:
+        last = self._static_nearest
+        if last is None:
             return False
-        moved, closing_speed = (
-            max_displacement(self._static_nearest.pose, pose, self._extent),
-            self._closing_speed(tick),
-        )
-        # The robot may have approached actors and moved away from the static world.
-        travel = self._actors.max_scripted_travel(tick - self._static_nearest.tick)
-        margin = self._static_nearest.margin - 2 * moved - travel
+        moved, closing_speed = max_displacement(last.pose, pose, self._extent), self._closing_speed(tick)
+        # The robot may have moved away from the static world and towards anything else, which may have moved, too.
+        travel = self._actors.max_scripted_travel(tick - last.tick)
+        if last.others:
+            travel = max(travel, *map(math.dist, last.others, self._other_positions()))
+        margin = last.margin - 2 * moved - travel
         if margin <= 0:
             return False
         free_s = min(HORIZON_S, max(0.0, self._distance - moved - CONTACT_TOLERANCE_M) / closing_speed)
