@@ -22,9 +22,9 @@ EXEMPT_RADIUS_M = 0.5
 """Half side of the square around start and goal in which a plan may have less clearance than elsewhere."""
 SAMPLE_SPACING_CELLS = 0.67
 """Distance in cells between two samples of the costs along a path."""
-SAMPLE_SPACING_RATIO = 0.4
+SAMPLE_SPACING_RATIO = 0.6
 """Distance between two samples along a motion of a search, relative to the inscribed radius. Each obstacle blocks at
-least a disc of that radius, which a line enters by at most 2 % of the radius between two samples."""
+least a disc of that radius, which a line enters by at most 5 % of the radius between two samples."""
 
 
 class TraversalCosts:
