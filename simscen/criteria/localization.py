@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.core.geometry import Array
-from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.base import Criterion
@@ -22,7 +21,7 @@ from simscen.spec.quantities import Duration, PositiveAngle, PositiveDuration, P
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
-    from simscen.core.records.trace import Trace
+    from simscen.core.records.trace import Samples, Trace
 
 NO_BELIEF = "the robot never reported an estimated pose"
 """Reason of inconclusive findings."""
@@ -78,7 +77,7 @@ class LocalizationError(Spec, Criterion):
             last = trace.seconds(int(error.ticks[-1]))
             because = f"the last belief is from t = {last:.2f} s, but the evaluation begins at {self.after:.2f} s"
             return [undecided("localization_error", because)]
-        return self._bounds(trace, Samples(error.ticks[is_counted], error.values[is_counted]))
+        return self._bounds(trace, error.select(is_counted))
 
     def _bounds(self, trace: Trace, error: Samples) -> list[Finding]:
         distances, angles = error.values.T
@@ -261,4 +260,4 @@ class LocalizationConsistency(Spec, Criterion):
         first, last = max(self.after * trace.tick_rate, int(all_samples.ticks[0])), int(all_samples.ticks[-1])
         times = np.arange(first, last + 1, self.every * trace.tick_rate).astype(np.int64)
         chosen = np.searchsorted(all_samples.ticks, times, side="right") - 1
-        return Samples(all_samples.ticks[chosen], all_samples.values[chosen])
+        return all_samples.select(chosen)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.judge import run_result
+from simscen.judge import several_robots
 from simscen.judge.result_json import read_result, to_json
 from simscen.judge.run_result import judge_run
 from simscen.loading.scenario_text import criteria_of_text, spec_of_text
@@ -86,7 +86,7 @@ def judged_again(live, log, name):
         criteria = criteria_of_text(log.header.scenario, name, log.header.facts, robot).pass_
         own, lines = tuple(lines[: len(criteria)]), lines[len(criteria) :]
         results[robot] = judge_run(live.key, live.path, criteria, one.trace, one.header.case, own)
-    return run_result.combine_robots(results, {robot: one.trace for robot, one in log.robots.items()})
+    return several_robots.combine_robots(results, {robot: one.trace for robot, one in log.robots.items()})
 
 
 @pytest.mark.slow

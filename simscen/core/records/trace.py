@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -169,3 +169,7 @@ class Samples:
         Before the first sample, the values are those of the first sample.
         """
         return self.values[np.maximum(np.searchsorted(self.ticks, ticks, side="right") - 1, 0)]
+
+    def select(self, chosen: npt.NDArray[Any] | slice) -> Samples:
+        """Return the samples that an index array, a mask, or a slice selects."""
+        return Samples(self.ticks[chosen], self.values[chosen])

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.ground_truth import check_samples, truth
 
 if TYPE_CHECKING:
-    from simscen.core.records.trace import Ticks, Trace
+    from simscen.core.records.trace import Samples, Ticks, Trace
 
 BELIEF_TIMEOUT_S = 1.0
 """Age up to which a belief is valid: transform_tolerance of nav2_amcl."""
@@ -27,6 +26,8 @@ def pose_error(trace: Trace) -> Samples:
     than BELIEF_TIMEOUT_S. The result is empty if the trace has no belief or no truth. It equals the APE of evo without
     --align.
     """
+    from simscen.core.records.trace import Samples
+
     belief, poses = check_samples(trace.belief, "the belief", trace), truth(trace)
     if not len(belief) or not len(poses):
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 2)))
@@ -78,6 +79,8 @@ def nees(error: Array, covariance: Array) -> Array:
 
 def nees_samples(trace: Trace) -> Samples:
     """Return the NEES (n, 1) of each belief; empty if the trace has no truth or no covariances."""
+    from simscen.core.records.trace import Samples
+
     belief, poses = check_samples(trace.belief, "the belief", trace), truth(trace)
     if not len(belief) or not len(poses) or belief.values.shape[1] < 9:
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 1)))

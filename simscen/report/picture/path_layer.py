@@ -40,7 +40,7 @@ def split_at_jumps(samples: Samples, tick_rate: int, placement_ticks: tuple[int,
         near = max(0, int(np.searchsorted(samples.ticks, tick)) - 1)
         cuts.add(near + 1 + int(distances[near : near + 2].argmax()) if near < len(distances) else len(samples))
     edges = sorted({0, *cuts, len(samples)})
-    return [Samples(samples.ticks[a:b], samples.values[a:b]) for a, b in pairwise(edges)]
+    return [samples.select(slice(a, b)) for a, b in pairwise(edges)]
 
 
 def driven_segments(scene: Scene) -> list[Samples]:

@@ -263,7 +263,5 @@ def moving_objects(trace: Trace, columns: PackedColumns, robots: frozenset[str])
         if name in robots or not len(samples):
             continue
         indices = spaced_in_time(samples.ticks, max(1, trace.tick_rate // 20))
-        objects.append(
-            {"name": one_line(name), **_poses(Samples(samples.ticks[indices], samples.values[indices]), columns)}
-        )
+        objects.append({"name": one_line(name), **_poses(samples.select(indices), columns)})
     return objects
