@@ -53,7 +53,7 @@ def _urdf_dimensions(wheels: tuple[Wheel, ...]) -> dict[str, float]:
     driven = [wheel for wheel in wheels if wheel.driven]
     if not driven:
         return {}
-    left, right = ([wheel.y for wheel in driven if wheel.left is side] for side in (True, False))
+    left, right = ([wheel.y for wheel in driven if wheel.is_left is side] for side in (True, False))
     axles, steered = [wheel.x for wheel in driven], [wheel.x for wheel in wheels if wheel.steered]
     base = np.mean(steered) - np.mean(axles) if steered else max(axles) - min(axles)
     return {

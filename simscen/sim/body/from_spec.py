@@ -24,11 +24,10 @@ def build_robot_body(
     read_mesh: MeshReader | None = None,
     found: RobotFiles | None = None,
 ) -> RobotBody:
-    """Build the body of a robot from its specification.
+    """Build the body of a robot from its specification. Raises InvalidInput if the URDF or the body is unusable.
 
-    `file` is the `*.robot.yaml`, to which `spec.urdf` is relative; `found` has the files if they are located
-    already. `roots` are the folders that must contain the URDF and its meshes; `read_mesh` reads a mesh file. Raises
-    InvalidInput if the URDF or the body is unusable.
+    `file` is the `*.robot.yaml`; `spec.urdf` is relative to its folder, unless `found` gives the path of the URDF. All
+    files must be in `roots` (default: the folder of `file`). Without `read_mesh`, a URDF must not have meshes.
     """
     body = _body_from_shapes(spec, file) if spec.urdf is None else body_from_urdf(spec, file, roots, read_mesh, found)
     check_robot_size(body, file)

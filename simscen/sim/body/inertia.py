@@ -6,27 +6,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Array, Pose3, Vector
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
-
-Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
-    """Mass in kg, center of mass in m, and inertia tensor (3, 3) about that center in kg m²."""
+    """Mass in kg, center of mass in m, and inertia tensor (3, 3) in kg m² about the center of mass."""
 
     mass: float
     center: Array
     tensor: Array
 
-    def placed(self, pose: Pose3) -> "MassProperties":
-        """Return the properties in the parent frame, in which their frame has this pose."""
+    def transformed(self, pose: Pose3) -> "MassProperties":
+        """Return the properties in a parent frame; `pose` is the pose of the current frame in it."""
         turn = pose.rotation()
         return MassProperties(self.mass, pose.apply(self.center[None])[0], turn @ self.tensor @ turn.T)
 
     def principal(self) -> tuple[Vector, Pose3]:
-        """Return the principal moments and their frame: at the center of mass, along the principal axes."""
+        """Return the principal moments in kg m², and their frame: at the center of mass, along the principal axes."""
         x, y, z = self.center.tolist()
         if np.abs(self.tensor - np.diag(np.diag(self.tensor))).max() <= 1e-9 * np.trace(self.tensor):
             a, b, c = np.diag(self.tensor).tolist()
@@ -38,11 +36,11 @@ class MassProperties:
 
 
 def combine(parts: Sequence[MassProperties]) -> MassProperties:
-    """Return the properties of rigidly joined parts that are given in one frame (parallel axis theorem)."""
+    """Return the properties of a rigid body from those of its parts in the same frame (parallel axis theorem)."""
     mass = sum(part.mass for part in parts)
     weighted = np.sum([part.mass * part.center for part in parts], axis=0)
     center = weighted / mass if mass > 0 else np.mean([part.center for part in parts], axis=0)
-    tensor = np.sum([part.tensor + part.mass * _about(part.center - center) for part in parts], axis=0)
+    tensor = np.sum([part.tensor + part.mass * _parallel_axis_term(part.center - center) for part in parts], axis=0)
     return MassProperties(mass, center, tensor)
 
 
@@ -50,13 +48,14 @@ def inertia_of_solids(solids: Sequence[Solid], mass: float) -> MassProperties:
     """Return the properties of solids of equal density with a total mass of `mass` kg."""
     volumes = [volume(solid.shape) for solid in solids]
     parts = [
-        inertia_of_shape(s.shape, mass * v / sum(volumes)).placed(s.pose) for s, v in zip(solids, volumes, strict=True)
+        inertia_of_shape(s.shape, mass * v / sum(volumes)).transformed(s.pose)
+        for s, v in zip(solids, volumes, strict=True)
     ]
     return combine(parts)
 
 
 def volume(shape: Shape) -> float:
-    """Return the volume in m³; for a mesh, which may be open, that of its bounding box."""
+    """Return the volume in m³; a mesh counts as its bounding box, because it may be open."""
     match shape:
         case Box(size):
             return math.prod(size)
@@ -77,7 +76,7 @@ def volume(shape: Shape) -> float:
 
 
 def inertia_of_shape(shape: Shape, mass: float) -> MassProperties:
-    """Return the properties of a solid of uniform density about its origin; a mesh counts as its bounding box."""
+    """Return the properties of a solid of uniform density in its own frame; a mesh counts as its bounding box."""
     match shape:
         case Box((x, y, z)):
             return _symmetric(mass, (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12)
@@ -110,7 +109,7 @@ def _symmetric(mass: float, xx: float, yy: float, zz: float) -> MassProperties:
     return MassProperties(mass, np.zeros(3), mass * np.diag([xx, yy, zz]))
 
 
-def _about(offset: Array) -> Array:
+def _parallel_axis_term(offset: Array) -> Array:
     result: Array = offset @ offset * np.eye(3) - np.outer(offset, offset)
     return result
 
@@ -124,10 +123,7 @@ def _prism(polygon: Sequence[tuple[float, float]], height: float, mass: float) -
 
 
 def _polygon_moments(polygon: Sequence[tuple[float, float]]) -> tuple[float, float, float, float, float, float]:
-    """Return area, centroid x and y, and ∫x², ∫y², ∫xy over a simple polygon.
-
-    (Steger, On the calculation of arbitrary moments of polygons, 1996.)
-    """
+    """Return area, centroid x and y, and ∫x², ∫y², ∫xy of a simple polygon (Steger, Moments of polygons, 1996)."""
     x, y = np.array(polygon).T
     u, v = np.roll(x, -1), np.roll(y, -1)
     cross = x * v - u * y

@@ -1,4 +1,4 @@
-"""Outlines of solids seen from above: footprints, convex hulls, and the points that span them."""
+"""Outlines of solids seen from above: footprints and convex hulls, and the corner points of shapes."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -11,13 +11,13 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 
 MIN_POINTS_TO_FILTER = 200
-"""Number of points above which a convex hull first discards points inside of the extreme ones."""
+"""Number of points from which on `convex_hull` first discards points inside the polygon of the extreme points."""
 _CIRCLE_CORNERS = 64
-"""Number of corners that approximate a circle, within 0.03 % of the radius."""
+"""Number of corners of the polygon that approximates a circle."""
 
 
 def circle(radius: float, corners: int = 32) -> Polygon:
-    """Return a regular polygon with its corners on a circle, counterclockwise from straight ahead."""
+    """Return a regular polygon whose corners are on a circle around the origin, counterclockwise from the x axis."""
     angles = [2 * math.pi * k / corners for k in range(corners)]
     return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
 
@@ -28,13 +28,16 @@ def footprint(solids: Iterable[Solid]) -> Polygon:
 
 
 def outlines_in_band(solids: Iterable[Solid], z_range: tuple[float, float]) -> list[Polygon]:
-    """Return outlines from above of the solids within a range of heights; meshes and tilted solids as convex hulls."""
+    """Return the outlines, seen from above, of the solids that extend into a range of heights (lowest, highest) in m.
+
+    The outline of an upright extrusion can be concave; all other outlines are convex hulls.
+    """
     return [outline for solid in solids if (outline := _outline(solid.shape, solid.pose, z_range))]
 
 
 @cached_on_instance
 def _outline(shape: Shape, pose: Pose3, z_range: tuple[float, float]) -> Polygon:
-    """Return an empty outline if the shape is out of range; the cache serves repeated shapes, such as chairs."""
+    """Return the outline, or () for a shape out of range; cached, because shapes such as chairs are repeated."""
     corners = pose.apply(hull_points(shape))
     if corners[:, 2].min() >= z_range[1] or corners[:, 2].max() <= z_range[0]:
         return ()
@@ -48,7 +51,7 @@ def _bottom(corners: Array) -> Polygon:
 
 
 def hull_points(shape: Shape) -> Array:
-    """Return points (n, 3) whose convex hull is that of the shape, for round shapes within 0.1 % of the radius."""
+    """Return points (n, 3) whose convex hull is that of the shape; round shapes are approximated by 64 corners."""
     match shape:
         case Box(size):
             return np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]) * size
@@ -84,7 +87,7 @@ def convex_hull(points: Array) -> Polygon:
 
 
 def _without_inner_points(points: Array) -> Array:
-    """Discard most points inside of the polygon of the extreme points (Akl and Toussaint 1978)."""
+    """Discard most points inside the polygon of the extreme points (Akl and Toussaint 1978)."""
     if len(points) < MIN_POINTS_TO_FILTER:
         return points
     angles = np.arange(32) * (math.pi / 16)

@@ -1,7 +1,7 @@
 """Rigid-body model of a robot, independent of the physics engine: hull, wheels, masses, and what it can climb.
 
-The analysis of climbing is quasi-static, without a run-up; `friction` is that between wheels and surface. Sources:
-Bekker, Introduction to Terrain-Vehicle Systems, 1969; Wong, Theory of Ground Vehicles, chapters 2 and 4.
+What a robot can climb is computed for slow driving, without a run-up. Sources: Bekker, Introduction to Terrain-Vehicle
+Systems, 1969; Wong, Theory of Ground Vehicles, chapters 2 and 4.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 
 from simscen.core.environment.world_model import GRAVITY_M_S2, Polygon
 from simscen.core.errors import InvalidInput, Problem
-from simscen.core.geometry import Pose3
+from simscen.core.geometry import Pose3, Vector
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.model.robot import Drive, Limits, Omnidirectional, RobotSpec
@@ -24,12 +24,15 @@ from simscen.sim.body.undercarriage import Wheel, add_casters, add_motors, caste
 
 @dataclass(frozen=True, eq=False)
 class RobotBody:
-    """Everything needed to build a robot, in its base frame: on the ground below the center of its axle.
+    """Model of a robot in its base frame. The origin is on the ground below the center of the driven axles.
 
-    `hull` and `casters` collide with obstacles, the hull with the friction coefficient `hull_friction`; `casters` also
-    slide on the ground without friction, and wheels only roll on it. `chassis` has the mass of everything except the
-    wheels; `power` is the share of their nominal force that the motors deliver. `footprint` is counterclockwise;
-    `radius` is set for a round robot.
+    hull:           solids that collide with obstacles, with the friction coefficient `hull_friction`
+    casters:        spheres that collide with obstacles and slide on the ground without friction
+    wheels:         wheels, which only touch the ground
+    chassis:        mass properties of everything except the wheels
+    footprint:      outline on the floor in m, counterclockwise
+    radius:         radius in m of the footprint if it is a circle, else None
+    motor_ratio:    fraction of the nominal motor force that the motors of a planar base deliver
     """
 
     name: str
@@ -42,7 +45,7 @@ class RobotBody:
     drive: Drive
     limits: Limits
     hull_friction: float
-    power: float = 1.0
+    motor_ratio: float = 1.0
 
     @property
     def mass(self) -> float:
@@ -50,7 +53,7 @@ class RobotBody:
         return self.chassis.mass + sum(wheel.inertia.mass for wheel in self.wheels)
 
     @property
-    def solid(self) -> tuple[Solid, ...]:
+    def collision_solids(self) -> tuple[Solid, ...]:
         """Solids that collide with obstacles, in the order in which the engine receives them."""
         return (*self.casters, *self.hull)
 
@@ -68,7 +71,10 @@ class RobotBody:
 def assemble(
     spec: RobotSpec, parts: tuple[Solid, ...], wheels: tuple[Wheel, ...], chassis: MassProperties
 ) -> RobotBody:
-    """Return a body of a hull and wheels; adds casters to a differential drive, and a footprint if none is given."""
+    """Return the body of a robot whose hull consists of `parts`.
+
+    Adds wheel guards, motors, casters for a differential drive, and a footprint if the specification has none.
+    """
     hull = (*parts, *(guard for wheel in wheels for guard in wheel_guards(wheel, parts)))
     outline = footprint(hull)
     casters: tuple[Solid, ...] = ()
@@ -87,19 +93,16 @@ def _counterclockwise(polygon: Polygon) -> Polygon:
     return polygon if area > 0 else polygon[::-1]
 
 
-Vector = tuple[float, float, float]
-
-
 def add_payload(body: RobotBody, mass: float, at: Vector) -> RobotBody:
     """Return the robot with a load of `mass` kg at a point in its base frame; the motors stay the same."""
     load = MassProperties(mass, np.array(at), np.zeros((3, 3)))
     return replace(body, chassis=combine([body.chassis, load]))
 
 
-def scale_motor_torque(body: RobotBody, share: float) -> RobotBody:
-    """Return the robot with a fraction of its motor torque."""
-    wheels = tuple(replace(wheel, torque=share * wheel.torque) for wheel in body.wheels)
-    return replace(body, wheels=wheels, power=share * body.power)
+def scale_motor_torque(body: RobotBody, factor: float) -> RobotBody:
+    """Return the robot with its motor torque multiplied by `factor`."""
+    wheels = tuple(replace(wheel, stall_torque=factor * wheel.stall_torque) for wheel in body.wheels)
+    return replace(body, wheels=wheels, motor_ratio=factor * body.motor_ratio)
 
 
 def hull_height(body: RobotBody) -> float:
@@ -115,18 +118,18 @@ def center_of_mass(body: RobotBody) -> Vector:
 
 
 def is_stable(body: RobotBody) -> bool:
-    """Return whether the center of mass is above the support polygon; a base without wheels never tips."""
+    """Return whether the center of mass is above the support polygon; true for all planar bases, which cannot tip."""
     points = [(wheel.x, wheel.y) for wheel in body.wheels] + [(c.pose.x, c.pose.y) for c in body.casters]
     x, y, _ = center_of_mass(body)
     return len(points) < 3 or body.drive.type == "mecanum" or polygon_contains(convex_hull(np.array(points)), (x, y))
 
 
 MIN_GROUND_CLEARANCE_M = 0.003
-"""Minimum height in m of a hull above the ground."""
+"""Smallest allowed height in m of a hull above the ground."""
 
 
 def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
-    """Raise InvalidInput if a part of the `body` of a wheeled robot touches the ground."""
+    """Raise InvalidInput, which names `file`, if a part of the `body` of a wheeled robot is too low."""
     on_wheels = not isinstance(spec.drive, Omnidirectional)
     if on_wheels and any(part.z < MIN_GROUND_CLEARANCE_M for part in spec.body or ()):
         message = f"a part of the body of {spec.name!r} reaches the ground: it would drag instead of roll"
@@ -135,15 +138,15 @@ def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
 
 
 MAX_EXTENT_M = 10.0
-"""Largest extent of a robot from its base frame in m; the largest vehicles in ports are 15 m long.
+"""Largest distance in m of any part of a robot from its base frame. The largest vehicles in ports are 15 m long.
 
 Maps and footprints of a larger robot would exhaust memory and time.
 """
 
 
 def check_robot_size(body: RobotBody, file: Path | None) -> None:
-    """Raise InvalidInput for a robot that extends farther than MAX_EXTENT_M from its base frame."""
-    across, up = radius_and_height(body.solid)
+    """Raise InvalidInput, which names `file`, if a robot extends farther than MAX_EXTENT_M."""
+    across, up = radius_and_height(body.collision_solids)
     wheels = max((math.hypot(wheel.x, wheel.y) + wheel.radius for wheel in body.wheels), default=0.0)
     farthest = max(across, up, wheels, body.circumscribed_radius)
     if farthest > MAX_EXTENT_M:
@@ -153,44 +156,45 @@ def check_robot_size(body: RobotBody, file: Path | None) -> None:
 
 
 MAX_SLOPE_DEG, SLOPE_STEP_DEG = 50.0, 0.1
-"""Steepest slope that is examined, and the distance between two slopes."""
+"""Steepest slope that `approach_angle` examines, and the step between two examined slopes."""
 
 
 class ClimbLimits(NamedTuple):
-    """Steepest slope in rad and highest step in m that a robot can climb; both 0 for a robot that stays at z = 0."""
+    """Steepest slope in rad and highest step in m that a robot can climb; both are 0 for a planar base."""
 
     slope: float
     step: float
 
 
 def compute_climb_limits(body: RobotBody, friction: float = 1.0) -> ClimbLimits:
-    """Return what a robot can climb, limited by its hull, its wheel friction, and its motors."""
-    wheels = [wheel for wheel in body.wheels if wheel.driven and wheel.torque > 0]
+    """Return what a robot can climb, limited by its hull, its motors, and the friction coefficient of its wheels."""
+    wheels = [wheel for wheel in body.wheels if wheel.driven and wheel.stall_torque > 0]
     if not wheels:
         return ClimbLimits(0.0, 0.0)
-    pull = sum(wheel.torque / wheel.radius for wheel in wheels) / (body.mass * GRAVITY_M_S2)
+    pull = sum(wheel.stall_torque / wheel.radius for wheel in wheels) / (body.mass * GRAVITY_M_S2)
     slope = min(approach_angle(body), grip_angle(body, friction), math.asin(min(1.0, pull)))
     return ClimbLimits(slope, min(wheel.radius for wheel in wheels) * (1 - 1 / math.hypot(1.0, friction)))
 
 
 def grip_angle(body: RobotBody, friction: float) -> float:
-    """Return the slope in rad on which the wheels spin: tan θ = μ · share of the weight on driven wheels.
+    """Return the slope θ in rad above which the wheels spin: tan θ = μ · (weight on driven wheels / total weight).
 
-    The share decreases with the slope, because the weight shifts back by h tan θ onto a caster behind the axle.
+    This ratio decreases with the slope, because the weight shifts backwards onto a caster behind the axle, by h tan θ
+    for a center of mass at the height h.
     """
     x, z = (float(body.chassis.center[axis]) for axis in (0, 2))
     ground_casters = [caster.pose.x for caster in body.casters if not caster_gap(caster)]
     if not ground_casters:
-        return math.atan(friction * _driven_share(body))
-    share = body.chassis.mass / body.mass
+        return math.atan(friction * _driven_weight_ratio(body))
+    chassis_ratio = body.chassis.mass / body.mass
     span = abs(ground_casters[0])
-    level = 1.0 - share * abs(x) / span
-    # tan θ = μ (level - share z tan θ / span): the caster is behind on the way up.
-    return math.atan(friction * level / (1.0 + friction * share * z / span))
+    level = 1.0 - chassis_ratio * abs(x) / span
+    # tan θ = μ (level - chassis_ratio z tan θ / span), if the caster is behind the axle.
+    return math.atan(friction * level / (1.0 + friction * chassis_ratio * z / span))
 
 
-def _driven_share(body: RobotBody) -> float:
-    """Return the share of the weight on the driven wheels of a robot with two axles, on level ground."""
+def _driven_weight_ratio(body: RobotBody) -> float:
+    """Return the weight on the driven wheels divided by the total weight, on level ground and without casters."""
     driven = [wheel.x for wheel in body.wheels if wheel.driven]
     idle = [wheel.x for wheel in body.wheels if not wheel.driven]
     if not idle:
@@ -201,7 +205,10 @@ def _driven_share(body: RobotBody) -> float:
 
 
 def approach_angle(body: RobotBody) -> float:
-    """Return the slope in rad of the ramp that the hull touches when the front wheels reach its lower edge."""
+    """Return the slope in rad of the least steep ramp that the hull touches when the front wheels are at its foot.
+
+    If the hull touches none, returns the steepest examined slope.
+    """
     foremost = max(body.wheels, key=lambda wheel: wheel.x)
     raised = [c for c in compliant_casters(body.casters) if caster_gap(c) > 0 and c.pose.x > foremost.x]
     points = np.concatenate([solid.pose.apply(hull_points(solid.shape)) for solid in body.hull])

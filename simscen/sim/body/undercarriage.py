@@ -11,27 +11,27 @@ from simscen.model.robot import Ackermann, Differential, Drive, Mecanum, Omnidir
 from simscen.sim.body.inertia import MassProperties, inertia_of_shape
 from simscen.sim.body.outline import footprint
 
-WHEEL_MASS_SHARE = 0.03
+WHEEL_MASS_RATIO = 0.03
 """Default mass of a wheel relative to that of the robot; the wheels of a TurtleBot3 and of a Jackal have 2 to 3 %."""
 ROTOR_INERTIA = {"differential": 0.25, "ackermann": 0.25, "skid_steer": 0.5}
-"""Rotor inertia of a wheel's motor at the output of its gear, in units of robot mass x wheel radius².
+"""Rotor inertia of a wheel's motor at the output of its gear, divided by robot mass x wheel radius², by drive.
 
 It grows with the square of the gear ratio and is far larger than the inertia of the wheel. It also lets ten solver
-iterations converge: without it, a robot at rest creeps at 1.1 mm/s, with it at 2 µm/s. For skidding wheels, friction
-is then closer to opposite to the slip (Coulomb). A larger inertia would tip the robot: the reaction torque of an
-accelerating rotor turns the chassis, and with 1.0 a Jackal flips over at 5 m/s².
+iterations converge: without it, a robot at rest creeps. For skidding wheels, it brings the direction of friction closer
+to Coulomb's law. A larger inertia would tip the robot, because the reaction torque of an accelerating rotor turns the
+chassis.
 """
 STALL_TORQUE = {"differential": 0.7, "ackermann": 0.7, "skid_steer": 1.5}
-"""Stall torque of a motor relative to the torque at which its wheel spins on the spot.
+"""Stall torque of a motor divided by the torque at which its wheel loses grip, by drive.
 
-A differential drive stalls against a wall rather than spinning its wheels; skid steering needs more than the friction
+A differential drive stalls against a wall rather than spinning its wheels. Skid steering needs more than the friction
 torque, because it also accelerates the rotors.
 """
-MASS_OFFSET_SHARE = 0.1
-"""Distance of the center of mass of a symmetric robot behind the axle, relative to the distance of the caster.
+MASS_OFFSET_RATIO = 0.1
+"""Smallest distance of the center of mass from the axle, divided by the distance of the loaded caster from the axle.
 
-With the center of mass exactly above the axle, the robot would rock between its casters and the solver would decide the
-load on the wheels: they slip by 4 % when accelerating with 1 m/s², instead of 0.1 %.
+With the center of mass exactly above the axle, the robot would rock between its casters, and the load on the wheels
+would be undetermined.
 """
 CASTER_GAP_M = 0.001
 """Height of the unloaded caster above the ground in m."""
@@ -46,9 +46,9 @@ that tips by 8°.
 
 @dataclass(frozen=True, eq=False)
 class Wheel:
-    """A wheel with its center at `x`, `y` in the base frame, `radius` above the ground; all in meters.
+    """A wheel on the ground that turns about y, with its center at `x` and `y` in the base frame; lengths are in m.
 
-    It turns about y. A driven one has a motor with `torque` in N m and a `rotor` in kg m².
+    A driven wheel has a motor with `stall_torque` in N m and `rotor_inertia` in kg m²; see ROTOR_INERTIA.
     """
 
     name: str
@@ -59,17 +59,20 @@ class Wheel:
     inertia: MassProperties
     driven: bool = True
     steered: bool = False
-    torque: float = 0.0
-    rotor: float = 0.0
+    stall_torque: float = 0.0
+    rotor_inertia: float = 0.0
 
     @property
-    def left(self) -> bool:
+    def is_left(self) -> bool:
         """Whether it is on the left side."""
         return self.y > 0
 
 
 def wheels_for_drive(drive: Drive, mass: float) -> tuple[Wheel, ...]:
-    """Return the wheels of a drive, rear before front and left before right; none for an omnidirectional one."""
+    """Return the wheels of a drive without motors, rear before front and left before right.
+
+    Returns () for an omnidirectional drive. `mass` is that of the robot in kg.
+    """
     match drive:
         case Omnidirectional():
             return ()
@@ -79,7 +82,7 @@ def wheels_for_drive(drive: Drive, mass: float) -> tuple[Wheel, ...]:
             axles = {"rear": -drive.wheel_base / 2, "front": drive.wheel_base / 2}
         case Ackermann():
             axles = {"rear": 0.0, "front": drive.wheel_base}
-    inertia = wheel_inertia(WHEEL_MASS_SHARE * mass, drive.wheel_radius, drive.wheel_width)
+    inertia = wheel_inertia(WHEEL_MASS_RATIO * mass, drive.wheel_radius, drive.wheel_width)
     half = drive.wheel_separation / 2
     return tuple(
         Wheel(f"{axle}_{side}", x, y, drive.wheel_radius, drive.wheel_width, inertia, driven=not steered,
@@ -91,20 +94,20 @@ def wheels_for_drive(drive: Drive, mass: float) -> tuple[Wheel, ...]:
 
 
 def wheel_inertia(mass: float, radius: float, width: float) -> MassProperties:
-    """Return the properties of a wheel as a disc that rotates about y."""
-    return inertia_of_shape(Cylinder(radius, width), mass).placed(Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0))
+    """Return the mass properties of a wheel: a disc that rotates about y, with its center at the origin."""
+    return inertia_of_shape(Cylinder(radius, width), mass).transformed(Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0))
 
 
 def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wheel, ...]:
-    """Return the wheels with motors for a robot of this mass in kg; a planar base has its own motors."""
+    """Return the wheels with motors for a robot of `mass` kg; mecanum wheels get none, because a planar base has its own."""
     if isinstance(drive, Mecanum):
         return wheels
     grip = mass * GRAVITY_M_S2 / max(1, sum(wheel.driven for wheel in wheels))
     return tuple(
         replace(
             wheel,
-            torque=STALL_TORQUE[drive.type] * grip * wheel.radius,
-            rotor=ROTOR_INERTIA[drive.type] * mass * wheel.radius**2,
+            stall_torque=STALL_TORQUE[drive.type] * grip * wheel.radius,
+            rotor_inertia=ROTOR_INERTIA[drive.type] * mass * wheel.radius**2,
         )
         if wheel.driven
         else wheel
@@ -113,9 +116,9 @@ def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wh
 
 
 def wheel_guards(wheel: Wheel, parts: Sequence[Solid]) -> tuple[Solid, ...]:
-    """Return the collision shape of a wheel for obstacles: a box around it, unless the hull covers it.
+    """Return a box with which a wheel collides with obstacles, or () if a part of the hull covers the wheel from above.
 
-    The box ends above the ground and below the top of the wheel, so that it never carries weight.
+    The box ends above the ground, so that it never carries weight.
     """
     box = Solid(
         Box((2 * wheel.radius, wheel.width, 1.2 * wheel.radius)), Pose3(wheel.x, wheel.y, wheel.radius), "wheel"
@@ -132,24 +135,25 @@ def _contains(outer: Polygon, inner: Polygon) -> bool:
 def add_casters(
     chassis: MassProperties, outline: Polygon, wheel_radius: float
 ) -> tuple[MassProperties, tuple[Solid, ...]]:
-    """Add casters in front of and behind the axle: one carries weight, the other ends just above the ground.
+    """Return a chassis and two casters: the loaded caster touches the ground, the other one ends just above it.
 
-    Returns the chassis, with its center of mass shifted towards the loaded caster if needed, and the casters.
+    One caster is in front of the axle and one behind. The center of mass of the chassis is shifted towards the loaded
+    caster if it is closer to the axle than MASS_OFFSET_RATIO allows. `outline` is that of the hull, seen from above.
     """
     radius = 0.5 * wheel_radius
     front = 0.9 * (max(x for x, _ in outline) - radius)
     rear = 0.9 * (min(x for x, _ in outline) + radius)
     center = chassis.center.copy()
-    loaded = front if center[0] > MASS_OFFSET_SHARE * front else rear
-    if abs(center[0]) < MASS_OFFSET_SHARE * abs(loaded):
-        center[0] = MASS_OFFSET_SHARE * loaded
+    loaded = front if center[0] > MASS_OFFSET_RATIO * front else rear
+    if abs(center[0]) < MASS_OFFSET_RATIO * abs(loaded):
+        center[0] = MASS_OFFSET_RATIO * loaded
     gaps = {front: CASTER_GAP_M, rear: CASTER_GAP_M} | {loaded: 0.0}
     balls = tuple(Solid(Sphere(radius), Pose3(x, 0.0, radius + gap), "caster") for x, gap in gaps.items())
     return MassProperties(chassis.mass, center, chassis.tensor), balls
 
 
 def compliant_casters(casters: Sequence[Solid]) -> tuple[Solid, ...]:
-    """Return the casters for uneven ground, where the unloaded one is higher."""
+    """Return the casters for uneven ground, with a larger gap below the unloaded one."""
     return tuple(_raised(caster) if caster_gap(caster) > 0 else caster for caster in casters)
 
 

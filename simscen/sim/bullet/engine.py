@@ -17,7 +17,7 @@ MAX_FACES_PER_SHAPE = 40_000
 """Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
 STRIP_WIDTH_M = 20.0
 """Width in m along x of the strips by which faces are sorted into tiles."""
-CONTACT_BREAKING_SHARE = 0.02
+CONTACT_BREAKING_RATIO = 0.02
 """Share of a shape's extent by which a contact point may move in a step and still count as the same point."""
 REST_SPEED_SQUARED = 1e-6
 """Squared speed in (m/s)² below which a body is at rest; Bullet's default of 0.05 would stop a ball at 0.2 m/s."""
@@ -58,7 +58,7 @@ def set_physics_parameters(
         frictionERP=0.2,
         globalCFM=0.0,
         restitutionVelocityThreshold=0.2,
-        contactBreakingThreshold=CONTACT_BREAKING_SHARE,
+        contactBreakingThreshold=CONTACT_BREAKING_RATIO,
         contactSlop=1e-5,
         collisionFilterMode=0,
         useSplitImpulse=0,

@@ -73,7 +73,7 @@ class Clearance:
         self._state = state
         self.others: Sequence[Clearance] = ()
         """Clearances of the other robots."""
-        limits, (self._radius, self._height) = robot.limits, radius_and_height(robot.solid)
+        limits, (self._radius, self._height) = robot.limits, radius_and_height(robot.collision_solids)
         self._limits, self._max_speed = limits, max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0)
         self._extent = math.hypot(self._radius, self._height)
         self.size = SHAPE_MARGIN_M + self._extent

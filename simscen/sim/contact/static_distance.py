@@ -48,9 +48,9 @@ class StaticDistance:
     def __init__(self, static: TriangleMesh, robot: RobotBody, max_range: float) -> None:
         self._client = CLIENT_POOL.take()
         self._mesh, self._max_range = static, max_range
-        radius, self._height = outline.radius_and_height(robot.solid)
+        radius, self._height = outline.radius_and_height(robot.collision_solids)
         self._radius, self._extent = radius + EXTENT_MARGIN_M, math.hypot(radius, self._height)
-        self._hull = engine.hull_shapes(self._client, robot.solid)
+        self._hull = engine.hull_shapes(self._client, robot.collision_solids)
         self._parts = parts_of(static)
         self._shape_pairs: dict[int, list[tuple[int, int]]] = {}
         self._others: list[PartBound] = []

@@ -35,7 +35,7 @@ class PlanarBase:
         """Place the base at `pose`; the renderer shows `visual_shape`."""
         self._client = client
         moments, base_from_center = _total_mass_properties(body).principal()
-        hulls = engine.hull_shapes(client, body.solid)
+        hulls = engine.hull_shapes(client, body.collision_solids)
         extra = len(hulls) - 1
         self.id: int = pybullet.createMultiBody(
             0,
@@ -64,7 +64,7 @@ class PlanarBase:
             )  # fmt: skip
         for link in self.hull_links:
             engine.set_collision_filter(client, self.id, link, engine.HULL, ~engine.GROUND)
-        self._mass, self._floor_friction, self._power = body.mass, 1.0, body.power
+        self._mass, self._floor_friction, self._motor_ratio = body.mass, 1.0, body.motor_ratio
         self._radius = body.circumscribed_radius
         self.place(pose)
 
@@ -97,7 +97,7 @@ class PlanarBase:
 
     def set_motors(self, velocity: Twist) -> None:
         """Set the motors to a velocity along the world axes, with at most the force that the wheels can transmit."""
-        max_force = min(MAX_FORCE_PER_WEIGHT * self._power, self._floor_friction) * self._mass * GRAVITY_M_S2
+        max_force = min(MAX_FORCE_PER_WEIGHT * self._motor_ratio, self._floor_friction) * self._mass * GRAVITY_M_S2
         pybullet.setJointMotorControlArray(
             self.id,
             self.joints,
@@ -110,7 +110,7 @@ class PlanarBase:
 
 def _total_mass_properties(body: RobotBody) -> MassProperties:
     """Return the mass properties of the chassis with its wheels, which do not turn in this model."""
-    wheels = [wheel.inertia.placed(Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
+    wheels = [wheel.inertia.transformed(Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
     return combine([body.chassis, *wheels]) if wheels else body.chassis
 
 

@@ -137,7 +137,7 @@ class Robot:
         """The other robots, by name."""
         self.bodies: Mapping[str, Body] = {}
         """All movable bodies by name; the same object until one is added or removed."""
-        self.body = Body(name, body.solid, Pose3.planar(pose), body.mass)
+        self.body = Body(name, body.collision_solids, Pose3.planar(pose), body.mass)
         self._collisions = CollisionTracker(scene.tick_rate)
         self._placements, self._placed_tick = 0, -1
         is_uneven = bool(scene.terrain and self.base.ground_links)

@@ -118,8 +118,8 @@ class DifferentialDrive:
 def driven_joints(body: RobotBody, vehicle: WheeledBase) -> tuple[list[int], list[int], list[float]]:
     """Return the joints of the left and of the right driven wheels, and all stall torques in N m in that order."""
     wheels = [(w, joint) for w, joint in zip(body.wheels, vehicle.joints, strict=True) if w.driven]
-    left, right = [pair for pair in wheels if pair[0].left], [pair for pair in wheels if not pair[0].left]
-    return [j for _, j in left], [j for _, j in right], [w.torque for w, _ in left + right]
+    left, right = [pair for pair in wheels if pair[0].is_left], [pair for pair in wheels if not pair[0].is_left]
+    return [j for _, j in left], [j for _, j in right], [w.stall_torque for w, _ in left + right]
 
 
 def is_rolling(client: int, robot: int, joints: Sequence[int], radius: float) -> bool:

@@ -81,7 +81,7 @@ class WheeledBase:
             linearDamping=0,
             angularDamping=0,
             jointDamping=0,
-            localInertiaDiagonal=(xx, yy + wheel.rotor, zz),
+            localInertiaDiagonal=(xx, yy + wheel.rotor_inertia, zz),
             physicsClientId=self._client,
         )
 
@@ -211,7 +211,7 @@ def _wheel_shape(client: int, wheel: Wheel, max_roll: float) -> int:
     accumulate up to three outdated points, which double the cost of a step. A small sphere along the axle, where
     nothing touches it, makes the extent large enough; it lies within the wheel on the other side.
     """
-    pin_distance = min(ROLL_MARGIN * max_roll / engine.CONTACT_BREAKING_SHARE, 2 * abs(wheel.y) + wheel.radius / 2)
+    pin_distance = min(ROLL_MARGIN * max_roll / engine.CONTACT_BREAKING_RATIO, 2 * abs(wheel.y) + wheel.radius / 2)
     if pin_distance <= wheel.radius:
         shape: int = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel.radius, physicsClientId=client)
         return shape

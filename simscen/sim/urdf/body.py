@@ -301,7 +301,9 @@ def _scale(spec: RobotSpec, tree: LinkTree) -> float:
 
 def _chassis_mass(tree: LinkTree, links: Sequence[str], base_from_root: Pose3, scale: float) -> MassProperties:
     masses = [(tree.poses[name], tree.links[name].mass) for name in links]
-    parts = [mass.placed(base_from_root.compose(pose)) for pose, mass in masses if mass is not None and mass.mass > 0]
+    parts = [
+        mass.transformed(base_from_root.compose(pose)) for pose, mass in masses if mass is not None and mass.mass > 0
+    ]
     if not parts:
         raise InvalidInput([tree.element.problem("no link besides the wheels has a mass; give one an <inertial>")])
     whole = combine(parts)
@@ -311,7 +313,7 @@ def _chassis_mass(tree: LinkTree, links: Sequence[str], base_from_root: Pose3, s
 def _wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale: float, spec: RobotSpec) -> Wheel:
     x, y, _ = base_from_root.compose(Pose3(*wheel.place)).position
     links = [(tree.poses[name], tree.links[name].mass) for name in tree.subtree(wheel.joint.child)]
-    parts = [mass.placed(pose) for pose, mass in links if mass is not None and mass.mass > 0]
+    parts = [mass.transformed(pose) for pose, mass in links if mass is not None and mass.mass > 0]
     mass = scale * sum(part.mass for part in parts)
     inertia = wheel_inertia(mass, wheel.radius, wheel.width) if mass > 0 else None
     if inertia is None:

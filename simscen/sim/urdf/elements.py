@@ -182,7 +182,7 @@ def _mass(inertial: Element) -> MassProperties:
             raise InvalidElement(tensor, "a moment of inertia must not be negative")
     xx, xy, xz, yy, yz, zz = values
     own = MassProperties(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    return own.placed(_origin(inertial))
+    return own.transformed(_origin(inertial))
 
 
 MAX_LINKS = 200

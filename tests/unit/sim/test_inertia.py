@@ -41,12 +41,12 @@ def test_two_halves_of_a_box_are_the_box():
 
 def test_principal_axes_of_a_turned_box_are_the_boxs_own():
     box = inertia_of_shape(Box((0.4, 0.3, 0.1)), 2.0)
-    moments, frame = box.placed(Pose3.from_rpy(1, 2, 3, 0.3, -0.2, 0.9)).principal()
+    moments, frame = box.transformed(Pose3.from_rpy(1, 2, 3, 0.3, -0.2, 0.9)).principal()
     assert sorted(moments) == pytest.approx(sorted(np.diag(box.tensor)))
     assert frame.position == pytest.approx((1, 2, 3))
     turn = frame.rotation()
     back = turn @ np.diag(moments) @ turn.T
-    assert back == pytest.approx(box.placed(Pose3.from_rpy(0, 0, 0, 0.3, -0.2, 0.9)).tensor)
+    assert back == pytest.approx(box.transformed(Pose3.from_rpy(0, 0, 0, 0.3, -0.2, 0.9)).tensor)
     assert math.isclose(np.linalg.det(turn), 1.0)
 
 

@@ -16,12 +16,12 @@ TICKS, GRAVITY_M_S2 = 240, 9.81
 
 def inertial_mass(body, payload):
     """What the motors of wheels accelerate: the robot, its load, and what turns with the wheels."""
-    turning = [wheel.inertia.tensor[1, 1] + wheel.rotor for wheel in body.wheels]
+    turning = [wheel.inertia.tensor[1, 1] + wheel.rotor_inertia for wheel in body.wheels]
     return body.mass + payload + sum(i / w.radius**2 for i, w in zip(turning, body.wheels, strict=True))
 
 
 def force(body):
-    return sum(wheel.torque / wheel.radius for wheel in body.wheels)
+    return sum(wheel.stall_torque / wheel.radius for wheel in body.wheels)
 
 
 def test_a_load_that_the_motors_cannot_brake_lengthens_the_way_to_stop_to_v_squared_over_2_a(simulate):
