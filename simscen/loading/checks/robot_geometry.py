@@ -50,11 +50,11 @@ def dimension_warnings(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]
 
 def _urdf_dimensions(wheels: tuple[Wheel, ...]) -> dict[str, float]:
     """Return the dimensions of the drive in m according to its wheels, by key of the drive in a robot file."""
-    driven = [wheel for wheel in wheels if wheel.driven]
+    driven = [wheel for wheel in wheels if wheel.is_driven]
     if not driven:
         return {}
     left, right = ([wheel.y for wheel in driven if wheel.is_left is side] for side in (True, False))
-    axles, steered = [wheel.x for wheel in driven], [wheel.x for wheel in wheels if wheel.steered]
+    axles, steered = [wheel.x for wheel in driven], [wheel.x for wheel in wheels if wheel.is_steered]
     base = np.mean(steered) - np.mean(axles) if steered else max(axles) - min(axles)
     return {
         "wheel_radius": float(np.mean([wheel.radius for wheel in driven])),

@@ -168,7 +168,7 @@ class ClimbLimits(NamedTuple):
 
 def compute_climb_limits(body: RobotBody, friction: float = 1.0) -> ClimbLimits:
     """Return what a robot can climb, limited by its hull, its motors, and the friction coefficient of its wheels."""
-    wheels = [wheel for wheel in body.wheels if wheel.driven and wheel.stall_torque > 0]
+    wheels = [wheel for wheel in body.wheels if wheel.is_driven and wheel.stall_torque > 0]
     if not wheels:
         return ClimbLimits(0.0, 0.0)
     pull = sum(wheel.stall_torque / wheel.radius for wheel in wheels) / (body.mass * GRAVITY_M_S2)
@@ -195,8 +195,8 @@ def grip_angle(body: RobotBody, friction: float) -> float:
 
 def _driven_weight_ratio(body: RobotBody) -> float:
     """Return the weight on the driven wheels divided by the total weight, on level ground and without casters."""
-    driven = [wheel.x for wheel in body.wheels if wheel.driven]
-    idle = [wheel.x for wheel in body.wheels if not wheel.driven]
+    driven = [wheel.x for wheel in body.wheels if wheel.is_driven]
+    idle = [wheel.x for wheel in body.wheels if not wheel.is_driven]
     if not idle:
         return 1.0
     driven_x, idle_x = sum(driven) / len(driven), sum(idle) / len(idle)

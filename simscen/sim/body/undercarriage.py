@@ -57,8 +57,8 @@ class Wheel:
     radius: float
     width: float
     inertia: MassProperties
-    driven: bool = True
-    steered: bool = False
+    is_driven: bool = True
+    is_steered: bool = False
     stall_torque: float = 0.0
     rotor_inertia: float = 0.0
 
@@ -85,8 +85,8 @@ def wheels_for_drive(drive: Drive, mass: float) -> tuple[Wheel, ...]:
     inertia = wheel_inertia(WHEEL_MASS_RATIO * mass, drive.wheel_radius, drive.wheel_width)
     half = drive.wheel_separation / 2
     return tuple(
-        Wheel(f"{axle}_{side}", x, y, drive.wheel_radius, drive.wheel_width, inertia, driven=not steered,
-              steered=steered)
+        Wheel(f"{axle}_{side}", x, y, drive.wheel_radius, drive.wheel_width, inertia, is_driven=not steered,
+              is_steered=steered)
         for axle, x in axles.items()
         for steered in [isinstance(drive, Ackermann) and axle == "front"]
         for side, y in (("left", half), ("right", -half))
@@ -102,14 +102,14 @@ def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wh
     """Return the wheels with motors for a robot of `mass` kg; mecanum wheels get none, because a planar base has its own."""
     if isinstance(drive, Mecanum):
         return wheels
-    grip = mass * GRAVITY_M_S2 / max(1, sum(wheel.driven for wheel in wheels))
+    grip = mass * GRAVITY_M_S2 / max(1, sum(wheel.is_driven for wheel in wheels))
     return tuple(
         replace(
             wheel,
             stall_torque=STALL_TORQUE[drive.type] * grip * wheel.radius,
             rotor_inertia=ROTOR_INERTIA[drive.type] * mass * wheel.radius**2,
         )
-        if wheel.driven
+        if wheel.is_driven
         else wheel
         for wheel in wheels
     )

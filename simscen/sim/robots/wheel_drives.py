@@ -117,7 +117,7 @@ class DifferentialDrive:
 
 def driven_joints(body: RobotBody, vehicle: WheeledBase) -> tuple[list[int], list[int], list[float]]:
     """Return the joints of the left and of the right driven wheels, and all stall torques in N m in that order."""
-    wheels = [(w, joint) for w, joint in zip(body.wheels, vehicle.joints, strict=True) if w.driven]
+    wheels = [(w, joint) for w, joint in zip(body.wheels, vehicle.joints, strict=True) if w.is_driven]
     left, right = [pair for pair in wheels if pair[0].is_left], [pair for pair in wheels if not pair[0].is_left]
     return [j for _, j in left], [j for _, j in right], [w.stall_torque for w, _ in left + right]
 
@@ -167,7 +167,7 @@ class AckermannDrive:
         wheels = list(zip(body.wheels, vehicle.joints, strict=True))
         self._left, self._right, self._torques = driven_joints(body, vehicle)
         # Left before right, like the angles in _set_steering.
-        self._knuckles = [joint for wheel, joint in sorted(wheels, key=lambda w: -w[0].y) if wheel.steered]
+        self._knuckles = [joint for wheel, joint in sorted(wheels, key=lambda w: -w[0].y) if wheel.is_steered]
         self._servo_torque = 0.5 * body.mass * GRAVITY_M_S2 * body.drive.wheel_radius
         # The front wheels roll freely.
         rolling = [joint + 1 for joint in self._knuckles]

@@ -62,7 +62,7 @@ class WheeledBase:
         for wheel, joint in zip(body.wheels, self.joints, strict=True):
             self._set_up_wheel(wheel, joint)
         self._wheels: dict[int, Vector] = {
-            joint + 1 if wheel.steered else joint: (wheel.x, wheel.y, 0.0)
+            joint + 1 if wheel.is_steered else joint: (wheel.x, wheel.y, 0.0)
             for wheel, joint in zip(body.wheels, self.joints, strict=True)
         }
         self._frictions = dict.fromkeys(self._wheels, 1.0)
@@ -70,7 +70,7 @@ class WheeledBase:
 
     def _set_up_wheel(self, wheel: Wheel, joint: int) -> None:
         xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # the axle is the y axis
-        link = joint + 1 if wheel.steered else joint
+        link = joint + 1 if wheel.is_steered else joint
         # The sphere extends beyond the sides of a narrow wheel; against obstacles, the wheel guard in the hull is used.
         engine.set_collision_filter(self._client, self.id, link, engine.WHEEL, engine.GROUND | engine.TERRAIN)
         pybullet.changeDynamics(
@@ -132,7 +132,7 @@ def _ground_links(
     body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]
 ) -> dict[int, float]:
     """Return the links of wheels and of separate casters (the last link of the hull); see `Base.ground_links`."""
-    wheels = [joint + 1 if wheel.steered else joint for wheel, joint in zip(body.wheels, joints, strict=True)]
+    wheels = [joint + 1 if wheel.is_steered else joint for wheel, joint in zip(body.wheels, joints, strict=True)]
     return dict.fromkeys(wheels, MIN_NORMAL_Z_WHEEL) | ({hull[-1]: MIN_NORMAL_Z_CASTER} if casters else {})
 
 
@@ -195,7 +195,7 @@ class _Link(NamedTuple):
 
 def _wheel_links(client: int, wheel: Wheel, index: int, max_roll: float) -> list[_Link]:
     shape, position = _wheel_shape(client, wheel, max_roll), (wheel.x, wheel.y, wheel.radius)
-    if not wheel.steered:
+    if not wheel.is_steered:
         return [_Link(wheel.inertia.mass, shape, position, 0, pybullet.JOINT_REVOLUTE, (0, 1, 0))]
     return [
         _Link(KNUCKLE_MASS_RATIO * wheel.inertia.mass, -1, position, 0, pybullet.JOINT_REVOLUTE, (0, 0, 1)),

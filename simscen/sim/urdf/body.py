@@ -77,7 +77,7 @@ def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshRead
 
 
 def _drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> Drive:
-    driven = [wheel for wheel in wheels if not wheel.steered]
+    driven = [wheel for wheel in wheels if not wheel.is_steered]
     left, right = ([w for w in driven if w.is_left is side] for side in (True, False))
     if not left or len(left) != len(right):
         message = f"the drive of the robot cannot be inferred from its wheels: {_found_wheels(wheels, others)}"
@@ -86,7 +86,7 @@ def _drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, list[s
     axles = [w.place[0] for w in driven]
     radius, width = (float(np.mean(values)) for values in zip(*((w.radius, w.width) for w in driven), strict=True))
     size = {"wheel_radius": radius, "wheel_separation": separation, "wheel_width": width}
-    steered = [wheel for wheel in wheels if wheel.steered and not wheel.is_caster]
+    steered = [wheel for wheel in wheels if wheel.is_steered and not wheel.is_caster]
     if steered:
         check_front_steering([*driven, *steered])
         base = float(np.mean([wheel.place[0] for wheel in steered]) - np.mean(axles))
@@ -128,7 +128,7 @@ def _found_wheels(wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> 
         return "it has no movable joints"
     groups: dict[str, list[str]] = {"left": [], "right": []}
     for wheel in wheels:
-        group = "steered" if wheel.steered else "left" if wheel.is_left else "right"
+        group = "steered" if wheel.is_steered else "left" if wheel.is_left else "right"
         groups.setdefault(group, []).append(wheel.joint.name)
     found = [f"{group}: {_shortened(names)}" for group, names in groups.items()]
     reasons = [f"{_shortened(names)} ({reason})" for reason, names in others.items()][:MAX_LISTED]
@@ -145,7 +145,7 @@ def _shortened(names: Sequence[str]) -> str:
 
 
 def _limits(wheels: list[WheelJoint], drive: Drive) -> Limits:
-    speeds = [wheel.joint.limits.velocity * wheel.radius for wheel in wheels if not wheel.steered]
+    speeds = [wheel.joint.limits.velocity * wheel.radius for wheel in wheels if not wheel.is_steered]
     linear = min([1.0, *(speed for speed in speeds if speed > 0)])
     angular = min(1.5, 2 * linear / getattr(drive, "wheel_separation", 1.0))
     return Limits(linear=linear, angular=angular, linear_acceleration=1.0, angular_acceleration=2.0)
@@ -154,7 +154,7 @@ def _limits(wheels: list[WheelJoint], drive: Drive) -> Limits:
 def _lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint]) -> Mount:
     body = body_from_tree(draft, tree)
     ground = min(wheel.bottom for wheel in wheels)
-    axle = np.mean([wheel.place for wheel in wheels if not wheel.steered], axis=0)
+    axle = np.mean([wheel.place for wheel in wheels if not wheel.is_steered], axis=0)
     for name in tree.links:
         if any(word in name.lower() for word in LIDAR_NAMES):
             pose = tree.poses[name]
@@ -241,12 +241,12 @@ def _check_wheels(spec: RobotSpec, tree: LinkTree, wheels: list[WheelJoint]) -> 
         return
     if isinstance(spec.drive, Mecanum):
         _check_corners(tree, wheels)
-    driven = [wheel for wheel in wheels if not wheel.steered]
+    driven = [wheel for wheel in wheels if not wheel.is_steered]
     if len({wheel.is_left for wheel in driven}) < 2:
         hint = "name the wheel joints in the drive's `left` and `right`"
         message = f"no driven wheels found on both sides: {_found_wheels(*examine_joints(tree))}"
         raise InvalidInput([tree.element.problem(message, hint)])
-    if spec.drive.type == "ackermann" and not any(wheel.steered for wheel in wheels):
+    if spec.drive.type == "ackermann" and not any(wheel.is_steered for wheel in wheels):
         hint = "name the steering joints in the drive's `steering`"
         raise InvalidInput([tree.element.problem("no steered wheels found", hint)])
     check_front_steering(wheels)
@@ -265,11 +265,11 @@ def _check_corners(tree: LinkTree, wheels: list[WheelJoint]) -> None:
 
 def check_front_steering(wheels: Sequence[WheelJoint]) -> None:
     """Raise InvalidInput for a car whose steered wheels are not in front of the driven ones."""
-    steered = [wheel for wheel in wheels if wheel.steered]
+    steered = [wheel for wheel in wheels if wheel.is_steered]
     if not steered:
         return
     front, rear = (
-        float(np.mean([w.place[0] for w in group])) for group in (steered, [w for w in wheels if not w.steered])
+        float(np.mean([w.place[0] for w in group])) for group in (steered, [w for w in wheels if not w.is_steered])
     )
     if front <= rear:
         message = (
@@ -283,7 +283,7 @@ def _base_from_root(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:
     """Return the root frame in the base frame, which is on the ground below the center of the driven axles."""
     if not wheels:
         return Pose3(0.0, 0.0, -min(_lowest(solid) for solid in solids))
-    x, y, _ = np.mean([wheel.place for wheel in wheels if not wheel.steered], axis=0).tolist()
+    x, y, _ = np.mean([wheel.place for wheel in wheels if not wheel.is_steered], axis=0).tolist()
     return Pose3(-x, -y, -min(wheel.bottom for wheel in wheels))
 
 
@@ -321,8 +321,8 @@ def _wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale: floa
         raise InvalidInput([problem])
     car = spec.drive.type == "ackermann"
     return Wheel(
-        wheel.joint.name, x, y, wheel.radius, wheel.width, inertia, driven=not (car and wheel.steered),
-        steered=car and wheel.steered,
+        wheel.joint.name, x, y, wheel.radius, wheel.width, inertia, is_driven=not (car and wheel.is_steered),
+        is_steered=car and wheel.is_steered,
     )  # fmt: skip
 
 

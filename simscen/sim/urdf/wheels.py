@@ -41,7 +41,7 @@ class WheelJoint:
     place: tuple[float, float, float]
     radius: float
     width: float
-    steered: bool
+    is_steered: bool
     trail: float = 0.0
     steering: Joint | None = None
 
@@ -58,7 +58,7 @@ class WheelJoint:
     @property
     def is_caster(self) -> bool:
         """Whether the wheel follows the motion of the robot instead of being steered."""
-        return self.steered and self.trail > MIN_CASTER_TRAIL_RADII * self.radius
+        return self.is_steered and self.trail > MIN_CASTER_TRAIL_RADII * self.radius
 
 
 def infer_wheels(tree: LinkTree) -> list[WheelJoint]:
@@ -80,12 +80,12 @@ def examine_joints(tree: LinkTree) -> tuple[list[WheelJoint], Mapping[str, list[
         elif wheel is not None:
             wheels.append(_with_trail(tree, wheel, steering_joints))
     ground = min((wheel.bottom for wheel in wheels), default=0.0)
-    largest = max((wheel.radius for wheel in wheels if not wheel.steered and _is_on(ground, wheel)), default=0.0)
+    largest = max((wheel.radius for wheel in wheels if not wheel.is_steered and _is_on(ground, wheel)), default=0.0)
     kept = []
     for wheel in sorted(wheels, key=lambda w: (w.place[0], -w.place[1], w.joint.name)):
         if not _is_on(ground, wheel):
             others.setdefault(f"{wheel.bottom - ground:.3g} m above the ground", []).append(wheel.joint.name)
-        elif not wheel.steered and wheel.radius < MIN_DRIVEN_RADIUS_RATIO * largest:
+        elif not wheel.is_steered and wheel.radius < MIN_DRIVEN_RADIUS_RATIO * largest:
             reason = f"radius {wheel.radius:.3g} m, much less than that of the largest wheel"
             others.setdefault(reason, []).append(wheel.joint.name)
         else:
@@ -137,7 +137,7 @@ def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
     wheels = infer_wheels(tree)
     if not named:
         # A wheel that swivels is a caster of a differential drive, not a steered wheel: it becomes part of the hull.
-        return [w for w in wheels if not w.steered] if isinstance(drive, Differential) else wheels
+        return [w for w in wheels if not w.is_steered] if isinstance(drive, Differential) else wheels
     turned = steered_links(tree, [tree.joints[name] for name in steering or []])
     given = [
         WheelJoint(

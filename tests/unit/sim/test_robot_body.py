@@ -60,7 +60,7 @@ def test_two_wheels_get_casters_within_the_hull_of_which_one_carries():
 
 def test_the_base_frame_of_a_car_is_under_its_rear_axle():
     wheels = build_robot_body(shipped("car")).wheels
-    assert [(wheel.x, wheel.steered, wheel.driven) for wheel in wheels] == [
+    assert [(wheel.x, wheel.is_steered, wheel.is_driven) for wheel in wheels] == [
         (0.0, False, True), (0.0, False, True), (0.45, True, False), (0.45, True, False)]  # fmt: skip
 
 

@@ -125,8 +125,8 @@ def test_swivel_casters_of_a_differential_drive_are_not_steered_wheels(load):
         + WHEEL.format(side="rear", y=0).replace('link="base"', 'link="fork"').replace("0.05", "0.03")
     )
     body = load(robot(extra=caster))
-    assert [wheel.driven for wheel in body.wheels if wheel.driven] == [True, True]
-    assert not any(wheel.steered for wheel in body.wheels)
+    assert [wheel.is_driven for wheel in body.wheels if wheel.is_driven] == [True, True]
+    assert not any(wheel.is_steered for wheel in body.wheels)
 
 
 def test_casters_that_stand_on_the_ground_are_left_to_the_bodys_own(load):
@@ -310,7 +310,7 @@ def test_a_car_is_steered_by_the_wheels_below_upright_joints(load):
     )
     drive = {"type": "ackermann", "wheel_radius": 0.05, "wheel_separation": 0.4, "wheel_base": 0.4, "max_steering": 0.5}
     body = load(robot(extra=steering), drive=drive)
-    assert [(w.steered, w.driven, round(w.x, 3)) for w in body.wheels] == [
+    assert [(w.is_steered, w.is_driven, round(w.x, 3)) for w in body.wheels] == [
         (False, True, 0.0), (False, True, 0.0), (True, False, 0.4), (True, False, 0.4)]  # fmt: skip
     simulation = SingleRobotSimulation(merge_solids([]), [], body, Pose2(0, 0, 0), triangulate)
     simulation.drive(Twist(0.4, 0.0, 0.4))
