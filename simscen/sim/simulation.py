@@ -66,7 +66,7 @@ class Simulation:
         engine.set_physics_parameters(client, tick_rate, solver_iterations, solve_islands_separately=len(robots) > 1)
         terrain = Terrain(client, static, max((w.radius for r in robots.values() for w in r.body.wheels), default=0.0))
         walls = Walls(client, terrain.obstacles)
-        visual_shape = engine.DEFAULT_VISUAL if has_images else engine.invisible_shape(client)
+        visual_shape = engine.DEFAULT_VISUAL if has_images else engine.create_invisible_shape(client)
         render_scene = RenderScene(client, static, triangulate) if has_images else None
         actors = Actors(client, tick_rate, triangulate, visual_shape, is_rendered=has_images)
         self._scene = Scene(client, tick_rate, walls, terrain, actors, render_scene)

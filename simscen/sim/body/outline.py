@@ -1,7 +1,8 @@
-"""Outlines of solids seen from above: footprints and convex hulls, and the corner points of shapes."""
+"""Convex hulls of shapes, and outlines of solids seen from above, such as footprints."""
 
 import math
 from collections.abc import Iterable, Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -131,3 +132,36 @@ def _ball(radii: tuple[float, float, float]) -> Array:
     rings = [(max(0.0, math.cos(latitude)), math.sin(latitude)) for latitude in latitudes]
     result: Array = _rings(*np.array(rings).T) * radii
     return result
+
+
+MAX_HULL_VERTICES = 256
+"""Number of vertices above which `reduce_hull_vertices` omits vertices."""
+HULL_TOLERANCE_M = 0.001
+"""Largest distance in m of an omitted vertex from the reduced hull."""
+
+_reduced_vertices: "WeakKeyDictionary[Mesh, Array]" = WeakKeyDictionary()
+
+
+def reduce_hull_vertices(mesh: Mesh) -> Array:
+    """Return the vertices (n, 3) that span the convex hull of a mesh within HULL_TOLERANCE_M, in their order.
+
+    Bullet needs time for each vertex at every step. Meshes with few vertices and planar meshes, whose hull has no
+    volume, keep all vertices. The result is cached for each mesh.
+    """
+    if len(mesh.vertices) <= MAX_HULL_VERTICES:
+        return mesh.vertices
+    if mesh not in _reduced_vertices:
+        _reduced_vertices[mesh] = _hull_corners(mesh.vertices)
+    return _reduced_vertices[mesh]
+
+
+def _hull_corners(points: Array) -> Array:
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        # Qhull's option W: a point that is outside of a facet by less counts as inside.
+        hull = ConvexHull(points, qhull_options=f"Qt W{HULL_TOLERANCE_M}")
+    except QhullError:
+        return points
+    corners: Array = points[np.sort(hull.vertices)]
+    return corners

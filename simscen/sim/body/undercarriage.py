@@ -99,7 +99,7 @@ def wheel_inertia(mass: float, radius: float, width: float) -> MassProperties:
 
 
 def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wheel, ...]:
-    """Return the wheels with motors for a robot of `mass` kg; mecanum wheels get none, because a planar base has its own."""
+    """Return the wheels with motors for a robot of `mass` kg; the motors of mecanum wheels are in the planar base."""
     if isinstance(drive, Mecanum):
         return wheels
     grip = mass * GRAVITY_M_S2 / max(1, sum(wheel.is_driven for wheel in wheels))

@@ -26,17 +26,17 @@ class PyBulletBaseline:
         ground = self._create_body(pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
         engine.set_collision_filter(client, ground, -1, engine.GROUND, engine.EVERYTHING)
         if isinstance(static, TriangleMesh):
-            for tile in engine.tiles(static.vertices, engine.above_floor(static.vertices, static.faces)):
-                mesh = self._create_body(engine.concave_shape(client, submesh(static.vertices, tile)))
+            for tile in engine.split_into_tiles(static.vertices, engine.above_floor(static.vertices, static.faces)):
+                mesh = self._create_body(engine.create_concave_shape(client, submesh(static.vertices, tile)))
                 pybullet.changeDynamics(mesh, -1, collisionMargin=0.0, physicsClientId=client)
         else:
             for solid in static:
-                self._create_body(engine.body_shape(client, [solid], False, triangulate))
+                self._create_body(engine.create_body_shape(client, [solid], False, triangulate))
         WheeledBase(self._client, robot, pose)
         self._pose = pose
 
     def _create_body(self, shape: int) -> int:
-        """Create a static body with PyBullet's defaults; `engine.create_static_body` makes a faster one."""
+        """Create a static body with PyBullet's defaults; those of `engine.create_static_body` are faster."""
         return engine.create_rigid_body(self._client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
 
     def step(self, ticks: int) -> None:
@@ -45,10 +45,10 @@ class PyBulletBaseline:
             pybullet.stepSimulation(self._client)
 
     def scan(self, directions: Array, min_range: float, max_range: float, height: float) -> None:
-        """Cast rays along unit vectors (n, 2) between two ranges in m.
+        """Cast rays along unit vectors (n, 2) at a height in m, from `min_range` to `max_range` m from the robot.
 
         Rays start at `min_range`, outside the lidar's housing, as is usual. If they started inside, PyBullet would also
-        test each ray against the housing, which takes a third of the time of a scan.
+        test each ray against the housing.
         """
         origin = (self._pose.x, self._pose.y)
         starts, ends = np.full((2, len(directions), 3), height)

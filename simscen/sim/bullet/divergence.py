@@ -5,17 +5,17 @@ import math
 MAX_SUNK_DEPTH_M = 0.2
 """Depth in m below the floor at which the center of a body has fallen through it.
 
-A landing body penetrates by millimeters, a light body that a scripted one presses down by up to 7 cm.
+A landing body penetrates by millimeters, and a light body that a scripted one presses down by some centimeters.
 """
 MAX_COORDINATE_M = 1e5
 """Largest valid coordinate in m; worlds extend to 10 km."""
 
 
 def divergence_reason(body_name: str, x: float, y: float, z: float, finite_sum: float) -> str | None:
-    """Return why the position of the center of a body is invalid, or None.
+    """Return why the state of a body is invalid, as a sentence about `body_name`, or None if it is valid.
 
-    `finite_sum` is the sum of further numbers, such as its velocity: it is finite only if all of them are finite.
-    `body_name` is the name of the body in the result.
+    `x`, `y`, and `z` are the position of its center in m. `finite_sum` is the sum of all other numbers of its state,
+    such as its velocity: the sum is finite only if all of them are.
     """
     if (
         -MAX_SUNK_DEPTH_M <= z <= MAX_COORDINATE_M

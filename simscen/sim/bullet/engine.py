@@ -1,4 +1,7 @@
-"""Functions on PyBullet clients: physics parameters, collision shapes of solids, and bodies."""
+"""Creates collision shapes and bodies in a PyBullet client, and sets its physics parameters.
+
+`client` is the id of the PyBullet client. Functions that create shapes and bodies return their ids.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -6,19 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.environment.world_model import GRAVITY_M_S2
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Array, Pose3, Vector
 from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, submesh
-from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
-from simscen.sim.body.outline import hull_points
+from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
+from simscen.sim.body.outline import hull_points, reduce_hull_vertices
 from simscen.sim.bullet import pybullet
-from simscen.sim.bullet.hull_vertices import reduce_hull_vertices
 
 MAX_FACES_PER_SHAPE = 40_000
-"""Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
+"""Largest number of faces of a shape: Bullet's shared-memory commands hold at most 131072 vertices."""
 STRIP_WIDTH_M = 20.0
-"""Width in m along x of the strips by which faces are sorted into tiles."""
+"""Width in m along x of the strips into which `split_into_tiles` sorts faces."""
 CONTACT_BREAKING_RATIO = 0.02
-"""Share of a shape's extent by which a contact point may move in a step and still count as the same point."""
+"""Fraction of a shape's extent by which a contact point may move in a step and still count as the same point."""
 REST_SPEED_SQUARED = 1e-6
 """Squared speed in (m/s)² below which a body is at rest; Bullet's default of 0.05 would stop a ball at 0.2 m/s."""
 SLEEP_DELAY_S = 2.0
@@ -27,8 +29,9 @@ SLEEP_DELAY_S = 2.0
 TERRAIN, GROUND, HULL, WHEEL, STATIC = 128, 64, 32, 16, 2
 """Collision groups: uneven ground, ground plane, hull and wheels of robots, and Bullet's own group of static bodies."""
 NOTHING, EVERYTHING = 0, -1
+"""Masks of no and of all collision groups."""
 DEFAULT_VISUAL = -1
-"""Visual shape that equals the collision shape; the renderer does not show most triangle meshes."""
+"""Id of the visual shape that equals the collision shape; the renderer does not show most triangle meshes."""
 
 ORIGIN = Pose3()
 
@@ -36,14 +39,17 @@ PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
 """Shapes that the engine supports as primitives."""
 
 Triangulate = Callable[[Shape], Mesh]
-Frame = tuple[tuple[float, float, float], Pose3]
+"""Returns the closed surface of a shape."""
+PrincipalInertia = tuple[Vector, Pose3]
+"""Principal moments of inertia in kg m², and the frame of their axes at the center of mass, in the body frame."""
 Faces = npt.NDArray[np.int32]
+"""Vertex indices (n, 3) of triangles."""
 
 
 def set_physics_parameters(
     client: int, tick_rate: int, solver_iterations: int, solve_islands_separately: bool = False
 ) -> None:
-    """Set all parameters, so that no trajectory depends on a default.
+    """Set all physics parameters, so that no trajectory depends on a default. `tick_rate` is in Hz.
 
     With `solve_islands_separately`, bodies that are not in contact do not affect each other's solution.
     """
@@ -77,22 +83,20 @@ def set_physics_parameters(
 
 
 def set_collision_filter(client: int, body: int, link: int, group: int, others: int) -> None:
-    """Set the collision group of a link and the groups that it collides with; both sides must match."""
+    """Set the collision group of a link (-1 for the base), and the mask of the groups that it collides with.
+
+    Two links collide if the mask of each one contains the group of the other one.
+    """
     pybullet.setCollisionFilterGroupMask(body, link, group, others, physicsClientId=client)
 
 
-def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:
-    """Create static geometry as a few concave bodies, without the faces that lie on the ground."""
-    return static_faces(client, mesh.vertices, above_floor(mesh.vertices, mesh.faces))
+def create_static_faces(client: int, vertices: Array, faces: Faces) -> list[int]:
+    """Create static faces as a few concave bodies, and return their ids."""
+    return [_create_concave_body(client, vertices, tile) for tile in split_into_tiles(vertices, faces)]
 
 
-def static_faces(client: int, vertices: Array, faces: Faces) -> list[int]:
-    """Create static faces as a few concave bodies."""
-    return [_create_concave_body(client, vertices, tile) for tile in tiles(vertices, faces)]
-
-
-def tiles(vertices: Array, faces: Faces) -> list[Faces]:
-    """Split faces into tiles that are small enough for Bullet; the faces of a tile are close together."""
+def split_into_tiles(vertices: Array, faces: Faces) -> list[Faces]:
+    """Split faces into tiles of at most MAX_FACES_PER_SHAPE faces that are close together."""
     if len(faces) > MAX_FACES_PER_SHAPE:
         middle = vertices[faces, :2].mean(axis=1)
         faces = faces[np.lexsort((middle[:, 1], np.floor(middle[:, 0] / STRIP_WIDTH_M)))]
@@ -100,20 +104,20 @@ def tiles(vertices: Array, faces: Faces) -> list[Faces]:
 
 
 def above_floor(vertices: Array, faces: Faces) -> Faces:
-    """Return the faces that do not lie on the ground."""
+    """Return the faces that do not lie on the floor."""
     above: Faces = faces[(vertices[faces, 2] > FLOOR_HEIGHT_M).any(axis=1)]
     return above
 
 
 def _create_concave_body(client: int, vertices: Array, faces: Faces) -> int:
-    body = create_static_body(client, concave_shape(client, submesh(vertices, faces)))
+    body = create_static_body(client, create_concave_shape(client, submesh(vertices, faces)))
     # Bullet would thicken the triangles by 1 mm.
     pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
     return body
 
 
-def concave_shape(client: int, mesh: Mesh) -> int:
-    """Create the shape of a triangle mesh."""
+def create_concave_shape(client: int, mesh: Mesh) -> int:
+    """Create the shape of a triangle mesh: a surface without an inside."""
     vertices, indices = mesh.vertices.tolist(), mesh.faces.ravel().tolist()
     shape: int = pybullet.createCollisionShape(
         pybullet.GEOM_MESH,
@@ -128,14 +132,14 @@ def concave_shape(client: int, mesh: Mesh) -> int:
     return _checked_shape(shape)
 
 
-def convex_shape(client: int, corners: Array) -> int:
+def create_convex_shape(client: int, corners: Array) -> int:
     """Create the shape of the convex hull of points (n, 3)."""
     shape: int = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=corners.tolist(), physicsClientId=client)
     return _checked_shape(shape)
 
 
-def compound_shape(client: int, solids: Iterable[Solid]) -> int:
-    """Create one rigid shape of boxes, cylinders, spheres, and capsules."""
+def create_compound_shape(client: int, solids: Iterable[Solid]) -> int:
+    """Create one rigid shape of solids that are primitives."""
     kinds, halves, radii, lengths, positions, orientations = [], [], [], [], [], []
     for solid in solids:
         kind, half, radius, length = _primitive(solid.shape)
@@ -157,40 +161,45 @@ def compound_shape(client: int, solids: Iterable[Solid]) -> int:
     return _checked_shape(shape)
 
 
-def hull_shape(client: int, solids: Iterable[Solid]) -> int:
-    """Create the shape of the convex hull of any solids."""
-    return convex_shape(client, np.concatenate([solid.pose.apply(_corners(solid.shape)) for solid in solids]))
+def create_hull_shape(client: int, solids: Iterable[Solid]) -> int:
+    """Create the shape of the common convex hull of solids."""
+    return create_convex_shape(client, np.concatenate([solid.pose.apply(_corners(solid.shape)) for solid in solids]))
 
 
 def _corners(shape: Shape) -> Array:
     return reduce_hull_vertices(shape) if isinstance(shape, Mesh) else hull_points(shape)
 
 
-def hull_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
-    """Create the shapes of a robot's hull: one of all primitives, and the convex hull of each other solid."""
+def create_hull_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
+    """Create the shapes of a robot's hull: one for all primitives, and the convex hull of each other solid."""
     primitives = [solid for solid in solids if isinstance(solid.shape, PRIMITIVES)]
     others = [solid for solid in solids if not isinstance(solid.shape, PRIMITIVES)]
-    first = [compound_shape(client, primitives)] if primitives else []
-    return first + [hull_shape(client, [solid]) for solid in others]
+    first = [create_compound_shape(client, primitives)] if primitives else []
+    return first + [create_hull_shape(client, [solid]) for solid in others]
 
 
-def body_shape(client: int, solids: Sequence[Solid], pushable: bool, triangulate: Triangulate) -> int:
-    """Create the collision shape of a moving object; concave if it is and cannot be pushed.
+def create_body_shape(client: int, solids: Sequence[Solid], is_pushable: bool, triangulate: Triangulate) -> int:
+    """Create the collision shape of a movable object.
 
-    Bullet can push convex shapes only. A pushable object that is not made of primitives becomes its convex hull.
+    If not all solids are primitives, a pushable object becomes its convex hull, because Bullet can only push convex
+    shapes. An object that cannot be pushed becomes a surface, which can be concave.
     """
     if are_primitives(solids):
-        return compound_shape(client, solids)
-    return hull_shape(client, solids) if pushable else concave_shape(client, fuse_surfaces(solids, triangulate))
+        return create_compound_shape(client, solids)
+    return (
+        create_hull_shape(client, solids)
+        if is_pushable
+        else create_concave_shape(client, fuse_surfaces(solids, triangulate))
+    )
 
 
-def is_hollow(solids: Sequence[Solid], pushable: bool) -> bool:
-    """Return whether the collision shape of a moving object is a surface without an inside."""
-    return not are_primitives(solids) and not pushable
+def is_hollow(solids: Sequence[Solid], is_pushable: bool) -> bool:
+    """Return whether `create_body_shape` creates a surface without an inside."""
+    return not are_primitives(solids) and not is_pushable
 
 
 def are_primitives(solids: Sequence[Solid]) -> bool:
-    """Return whether all solids are primitives of the engine."""
+    """Return whether the engine supports all solids as primitives."""
     return all(isinstance(solid.shape, PRIMITIVES) for solid in solids)
 
 
@@ -204,61 +213,63 @@ def fuse_surfaces(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
 
 
 def create_rigid_body(
-    client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float, visual: int = DEFAULT_VISUAL
+    client: int,
+    mass: float,
+    shape: int,
+    pose: Pose3,
+    inertia: PrincipalInertia,
+    friction: float,
+    visual: int = DEFAULT_VISUAL,
 ) -> int:
-    """Create a rigid body with a collision shape, a visual shape, and principal moments and center of mass in `frame`.
+    """Create a body with the collision shape `shape` and the visual shape `visual`; `mass` is in kg.
 
-    A body with mass 0 cannot be pushed. It sleeps while it stands, so that objects on it can sleep as well.
+    A body with mass 0 cannot be pushed. It sleeps while it stands still, so that objects on it can sleep as well.
     """
-    moments, base_from_center = frame
+    moments, base_from_center = inertia
     center = pose.compose(base_from_center)
-    number: int = pybullet.createMultiBody(
+    body_id: int = pybullet.createMultiBody(
         mass, shape, visual, pose.position, pose.quaternion,
         baseInertialFramePosition=base_from_center.position,
         baseInertialFrameOrientation=base_from_center.quaternion, physicsClientId=client,
     )  # fmt: skip
     pybullet.changeDynamics(
-        number, -1, lateralFriction=friction, restitution=0.0, linearDamping=0.0, angularDamping=0.0,
+        body_id, -1, lateralFriction=friction, restitution=0.0, linearDamping=0.0, angularDamping=0.0,
         physicsClientId=client,
     )  # fmt: skip
     if mass == 0:  # otherwise, Bullet would search for contacts with the ground at each step
-        set_collision_filter(client, number, -1, STATIC, ~(STATIC | GROUND | TERRAIN))
+        set_collision_filter(client, body_id, -1, STATIC, ~(STATIC | GROUND | TERRAIN))
         sleeps = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
-        pybullet.changeDynamics(number, -1, activationState=sleeps, physicsClientId=client)
+        pybullet.changeDynamics(body_id, -1, activationState=sleeps, physicsClientId=client)
     if mass > 0:
-        pybullet.changeDynamics(number, -1, localInertiaDiagonal=moments, physicsClientId=client)
-        pybullet.resetBasePositionAndOrientation(number, center.position, center.quaternion, physicsClientId=client)
-    return number
+        pybullet.changeDynamics(body_id, -1, localInertiaDiagonal=moments, physicsClientId=client)
+        pybullet.resetBasePositionAndOrientation(body_id, center.position, center.quaternion, physicsClientId=client)
+    return body_id
 
 
-def wake(client: int, number: int) -> None:
-    """Wake a body. It sleeps again SLEEP_DELAY_S after it comes to rest, until something with mass touches it."""
+def wake(client: int, body_id: int) -> None:
+    """Wake a body. After SLEEP_DELAY_S at rest, it sleeps again until something with mass touches it."""
     awake = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP
     pybullet.changeDynamics(
-        number, -1, activationState=awake, sleepThreshold=REST_SPEED_SQUARED, physicsClientId=client
+        body_id, -1, activationState=awake, sleepThreshold=REST_SPEED_SQUARED, physicsClientId=client
     )
 
 
-def put_to_sleep(client: int, number: int) -> None:
+def put_to_sleep(client: int, body_id: int) -> None:
     """Put a body that is at rest to sleep after the next step, without waiting for SLEEP_DELAY_S."""
     asleep = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
     pybullet.changeDynamics(
-        number, -1, activationState=asleep, sleepThreshold=REST_SPEED_SQUARED, physicsClientId=client
+        body_id, -1, activationState=asleep, sleepThreshold=REST_SPEED_SQUARED, physicsClientId=client
     )
 
 
-STATIC_FILTER = 2
-"""Bullet's collision group of bodies without mass; they collide with all other groups."""
+def disable_collisions(client: int, body_id: int) -> None:
+    """Keep a body without mass from colliding. Distances to it can still be measured."""
+    set_collision_filter(client, body_id, -1, NOTHING, NOTHING)
 
 
-def disable_collisions(client: int, number: int) -> None:
-    """Keep a body without mass from colliding. Its distances can still be measured."""
-    pybullet.setCollisionFilterGroupMask(number, -1, 0, 0, physicsClientId=client)
-
-
-def enable_collisions(client: int, number: int) -> None:
+def enable_collisions(client: int, body_id: int) -> None:
     """Let a body without mass collide again, as if it had been created now."""
-    pybullet.setCollisionFilterGroupMask(number, -1, STATIC_FILTER, ~STATIC_FILTER, physicsClientId=client)
+    set_collision_filter(client, body_id, -1, STATIC, ~STATIC)
 
 
 def create_static_body(
@@ -266,31 +277,31 @@ def create_static_body(
 ) -> int:
     """Create a static body. It sleeps, so that objects on it can sleep as well.
 
-    It is a rigid body instead of Bullet's default multibody, whose six velocities would be part of each contact. With a
-    multibody as the ground, a step of a robot takes an eighth longer.
+    It is a rigid body instead of Bullet's default multibody, whose six velocities would be part of each contact and
+    would slow down each step.
     """
-    number: int = pybullet.createMultiBody(
+    body_id: int = pybullet.createMultiBody(
         0.0, shape, visual, pose.position, pose.quaternion, useMaximalCoordinates=1, physicsClientId=client
     )
-    set_collision_filter(client, number, -1, STATIC, ~(STATIC | GROUND | TERRAIN))
+    set_collision_filter(client, body_id, -1, STATIC, ~(STATIC | GROUND | TERRAIN))
     pybullet.changeDynamics(
-        number, -1, lateralFriction=friction, restitution=0.0, activationState=pybullet.ACTIVATION_STATE_SLEEP,
+        body_id, -1, lateralFriction=friction, restitution=0.0, activationState=pybullet.ACTIVATION_STATE_SLEEP,
         physicsClientId=client,
     )  # fmt: skip
-    return number
+    return body_id
 
 
 def create_ground_plane(client: int, visual: int = DEFAULT_VISUAL) -> int:
-    """Create the plane z = 0."""
+    """Create the plane z = 0 as a static body."""
     return create_static_body(
         client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client), visual
     )
 
 
-def invisible_shape(client: int) -> int:
+def create_invisible_shape(client: int) -> int:
     """Create a visual shape that is too small to be drawn, for simulations without images.
 
-    By default, Bullet creates a visual shape from each collision shape, which takes a millisecond for a plane.
+    By default, Bullet creates a visual shape from each collision shape, which takes time.
     """
     corners = [(0.0, 0.0, 0.0), (1e-9, 0.0, 0.0), (0.0, 1e-9, 0.0)]
     visual: int = pybullet.createVisualShape(

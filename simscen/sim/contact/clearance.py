@@ -1,33 +1,25 @@
-"""Clearance of a robot, and how long it therefore cannot touch anything.
-
-Truth samples get their clearance in batches: the log needs a sample up to 0.9 s later, and computing in batches uses
-the processor's caches better and takes half the time.
-"""
+"""Measures the clearance of a robot, and derives until when the robot cannot touch anything."""
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from simscen.core.geometry import Pose3, Vector
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.records.case import CLEARANCE_RANGE_M
-from simscen.core.records.trace import Truth
 from simscen.sim.body.outline import hull_points, radius_and_height
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import pybullet
 from simscen.sim.contact.static_distance import StaticDistance, max_displacement
+from simscen.sim.objects.actor import SHAPE_MARGIN_M, SPEED_HORIZON_S
 from simscen.sim.objects.actors import NEVER, Actors
 from simscen.sim.robots.drive_factory import Base
 from simscen.sim.robots.robot_state import RobotState
 
-HORIZON_S = 0.1
-"""Longest time for which a clearance can exclude contact."""
 CONTACT_TOLERANCE_M = 0.002
-"""Clearance that counts as contact, because corners of shapes are rounded by up to 0.4 mm."""
-SHAPE_MARGIN_M = 0.05
-"""Distance that collision shapes may extend beyond their vertices, from which sizes are computed."""
+"""Clearance up to which contact is possible, because corners of shapes are rounded by up to 0.4 mm."""
 
 
 class _StaticNearest(NamedTuple):
@@ -44,11 +36,11 @@ class _StaticNearest(NamedTuple):
 
 
 class Clearance:
-    """Distance from a robot to the static world, actors, and other robots.
+    """Distance from a robot to the static world, actors, and other robots. Call `close` after use.
 
-    Asking the engine for contacts after every tick costs more than measuring a distance now and then: while nothing can
-    have closed the gap, there is no contact (conservative advancement; Mirtich, Impulse-based dynamic simulation, 1996,
-    section 2.3). No contact is possible before tick `no_contact_before`.
+    No contact is possible before the tick `no_contact_before`, because until then nothing is fast enough to close the
+    gap (conservative advancement; Mirtich, Impulse-based dynamic simulation, 1996, section 2.3). Measuring a distance
+    now and then costs less than asking the engine for contacts after every tick.
     """
 
     def __init__(
@@ -67,7 +59,7 @@ class Clearance:
         """Prepare measurements up to `max_range` m; `state` returns the current state of the robot.
 
         `obstacles` is the part of the `static` world that blocks the robot, without the ramps that it can drive on.
-        `is_uneven` tells that there is other ground than the plane z = 0 for wheels and casters.
+        `is_uneven` states that wheels and casters can also stand on ground other than the plane z = 0.
         """
         self._client, self._tick_rate, self._base, self._actors = client, tick_rate, base, actors
         self._state = state
@@ -88,16 +80,17 @@ class Clearance:
         self._obstacle_distance = StaticDistance(obstacles, robot, max_range) if is_uneven else self._static_distance
         self._max_range = max_range
         self._push_tick = -1
-        self._owner_cache: dict[tuple[int, int, int], str] = {}
+        self._static_names: dict[tuple[int, int, int], str] = {}
+        """Names of touched static solids, by the position of the contact in cm."""
         first = robot.hull[0]
         self._hull_center = first.pose.apply(hull_points(first.shape).mean(axis=0))
         # A closed concave surface around the initial pose is a building, because no robot starts inside an obstacle.
-        enclosing = self._static_distance.enclosing(self._center_point())
+        enclosing = self._static_distance.enclosing_solids(self._center_point())
         self._buildings = [k for k in enclosing if not self._static_distance.is_convex(k)]
         self.invalidate()
 
     def invalidate(self) -> None:
-        """Discard all results, because an object was added, removed, or placed elsewhere."""
+        """Discard all results, because an object or robot was added, removed, or placed elsewhere."""
         self._distance = 0.0
         self._measured_tick, self.no_contact_before = -1, 0
         self._static_nearest: _StaticNearest | None = None
@@ -110,7 +103,7 @@ class Clearance:
         """Whether the robot may be inside an object: only after it was placed, or the object appeared."""
 
     def on_push(self, tick: int) -> None:
-        """Discard bounds, because a push during the step from `tick` changes velocities."""
+        """Discard all bounds, because a push during the step from `tick` changes velocities."""
         self._push_tick = tick
         self._measured_tick, self.no_contact_before, self._static_nearest, self._deferrable_until = -1, tick, None, -1
         self._actors.set_no_contact_before(self._base.id, tick)
@@ -118,7 +111,7 @@ class Clearance:
     def measure(self, tick: int, period: int = NEVER) -> float:
         """Return the clearance in m at the current `tick`, at most the maximum range.
 
-        The next call is `period` ticks later; `no_contact_before` is only updated if it ends before.
+        If the next call is `period` ticks later, `no_contact_before` is only updated if it is earlier than that.
         """
         if self._measured_tick == tick:
             return self._distance
@@ -134,7 +127,7 @@ class Clearance:
             self._distance = -abs(self._distance)
             gap = self._distance
         if self.no_contact_before < tick + period:
-            free_s = min(HORIZON_S, max(0.0, gap - CONTACT_TOLERANCE_M) / self._closing_speed(tick))
+            free_s = min(SPEED_HORIZON_S, max(0.0, gap - CONTACT_TOLERANCE_M) / self._closing_speed(tick))
             is_pushed = tick == self._push_tick
             self.no_contact_before = tick + (0 if is_pushed else math.floor(free_s * self._tick_rate))
         self._actors.set_no_contact_before(self._base.id, self.no_contact_before)
@@ -158,9 +151,10 @@ class Clearance:
         return tuple([robot._state().pose.position for robot in self.others])
 
     def can_defer(self, tick: int, period: int, pose: Pose3) -> bool:
-        """Return whether `static_clearance` equals `measure` at the current `tick`, without contact for `period` ticks.
+        """Return whether the clearance at the current `tick` can be computed later, by `static_clearance(pose)`.
 
-        Decided by how far the robot has moved since the last measurement and can move, without another measurement.
+        It can if the static world is nearer than all actors and no contact is possible for `period` ticks. This is
+        decided without a measurement, by how far robot and actors have moved since the last one and can move.
         """
         if tick + period <= self._deferrable_until:
             return True
@@ -175,9 +169,9 @@ class Clearance:
         margin = last.margin - 2 * moved - travel
         if margin <= 0:
             return False
-        free_s = min(HORIZON_S, max(0.0, self._distance - moved - CONTACT_TOLERANCE_M) / closing_speed)
+        free_s = min(SPEED_HORIZON_S, max(0.0, self._distance - moved - CONTACT_TOLERANCE_M) / closing_speed)
         self.no_contact_before = max(self.no_contact_before, tick + math.floor(free_s * self._tick_rate))
-        static_ticks = math.floor(min(HORIZON_S, margin / (2 * closing_speed)) * self._tick_rate)
+        static_ticks = math.floor(min(SPEED_HORIZON_S, margin / (2 * closing_speed)) * self._tick_rate)
         self._deferrable_until = min(self.no_contact_before, tick + static_ticks + period)
         return tick + period <= self._deferrable_until
 
@@ -189,7 +183,9 @@ class Clearance:
         nearest, point = min(self._max_range, static.distance(pose)), pose[:3]
         # The top of a tilted robot extends beyond its radius.
         ground_radius = SHAPE_MARGIN_M + self._radius + 2 * self._height * math.hypot(pose.qx, pose.qy)
-        for other in self._actors.ids_near(self._base.id, point, nearest + self.size, nearest + ground_radius, tick):
+        for other in self._actors.prepare_nearby(
+            self._base.id, point, nearest + self.size, nearest + ground_radius, tick
+        ):
             for link in self._base.hull_links:
                 points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
                 nearest = min((point[8] for point in points), default=nearest)
@@ -215,7 +211,7 @@ class Clearance:
 
     def _find_enclosing(self, tick: int) -> str | None:
         point = self._center_point()
-        solids = self._static_distance.enclosing(point, exclude=self._buildings)
+        solids = self._static_distance.enclosing_solids(point, exclude=self._buildings)
         return self._static_distance.name(solids[0]) if solids else self._actors.find_enclosing(point, tick)
 
     def _closing_speed(self, tick: int) -> float:
@@ -227,64 +223,22 @@ class Clearance:
         return self.speed_bound() + speed + 0.1
 
     def speed_bound(self) -> float:
-        """Return an upper bound in m/s of the speed of any point of the robot within the horizon."""
+        """Return an upper bound in m/s of the speed of any point of the robot within SPEED_HORIZON_S."""
         _, linear, (x, y, z) = self._state()
         forward = max(self._max_speed, math.hypot(*linear))
         turning = max(self._limits.angular, math.hypot(x, y, z)) * self._radius
         return 1.25 * (forward + turning + math.hypot(x, y) * self._height)
 
-    def static_owner(self, point: Vector) -> str:
-        """Return the name of the static solid that is touched at a point; cached by centimeter, since contacts last."""
+    def static_solid_at(self, point: Vector) -> str:
+        """Return the name of the static solid that is touched at a point. Cached, because contacts last many ticks."""
         x, y, z = point
         cell = (round(100 * x), round(100 * y), round(100 * z))
-        if cell not in self._owner_cache:
-            self._owner_cache[cell] = self._static_distance.nearest_owner(point)
-        return self._owner_cache[cell]
+        if cell not in self._static_names:
+            self._static_names[cell] = self._static_distance.nearest_solid_name(point)
+        return self._static_names[cell]
 
     def close(self) -> None:
         """Release the engine clients."""
         self._static_distance.close()
         if self._obstacle_distance is not self._static_distance:
             self._obstacle_distance.close()
-
-
-_new = tuple.__new__  # creates a named tuple without the call overhead of its class
-
-
-class DeferredTruth:
-    """State of a robot and poses of all objects at one tick; see core.records.trace.DeferredTruth."""
-
-    __slots__ = ("objects", "result", "sampler", "state")
-
-    def __init__(self, sampler: "TruthSampler", state: RobotState, objects: Mapping[str, Pose3]) -> None:
-        self.sampler, self.state, self.objects = sampler, state, objects
-        self.result: Truth | None = None
-
-    def truth(self) -> Truth:
-        """Return the complete sample."""
-        if self.result is None:
-            self.sampler.compute_deferred()
-        assert self.result is not None
-        return self.result
-
-
-class TruthSampler:
-    """Deferred samples of one robot, which must be far from all moving objects."""
-
-    def __init__(self, clearance: Clearance) -> None:
-        self._clearance = clearance
-        self._deferred: list[DeferredTruth] = []
-
-    def defer(self, state: RobotState, objects: Mapping[str, Pose3]) -> DeferredTruth:
-        """Return a sample that is computed when it, or another one, is needed."""
-        sample = DeferredTruth(self, state, objects)
-        self._deferred.append(sample)
-        return sample
-
-    def compute_deferred(self) -> None:
-        """Compute all deferred samples."""
-        deferred, self._deferred = self._deferred, []
-        static_clearance = self._clearance.static_clearance
-        for sample in deferred:
-            state = sample.state
-            sample.result = _new(Truth, (state.pose, state.twist, static_clearance(state.pose), sample.objects))

@@ -1,4 +1,4 @@
-"""Collisions of a robot: one event when a contact begins and one when it ends."""
+"""Detects the collisions of a robot: creates one event when a collision starts, and one when it ends."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -12,26 +12,27 @@ from simscen.sim.bullet import pybullet
 END_DELAY_S = 0.1
 """Time without contact after which a collision has ended, so that a bouncing robot collides once."""
 MIN_CAUSING_SPEED_M_S = 0.02
-"""A robot that moves more slowly towards what it touches did not cause the contact.
+"""Speed towards the touched object below which the robot did not cause the contact.
 
-Contact with the static world counts as caused by any motion, because a robot may graze a wall.
+In contact with the static world, motion in any direction counts, because a robot may graze a wall.
 """
 NO_BODY = -1
+"""Body id that no body has."""
 
-OwnerOf = Callable[[Vector], str]
 IsGroundContact = Callable[[int, int, float], bool]
+"""Takes the id of the other body, the link of the robot, and the z of the unit normal towards the robot."""
 
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """Contact of a robot: `point` and unit `normal` towards the robot in the world frame.
+    """Contact of a robot with one object: `point` and unit `normal` towards the robot are in the world frame.
 
-    `other` is the body id of the touched object, and `is_static` states whether this object never moves. `impulse` is
-    the impulse in N s during one tick.
+    `name` and `other_id` are the name and body id of the object, and `is_static` states whether it never moves.
+    `impulse` is in N s, during one tick.
     """
 
     name: str
-    other: int
+    other_id: int
     point: Vector
     normal: Vector
     impulse: float
@@ -47,10 +48,10 @@ class BaseMotion(NamedTuple):
 
 
 class PreStepMotion(NamedTuple):
-    """Motion before a step.
+    """Motions before a step, which give the speed of a collision that starts during the step.
 
     robot:   motion of the robot that touches something
-    actors:  velocities in m/s of scripted moving objects, by body id
+    actors:  velocities in m/s of all movable objects that can collide, by body id
     robots:  motions of all robots, by body id
     """
 
@@ -75,16 +76,16 @@ class CollisionTracker:
         self._events: list[Event] = []
 
     def has_contact_at(self, tick: int) -> bool:
-        """Return whether the robot touched anything at `tick`, which must be the newest one."""
+        """Return whether the robot touched anything at `tick`, which must not be before the last update."""
         return bool(self._ongoing) and any(collision.last_tick == tick for collision in self._ongoing.values())
 
     @property
     def is_colliding(self) -> bool:
-        """Whether a collision has not ended."""
+        """Whether there is a collision that has not ended."""
         return bool(self._ongoing)
 
     def update(self, tick: int, contact_points: list[ContactPoint], before: PreStepMotion) -> None:
-        """Take the contacts at `tick` and the motion before the step."""
+        """Add the contacts at `tick`, with the motions before the step that ended at `tick`."""
         for contact in contact_points:
             collision = self._ongoing.get(contact.name)
             if collision is None:
@@ -123,21 +124,21 @@ def contact_points(
     client: int,
     robot_id: int,
     names: Mapping[int, str | None],
-    owner_of: OwnerOf,
+    static_solid_at: Callable[[Vector], str],
     tick_seconds: float,
     is_ground_contact: IsGroundContact = _no_ground,
 ) -> list[ContactPoint]:
     """Return the current contacts of a robot, one for each touched object, sorted by name.
 
-    `names` maps body ids to names; for None, `owner_of` returns the name of the static solid at a point.
-    `is_ground_contact` takes the other body, the link of the robot, and the z of the unit normal towards it.
+    `names` maps body ids to names; contacts with other bodies are ignored. If a name is None, the body is static, and
+    `static_solid_at` returns the name of the solid at a point. Contacts with the ground are ignored.
     """
     found: dict[str, ContactPoint] = {}
     for contact in pybullet.getContactPoints(robot_id, physicsClientId=client):
         other, point, normal, distance, force = contact[2], contact[6], contact[7], contact[8], contact[9]
         if other not in names or (force <= 0 and distance > 0) or is_ground_contact(other, contact[3], normal[2]):
             continue
-        name = names[other] or owner_of(point)
+        name = names[other] or static_solid_at(point)
         known = found.get(name)
         impulse = force * tick_seconds + (known.impulse if known else 0.0)
         found[name] = ContactPoint(name, other, point, normal, impulse, names[other] is None)
@@ -147,17 +148,17 @@ def contact_points(
 def enclosed_contact(name: str, point: Vector) -> ContactPoint:
     """Return the contact of a robot that is completely inside an object.
 
-    Its normal points up, so that the collision has the speed 0 while the robot drives on a level floor.
+    The normal points up, so that the speed of the collision is 0 for a robot on a level floor.
     """
     return ContactPoint(name, NO_BODY, point, (0.0, 0.0, 1.0), 0.0, is_static=True)
 
 
 def _started_event(tick: int, contact: ContactPoint, before: PreStepMotion) -> Event:
     robot_velocity = _velocity_at(before.robot, contact.point)
-    if contact.other in before.robots:
-        other_velocity = _velocity_at(before.robots[contact.other], contact.point)
+    if contact.other_id in before.robots:
+        other_velocity = _velocity_at(before.robots[contact.other_id], contact.point)
     else:
-        other_velocity = before.actors.get(contact.other, (0.0, 0.0, 0.0))
+        other_velocity = before.actors.get(contact.other_id, (0.0, 0.0, 0.0))
     approach = -_dot(robot_velocity, contact.normal)
     is_grazing = contact.is_static and math.hypot(*robot_velocity) >= MIN_CAUSING_SPEED_M_S
     return Event(

@@ -1,8 +1,8 @@
-"""Distance from a robot to the static world, and tests whether a closed surface encloses a point.
+"""Measures the distance from a robot to the static world, and tests whether a closed surface encloses a point.
 
-Distances are measured solid by solid in a separate engine client that has no bodies and is never stepped. A convex
-solid becomes one convex shape when the robot first comes near; a large concave solid is split into tiles. Querying one
-fused mesh would cost time for each triangle within range.
+Distances are measured part by part (see MeshParts) in a separate engine client that has no bodies and is never stepped.
+The shapes of a part are created when the robot first comes near. Querying the mesh of the whole world would cost time
+for each triangle within range.
 """
 
 import itertools
@@ -20,26 +20,28 @@ from simscen.sim.body import outline
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.client_pool import CLIENT_POOL
-from simscen.sim.scene.walls import parts_of
+from simscen.sim.scene.mesh_parts import parts_of
 
 RELIST_DISTANCE_M = 4.0
 """Distance that the robot can move before the list of parts near it is updated."""
 SEARCH_SLACK_M = 0.15
-"""Distance beyond the nearest part within which others are measured too, to postpone the next measurement."""
+"""Distance beyond the nearest part within which other parts are measured too, so that their next measurement is later.
+"""
 BULLET_MARGIN_M = 0.001
 """Collision margin of meshes without a body, which Bullet subtracts from distances."""
 EXTENT_MARGIN_M = 0.002
 """Distance that a robot may extend beyond the vertices of its shapes."""
 NEAREST_SLACK_M = 0.005
-"""Additional distance within which the nearest part is searched again."""
-OWNER_TOLERANCE_M = 0.05
+"""Additional distance within which the part that was nearest is searched again."""
+SOLID_TOLERANCE_M = 0.05
 """Largest distance from a contact point to the bounding box of the touched part."""
 LINE_TILT = 0.0123, 0.0271
-"""Slope in x and y over z of the test line for enclosure, which must not hit the vertical edges of maps."""
+"""Slopes dx/dz and dy/dz of the line that tests for enclosure. A vertical line could hit the vertical edges of maps."""
 ORIGIN, IDENTITY = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
 PartBound = tuple[float, int, tuple[float, float, float, float]]
-"""Lower bound of the distance to a part plus the robot's travel when it was known; the part; its bounding rectangle."""
+"""Lower bound in m of the distance to a part, plus the robot's travel at that time; index of the part; its bounding
+rectangle (left, low, right, high) in m."""
 
 
 class StaticDistance:
@@ -50,7 +52,7 @@ class StaticDistance:
         self._mesh, self._max_range = static, max_range
         radius, self._height = outline.radius_and_height(robot.collision_solids)
         self._radius, self._extent = radius + EXTENT_MARGIN_M, math.hypot(radius, self._height)
-        self._hull = engine.hull_shapes(self._client, robot.collision_solids)
+        self._hull = engine.create_hull_shapes(self._client, robot.collision_solids)
         self._parts = parts_of(static)
         self._shape_pairs: dict[int, list[tuple[int, int]]] = {}
         self._others: list[PartBound] = []
@@ -67,8 +69,7 @@ class StaticDistance:
     def distance(self, pose: Pose3) -> float:
         """Return the distance in m from the robot, with its base at `pose`, to the nearest solid; inf out of range.
 
-        The distance to a part changes at most by the motion of the robot, so that only parts are measured again that
-        may now be nearer than the nearest one.
+        A distance changes at most by the robot's motion. Only parts that may now be the nearest are measured again.
         """
         moved = max_displacement(self._pose, pose, self._extent)
         self._travel += moved
@@ -144,23 +145,22 @@ class StaticDistance:
 
     def _build_shapes(self, part: int) -> list[int]:
         vertices, hulls = self._mesh.vertices, self._mesh.hulls
-        if hulls and (own := hulls[self._parts.owners[part]]):
-            return [engine.convex_shape(self._client, vertices[own])]
+        if hulls and (own := hulls[self._parts.solids[part]]):
+            return [engine.create_convex_shape(self._client, vertices[own])]
         faces = self._mesh.faces[self._parts.faces(part)]
         if self._parts.is_whole_solid(part) and is_convex(solid := submesh(vertices, faces)):
-            return [engine.convex_shape(self._client, solid.vertices)]
-        tiles = engine.tiles(vertices, engine.above_floor(vertices, faces))
-        return [engine.concave_shape(self._client, submesh(vertices, tile)) for tile in tiles]
+            return [engine.create_convex_shape(self._client, solid.vertices)]
+        tiles = engine.split_into_tiles(vertices, engine.above_floor(vertices, faces))
+        return [engine.create_concave_shape(self._client, submesh(vertices, tile)) for tile in tiles]
 
-    def enclosing(self, point: Vector, exclude: Collection[int] = ()) -> list[int]:
+    def enclosing_solids(self, point: Vector, exclude: Collection[int] = ()) -> list[int]:
         """Return the indices of the solids that enclose a point, except those in `exclude`."""
-        candidates = [owner for owner in self._parts.owners_around(point) if owner not in exclude]
-        return [owner for owner in candidates if self._encloses(owner, point)]
+        return [k for k in self._parts.solids_around(point) if k not in exclude and self._encloses(k, point)]
 
-    def _encloses(self, owner: int, point: Vector) -> bool:
-        """Return whether a solid encloses a point; of a tiled solid, usually a few tiles on a line are sufficient."""
+    def _encloses(self, solid: int, point: Vector) -> bool:
+        """Return whether a solid encloses a point. If it has tiles, those on a line usually suffice for the test."""
         parts, vertices = self._parts, self._mesh.vertices
-        tiles = parts.of_owner(owner)
+        tiles = parts.of_solid(solid)
         if len(tiles) > 1:
             low, high = parts.low[tiles.start : tiles.stop], parts.high[tiles.start : tiles.stop]
             tilt = max(LINE_TILT) * max(high[:, 2].max() - point[2], point[2] - low[:, 2].min())
@@ -170,24 +170,24 @@ class StaticDistance:
             is_enclosed = encloses_along_line(vertices[self._mesh.faces[faces]], point)
             if is_enclosed is not None:
                 return is_enclosed
-        return encloses(vertices[self._faces_of(owner)], point)
+        return encloses(vertices[self._faces_of(solid)], point)
 
-    def is_convex(self, owner: int) -> bool:
+    def is_convex(self, solid: int) -> bool:
         """Return whether a solid is convex."""
-        return is_convex(submesh(self._mesh.vertices, self._faces_of(owner)))
+        return is_convex(submesh(self._mesh.vertices, self._faces_of(solid)))
 
-    def _faces_of(self, owner: int) -> npt.NDArray[np.int32]:
-        return self._mesh.faces[self._parts.faces_of_owner(owner)]
+    def _faces_of(self, solid: int) -> npt.NDArray[np.int32]:
+        return self._mesh.faces[self._parts.faces_of_solid(solid)]
 
-    def name(self, owner: int) -> str:
+    def name(self, solid: int) -> str:
         """Return the name of a solid."""
-        return self._mesh.names[owner]
+        return self._mesh.names[solid]
 
-    def nearest_owner(self, point: Vector) -> str:
-        """Return the name of the solid whose surface is nearest to a contact point; "" if none is near."""
+    def nearest_solid_name(self, point: Vector) -> str:
+        """Return the name of the solid whose surface is nearest to a contact point; "" if no bounding box is near."""
         position = np.array(point)
         outside = np.maximum(np.maximum(self._parts.low - position, position - self._parts.high), 0.0)
-        near = np.flatnonzero((outside < OWNER_TOLERANCE_M).all(axis=1))
+        near = np.flatnonzero((outside < SOLID_TOLERANCE_M).all(axis=1))
         if not len(near):
             return ""
         faces = np.concatenate([self._parts.faces(part) for part in near.tolist()])
@@ -234,8 +234,8 @@ def _distances_to_segments(point: Array, start: Array, end: Array) -> Array:
 def encloses(corners: Array, point: Vector) -> bool:
     """Return whether a surface of triangles (n, 3, 3), counterclockwise from outside, encloses a point.
 
-    It does if its winding number, the sum of solid angles over 4 pi, exceeds one half, also with small holes
-    (van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
+    The criterion is a winding number above one half, which allows for small holes. The winding number is the sum of the
+    solid angles of all triangles divided by 4 pi (van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
     """
     ax, ay, az, bx, by, bz, cx, cy, cz = np.ascontiguousarray(corners.reshape(-1, 9).T) - np.tile(point, 3)[:, None]
     la, lb, lc = (np.sqrt(x * x + y * y + z * z) for x, y, z in ((ax, ay, az), (bx, by, bz), (cx, cy, cz)))
@@ -246,10 +246,10 @@ def encloses(corners: Array, point: Vector) -> bool:
 
 
 def encloses_along_line(corners: Array, point: Vector) -> bool | None:
-    """Return the same as `encloses`, from the triangles (n, 3, 3) alone that a line through the point may cross.
+    """Return the result of `encloses`; `corners` (n, 3, 3) only needs the triangles that a tilted line may cross.
 
-    The winding number is how many more times a ray to infinity leaves the surface than enters it. Returns None if both
-    directions of the line disagree, as through a hole, or if an edge lies on the line.
+    The line passes through the point with LINE_TILT. The winding number is how many more times a ray along it leaves
+    the surface than enters it. Returns None if both directions disagree because of a hole, or if the line hits an edge.
     """
     x, y, z = np.moveaxis(corners - point, 2, 0)
     x, y = x - LINE_TILT[0] * z, y - LINE_TILT[1] * z

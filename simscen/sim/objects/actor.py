@@ -1,4 +1,8 @@
-"""A movable object, its creation in the engine, and precomputed poses of scripted objects."""
+"""State of one movable object (actor), its creation in the engine, and precomputed poses of scripted actors.
+
+A scripted actor follows a path and has no mass in the engine. A pushable actor has a mass and no path. Others stand
+still.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -26,8 +30,12 @@ from simscen.sim.bullet import engine, pybullet
 
 FRICTION = 0.6
 """Friction of movable objects on the ground: about that of wood or cardboard on concrete."""
-FALL_SPEED_M_S = 0.1 * GRAVITY_M_S2
-"""Speed that a resting object can gain by falling for 0.1 s."""
+SPEED_HORIZON_S = 0.1
+"""Time for which all upper bounds of speeds hold, also for objects that fall or are hit."""
+FALL_SPEED_M_S = SPEED_HORIZON_S * GRAVITY_M_S2
+"""Speed that a resting object can gain by falling for SPEED_HORIZON_S."""
+SHAPE_MARGIN_M = 0.05
+"""Distance that collision shapes may extend beyond their vertices, from which sizes are computed."""
 PRECOMPUTED_S = 4
 """Simulated seconds for which scripted poses are computed in one batch."""
 
@@ -43,7 +51,7 @@ class Actor:
     max_speed: upper bound in m/s of the speed of any of its points on the path
     size:      radius in m of its bounding sphere around the origin
     radius:    radius in m of its bounding cylinder around the vertical axis
-    shell:     its surface in the body frame, if the engine only has a surface without an inside
+    surface:   its surface in the body frame if it is hollow in the engine (see `engine.is_hollow`), else None
     """
 
     body: Body
@@ -53,16 +61,17 @@ class Actor:
     max_speed: float
     size: float
     radius: float
-    shell: Mesh | None
+    surface: Mesh | None
     is_steered: bool = False
     """Whether the path can be replaced at any time, as for pedestrians."""
     body_id: int | None = None
-    """Body id in the engine; None if the engine does not have it."""
-    is_tangible: bool = False
-    """Whether the engine has it and it collides. Otherwise it can only be measured and rendered."""
+    """Body id in the engine; None if it is not in the engine."""
+    collides: bool = False
+    """Whether it is in the engine and can collide. Otherwise, it can at most be measured and rendered."""
     engine_pose: Pose3 | None = None
-    """Pose at which the engine currently has it."""
+    """Pose at which it was last placed in the engine."""
     center_from_base: Pose3 = Pose3()
+    """Body frame in the frame of its principal axes of inertia."""
     center_and_pose: tuple[CenterPose, Pose3] | None = None
     """The last center of mass that the engine returned, and the resulting pose."""
     is_resting: bool = False
@@ -73,29 +82,29 @@ class Actor:
 
     @property
     def id(self) -> int:
-        """Body id in the engine; raises LookupError for a deferred actor, whose absence would falsify the run."""
+        """Body id in the engine; raises LookupError if it is not in the engine."""
         if self.body_id is None:
             raise LookupError(f'"{self.body.name}" is not in the engine')
         return self.body_id
 
     @property
     def is_pushable(self) -> bool:
-        """Whether the engine moves it, rather than a script."""
+        """Whether the engine moves it, rather than a path."""
         return self.body.mass > 0 and self.path is None
 
     def is_parked(self, elapsed: float, horizon: float) -> bool:
-        """Return whether its path, `elapsed` seconds after its start, has no motion within `horizon` seconds."""
+        """Return whether it stands still on its path from `elapsed` seconds after the start for `horizon` seconds."""
         if self.path is None or self.is_steered:
             return False
         return self.path.has_ended(elapsed) or elapsed + horizon < self.path.start
 
     def follow(self, path: MotionPath, max_speed: float, tick: int) -> None:
-        """Follow another path from `tick` on."""
+        """Follow another path from `tick` on, never faster than `max_speed` m/s."""
         self.path, self.path_start_tick, self.max_speed, self._sampler = path, tick, max_speed, None
         self._path_poses.clear()
 
     def path_pose(self, tick: int, tick_rate: int) -> Pose3:
-        """Return the pose on its path."""
+        """Return the pose on its path at a tick."""
         pose = self._path_poses.get(tick)
         if pose is None:
             if len(self._path_poses) > 1:
@@ -107,7 +116,7 @@ class Actor:
         return pose
 
     def path_velocity(self, tick: int, tick_rate: int) -> tuple[Vector, float]:
-        """Return the velocity in m/s and rad/s that leads along its path to the next tick."""
+        """Return the velocity in m/s and the turn rate in rad/s with which it reaches its pose at the next tick."""
         pose, following = self.path_pose(tick, tick_rate), self.path_pose(tick + 1, tick_rate)
         vx, vy = (following.x - pose.x) * tick_rate, (following.y - pose.y) * tick_rate
         if math.hypot(vx, vy) > MAX_STEP_M * tick_rate:  # a jump of the path is a teleportation, not a motion
@@ -125,7 +134,7 @@ class Actor:
         return distance if self.engine_pose is None else min(distance, math.dist(self.engine_pose[:3], point))
 
     def set_engine_pose(self, client: int, pose: Pose3) -> None:
-        """Move it in the engine, if the engine has it."""
+        """Place it in the engine, unless it is not in the engine or already there."""
         if self.body_id is not None and pose != self.engine_pose:
             self.engine_pose = pose
             pybullet.resetBasePositionAndOrientation(self.id, pose[:3], pose[3:], client)
@@ -139,7 +148,7 @@ class Actor:
         return not self.is_resting
 
     def speed_bound(self, client: int) -> float:
-        """Return an upper bound in m/s of the speed of any point of a pushable actor within the next 0.1 s."""
+        """Return an upper bound in m/s of the speed of any point of a pushable actor within SPEED_HORIZON_S."""
         if self.is_resting:
             return FALL_SPEED_M_S
         linear, angular = pybullet.getBaseVelocity(self.id, physicsClientId=client)
@@ -147,10 +156,10 @@ class Actor:
 
 
 class ActorBuilder:
-    """Creates actors, and their bodies in the engine with and without collisions."""
+    """Creates actors, and their bodies in the engine with or without collisions."""
 
     def __init__(self, client: int, tick_rate: int, triangulate: engine.Triangulate, visual_shape: int) -> None:
-        """Take the engine's client, and the shape that the renderer shows of all actors."""
+        """Take the id of the engine's client, and the id of the visual shape of all actors."""
         self._client, self._tick_rate = client, tick_rate
         self._triangulate, self._visual_shape = triangulate, visual_shape
 
@@ -163,13 +172,13 @@ class ActorBuilder:
         if body.path is not None:
             segments, speed = swept_segments(body.path), top_speed(body.path, radius)
         is_hollow = engine.is_hollow(body.solids, body.mass > 0 and body.path is None)
-        shell = engine.fuse_surfaces(body.solids, self._triangulate) if is_hollow else None
+        surface = engine.fuse_surfaces(body.solids, self._triangulate) if is_hollow else None
         size = math.hypot(radius, height)
-        return Actor(body, body.path, tick, segments, speed, size, radius, shell, is_steered)
+        return Actor(body, body.path, tick, segments, speed, size, radius, surface, is_steered)
 
-    def make_tangible(self, actor: Actor, tick: int) -> None:
-        """Let an actor collide; Bullet then sorts its contacts after those of all that already collide."""
-        if actor.is_tangible:
+    def enable_collisions(self, actor: Actor, tick: int) -> None:
+        """Let an actor collide, and create it if necessary. Bullet solves contacts in the order of these calls."""
+        if actor.collides:
             return
         if actor.body_id is None:
             self._create(actor, tick)
@@ -177,17 +186,17 @@ class ActorBuilder:
             engine.enable_collisions(self._client, actor.id)
             if actor.path is not None:
                 actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
-        actor.is_tangible = True
+        actor.collides = True
 
-    def make_measurable(self, actor: Actor, tick: int) -> None:
-        """Create an actor in the engine without collisions."""
+    def add_without_collisions(self, actor: Actor, tick: int) -> None:
+        """Create an actor without collisions unless it exists, so that it can be measured and rendered."""
         if actor.body_id is None:
             self._create(actor, tick)
             engine.disable_collisions(self._client, actor.id)
 
     def _create(self, actor: Actor, tick: int) -> None:
         client, body, visual = self._client, actor.body, self._visual_shape
-        shape = engine.body_shape(client, body.solids, actor.is_pushable, self._triangulate)
+        shape = engine.create_body_shape(client, body.solids, actor.is_pushable, self._triangulate)
         if actor.is_pushable:
             frame = inertia_of_solids(body.solids, body.mass).principal()
             actor.center_from_base = frame[1].inverse()
@@ -218,11 +227,14 @@ class ScheduledPoses:
         return None if self._predicted is None else self._predicted.at(tick)
 
     def invalidate(self) -> None:
-        """Discard the poses, because an actor without a script has moved."""
+        """Discard the poses, because an actor that is not scripted has moved."""
         self._predicted = None
 
     def compute(self, tick: int, period: int, poses: Mapping[str, Pose3]) -> None:
-        """Compute the poses for every `period` ticks from `tick` on, unless known; `poses` has those of all actors."""
+        """Compute the poses for every `period` ticks from `tick` on, unless they are known or an actor is steered.
+
+        `poses` are the current poses of all actors, so that `at` can return them together with the scripted poses.
+        """
         is_known = self._predicted is not None and tick in self._predicted.ticks
         if is_known or any(actor.is_steered for actor in self._scripted):
             return

@@ -1,4 +1,4 @@
-"""All movable objects of a simulation, scripted or pushable."""
+"""All movable objects (actors) of a simulation; see `actor` for scripted and pushable ones."""
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -22,11 +22,11 @@ NEVER = 2**62
 class Actors:
     """All movable objects, sorted by name, so that their order in the engine is reproducible.
 
-    Scripted bodies are moved in the engine only where contact is possible: `begin_step` and `end_step` give them their
-    pose and velocity, so that they push others with the correct speed. Pushable objects sleep until something comes
-    near (see BroadPhase). If there are none, actors collide only after a robot has come near (see DeferredActors).
-    Bullet solves contacts in the order in which bodies begin to collide. Actors that are only measured or rendered are
-    therefore in the engine without collisions, so that no observation changes a run.
+    Scripted actors are moved in the engine only if contact is possible: `begin_step` and `end_step` give them their
+    pose and velocity, so that they push others with the correct speed. Pushable actors sleep until something comes
+    near (see BroadPhase). Without pushable actors, all actors collide only after a robot has come near (see
+    DeferredActors). Bullet solves contacts in the order in which bodies begin to collide. Therefore, actors that are
+    only measured or rendered are in the engine without collisions, so that no observation changes a run.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class Actors:
         visual_shape: int = engine.DEFAULT_VISUAL,
         is_rendered: bool = True,
     ) -> None:
-        """Begin without actors; `visual_shape` is what the renderer shows of all of them if `is_rendered`."""
+        """Begin without actors. If `is_rendered`, all actors are in the engine from the start, with `visual_shape`."""
         self._client, self._tick_rate = client, tick_rate
         self._builder = ActorBuilder(client, tick_rate, triangulate, visual_shape)
         self._is_rendered = is_rendered
@@ -45,7 +45,7 @@ class Actors:
         self._deferred: DeferredActors | None = None
         self._deferred_count = 0
         self._scripted: list[Actor] = []
-        self._scripted_tangible: list[Actor] = []
+        self._scripted_colliding: list[Actor] = []
         self._scripted_speed = 0.0
         """Upper bound of the speed of all scripted actors in m/s."""
         self._pushable: list[Actor] = []
@@ -78,37 +78,37 @@ class Actors:
         self._update_engine(tick)
 
     def _update_engine(self, tick: int) -> None:
-        """Let all actors collide that cannot be deferred, and create the others if they are rendered."""
+        """Let all actors collide that cannot be deferred; add the others without collisions if they are rendered."""
         self._actors = dict(sorted(self._actors.items()))
         actors = self._actors.values()
         none_deferred = any(actor.is_pushable for actor in actors)
         for actor in actors:
             if none_deferred or actor.is_steered:
-                self._builder.make_tangible(actor, tick)
+                self._builder.enable_collisions(actor, tick)
             elif self._is_rendered:
-                self._builder.make_measurable(actor, tick)
+                self._builder.add_without_collisions(actor, tick)
         self._update_lists()
 
     @property
     def is_engine_complete(self) -> bool:
-        """Whether all actors collide."""
+        """Whether all actors can collide, so that none is deferred."""
         return not self._deferred_count
 
     def activate_near(self, queries: Iterable[ProximityQuery], tick: int) -> dict[int, str | None]:
-        """Let the deferred actors collide that any robot could reach, and create those that it could measure.
+        """Let the deferred actors collide that any robot could reach, and add those that it could measure.
 
-        Return the names of both by body id.
+        Returns the names of both by body id.
         """
         if self._deferred is None:
-            self._deferred = DeferredActors([actor for actor in self._actors.values() if not actor.is_tangible])
+            self._deferred = DeferredActors([actor for actor in self._actors.values() if not actor.collides])
         activated, measured = self._deferred.activate_near(queries)
         for actor in activated:
-            self._builder.make_tangible(actor, tick)
+            self._builder.enable_collisions(actor, tick)
         for actor in measured:
-            self._builder.make_measurable(actor, tick)
+            self._builder.add_without_collisions(actor, tick)
         if activated:
             self._deferred_count -= len(activated)
-            self._scripted_tangible = [actor for actor in self._scripted if actor.is_tangible]
+            self._scripted_colliding = [actor for actor in self._scripted if actor.collides]
         return {actor.id: actor.body.name for actor in (*activated, *measured)}
 
     def remove(self, name: str) -> None:
@@ -142,9 +142,9 @@ class Actors:
     def _update_lists(self) -> None:
         self._poses_tick = self._resting_since = None
         actors = self._actors.values()
-        self._deferred, self._deferred_count = None, sum(not actor.is_tangible for actor in actors)
+        self._deferred, self._deferred_count = None, sum(not actor.collides for actor in actors)
         self._scripted = [actor for actor in actors if actor.path is not None]
-        self._scripted_tangible = [actor for actor in self._scripted if actor.is_tangible]
+        self._scripted_colliding = [actor for actor in self._scripted if actor.collides]
         self._scripted_speed = max((actor.max_speed for actor in self._scripted), default=0.0)
         self._pushable = [actor for actor in actors if actor.is_pushable]
         self._broad_phase = BroadPhase(self._client, self._tick_rate, self._scripted, self._pushable)
@@ -190,11 +190,11 @@ class Actors:
         self._resting_since = None
 
     def make_rest_detector(self) -> RestDetector:
-        """Return a detector for all pushable actors, whose result goes to `put_to_sleep`."""
+        """Return a detector for all pushable actors; pass the ids that it returns to `put_to_sleep`."""
         return RestDetector(self._client, [actor.id for actor in self._pushable])
 
     def put_to_sleep(self, body_ids: Collection[int]) -> None:
-        """Let bodies at rest sleep after the next step; queried poses are invalid after that step."""
+        """Let bodies at rest sleep after the next step."""
         for body_id in body_ids:
             engine.put_to_sleep(self._client, body_id)
         self._poses_tick = None
@@ -206,15 +206,15 @@ class Actors:
 
     @property
     def rest_poses(self) -> Mapping[str, Pose3]:
-        """Poses in which pushable actors have come to rest; most remain there until the end."""
+        """Poses in which pushable actors have come to rest, by name."""
         return self._rest_poses.poses
 
     def on_push(self, tick: int) -> None:
-        """Note that something is pushed during the step from `tick`, so that current speeds are no bound."""
+        """Discard speed bounds, because something is pushed during the step from `tick`."""
         self._broad_phase.invalidate(tick)
 
     def no_push_before(self, tick: int, robot_speed: Callable[[], float]) -> int:
-        """Return the tick until which no scripted body can push anything; -1 if one may do so during this step.
+        """Return the tick until which no scripted actor can push anything; -1 if one may do so during this step.
 
         Wakes the pushable actors that may be touched soon. `robot_speed` returns an upper bound in m/s for all robots.
         """
@@ -228,9 +228,9 @@ class Actors:
         return -1 if broad_phase.near_contact else broad_phase.valid_until
 
     def _is_asleep(self, tick: int) -> bool:
-        """Return whether all pushable actors sleep in the engine and no robot can have touched one.
+        """Return whether all pushable actors sleep in the engine, and no robot can have touched one.
 
-        A body that is only approached wakes and creeps by less than a micrometer until it is touched.
+        A robot that only comes near wakes a body in the engine, but does not move it noticeably.
         """
         is_resting = self._resting_since is not None and tick - self._resting_since > self._ticks_until_asleep
         return is_resting and tick <= min(self._no_contact_before.values())
@@ -242,26 +242,29 @@ class Actors:
     # Stepping
 
     def begin_step(self, tick: int, everything: bool = True) -> None:
-        """Give scripted bodies, or only those near contact, their pose and velocity before the step from `tick`."""
-        for actor in self._scripted_tangible if everything else self._broad_phase.near_contact:
+        """Give scripted actors their pose and velocity before the step from `tick`.
+
+        Without `everything`, only those are moved that may push something soon, as for `end_step`.
+        """
+        for actor in self._scripted_colliding if everything else self._broad_phase.near_contact:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
             velocity, turn_rate = actor.path_velocity(tick, self._tick_rate)
             if turn_rate or any(velocity):
                 pybullet.resetBaseVelocity(actor.id, velocity, (0.0, 0.0, turn_rate), physicsClientId=self._client)
 
     def end_step(self, tick: int, everything: bool = True) -> None:
-        """Move scripted bodies, or only those near contact, to their pose at `tick`."""
-        for actor in self._scripted_tangible if everything else self._broad_phase.near_contact:
+        """Move scripted actors to their pose at `tick`, after the step."""
+        for actor in self._scripted_colliding if everything else self._broad_phase.near_contact:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
     def move_rendered(self, tick: int) -> None:
-        """Move all scripted bodies in the engine to their pose at `tick`, also those that do not collide."""
+        """Move all scripted actors in the engine to their pose at `tick`, also those that do not collide."""
         for actor in self._scripted:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
     def velocities(self, tick: int) -> dict[int, Vector]:
         """Return the velocities in m/s of all actors that collide, by body id."""
-        scripted = {actor.id: actor.path_velocity(tick, self._tick_rate)[0] for actor in self._scripted_tangible}
+        scripted = {actor.id: actor.path_velocity(tick, self._tick_rate)[0] for actor in self._scripted_colliding}
         pushed = {actor.id: pybullet.getBaseVelocity(actor.id, self._client)[0] for actor in self._pushable}
         return {**scripted, **pushed}
 
@@ -297,7 +300,7 @@ class Actors:
         return actor.center_and_pose[1]
 
     def prefetch_poses(self, tick: int, period: int) -> None:
-        """Precompute scripted poses for `poses` queries at the current `tick` and every `period` ticks after it."""
+        """Precompute scripted poses for calls of `poses` at the current `tick` and every `period` ticks after it."""
         if self._scripted and self._poses_tick is not None and (not self._pushable or self._is_asleep(tick)):
             self._scheduled_poses.compute(tick, period, self._poses)
 
@@ -314,17 +317,20 @@ class Actors:
         return {actor.body_id: name for name, actor in self._actors.items() if actor.body_id is not None}
 
     def find_enclosing(self, point: Vector, tick: int) -> str | None:
-        """Return the name of the first actor that encloses a point, of those that are hollow in the engine."""
+        """Return the name of the first hollow actor that encloses a point, or None.
+
+        The engine itself detects that a point is inside an actor that is not hollow (see `engine.is_hollow`).
+        """
         for name, pose in self.poses(tick).items():
-            shell = self._actors[name].shell
-            if shell is not None:
+            surface = self._actors[name].surface
+            if surface is not None:
                 x, y, z = pose.inverse().apply(np.array(point)).tolist()
-                if encloses(shell.vertices[shell.faces], (x, y, z)):
+                if encloses(surface.vertices[surface.faces], (x, y, z)):
                     return name
         return None
 
     def find_divergence(self, tick: int) -> str | None:
-        """Return what is wrong with the first actor that the simulation has lost, or None."""
+        """Return what is wrong with the first actor that has diverged, of those that have moved, or None."""
         self.poses(tick)
         moved, self._moved = self._moved, []
         for actor in moved:
@@ -336,11 +342,13 @@ class Actors:
 
     # Distances and speeds
 
-    def ids_near(self, robot_id: int, point: Vector, distance: float, ground_distance: float, tick: int) -> list[int]:
-        """Return the body ids of the actors that may be within `distance` m of a point, for a robot's clearance.
+    def prepare_nearby(
+        self, robot_id: int, point: Vector, distance: float, ground_distance: float, tick: int
+    ) -> list[int]:
+        """Prepare a robot's query of distances; return the ids of the actors that may be within `distance` m of `point`.
 
-        Along the ground, `ground_distance` is sufficient. Scripted actors that are that near are moved to their pose in
-        the engine, as are those whose engine pose is that near, so that nothing collides with an outdated pose.
+        Moves scripted actors to their pose in the engine, if this pose or their outdated pose is within `distance`. If
+        none of the actors moves, returns only those that may be within `ground_distance` m along the ground.
         """
         poses = self.poses(tick)
         asleep_since = self._resting_since if not self._pushable or self._is_asleep(tick) else None
@@ -349,12 +357,12 @@ class Actors:
         if nearby is None or nearby.asleep_since != asleep_since or not nearby.covers(point, distance, tick, max_step):
             nearby = find_nearby(self._actors.values(), poses, point, distance, tick, asleep_since)
             self._nearby[robot_id] = nearby
-        return nearby.ids_near(self._client, point, distance, ground_distance, poses)
+        return nearby.prepare_nearby(self._client, point, distance, ground_distance, poses)
 
     def free_distance(self, robot_id: int, point: Vector, distance: float, tick: int) -> float | None:
-        """Return by how many meters `ids_near`, called just before, could extend `distance` and still find no actor.
+        """Return by how many meters all actors are farther from `point` than `distance`, as a lower bound.
 
-        None if actors can come from anywhere, because they can be pushed or steered.
+        Call it after `prepare_nearby`. Returns None if any actor can be pushed or steered.
         """
         nearby = self._nearby[robot_id]
         if self._pushable or any(actor.is_steered for actor in self._scripted):
@@ -367,14 +375,14 @@ class Actors:
         return self._scripted_speed * ticks / self._tick_rate
 
     def reachable_spheres(self, tick: int, ticks: int) -> Iterator[tuple[int, Vector, float]]:
-        """Yield body id, position, and the radius in m that each pushable actor can reach within `ticks`."""
+        """Yield body id, center, and radius in m of the sphere that each pushable actor can reach within `ticks`."""
         if self._pushable:
             poses, travel = self.poses(tick), self.speed_bound(tick) * ticks / self._tick_rate
             for actor in self._pushable:
                 yield actor.id, poses[actor.body.name].position, actor.size + travel
 
     def speed_bound(self, tick: int) -> float:
-        """Return an upper bound in m/s of the speed of all actors within 0.1 s from the current `tick`."""
+        """Return an upper bound in m/s of the speed of all actors within SPEED_HORIZON_S from the current `tick`."""
         if not self._pushable:
             return self._scripted_speed
         self.poses(tick)

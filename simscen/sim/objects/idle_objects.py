@@ -1,15 +1,13 @@
-"""Idle objects: pushable objects at rest that no scripted object can touch soon, so that they need no computing time.
+"""Decides which pushable objects sleep in the engine, so that they need nearly no computing time.
 
-A scripted object follows a given path and has no mass in the engine.
+Bullet only lets a body sleep after two seconds at rest. Therefore, the world settles before tick 0, and objects at rest
+are then put to sleep. The speed of each object is sampled meanwhile. An object is at rest if it is slow at every sample
+and not faster at each sample than at the one before. A speed that always increases shows that the object begins to
+slide or tip over; other small speeds are jitter of the contact solver.
 
-Bullet deactivates a body after two seconds at rest; until then, a chair takes as much computing time as a robot. The
-world settles before tick 0, and the speed of each object is sampled meanwhile. An object is at rest if it is slow at
-every sample and its speed does not increase at least once between two samples. A speed that increases every time shows
-that the object begins to slide or tip over; other small speeds are jitter of the contact solver.
-
-Bullet does not wake a body that is touched by a body without mass. Pushable objects must therefore be awake where a
-scripted object arrives; elsewhere they sleep, which saves nearly all of their computing time. Any other contact wakes
-them in the engine, together with everything that they touch (Bullet's islands).
+Bullet does not wake a body that is touched by a scripted object, because this has no mass (see `actor`). Pushable
+objects are therefore woken before a scripted object reaches them. Any other contact wakes them in the engine, together
+with everything that they touch.
 """
 
 import itertools
@@ -22,7 +20,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose3, Vector
 from simscen.sim.bullet import engine, pybullet
-from simscen.sim.objects.actor import Actor
+from simscen.sim.objects.actor import SHAPE_MARGIN_M, SPEED_HORIZON_S, Actor
 
 SAMPLE_PERIOD_TICKS = 6
 """Ticks between two samples. A swinging object is slow at one sample and fast at another."""
@@ -31,7 +29,7 @@ SAMPLE_COUNT = 5
 
 
 class RestDetector:
-    """Samples the speeds of bodies while the world settles."""
+    """Finds the bodies that are at rest, from samples of their speeds while the world settles."""
 
     def __init__(self, client: int, body_ids: Iterable[int]) -> None:
         self._client = client
@@ -54,20 +52,17 @@ def _is_at_rest(speeds: list[float]) -> bool:
 
 
 class RestPoses:
-    """Rest poses of pushable objects, by name.
-
-    A rest pose is a pose that an object had at two consecutive updates. All poses of the first update are rest poses.
-    """
+    """Rest poses of pushable objects: poses that they had at two consecutive updates, or at the first update."""
 
     def __init__(self) -> None:
         self.poses: Mapping[str, Pose3] = {}
-        """Newest rest pose of each object. A change of a pose creates a new mapping."""
+        """Newest rest pose of each object by name. A change creates a new mapping."""
         self._last: Mapping[str, Pose3] | None = None
 
     def update(self, poses: Mapping[str, Pose3]) -> None:
         """Update the rest poses with the current poses of all pushable objects.
 
-        The last rest pose of an object that moves or is removed stays, in case it returns to exactly this pose.
+        An object that moves or is removed keeps its last rest pose, in case it returns to exactly this pose.
         """
         before, self._last = poses if self._last is None else self._last, poses
         changed = {name: pose for name, pose in poses.items() if before.get(name) == pose != self.poses.get(name)}
@@ -75,12 +70,8 @@ class RestPoses:
             self.poses = {**self.poses, **changed}
 
 
-HORIZON_S = 0.1
-"""Time for which the assumed maximum speeds hold, also for objects that fall or are hit."""
 NEAR_CONTACT_S = 0.05
-"""Time to contact below which pushable objects are woken, and scripted objects are moved in the engine every tick."""
-SHAPE_MARGIN_M = 0.05
-"""Distance that collision shapes may extend beyond their vertices, from which sizes are computed."""
+"""Time to collision below which pushable objects are woken, and scripted objects are moved in the engine every tick."""
 
 
 class BoundingDiscs(NamedTuple):
@@ -99,7 +90,7 @@ class BoundingDiscs(NamedTuple):
 
 
 class CollisionCandidates(NamedTuple):
-    """Indices of the scripted and pushable bodies that may touch soon; without any, none can touch for `seconds`."""
+    """Indices of the scripted and pushable bodies that may touch soon. No others can touch for `seconds`."""
 
     scripted: tuple[int, ...]
     pushable: tuple[int, ...]
@@ -107,14 +98,14 @@ class CollisionCandidates(NamedTuple):
 
 
 def find_candidates(scripted: BoundingDiscs, pushable: BoundingDiscs, hit_speed: float) -> CollisionCandidates:
-    """Return the bodies that may touch soon; a pushable body can reach `hit_speed` m/s if something hits it."""
+    """Return the bodies that may touch within NEAR_CONTACT_S; a pushable body that is hit can reach `hit_speed` m/s."""
     distances = np.linalg.norm(scripted.centers[:, np.newaxis] - pushable.centers, axis=2)
     gaps = distances - scripted.radii[:, np.newaxis] - pushable.radii - 2 * SHAPE_MARGIN_M
     closing_speeds = scripted.speeds[:, np.newaxis] + np.maximum(pushable.speeds, hit_speed)
     near = gaps < NEAR_CONTACT_S * closing_speeds
     if near.any():
         return CollisionCandidates(_indices(near.any(axis=1)), _indices(near.any(axis=0)), NEAR_CONTACT_S)
-    return CollisionCandidates((), (), min(HORIZON_S, float((gaps / closing_speeds).min(initial=math.inf))))
+    return CollisionCandidates((), (), min(SPEED_HORIZON_S, float((gaps / closing_speeds).min(initial=math.inf))))
 
 
 def _indices(mask: npt.NDArray[np.bool_]) -> tuple[int, ...]:
@@ -122,7 +113,10 @@ def _indices(mask: npt.NDArray[np.bool_]) -> tuple[int, ...]:
 
 
 class BroadPhase:
-    """Broad phase of a fixed set of scripted and pushable actors; create a new instance when the set changes."""
+    """Broad phase between scripted and pushable actors: finds those that may touch soon, and wakes the pushable ones.
+
+    The set of actors is fixed; create a new instance when it changes.
+    """
 
     def __init__(self, client: int, tick_rate: int, scripted: Sequence[Actor], pushable: Sequence[Actor]) -> None:
         self._client, self._tick_rate, self._scripted, self._pushable = client, tick_rate, scripted, pushable
@@ -131,7 +125,7 @@ class BroadPhase:
         self.valid_until = -1
         """Tick until which only the actors in `near_contact` can push anything."""
         self.near_contact: list[Actor] = []
-        """Scripted actors that may push something soon."""
+        """Scripted actors that may push something before `valid_until`."""
 
     def invalidate(self, tick: int) -> None:
         """Discard the result, because a push during the step from `tick` changes speeds."""
@@ -140,13 +134,13 @@ class BroadPhase:
     def update(self, tick: int, robot_speed: float, poses: Mapping[str, Pose3], is_asleep: bool) -> bool:
         """Find the actors that may touch soon, and wake the pushable ones; return whether there were any.
 
-        All scripted actors are moved to their poses in the engine, where they remain until the next update.
-        `robot_speed` is an upper bound in m/s for all robots; `is_asleep` tells that all pushable actors sleep.
+        Places all scripted actors at their poses in the engine; only those in `near_contact` are moved again before the
+        next update. `robot_speed` is an upper bound in m/s for all robots. `is_asleep`: all pushable actors sleep.
         """
         moving = list[Actor]()
         for actor in self._scripted:
             actor.set_engine_pose(self._client, poses[actor.body.name])
-            if not actor.is_parked((tick - actor.path_start_tick) / self._tick_rate, HORIZON_S):
+            if not actor.is_parked((tick - actor.path_start_tick) / self._tick_rate, SPEED_HORIZON_S):
                 moving.append(actor)
         if self._pushable_discs is None or not is_asleep:
             self._pushable_discs = BoundingDiscs.of(

@@ -14,18 +14,18 @@ EXTRA_RADIUS_M = 2.0
 REQUERY_DISTANCE_M = 1.0
 """Distance that a robot can move before it queries deferred actors again."""
 EARLY_QUERY_DISTANCE_M = 0.5
-"""The same at ticks that are a multiple of ACTIVATION_PERIOD_S, however often the robot is observed."""
+"""Shorter distance that applies every ACTIVATION_PERIOD_S, so that REQUERY_DISTANCE_M is not exceeded between ticks."""
 ACTIVATION_PERIOD_S = 0.05
-"""Time between two of these ticks: robots are slower than 10 m/s, so that the other distance is not reached."""
+"""Time between early queries, in which robots, slower than 10 m/s, move at most EARLY_QUERY_DISTANCE_M."""
 ROUNDING_MARGIN_M = 1e-3
 """Upper bound of rounding errors in the distances of deferred actors."""
 
 
 class NearbyActors(NamedTuple):
-    """The actors within `distance` of a point at a tick, and all pushable actors unless they sleep.
+    """The actors within `distance` m of a point at a tick, and all pushable actors unless they sleep.
 
-    `asleep_since` is the tick since when all pushable actors have been at rest, or None. `resting` has each actor with
-    its position and its radius on the ground if none of them moves, else None.
+    `asleep_since` is the tick since when all pushable actors have been at rest, or None if one is awake. `resting` has
+    each actor with its position (x, y) and its radius on the ground; it is None if any of the actors can move.
     """
 
     actors: tuple[Actor, ...]
@@ -36,17 +36,13 @@ class NearbyActors(NamedTuple):
     resting: tuple[tuple[Actor, tuple[float, float], float], ...] | None
 
     def covers(self, point: Vector, distance: float, tick: int, max_step: float) -> bool:
-        """Return whether no other actor can be within `distance` of `point`, moving at most `max_step` m per tick."""
+        """Return whether no other actor, moving at most `max_step` m per tick, can be within `distance` m of `point`."""
         return math.dist(point, self.point) + max_step * (tick - self.tick) + distance <= self.distance
 
-    def ids_near(
+    def prepare_nearby(
         self, client: int, point: Vector, distance: float, ground_distance: float, poses: Mapping[str, Pose3]
     ) -> list[int]:
-        """Return the body ids of the actors that may be within `distance` of a point.
-
-        Along the ground, `ground_distance` is sufficient. Scripted actors that are that near, at their pose or at their
-        engine pose, are moved to their pose in the engine.
-        """
+        """Move the scripted actors near a point in the engine, and return the ids; see `Actors.prepare_nearby`."""
         if self.resting is not None:
             return [
                 actor.id for actor, xy, radius in self.resting if math.dist(xy, point[:2]) <= ground_distance + radius
@@ -61,7 +57,7 @@ class NearbyActors(NamedTuple):
         return near
 
     def free_distance(self, point: Vector, poses: Mapping[str, Pose3], travel: float) -> float:
-        """Return a lower bound of the distance to any actor if others may have come nearer by `travel` m since."""
+        """Return a lower bound in m of the distance to any actor; others have moved at most `travel` m since `tick`."""
         free = self.distance - math.dist(point, self.point) - travel
         return min([free, *(actor.distance_to(point, poses[actor.body.name]) - actor.size for actor in self.actors)])
 
@@ -74,7 +70,7 @@ def find_nearby(
     tick: int,
     asleep_since: int | None,
 ) -> NearbyActors:
-    """Return the actors within `distance` of a point, plus EXTRA_RADIUS_M for the next queries."""
+    """Return the actors within `distance` + EXTRA_RADIUS_M of a point."""
     distance += EXTRA_RADIUS_M
     is_awake = asleep_since is None
     nearby = tuple(
@@ -103,8 +99,8 @@ class ProximityQuery(NamedTuple):
 class DeferredActors:
     """Actors that do not collide in the engine yet, because no robot has come near their path.
 
-    They stand still or follow a fixed path. An actor is activated, for good, before a robot can reach any point of its
-    path, regardless of time and speed, so that no collision can be missed. docs/design/speed.md has the measurements.
+    They stand still or follow a fixed path. An actor is activated before a robot can reach any point of its path,
+    regardless of time and speed, so that no collision can be missed. It then remains active.
     """
 
     def __init__(self, actors: Sequence[Actor]) -> None:
@@ -119,9 +115,9 @@ class DeferredActors:
         self._is_measured = np.zeros(len(actors), dtype=np.bool_)
 
     def activate_near(self, queries: Iterable[ProximityQuery]) -> tuple[list[Actor], list[Actor]]:
-        """Return the deferred actors that any robot could reach, and the others that it could measure, in order.
+        """Return the deferred actors that any robot could reach, which are then active, and those it can only measure.
 
-        Both are returned once. The result holds until a robot has moved by REQUERY_DISTANCE_M.
+        Each list contains an actor only once. Query again before a robot has moved by REQUERY_DISTANCE_M.
         """
         is_near, is_measured = np.zeros((2, len(self._actors)), dtype=np.bool_)
         for point, radius, observed_radius in queries:

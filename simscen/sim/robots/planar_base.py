@@ -35,7 +35,7 @@ class PlanarBase:
         """Place the base at `pose`; the renderer shows `visual_shape`."""
         self._client = client
         moments, base_from_center = _total_mass_properties(body).principal()
-        hulls = engine.hull_shapes(client, body.collision_solids)
+        hulls = engine.create_hull_shapes(client, body.collision_solids)
         extra = len(hulls) - 1
         self.id: int = pybullet.createMultiBody(
             0,

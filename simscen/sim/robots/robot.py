@@ -15,12 +15,12 @@ from simscen.core.records.events import Event
 from simscen.core.records.trace import DeferredTruth, Truth
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet.divergence import divergence_reason
-from simscen.sim.contact.clearance import Clearance, TruthSampler
+from simscen.sim.contact.clearance import Clearance
 from simscen.sim.contact.collisions import BaseMotion, CollisionTracker, PreStepMotion, contact_points, enclosed_contact
 from simscen.sim.objects.actors import NEVER, Actors
 from simscen.sim.objects.proximity import REQUERY_DISTANCE_M, ProximityQuery
 from simscen.sim.robots.drive_factory import build_drive
-from simscen.sim.robots.robot_state import CachedState, RobotState
+from simscen.sim.robots.robot_state import CachedState, RobotState, TruthSampler
 from simscen.sim.scene.camera import RenderScene, render_image
 from simscen.sim.scene.terrain import FloorFriction, Terrain, is_ground_contact
 from simscen.sim.scene.walls import Walls
@@ -153,7 +153,7 @@ class Robot:
             scene.actors,
             clearance_range,
         )
-        self.sampler = TruthSampler(self.clearance)
+        self.sampler = TruthSampler(self.clearance.static_clearance)
         self._names: dict[int, str | None] = {}
         self._query_point: Vector = (math.inf, math.inf, math.inf)
 
@@ -334,7 +334,7 @@ class Robot:
             self._scene.client,
             self.base.id,
             self._names,
-            clearance.static_owner,
+            clearance.static_solid_at,
             1 / self._scene.tick_rate,
             self._is_ground_contact,
         )

@@ -1,16 +1,22 @@
-"""Pose and velocity of a robot, queried from the engine at most once per tick."""
+"""Pose and velocity of a robot, queried from the engine at most once per tick, and samples of its true state.
 
-from collections.abc import Callable
+The clearance of many samples is computed in one batch, because this uses the processor's caches better. It is not
+urgent, because the log needs a sample only some ticks later.
+"""
+
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
 from simscen.core.geometry import Pose3, Vector
 from simscen.core.geometry.kinematics import Twist
+from simscen.core.records.trace import Truth
 
-_new = tuple.__new__  # creates a named tuple without the call overhead of its class
+_new = tuple.__new__
+"""Creates a named tuple without the call overhead of its class."""
 
 
 class RobotState(NamedTuple):
-    """Pose of the base frame in the world, and velocity of its origin (m/s, rad/s) along the world axes."""
+    """Pose of the base frame in the world, and its linear (m/s) and angular (rad/s) velocity along the world axes."""
 
     pose: Pose3
     linear: Vector
@@ -18,10 +24,7 @@ class RobotState(NamedTuple):
 
     @property
     def twist(self) -> Twist:
-        """The velocity in the base frame: forward, left, and turn rate.
-
-        The values are those of `geometry.rotated`, without its other three components.
-        """
+        """The velocity in the base frame: forward, left, and turn rate. Equal bit for bit to `geometry.rotated`."""
         (_, _, _, x, y, z, w), (a, b, c), (f, g, h) = self
         x, y, z = -x, -y, -z
         p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
@@ -39,7 +42,7 @@ class TickClock(Protocol):
 
 
 class CachedState:
-    """State of a robot, cached for the current tick; must be invalidated when the robot is placed elsewhere."""
+    """Callable that returns the state of a robot, and caches it for the current tick."""
 
     def __init__(self, query: Callable[[], RobotState], clock: TickClock) -> None:
         self._query, self._clock = query, clock
@@ -53,5 +56,45 @@ class CachedState:
         return self._state
 
     def invalidate(self) -> None:
-        """Discard the cached state."""
+        """Discard the cached state, because the robot was placed elsewhere."""
         self._tick = -1
+
+
+class PendingTruth:
+    """State of a robot and poses of all objects at one tick, whose clearance is computed later: a DeferredTruth."""
+
+    __slots__ = ("objects", "result", "sampler", "state")
+
+    def __init__(self, sampler: "TruthSampler", state: RobotState, objects: Mapping[str, Pose3]) -> None:
+        self.sampler, self.state, self.objects = sampler, state, objects
+        self.result: Truth | None = None
+
+    def truth(self) -> Truth:
+        """Return the sample with its clearance."""
+        if self.result is None:
+            self.sampler.compute_deferred()
+        assert self.result is not None
+        return self.result
+
+
+class TruthSampler:
+    """Collects the deferred samples of one robot, and computes the clearance of all of them when one is needed."""
+
+    def __init__(self, static_clearance: Callable[[Pose3], float]) -> None:
+        """Take the function that returns the clearance in m at a pose; see `Clearance.static_clearance`."""
+        self._static_clearance = static_clearance
+        self._deferred: list[PendingTruth] = []
+
+    def defer(self, state: RobotState, objects: Mapping[str, Pose3]) -> PendingTruth:
+        """Return a sample whose clearance, that to the static world, is computed later; see `Clearance.can_defer`."""
+        sample = PendingTruth(self, state, objects)
+        self._deferred.append(sample)
+        return sample
+
+    def compute_deferred(self) -> None:
+        """Compute the clearance of all deferred samples."""
+        deferred, self._deferred = self._deferred, []
+        for sample in deferred:
+            state = sample.state
+            clearance = self._static_clearance(state.pose)
+            sample.result = _new(Truth, (state.pose, state.twist, clearance, sample.objects))

@@ -15,7 +15,8 @@ from simscen.sim.robots.robot_state import RobotState
 from simscen.sim.scene.terrain import MIN_NORMAL_Z_CASTER, MIN_NORMAL_Z_WHEEL, Terrain
 
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
-_new = tuple.__new__  # creates a named tuple without the call overhead of its class
+_new = tuple.__new__
+"""Creates a named tuple without the call overhead of its class."""
 KNUCKLE_MASS_RATIO = 0.2
 """Mass of a steering knuckle relative to that of its wheel."""
 PIN_RADIUS_M = 0.001
@@ -149,8 +150,8 @@ def _build(
         joints.append(len(links))
         max_roll = tick * (body.limits.linear + body.limits.angular * abs(wheel.y))
         links += _wheel_links(client, wheel, len(links), max_roll)
-    hull_shapes = engine.hull_shapes(client, body.hull)
-    first, *others = [*hull_shapes, *engine.hull_shapes(client, casters)]
+    hull_shapes = engine.create_hull_shapes(client, body.hull)
+    first, *others = [*hull_shapes, *engine.create_hull_shapes(client, casters)]
     hull = (-1, *range(len(links), len(links) + len(others)))
     links += [_Link(HULL_LINK_MASS_KG, shape, (0.0, 0.0, 0.0), 0, pybullet.JOINT_FIXED, (0, 0, 1)) for shape in others]
     _, center = body.chassis.principal()
@@ -216,4 +217,4 @@ def _wheel_shape(client: int, wheel: Wheel, max_roll: float) -> int:
         shape: int = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel.radius, physicsClientId=client)
         return shape
     pin = Solid(Sphere(PIN_RADIUS_M), Pose3(y=-math.copysign(pin_distance, wheel.y)))
-    return engine.compound_shape(client, [Solid(Sphere(wheel.radius)), pin])
+    return engine.create_compound_shape(client, [Solid(Sphere(wheel.radius)), pin])

@@ -12,16 +12,18 @@ from simscen.core.geometry.shapes import Body, Solid, TriangleMesh
 from simscen.sim.bullet import engine, pybullet
 
 NEAR_PLANE_M = 0.02
+"""Distance from the camera below which nothing is rendered."""
 FACES_PER_SHAPE = 20_000
-"""Bullet accepts at most 131072 vertices per shape; here, each face has three vertices of its own."""
+"""Largest number of faces of a visual shape: Bullet accepts 131072 vertices, and each face has three of its own."""
 
 
 def render_image(
     client: int, camera: Pose3, width: int, height: int, field_of_view: float, far: float
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-    """Return colors (h, w, 3) and depths (h, w) in meters along the optical axis, inf beyond `far`.
+    """Return colors (height, width, 3) and depths (height, width) in m along the optical axis, inf beyond `far` m.
 
-    The optical axis is the x axis of the camera pose, and z is up; `field_of_view` is horizontal, in rad.
+    `camera` is the pose of the camera in the world: its x axis is the optical axis, and z points up in the image.
+    `width` and `height` are in pixels; `field_of_view` is horizontal, in rad.
     """
     eye, target, above = camera.apply(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])).tolist()
     up = [a - b for a, b in zip(above, eye, strict=True)]
@@ -52,9 +54,10 @@ class _VisualBody:
 
 
 class RenderScene:
-    """Visual bodies for the renderer, which does not show collision shapes made of triangles.
+    """Visual bodies of the static world and of movable objects that are not primitives, for the renderer.
 
-    They are built with the first image, because most runs take none.
+    They are necessary because the renderer does not show collision shapes made of triangles. They are created with the
+    first image, because most runs take none.
     """
 
     def __init__(self, client: int, static: TriangleMesh, triangulate: engine.Triangulate) -> None:
@@ -63,7 +66,7 @@ class RenderScene:
         self._visuals: dict[str, _VisualBody] = {}
 
     def update(self, moving: Mapping[str, tuple[Body, Pose3]]) -> None:
-        """Move all visual bodies to the current poses of the movable objects."""
+        """Show the movable objects, given by name, at their current poses; remove the visual bodies of all others."""
         if not self._is_built:
             self._is_built = True
             engine.set_collision_filter(

@@ -1,7 +1,7 @@
-"""Uneven ground besides the plane z = 0, the pose of a robot on it, and the friction of the floor.
+"""Ground on which robots drive: ramps and other uneven ground above the plane z = 0, and the friction of the floor.
 
 Each convex solid becomes one convex shape, so that a wheel on a ramp does not bump into edges between triangles.
-Concave solids (height fields, meshes) remain triangles; there, a wheel loses some millimeters per second at each edge.
+Concave solids (height fields, meshes) remain triangles, and wheels lose some speed at their edges.
 """
 
 import math
@@ -18,9 +18,9 @@ from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.sim.bullet import engine, pybullet
 
 RAY_HEIGHT_M = 1000.0
-"""Height above and below the floor between which the ground is searched."""
+"""Height above and below the floor between which rays search the ground."""
 MIN_NORMAL_Z_WHEEL, MIN_NORMAL_Z_CASTER = 0.6, 0.1
-"""z of the contact normal above which a wheel or caster stands on the ground; below, it has hit an obstacle.
+"""Smallest z of the contact normal of a wheel or caster that stands on the ground; below, it has hit an obstacle.
 
 At an edge of height h, the normal of a wheel of radius r has z = 1 - h / r, so 0.6 is an edge of 0.4 r. A driven wheel
 climbs 0.29 r from standstill, and 0.4 r with some speed; a caster is pushed over anything lower than its center.
@@ -28,46 +28,46 @@ climbs 0.29 r from standstill, and 0.4 r with some speed; a caster is pushed ove
 
 
 class Terrain:
-    """The solids of a static world that wheels can roll on, as bodies in the engine; empty if the world is flat.
+    """The solids of a static world that wheels can roll on, as bodies in the engine; false if the world is flat.
 
-    `names` are their names by body id.
+    `solids` are their indices, and `names` are their names by body id.
     """
 
     def __init__(self, client: int, static: TriangleMesh, max_step: float) -> None:
-        """Build the solids; `max_step` is the highest step in m that any robot can climb: the radius of its wheels."""
+        """Create the solids that wheels can roll onto if they climb steps of `max_step` m: the largest wheel radius."""
         self._client = client
-        self.owners: SolidIndices = drivable_solids(static, max_step)
+        self.solids: SolidIndices = drivable_solids(static, max_step)
         self.names: dict[int, str | None] = {}
         self.obstacles = static
         """The rest of the static world, on which no wheel can roll."""
-        for owner in sorted(self.owners):
-            self._add(static, owner)
-        if self.owners:
+        for solid in sorted(self.solids):
+            self._add(static, solid)
+        if self.solids:
             # Rays only hit bodies after a first collision detection.
             pybullet.performCollisionDetection(physicsClientId=client)
-            is_obstacle = ~np.isin(static.owners, sorted(self.owners))
+            is_obstacle = ~np.isin(static.owners, sorted(self.solids))
             faces, owners = static.faces[is_obstacle], static.owners[is_obstacle]
             self.obstacles = TriangleMesh(static.vertices, faces, owners, static.names)
 
     def __bool__(self) -> bool:
         return bool(self.names)
 
-    def _add(self, static: TriangleMesh, owner: int) -> None:
-        faces = static.faces[static.owners == owner]
-        solid = submesh(static.vertices, faces)
-        if is_convex(solid):
-            shapes = [engine.convex_shape(self._client, solid.vertices)]
+    def _add(self, static: TriangleMesh, solid: int) -> None:
+        faces = static.faces[static.owners == solid]
+        mesh = submesh(static.vertices, faces)
+        if is_convex(mesh):
+            shapes = [engine.create_convex_shape(self._client, mesh.vertices)]
         else:
-            tiles = engine.tiles(static.vertices, engine.above_floor(static.vertices, faces))
-            shapes = [engine.concave_shape(self._client, submesh(static.vertices, tile)) for tile in tiles]
-        friction = static.frictions[owner] if static.frictions else 1.0
+            tiles = engine.split_into_tiles(static.vertices, engine.above_floor(static.vertices, faces))
+            shapes = [engine.create_concave_shape(self._client, submesh(static.vertices, tile)) for tile in tiles]
+        friction = static.frictions[solid] if static.frictions else 1.0
         for shape in shapes:
             body = engine.create_static_body(self._client, shape)
             pybullet.changeDynamics(
                 body, -1, collisionMargin=0.0, lateralFriction=friction, physicsClientId=self._client
             )
             engine.set_collision_filter(self._client, body, -1, engine.TERRAIN, engine.EVERYTHING)
-            self.names[body] = static.names[owner]
+            self.names[body] = static.names[solid]
 
     def heights(self, points: Array) -> Array:
         """Return the heights (n,) in m of the ground at points (n, 2); the highest surface counts."""
@@ -84,9 +84,9 @@ class Terrain:
         return replace(body, pose=body.pose._replace(z=body.pose.z + height)) if height else body
 
     def standing_pose(self, pose: Pose2, supports: Array) -> Pose3:
-        """Return the base frame of a robot that stands at `pose` on its `supports` (n, 2), given in its own frame.
+        """Return the base frame of a robot that stands at `pose` on the points `supports` (n, 2) of its own frame.
 
-        It lies on the plane that fits the ground below the supports best, raised so that none is below the ground.
+        The robot stands on the plane that fits the ground best, raised so that no support is below the ground.
         """
         heights = self.heights(pose.apply(supports))
         if len(supports) < 3 or not np.ptp(heights):
@@ -102,20 +102,19 @@ class Terrain:
 def is_ground_contact(
     ground: Mapping[int, str | None], min_normal_z: Mapping[int, float], other: int, link: int, normal_z: float
 ) -> bool:
-    """Return whether the contact of a link with the body `other` is that of a wheel or caster with the ground.
+    """Return whether a robot's link touches the body `other` like a wheel or caster that stands on the ground.
 
-    `ground` has the bodies of the terrain. `min_normal_z` has the links of wheels and casters, each with the smallest z
-    of the unit normal towards the robot at which it stands on the ground.
+    `ground` are the names of the terrain's bodies by body id. `min_normal_z` has the smallest `normal_z` of each wheel
+    and caster that stands on the ground, by link. `normal_z` is that of the unit normal towards the robot.
     """
     return other in ground and link in min_normal_z and normal_z >= min_normal_z[link]
 
 
 class FloorFriction:
-    """Named patches of the floor with a friction of their own; later patches cover earlier ones.
+    """Named patches of the floor with a friction of their own; a newer patch covers older ones.
 
-    The engine multiplies the frictions of the two bodies in contact. A wheel normally has friction 1, so that the
-    friction of the floor applies. On a patch, the wheel gets the friction of the patch instead. On a ramp with its own
-    friction, the friction of a patch is multiplied by that of the ramp.
+    The engine multiplies the frictions of two bodies in contact. The ground has friction 1 and ramps have their own. A
+    wheel gets the friction of the patch below it, or 1 without a patch. On a ramp, both frictions are multiplied.
     """
 
     def __init__(self) -> None:
@@ -123,7 +122,7 @@ class FloorFriction:
         self._has_expired = False
 
     def __bool__(self) -> bool:
-        """Whether there has ever been a patch, so that the friction of wheels must be updated."""
+        """Whether a patch exists or has expired, so that the friction of wheels must be updated."""
         return bool(self._patches) or self._has_expired
 
     def add(self, name: str, patch: Patch) -> None:

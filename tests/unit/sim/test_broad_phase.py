@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from simscen.sim.objects.idle_objects import HORIZON_S, NEAR_CONTACT_S, BoundingDiscs, find_candidates
+from simscen.sim.objects.actor import SPEED_HORIZON_S
+from simscen.sim.objects.idle_objects import NEAR_CONTACT_S, BoundingDiscs, find_candidates
 
 
 def test_bodies_do_not_meet_within_the_guaranteed_time():
@@ -12,7 +13,7 @@ def test_bodies_do_not_meet_within_the_guaranteed_time():
         scripted = BoundingDiscs(rng.uniform(-2, 2, (3, 2)), rng.uniform(0.1, 0.3, 3), rng.uniform(0, 2, 3))
         pushable = BoundingDiscs(rng.uniform(-2, 2, (4, 2)), rng.uniform(0.1, 0.3, 4), rng.uniform(0, 1, 4))
         found = find_candidates(scripted, pushable, hit_speed=1.5)
-        assert 0 < found.seconds <= HORIZON_S
+        assert 0 < found.seconds <= SPEED_HORIZON_S
         apart = np.linalg.norm(scripted.centers[:, None] - pushable.centers, axis=2)
         reach = scripted.radii[:, None] + pushable.radii + found.seconds * (scripted.speeds[:, None] + 1.5)
         for mover, thing in np.argwhere(apart < reach).tolist():
@@ -22,6 +23,6 @@ def test_bodies_do_not_meet_within_the_guaranteed_time():
 
 def test_distant_bodies_are_skipped_and_jumping_bodies_are_checked():
     far = BoundingDiscs.of([((9.0, 0.0, 0.0), 0.3, 0.0)])
-    assert find_candidates(BoundingDiscs.of([((0.0, 0.0, 0.0), 0.3, 1.0)]), far, 1.0) == ((), (), HORIZON_S)
+    assert find_candidates(BoundingDiscs.of([((0.0, 0.0, 0.0), 0.3, 1.0)]), far, 1.0) == ((), (), SPEED_HORIZON_S)
     assert find_candidates(BoundingDiscs.of([((0.0, 0.0, 0.0), 0.3, np.inf)]), far, 1.0) == ((0,), (0,), NEAR_CONTACT_S)
-    assert find_candidates(BoundingDiscs.of([]), far, 1.0) == ((), (), pytest.approx(HORIZON_S))
+    assert find_candidates(BoundingDiscs.of([]), far, 1.0) == ((), (), pytest.approx(SPEED_HORIZON_S))

@@ -123,7 +123,7 @@ def test_no_contact_is_missed_compared_with_asking_after_every_tick(simulate, mo
         return events, simulation.truth().pose
 
     gated = run()
-    monkeypatch.setattr("simscen.sim.contact.clearance.HORIZON_S", -1.0)
+    monkeypatch.setattr("simscen.sim.contact.clearance.SPEED_HORIZON_S", -1.0)
     always = run()
     assert started(always[0])
     assert gated == always

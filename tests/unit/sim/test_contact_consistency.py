@@ -99,7 +99,7 @@ def test_ruling_contacts_out_gives_the_events_and_the_clearance_of_asking_at_eve
         return events, samples
 
     ruled_out = run()
-    monkeypatch.setattr("simscen.sim.contact.clearance.HORIZON_S", -1.0)
+    monkeypatch.setattr("simscen.sim.contact.clearance.SPEED_HORIZON_S", -1.0)
     polled = run()
     assert EventKind.COLLISION_STARTED in kinds(polled[0])
     assert ruled_out[0] == polled[0]
@@ -159,6 +159,6 @@ def test_a_push_does_not_carry_the_robot_into_something_unseen(simulate, monkeyp
         return watch(simulation, 48, 24)
 
     ruled_out = run()
-    monkeypatch.setattr("simscen.sim.contact.clearance.HORIZON_S", -1.0)
+    monkeypatch.setattr("simscen.sim.contact.clearance.SPEED_HORIZON_S", -1.0)
     assert ruled_out == run()
     assert kinds(ruled_out[0])[0] == EventKind.COLLISION_STARTED

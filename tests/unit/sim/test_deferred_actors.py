@@ -201,4 +201,4 @@ def test_distance_to_a_deferred_actor_is_an_error(simulate):
     """Rather than that a collision with it is not seen."""
     simulation = simulate(bodies=[FAR], has_images=False)
     with pytest.raises(LookupError, match='"far" is not in the engine'):
-        simulation._scene.actors.ids_near(simulation.robot.base.id, (7.0, 0.0, 0.0), 2.0, 2.0, 0)
+        simulation._scene.actors.prepare_nearby(simulation.robot.base.id, (7.0, 0.0, 0.0), 2.0, 2.0, 0)

@@ -5,7 +5,7 @@ from scipy.spatial import ConvexHull
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Body, Cylinder, Mesh, Solid
-from simscen.sim.bullet.hull_vertices import MAX_VERTICES, TOLERANCE_M, reduce_hull_vertices
+from simscen.sim.body.outline import HULL_TOLERANCE_M, MAX_HULL_VERTICES, reduce_hull_vertices
 
 
 def mesh(made):
@@ -29,14 +29,14 @@ def test_removed_vertices_are_within_a_millimeter_of_the_hull(shape):
     assert len(kept) < len(ConvexHull(full).vertices) / 2
     assert reduce_hull_vertices(ROUND[shape]) is kept
     planes = ConvexHull(kept).equations
-    assert max((planes[:, :3] @ point + planes[:, 3]).max() for point in full) <= TOLERANCE_M + 1e-9
+    assert max((planes[:, :3] @ point + planes[:, 3]).max() for point in full) <= HULL_TOLERANCE_M + 1e-9
     rows = {tuple(row) for row in full.tolist()}
     assert all(tuple(row) in rows for row in kept.tolist())
 
 
 def test_a_hull_of_few_corners_is_kept_whole():
     box = trimesh.creation.box((1, 2, 3)).subdivide().subdivide().subdivide()
-    assert len(box.vertices) > MAX_VERTICES
+    assert len(box.vertices) > MAX_HULL_VERTICES
     assert ConvexHull(reduce_hull_vertices(mesh(box))).volume == pytest.approx(6.0)
     assert len(reduce_hull_vertices(mesh(box))) < 100
 

@@ -11,7 +11,7 @@ from playground import box, shipped
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.bullet.engine import create_static_body, hull_shape, tiles
+from simscen.sim.bullet.engine import create_hull_shape, create_static_body, split_into_tiles
 from simscen.sim.contact.static_distance import (
     StaticDistance,
     encloses,
@@ -66,9 +66,9 @@ def proximity():
 
 
 def test_the_owner_is_the_solid_whose_surface_is_nearest(proximity):
-    assert proximity.nearest_owner((1.01, 0.5, 0.2)) == "shelf"
-    assert proximity.nearest_owner((2.71, 0.0, 0.2)) == "post"
-    assert proximity.nearest_owner((50.0, 0.0, 0.2)) == ""
+    assert proximity.nearest_solid_name((1.01, 0.5, 0.2)) == "shelf"
+    assert proximity.nearest_solid_name((2.71, 0.0, 0.2)) == "post"
+    assert proximity.nearest_solid_name((50.0, 0.0, 0.2)) == ""
 
 
 def test_distances_are_to_the_nearest_solid_but_the_floor(proximity):
@@ -176,15 +176,15 @@ def test_a_solid_of_more_triangles_than_bullet_takes_at_once_is_as_near_as_any()
 
 def test_every_face_is_in_one_tile():
     wall = wall_of_many_triangles(400, 60)
-    found = np.concatenate(tiles(wall.vertices, wall.faces))
+    found = np.concatenate(split_into_tiles(wall.vertices, wall.faces))
     assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, wall.faces.tolist()))
-    assert [len(tile) for tile in tiles(wall.vertices, wall.faces)] == [40_000, 8_000]
+    assert [len(tile) for tile in split_into_tiles(wall.vertices, wall.faces)] == [40_000, 8_000]
 
 
 def test_a_hull_of_more_corners_than_bullet_takes_at_once_is_that_of_its_outermost():
     points = np.random.default_rng(4).uniform(-0.2, 0.2, size=(150_000, 3))
     made = StaticDistance(merge_solids([]), build_robot_body(shipped("turtlebot")), 2.0)
-    shape = hull_shape(made._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")])
+    shape = create_hull_shape(made._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")])
     low, high = pybullet.getAABB(create_static_body(made._client, shape), physicsClientId=made._client)
     assert low == pytest.approx(points.min(axis=0), abs=0.05)
     assert high == pytest.approx(points.max(axis=0), abs=0.05)
@@ -196,8 +196,8 @@ def test_a_solid_as_large_as_a_map_is_asked_where_the_robot_is_only():
     made = StaticDistance(merge_solids([Solid(wall, Pose3(), "wall")]), build_robot_body(shipped("turtlebot")), 2.0)
     assert made.distance(Pose3(4.0, 0.0)) == pytest.approx(1.0 - 0.22, abs=1e-3)
     assert sum(len(made._parts.faces(part)) for part in made._shape_pairs) < 0.5 * len(wall.faces)
-    assert made.nearest_owner((5.0, 1.0, 0.5)) == "wall"
-    assert made.enclosing((4.0, 0.0, 0.5)) == []
+    assert made.nearest_solid_name((5.0, 1.0, 0.5)) == "wall"
+    assert made.enclosing_solids((4.0, 0.0, 0.5)) == []
 
 
 def room_of_many_triangles():
@@ -212,8 +212,8 @@ def test_a_place_is_inside_a_solid_of_many_tiles_as_in_any_other():
         build_robot_body(shipped("turtlebot")),
         2.0,
     )
-    assert [made.name(k) for k in made.enclosing((1.0, 1.0, 0.5))] == ["block"]
-    assert [made.name(k) for k in made.enclosing((20.0, 0.0, 0.5))] == ["shelf"]
+    assert [made.name(k) for k in made.enclosing_solids((1.0, 1.0, 0.5))] == ["block"]
+    assert [made.name(k) for k in made.enclosing_solids((20.0, 0.0, 0.5))] == ["shelf"]
     assert made.distance(Pose3(6.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
     assert not made.is_convex(0)
     assert made.is_convex(1)
