@@ -26,13 +26,13 @@ from simscen.sim.scene.walls import Walls
 FIRMWARE_RATE_HZ = 60
 """Rate at which a base's firmware updates its wheel speeds; those of Clearpath and Robotis run at 50 to 100 Hz."""
 REST_UPDATE_PERIOD_S = 5.0
-"""Time between two updates of the rest poses of pushable objects."""
+"""Time between two updates of the rest poses of pushable objects; see RestPoses."""
 SETTLING_TICKS = 60
 """Ticks before tick 0 in which everything comes to rest on the ground."""
 
 
 class RobotPlacement(NamedTuple):
-    """Body and initial pose of a robot, and its obstacles if these are only a part of the static world."""
+    """Body and initial pose of a robot, and its obstacles; None means that the whole static world is its obstacles."""
 
     body: RobotBody
     pose: Pose2
@@ -40,10 +40,7 @@ class RobotPlacement(NamedTuple):
 
 
 class Simulation:
-    """Physics of one run. Create it in the process that uses it, and close it.
-
-    `robots` has the robots by name.
-    """
+    """Physics of one run. Create it in the process that uses it, and close it. `robots` has all robots by name."""
 
     def __init__(
         self,
@@ -56,11 +53,11 @@ class Simulation:
         clearance_range: float = CLEARANCE_RANGE_M,
         has_images: bool = True,
     ) -> None:
-        """Build the world with the robots at rest at their initial poses.
+        """Build the world with the robots at rest at their initial poses. `tick_rate` is in Hz.
 
-        The order of `robots` and `bodies` does not matter, because the engine receives both sorted by name. Clearance
-        is measured up to `clearance_range` m. `triangulate` returns the surface of a shape, for movable objects that
-        are no engine primitive. Without `has_images`, nothing is prepared for the renderer.
+        `bodies` are the movable objects. The order of `robots` and `bodies` does not matter, because the engine
+        receives both sorted by name. Clearance is measured up to `clearance_range` m. `triangulate` returns the surface
+        of a shape that is not an engine primitive. Without `has_images`, cameras cannot be used.
         """
         client = CLIENT_POOL.take()
         engine.set_physics_parameters(client, tick_rate, solver_iterations, solve_islands_separately=len(robots) > 1)
@@ -93,7 +90,7 @@ class Simulation:
         self._scene.after_change()
 
     def _settle(self) -> None:
-        """Let all objects come to rest, and let those that do sleep from tick 0 on."""
+        """Simulate SETTLING_TICKS, and let the objects sleep that are then at rest."""
         actors = self._scene.actors
         rest_detector = actors.make_rest_detector()
         for tick in range(1 - SETTLING_TICKS, 1):
@@ -118,16 +115,17 @@ class Simulation:
         if has_pushable or not scene.actors.is_engine_complete:
             period = self._rest_update_period if has_pushable else self._activation_period
             for due in range(scene.tick - scene.tick % period + period, until + 1, period):
-                self._step(due - scene.tick)
+                self._step_uninterrupted(due - scene.tick)
                 if has_pushable:
                     scene.actors.update_rest_poses(due)
                 else:
                     scene.activate_actors(EARLY_QUERY_DISTANCE_M)
         if scene.tick < until:
-            self._step(until - scene.tick)
+            self._step_uninterrupted(until - scene.tick)
         scene.activate_actors()
 
-    def _step(self, ticks: int) -> None:
+    def _step_uninterrupted(self, ticks: int) -> None:
+        """Simulate `ticks` ticks without updates of rest poses or deferred actors in between."""
         scene, no_contact_before = self._scene, -1
         until, is_plain = scene.tick + ticks, not (scene.pushes or self._periodic_call or scene.floor)
         if is_plain and (no_contact_before := self._no_contact_before(ticks)) >= until:
@@ -168,7 +166,7 @@ class Simulation:
     def _no_contact_before(self, ticks: int) -> int:
         """Return the tick until which no contact is possible; -1 if one is possible in this step.
 
-        Builds the walls that pushable objects can reach within `ticks`.
+        Also creates the walls that pushable objects can reach within `ticks`.
         """
         actors = self._scene.actors
         if not actors.has_pushable:
@@ -182,7 +180,7 @@ class Simulation:
         return max([robot.clearance.speed_bound() for robot in self._robots])
 
     def _step_with_contact(self) -> None:
-        """Step with scripted bodies at their poses and contacts recorded."""
+        """Simulate one tick with scripted actors at their poses, and record the contacts of robots."""
         scene = self._scene
         if scene.tick < min([robot.no_contact_before for robot in self._robots]):  # only objects can touch each other
             scene.actors.begin_step(scene.tick, everything=False)
@@ -203,7 +201,7 @@ class Simulation:
         scene.actors.end_step(scene.tick)
 
     def _build_walls(self, ticks: int) -> None:
-        """Build the walls that robots touch now, and those that pushable objects can reach within `ticks`."""
+        """Create the walls that robots may touch now, and those that pushable objects can reach within `ticks`."""
         scene = self._scene
         robots = [(robot.base.id, robot.base_pose().position, robot.clearance.size) for robot in self.robots.values()]
         for sphere in itertools.chain(robots, scene.actors.reachable_spheres(scene.tick, ticks)):
@@ -212,13 +210,13 @@ class Simulation:
                     robot.add_bodies(dict.fromkeys(new_walls))
 
     def call_before_steps(self, period: int, function: Callable[[], None]) -> None:
-        """Call a function before each step from a tick that is a multiple of `period`."""
+        """Call `function` before each step that begins at a multiple of `period` ticks (only one function)."""
         self._periodic_call = period, function
 
     # Changing the world
 
     def add_friction_patch(self, name: str, patch: Patch) -> None:
-        """Change the friction of a piece of floor; replaces a patch of the same name."""
+        """Change the friction of an area of the floor; replaces a patch of the same name."""
         self._scene.floor.add(name, patch)
 
     def spawn(self, body: Body) -> None:
@@ -234,7 +232,7 @@ class Simulation:
         self._scene.after_change()
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Let a body follow a path that begins now; raises KeyError for an unknown name."""
+        """Let a body follow a path that begins now, and never be pushed again; raises KeyError for an unknown name."""
         self._scene.before_change()
         self._scene.actors.move(name, path, self.tick)
         self._scene.after_change()
@@ -246,7 +244,7 @@ class Simulation:
         self._scene.after_change()
 
     def push_object(self, name: str, impulse: tuple[float, float], seconds: float = 0.0) -> None:
-        """Apply an impulse (N s, world frame) to a body, spread over `seconds` or one tick, from the next tick on.
+        """Apply an impulse (N s, world frame) to a body from the next tick on, over `seconds`, at least one tick.
 
         Has no effect on a body that does not exist or cannot be pushed.
         """
@@ -255,7 +253,7 @@ class Simulation:
         self._scene.add_push(partial(actors.push, name), impulse, seconds, self.tick + 1)
 
     def add_steered(self, body: Body, max_speed: float) -> None:
-        """Add a round body that `follow` will move, never faster than `max_speed` m/s."""
+        """Add a round body that is moved with `follow`, such as a pedestrian, at up to `max_speed` m/s."""
         self._scene.before_change()
         path = MotionPath((0.0,), (body.pose.plane,))
         self._scene.actors.add(replace(body, path=path), self.tick, is_steered=True)
@@ -263,13 +261,13 @@ class Simulation:
         self._scene.after_change()
 
     def follow(self, name: str, path: MotionPath, max_speed: float) -> None:
-        """Let a steered body follow a path that begins at its current pose."""
+        """Let a body from `add_steered` follow a path that begins at its current pose, at up to `max_speed` m/s."""
         self._scene.actors.follow(name, path, max_speed, self.tick)
 
     # Observing the world
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the path that moves a body now and the seconds since its start, or None."""
+        """Return the path that moves a body now and the seconds since its start, or None if no path moves it."""
         return self._scene.actors.motion(name, self.tick)
 
     def mass(self, name: str) -> float:

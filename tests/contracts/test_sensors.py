@@ -53,7 +53,7 @@ class Rig:
 
     def __init__(self, spec, seed=1, pose=Pose2(0.5, -0.3, 0.4)):
         self.simulation = SingleRobotSimulation(ROOM, [], build_robot_body(spec), pose, triangulate)
-        self.sensors = build_sensors(spec, Clock(240), Streams(seed), self.simulation, RayScene(ROOM))
+        self.sensors = build_sensors(spec, Clock(240), Streams(seed), self.simulation.robot, RayScene(ROOM))
 
     def drive(self, twist, ticks):
         """All readings on the way."""

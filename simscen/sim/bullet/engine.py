@@ -40,7 +40,7 @@ PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
 
 Triangulate = Callable[[Shape], Mesh]
 """Returns the closed surface of a shape."""
-PrincipalInertia = tuple[Vector, Pose3]
+Inertia = tuple[Vector, Pose3]
 """Principal moments of inertia in kg m², and the frame of their axes at the center of mass, in the body frame."""
 Faces = npt.NDArray[np.int32]
 """Vertex indices (n, 3) of triangles."""
@@ -213,13 +213,7 @@ def fuse_surfaces(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
 
 
 def create_rigid_body(
-    client: int,
-    mass: float,
-    shape: int,
-    pose: Pose3,
-    inertia: PrincipalInertia,
-    friction: float,
-    visual: int = DEFAULT_VISUAL,
+    client: int, mass: float, shape: int, pose: Pose3, inertia: Inertia, friction: float, visual: int = DEFAULT_VISUAL
 ) -> int:
     """Create a body with the collision shape `shape` and the visual shape `visual`; `mass` is in kg.
 

@@ -155,7 +155,7 @@ class Actors:
             engine.wake(self._client, actor.id)  # it may have stood on a removed object
 
     def motion(self, name: str, tick: int) -> tuple[MotionPath, float] | None:
-        """Return the path that moves a body now and the seconds since its start, or None."""
+        """Return the path that moves a body now and the seconds since its start, or None if no path moves it."""
         actor = self._actors.get(name)
         if actor is None or actor.path is None:
             return None
@@ -345,7 +345,7 @@ class Actors:
     def prepare_nearby(
         self, robot_id: int, point: Vector, distance: float, ground_distance: float, tick: int
     ) -> list[int]:
-        """Prepare a robot's query of distances; return the ids of the actors that may be within `distance` m of `point`.
+        """Prepare a robot's distance query; return the ids of the actors that may be within `distance` m of `point`.
 
         Moves scripted actors to their pose in the engine, if this pose or their outdated pose is within `distance`. If
         none of the actors moves, returns only those that may be within `ground_distance` m along the ground.

@@ -36,7 +36,7 @@ class NearbyActors(NamedTuple):
     resting: tuple[tuple[Actor, tuple[float, float], float], ...] | None
 
     def covers(self, point: Vector, distance: float, tick: int, max_step: float) -> bool:
-        """Return whether no other actor, moving at most `max_step` m per tick, can be within `distance` m of `point`."""
+        """Return whether all other actors, moving up to `max_step` m per tick, are farther than `distance` m away."""
         return math.dist(point, self.point) + max_step * (tick - self.tick) + distance <= self.distance
 
     def prepare_nearby(

@@ -1,4 +1,4 @@
-"""Interfaces of bases and drives, and the choice of both for a robot."""
+"""Interfaces of a robot's base and drive, and the function that builds both for any type of drive."""
 
 from collections.abc import Callable, Mapping
 from typing import Protocol
@@ -15,13 +15,13 @@ from simscen.sim.scene.terrain import Terrain
 
 
 class Base(Protocol):
-    """Body of a robot in the engine with the body id `id`; its links `hull_links` collide with obstacles."""
+    """Hull and wheels of a robot in the engine, with the body id `id`; its `hull_links` collide with obstacles."""
 
     id: int
     hull_links: tuple[int, ...]
     ground_links: Mapping[int, float]
-    """Links that stand on uneven ground, with the smallest z of the contact normal; see `terrain.is_ground_contact`.
-    Empty for a base that is bound to z = 0."""
+    """Smallest z of the contact normal of each link that can stand on uneven ground; see `terrain.is_ground_contact`.
+    Empty for a planar base."""
 
     def place(self, pose: Pose2) -> None:
         """Place the robot at rest with its base frame on the ground."""
@@ -32,7 +32,7 @@ class Base(Protocol):
         ...
 
     def set_friction(self, friction: Callable[[float, float], float]) -> None:
-        """Set the friction of its wheels for the next step; `friction` returns that of the floor at x, y."""
+        """Set the friction of its wheels for the next step; `friction` returns the friction of the floor at (x, y)."""
         ...
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
@@ -66,11 +66,11 @@ class Drive(Protocol):
 
 
 def build_drive(
-    client: int, body: RobotBody, pose: Pose2, period: float, tick: float, terrain: Terrain, visual_shape: int
+    client: int, body: RobotBody, pose: Pose2, period: float, tick_seconds: float, terrain: Terrain, visual_shape: int
 ) -> tuple[Base, Drive]:
     """Return the base of a robot at `pose` and its drive, whose firmware runs every `period` seconds.
 
-    A physics step lasts `tick` seconds; the renderer shows `visual_shape`.
+    The renderer shows `visual_shape` (an id) instead of each collision shape.
     """
     match body.drive:
         case Omnidirectional():
@@ -80,8 +80,8 @@ def build_drive(
             base = PlanarBase(client, body, pose, visual_shape)
             return base, MecanumDrive(base, body, period)
         case Ackermann():
-            vehicle = WheeledBase(client, body, pose, terrain, tick, visual_shape)
+            vehicle = WheeledBase(client, body, pose, terrain, tick_seconds, visual_shape)
             return vehicle, AckermannDrive(client, vehicle, body, period)
         case Differential() | SkidSteer():
-            vehicle = WheeledBase(client, body, pose, terrain, tick, visual_shape)
+            vehicle = WheeledBase(client, body, pose, terrain, tick_seconds, visual_shape)
             return vehicle, DifferentialDrive(client, vehicle, body, period)

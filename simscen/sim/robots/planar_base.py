@@ -1,4 +1,4 @@
-"""Omnidirectional and mecanum bases: a body on three planar joints with a motor for each direction."""
+"""Omnidirectional and mecanum drives on a planar base: a hull on three joints with a motor for each direction."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -16,11 +16,12 @@ from simscen.sim.robots.robot_state import RobotState
 from simscen.sim.robots.wheel_drives import VelocityRamp
 
 MAX_FORCE_PER_WEIGHT = 0.7
-"""Largest motor force relative to the weight of the robot."""
+"""Largest motor force divided by the weight of the robot."""
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
-CARRIER_MASS_KG = 0.001
-"""Mass of the two carriers between the world and the hull, because the engine requires one."""
 CARRIERS = 2
+"""Number of links without a shape between the world and the hull: one for the joint along x, one for that along y."""
+CARRIER_MASS_KG = 0.001
+"""Mass of a carrier, because the engine requires one."""
 
 
 class PlanarBase:
@@ -80,7 +81,7 @@ class PlanarBase:
         return RobotState(Pose3.planar(Pose2(x, y, yaw)), (vx, vy, 0.0), (0.0, 0.0, wz))
 
     def pose(self) -> Pose2:
-        """Return the pose; the heading is not limited to one turn."""
+        """Return the pose; its heading counts full turns."""
         states = pybullet.getJointStates(self.id, self.joints, physicsClientId=self._client)
         return Pose2(*(state[0] for state in states))
 
@@ -115,11 +116,11 @@ def _total_mass_properties(body: RobotBody) -> MassProperties:
 
 
 class OmnidirectionalDrive:
-    """Drive that follows any twist; its encoders measure every motion over the ground in the base frame."""
+    """Drive that follows any twist. Its encoders measure every motion over the ground, along the axes of the base."""
 
     def __init__(self, base: PlanarBase, body: RobotBody, period: float) -> None:
         self._base, self._period = base, period
-        self._ramp = VelocityRamp(body.limits, period, holonomic=True)
+        self._ramp = VelocityRamp(body.limits, period, is_holonomic=True)
         self._traveled = (0.0, 0.0, 0.0)
         self._last_pose = base.pose()
         base.set_motors(STOP)
@@ -129,7 +130,7 @@ class OmnidirectionalDrive:
         self._ramp.command(twist)
 
     def advance(self) -> None:
-        """Rotate the motor velocity to the heading half a period ahead, so that the base drives arcs."""
+        """Update the motor velocity, rotated to the heading half a period ahead, so that the base drives arcs."""
         changed = self._ramp.advance()
         velocity = self._actual_velocity(self._ramp.velocity)
         if not changed and velocity == STOP:
@@ -150,7 +151,7 @@ class OmnidirectionalDrive:
         self._base.set_motors(STOP)
 
     def encoders(self) -> tuple[float, ...]:
-        """Return accumulated meters forward, meters to the left, and radians."""
+        """Return the accumulated motion: meters forward, meters to the left, and radians."""
         self._update_encoders()
         return self._traveled
 
@@ -167,14 +168,14 @@ class OmnidirectionalDrive:
 
 
 class MecanumDrive(OmnidirectionalDrive):
-    """Four mecanum wheels under a planar base: the wheels roll without slip, their rollers without friction.
+    """Drive with four mecanum wheels that never slip.
 
-    The firmware uses the dimensions of the drive, which may differ from those of the wheels as built.
+    The firmware uses the wheel dimensions of the drive's specification, which may differ from those of the real wheels.
     """
 
     def __init__(self, base: PlanarBase, body: RobotBody, period: float) -> None:
         assert isinstance(body.drive, Mecanum)
-        self._firmware, self._wheels = body.drive.wheels, mecanum_wheels(body)
+        self._firmware, self._wheels = body.drive.wheels, _real_wheels(body)
         super().__init__(base, body, period)
 
     def encoders(self) -> tuple[float, ...]:
@@ -185,8 +186,8 @@ class MecanumDrive(OmnidirectionalDrive):
         return self._wheels.motion(self._firmware.speeds(velocity))
 
 
-def mecanum_wheels(body: RobotBody) -> MecanumWheels:
-    """Return the dimensions of the wheels as built, which in a URDF can differ from those of the drive."""
+def _real_wheels(body: RobotBody) -> MecanumWheels:
+    """Return the dimensions of the body's wheels, which in a URDF can differ from those of the drive."""
     assert isinstance(body.drive, Mecanum)
     return MecanumWheels(
         radius=float(np.mean([wheel.radius for wheel in body.wheels])),

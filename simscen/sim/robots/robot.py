@@ -1,4 +1,4 @@
-"""One robot of a simulation: its motion, collisions, and clearance."""
+"""One robot of a simulation: its motion, collisions, and clearance; and the scene that all robots share."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -28,7 +28,10 @@ from simscen.sim.scene.walls import Walls
 
 @dataclass(frozen=True)
 class TimedPush:
-    """An `impulse` in N s for each tick from `start_tick` to before `end_tick`, applied by `push`."""
+    """Push over several ticks, from `start_tick` to before `end_tick`.
+
+    `push` applies `impulse`, in N s along x and y of the world, during each tick.
+    """
 
     push: Callable[[tuple[float, float]], None]
     impulse: tuple[float, float]
@@ -38,7 +41,7 @@ class TimedPush:
 
 @dataclass(eq=False)
 class Scene:
-    """Everything that the robots of a simulation share, and the robots by name."""
+    """Everything that the robots of a simulation share, such as the current tick, and all robots by name."""
 
     client: int
     tick_rate: int
@@ -58,7 +61,7 @@ class Scene:
             robot.base.set_friction(self.floor.friction)
 
     def apply_pushes(self) -> bool:
-        """Apply all pushes that are due for the next step; return whether any is due now or later."""
+        """Apply the pushes of the next step; return whether any push is due now or later."""
         self.pushes = [push for push in self.pushes if push.end_tick > self.tick]
         for push in self.pushes:
             if push.start_tick <= self.tick:
@@ -70,12 +73,12 @@ class Scene:
     def add_push(
         self, push: Callable[[tuple[float, float]], None], impulse: tuple[float, float], seconds: float, tick: int
     ) -> None:
-        """Spread an impulse in N s evenly over the given time from `tick` on, at least over one tick."""
+        """Spread an impulse in N s evenly over `seconds` from `tick` on, at least over one tick."""
         ticks = max(1, round(seconds * self.tick_rate))
         self.pushes.append(TimedPush(push, (impulse[0] / ticks, impulse[1] / ticks), tick, tick + ticks))
 
     def on_push(self) -> None:
-        """Discard predictions that assume that nothing is pushed during the next step."""
+        """Discard all predictions that would be wrong if something is pushed during the next step."""
         self.actors.on_push(self.tick)
         for robot in self.robots.values():
             robot.on_push()
@@ -86,9 +89,9 @@ class Scene:
             robot.sampler.compute_deferred()
 
     def activate_actors(self, moved: float = REQUERY_DISTANCE_M) -> None:
-        """Let the deferred actors near robots collide in the engine; called at every tick at which a robot is observed.
+        """Let the deferred actors near robots collide. Call it at every tick at which a robot is observed.
 
-        Only robots that have moved at least `moved` m since their last query are considered.
+        Robots that have moved less than `moved` m since their last query are skipped.
         """
         if self.actors.is_engine_complete:
             return
@@ -105,7 +108,7 @@ class Scene:
 
 
 class Robot:
-    """A robot that can be driven and observed."""
+    """A robot that can be driven and observed. Implements `SensorView`."""
 
     def __init__(
         self,
@@ -121,7 +124,8 @@ class Robot:
     ) -> None:
         """Place the robot at `pose`; its firmware runs every `period` seconds, and the renderer shows `visual_shape`.
 
-        `obstacles` is the part of the `static` world that blocks it. Clearance is measured up to `clearance_range` m.
+        `obstacles` is the part of the `static` world that counts for the clearance, which is measured up to
+        `clearance_range` m.
         """
         self.name, self._scene = name, scene
         tick_seconds = 1 / scene.tick_rate
@@ -171,7 +175,10 @@ class Robot:
         return self._truth(tick, self._checked_state(tick))
 
     def sample(self, period: int) -> Truth | DeferredTruth:
-        """Return the true state, to be evaluated later, if the next sample is `period` ticks later; raises RunError."""
+        """Return the true state, or a deferred sample of it if its clearance can be computed later.
+
+        The caller must take the next sample at most `period` ticks later. Raises RunError if the physics has diverged.
+        """
         tick = self._scene.tick
         state = self._checked_state(tick)
         self._scene.actors.prefetch_poses(tick, period)
@@ -181,7 +188,7 @@ class Robot:
         return self._truth(tick, state, period)
 
     def _checked_state(self, tick: int) -> RobotState:
-        """Return the state; raises RunError if the robot or an actor is lost."""
+        """Return the state; raises RunError if the physics of the robot or of an actor has diverged."""
         (x, y, z, i, j, k, w), (vx, vy, vz), (wx, wy, wz) = state = self._state()
         actors = self._scene.actors
         reason = divergence_reason(self._label, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz)
@@ -200,22 +207,22 @@ class Robot:
     def collisions(self) -> tuple[Event, ...]:
         """Return the events collision.started and collision.ended since the last call.
 
-        `robot_caused` tells whether the robot moved towards the object rather than being hit.
+        In their data, `robot_caused` states whether the robot moved towards the object, rather than being hit.
         """
         return self._collisions.take_events()
 
     def objects(self) -> Mapping[str, Pose3]:
-        """Return the poses of all movable objects and of the other robots."""
+        """Return the poses of all movable objects and of the other robots by name."""
         poses = self._scene.actors.poses(self._scene.tick)
         return {**poses, **{robot.name: robot.base_pose() for robot in self.others}} if self.others else poses
 
     @property
     def rest_poses(self) -> Mapping[str, Pose3]:
-        """Poses in which pushable objects have come to rest."""
+        """Poses in which pushable objects have come to rest, by name."""
         return self._scene.actors.rest_poses
 
     def bodies_and_poses(self) -> Mapping[str, tuple[Body, Pose3]]:
-        """Return all movable objects and other robots with their poses."""
+        """Return all movable objects and other robots with their poses by name."""
         return {name: (self.bodies[name], pose) for name, pose in self.objects().items()}
 
     def base_pose(self) -> Pose3:
@@ -279,7 +286,7 @@ class Robot:
         self._drive.rest()
 
     def on_push(self) -> None:
-        """Discard predictions that assume that nothing is pushed during the next step."""
+        """Discard all predictions that would be wrong if something is pushed during the next step."""
         self.clearance.on_push(self._scene.tick)
 
     def on_change(self) -> None:
@@ -299,16 +306,16 @@ class Robot:
 
     @property
     def distance_since_query(self) -> float:
-        """Distance in m from where it last queried deferred actors."""
+        """Distance in m that it has moved since it last queried deferred actors."""
         return math.dist(self._query_point, self._state().pose[:3])
 
     def make_query(self) -> ProximityQuery:
-        """Return its query of deferred actors."""
+        """Return a query of the deferred actors near the robot, and remember its position."""
         self._query_point = self._state().pose.position
         return ProximityQuery(self._query_point, self.clearance.contact_radius, self.clearance.query_radius)
 
     def add_bodies(self, names: Mapping[int, str | None]) -> None:
-        """Add new bodies of the engine that it can touch: names by body id, None for walls."""
+        """Add new bodies that the robot can touch; `names` has their names by body id, None for walls."""
         self._names.update(names)
 
     @property
@@ -326,7 +333,7 @@ class Robot:
         return BaseMotion(state.pose.position, state.linear, state.angular)
 
     def after_contact_step(self, before: PreStepMotion) -> None:
-        """Record the contacts of the step."""
+        """Record the robot's contacts after the step; `before` has the motions before the step."""
         tick, clearance = self._scene.tick, self.clearance
         if not self._collisions.is_colliding and tick <= clearance.no_contact_before:
             return

@@ -1,4 +1,4 @@
-"""Drives of bases on wheels: differential, skid-steer and Ackermann, and the velocity limits of a base's firmware."""
+"""Drives of a wheeled base: differential, skid-steer, and Ackermann; and the velocity ramp that all firmware uses."""
 
 import math
 from collections.abc import Sequence
@@ -12,11 +12,11 @@ from simscen.sim.robots.wheeled_base import WheeledBase
 
 
 class VelocityRamp:
-    """Follows velocity commands within the limits of a base, one step every `period` seconds."""
+    """Velocity that follows commands within the limits of speed and acceleration, one step every `period` seconds."""
 
-    def __init__(self, limits: Limits, period: float, holonomic: bool) -> None:
+    def __init__(self, limits: Limits, period: float, is_holonomic: bool) -> None:
         self._limits = limits
-        self._max_lateral = (limits.lateral or limits.linear) if holonomic else 0.0
+        self._max_lateral = (limits.lateral or limits.linear) if is_holonomic else 0.0
         self._speed_up_step = limits.linear_acceleration * period
         self._slow_down_step = (limits.linear_deceleration or limits.linear_acceleration) * period
         self._turn_step = limits.angular_acceleration * period
@@ -61,17 +61,17 @@ def _step_towards(now: float, target: float, speed_up: float, slow_down: float) 
 
 
 MAX_HOLD_SPEED_M_S = 0.1
-"""Rim speed up to which a wheel is held in position when the robot should stand: more than one firmware step."""
+"""Rim speed of a wheel up to which it is held in position if the robot should stand; above, motors still brake it."""
 
 
 class DifferentialDrive:
-    """Drive whose wheels on each side turn at the same speed."""
+    """Differential or skid-steer drive: all wheels on a side turn at the same speed."""
 
     def __init__(self, client: int, vehicle: WheeledBase, body: RobotBody, period: float) -> None:
         drive = body.drive
         assert isinstance(drive, Differential | SkidSteer)
         self._client, self._vehicle = client, vehicle
-        self._ramp = VelocityRamp(body.limits, period, holonomic=False)
+        self._ramp = VelocityRamp(body.limits, period, is_holonomic=False)
         self._radius = drive.wheel_radius
         scale = drive.turning_scale if isinstance(drive, SkidSteer) else 1.0
         self._half_separation = drive.wheel_separation * scale / 2
@@ -116,20 +116,20 @@ class DifferentialDrive:
 
 
 def driven_joints(body: RobotBody, vehicle: WheeledBase) -> tuple[list[int], list[int], list[float]]:
-    """Return the joints of the left and of the right driven wheels, and all stall torques in N m in that order."""
+    """Return the joints of the left and of the right driven wheels, and the stall torques in N m, left before right."""
     wheels = [(w, joint) for w, joint in zip(body.wheels, vehicle.joints, strict=True) if w.is_driven]
     left, right = [pair for pair in wheels if pair[0].is_left], [pair for pair in wheels if not pair[0].is_left]
     return [j for _, j in left], [j for _, j in right], [w.stall_torque for w, _ in left + right]
 
 
 def is_rolling(client: int, robot: int, joints: Sequence[int], radius: float) -> bool:
-    """Return whether a wheel is too fast to be held in position, because weak motors are still braking it."""
+    """Return whether any wheel is too fast to be held in position; `radius` is that of the wheels in m."""
     speeds = (pybullet.getJointState(robot, joint, physicsClientId=client)[1] for joint in joints)
     return any(abs(speed) * radius > MAX_HOLD_SPEED_M_S for speed in speeds)
 
 
 def hold_wheels(client: int, robot: int, joints: Sequence[int], torques: Sequence[float]) -> None:
-    """Hold the wheel angles with position control; velocity control at zero would creep by 0.1 mm/s."""
+    """Hold the wheel angles with position control, because a robot with velocity control at zero would creep."""
     angles = [pybullet.getJointState(robot, joint, physicsClientId=client)[0] for joint in joints]
     pybullet.setJointMotorControlArray(
         robot, joints, pybullet.POSITION_CONTROL, targetPositions=angles, forces=torques, physicsClientId=client
@@ -146,22 +146,23 @@ def mean_angles(client: int, robot: int, joints: Sequence[int], left_count: int)
 
 
 STEERING_RATE_RAD_S = 3.2
-"""Steering rate of the servo of an F1TENTH car (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
+"""Largest steering rate, that of the servo of an F1TENTH car (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
 MIN_STEERING_SPEED_M_S = 0.01
-"""Commanded speed below which the curvature is undefined; the steering angle then remains."""
+"""Commanded speed below which the curvature is too uncertain, so that the steering angle remains."""
 
 
 class AckermannDrive:
-    """Inverse of the bicycle model: curvature = turn rate / speed, tan(steering) = wheel base * curvature.
+    """Drive of a car that steers its front wheels. It cannot turn in place.
 
-    Both front wheels turn around the same point on the line of the rear axle (Ackermann condition; Siegwart et al.,
-    Autonomous Mobile Robots, section 3.3). The drive cannot turn in place.
+    Inverts the bicycle model: curvature = turn rate / speed, tan(steering angle) = wheel base * curvature. Both front
+    wheels turn around the same point on the line of the rear axle (Ackermann condition; Siegwart et al., Autonomous
+    Mobile Robots, section 3.3).
     """
 
     def __init__(self, client: int, vehicle: WheeledBase, body: RobotBody, period: float) -> None:
         assert isinstance(body.drive, Ackermann)
         self._client, self._robot, self._drive = client, vehicle.id, body.drive
-        self._ramp = VelocityRamp(body.limits, period, holonomic=False)
+        self._ramp = VelocityRamp(body.limits, period, is_holonomic=False)
         self._max_steering_step = STEERING_RATE_RAD_S * period
         self._steering = 0.0
         wheels = list(zip(body.wheels, vehicle.joints, strict=True))

@@ -1,4 +1,4 @@
-"""Base on wheels: a multibody with the hull as its base and the wheels as links."""
+"""Base on wheels: a PyBullet multibody with the hull as its base and the wheels as links."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -22,18 +22,18 @@ KNUCKLE_MASS_RATIO = 0.2
 PIN_RADIUS_M = 0.001
 """Radius of the sphere that enlarges the extent of a wheel; see `_wheel_shape`."""
 ROLL_MARGIN = 1.1
-"""Factor by which a wheel may roll farther in a step than its limits allow."""
+"""Factor by which a wheel may roll farther in a step than the robot's velocity limits allow."""
 HULL_LINK_MASS_KG = 0.001
-"""Mass of a hull link, because the engine requires one; the chassis has the true mass."""
+"""Mass of a further link of the hull, because the engine requires one; the base has the mass of the chassis."""
 
 
 class WheeledBase:
-    """Robot on wheels.
+    """Hull and casters on wheels, for all drives except omnidirectional and mecanum.
 
-    The contact shape of a wheel is a sphere of its radius: it has a single contact point in the center plane of the
-    wheel, so that radius and separation of the datasheet apply to the contact, and it takes half the time of a
-    cylinder. Only the hull collides with obstacles. Casters are a separate link: they have no friction, and a caster
-    that stands on a ramp is distinguished from a hull that scrapes it.
+    The contact shape of a wheel is a sphere, which touches the ground at a single point in the center plane of the
+    wheel, as datasheets assume, and needs less time than a cylinder. Only hull and casters collide with obstacles.
+    Casters are a separate link, because they have no friction, and because a caster may stand on a ramp, while a hull
+    may not touch it.
     """
 
     def __init__(
@@ -42,12 +42,12 @@ class WheeledBase:
         body: RobotBody,
         pose: Pose2,
         terrain: Terrain | None = None,
-        tick: float = 0.0,
+        tick_seconds: float = 0.0,
         visual_shape: int = engine.DEFAULT_VISUAL,
     ) -> None:
-        """Place the base at `pose`; a physics step lasts `tick` seconds, 0 for a robot that never drives.
+        """Place the base at `pose`; `tick_seconds` is 0 for a robot that never drives.
 
-        The renderer shows `visual_shape`.
+        `terrain` is the uneven ground, if there is any. The renderer shows `visual_shape`.
         """
         self._client, self._terrain = client, terrain
         moments, self._base_from_center = body.chassis.principal()
@@ -55,7 +55,7 @@ class WheeledBase:
         self._center_from_base = self._base_from_center.inverse()
         self._is_aligned = self._center_from_base.quaternion == IDENTITY
         casters = compliant_casters(body.casters) if terrain else body.casters
-        self.id, self.joints, self.hull_links = _build(client, body, casters, tick, visual_shape)
+        self.id, self.joints, self.hull_links = _build(client, body, casters, tick_seconds, visual_shape)
         self.ground_links: Mapping[int, float] = _ground_links(body, self.joints, self.hull_links, casters)
         on_ground = [(caster.pose.x, caster.pose.y) for caster in body.casters if not caster_gap(caster)]
         self._supports = np.array([*((wheel.x, wheel.y) for wheel in body.wheels), *on_ground])
@@ -132,23 +132,23 @@ class WheeledBase:
 def _ground_links(
     body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]
 ) -> dict[int, float]:
-    """Return the links of wheels and of separate casters (the last link of the hull); see `Base.ground_links`."""
+    """Return `Base.ground_links`: the links of the wheels, and the last link of the `hull` if there are casters."""
     wheels = [joint + 1 if wheel.is_steered else joint for wheel, joint in zip(body.wheels, joints, strict=True)]
     return dict.fromkeys(wheels, MIN_NORMAL_Z_WHEEL) | ({hull[-1]: MIN_NORMAL_Z_CASTER} if casters else {})
 
 
 def _build(
-    client: int, body: RobotBody, casters: Sequence[Solid], tick: float, visual_shape: int
+    client: int, body: RobotBody, casters: Sequence[Solid], tick_seconds: float, visual_shape: int
 ) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
-    """Return the body id, the first joint of each wheel (steering before rolling), and the links of the hull.
+    """Create the multibody; return its id, the first joint of each wheel, and the links of the hull.
 
-    The `casters`, if any, become the last link of the hull.
+    The first joint of a steered wheel is its steering joint. The `casters`, if any, are the last link of the hull.
     """
     links: list[_Link] = []
     joints: list[int] = []
     for wheel in body.wheels:
         joints.append(len(links))
-        max_roll = tick * (body.limits.linear + body.limits.angular * abs(wheel.y))
+        max_roll = tick_seconds * (body.limits.linear + body.limits.angular * abs(wheel.y))
         links += _wheel_links(client, wheel, len(links), max_roll)
     hull_shapes = engine.create_hull_shapes(client, body.hull)
     first, *others = [*hull_shapes, *engine.create_hull_shapes(client, casters)]
@@ -205,12 +205,11 @@ def _wheel_links(client: int, wheel: Wheel, index: int, max_roll: float) -> list
 
 
 def _wheel_shape(client: int, wheel: Wheel, max_roll: float) -> int:
-    """Return the contact shape of a wheel that rolls at most `max_roll` m in one step: a sphere, with a pin if needed.
+    """Create the contact shape of a wheel that rolls at most `max_roll` m in one step: a sphere, with a pin if needed.
 
-    Bullet identifies a contact with one of the last step if its point on the wheel has moved by at most a share of the
-    extent of the shape; otherwise it keeps both. A sphere that rolls by more than 2 % of its radius per step would
-    accumulate up to three outdated points, which double the cost of a step. A small sphere along the axle, where
-    nothing touches it, makes the extent large enough; it lies within the wheel on the other side.
+    Bullet replaces the contact point of the last step if the wheel has moved it by at most CONTACT_BREAKING_RATIO of
+    the extent of the shape; otherwise, it keeps both points. A sphere that rolls farther would accumulate outdated
+    points, which cost time. The pin, a small sphere on the axle where nothing touches it, enlarges the extent.
     """
     pin_distance = min(ROLL_MARGIN * max_roll / engine.CONTACT_BREAKING_RATIO, 2 * abs(wheel.y) + wheel.radius / 2)
     if pin_distance <= wheel.radius:

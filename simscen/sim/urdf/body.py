@@ -1,4 +1,4 @@
-"""Builds the body of a robot from its URDF, and infers its specification."""
+"""Builds the body of a robot from a URDF, and infers the specification of a robot that has only a URDF."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -37,59 +37,59 @@ from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
 from simscen.sim.urdf.xml_source import CODE, RobotFiles, read_xml
 
 AXLE_TOLERANCE_M = 0.02
-"""Largest difference in m along x of wheels on the same axle."""
+"""Largest distance in m along x between wheels on the same axle."""
 MAX_UPSIDE_DOWN_Z = -0.9
-"""Largest z component, in the frame of the robot, of the z axis of a lidar that is mounted upside down."""
+"""Cosine of the angle between the z axes of lidar and robot, below which the lidar is mounted upside down."""
 DEFAULT_MAX_STEERING_RAD = 0.5
 """Largest steering angle of a car whose steering joints have no limits, or have limits of 90 degrees or more."""
 MIN_STEERING_RAD, MAX_STEERING_RAD = 0.1, 1.0
-"""Plausible limits of a steering joint; others are replaced by the nearest of them."""
+"""Range of plausible steering angles; the limit of a steering joint is clipped to it."""
 LIDAR_NAMES = ("laser", "lidar", "scan")
 """Words in the names of links that carry a lidar."""
-HINT = "write a *.robot.yaml next to it with its drive, limits, and sensors; see `simscen explain robot`"
+ROBOT_FILE_HINT = "write a *.robot.yaml next to it with its drive, limits, and sensors; see `simscen explain robot`"
 
 
 def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader | None = None) -> RobotSpec:
-    """Infer the specification of a robot from its URDF: drive from the wheels, and default lidar, odometry, and IMU.
+    """Infer the specification of a robot from its URDF: the drive, its limits, and a lidar, odometry, and an IMU.
 
-    Two driven wheels make a differential drive, four or more a skid-steer drive, steered wheels a car. Limits are 1
-    m/s, 1.5 rad/s, 1 m/s², and 2 rad/s², or those of the wheel joints if they are lower. The lidar is on the link named
-    laser, lidar, or scan, or on top. Raises InvalidInput if the file is invalid or its drive ambiguous.
+    Wheels on one axle make a differential drive, on several axles a skid-steer drive, with steered wheels a car. Limits
+    are 1 m/s, 1.5 rad/s, 1 m/s², and 2 rad/s², or those of the wheel joints if they are lower. The lidar is at the link
+    with a name like LIDAR_NAMES, or on top. Raises InvalidInput if the file is invalid or its drive cannot be inferred.
     """
     folders = AllowedFolders.of(roots or (path.resolve().parent,))
     tree = read_tree(path, folders, read_mesh)
     wheels, others = examine_joints(tree)
-    drive = _drive(tree, wheels, others)
+    drive = _infer_drive(tree, wheels, others)
     draft = RobotSpec(
         simscen=1,
         name=tree.name.lstrip("/") or path.stem,
         urdf=path.name,
         drive=drive,
-        limits=_limits(wheels, drive),
+        limits=_infer_limits(wheels, drive),
         sensors={},
     )
     sensors = {
-        "lidar": Sensor(lidar=Lidar(mount=_lidar_mount(tree, draft, wheels))),
+        "lidar": Sensor(lidar=Lidar(mount=_infer_lidar_mount(tree, draft, wheels))),
         "odom": Sensor(odometry=WheelOdometry()),
         "imu": Sensor(imu=InertialUnit()),
     }
     return draft.model_copy(update={"sensors": sensors})
 
 
-def _drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> Drive:
+def _infer_drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> Drive:
     driven = [wheel for wheel in wheels if not wheel.is_steered]
     left, right = ([w for w in driven if w.is_left is side] for side in (True, False))
     if not left or len(left) != len(right):
-        message = f"the drive of the robot cannot be inferred from its wheels: {_found_wheels(wheels, others)}"
-        raise InvalidInput([tree.element.problem(message, HINT)])
-    separation = float(np.mean([w.place[1] for w in left]) - np.mean([w.place[1] for w in right]))
-    axles = [w.place[0] for w in driven]
+        message = f"the drive of the robot cannot be inferred from its wheels: {_describe_wheels(wheels, others)}"
+        raise InvalidInput([tree.element.problem(message, ROBOT_FILE_HINT)])
+    separation = float(np.mean([w.center[1] for w in left]) - np.mean([w.center[1] for w in right]))
+    axles = [w.center[0] for w in driven]
     radius, width = (float(np.mean(values)) for values in zip(*((w.radius, w.width) for w in driven), strict=True))
     size = {"wheel_radius": radius, "wheel_separation": separation, "wheel_width": width}
     steered = [wheel for wheel in wheels if wheel.is_steered and not wheel.is_caster]
     if steered:
-        check_front_steering([*driven, *steered])
-        base = float(np.mean([wheel.place[0] for wheel in steered]) - np.mean(axles))
+        _check_front_steering([*driven, *steered])
+        base = float(np.mean([wheel.center[0] for wheel in steered]) - np.mean(axles))
         steering = _max_steering(steered, separation / (2 * base))
         return Ackermann.model_validate({"type": "ackermann", "wheel_base": base, "max_steering": steering, **size})
     if max(axles) - min(axles) < AXLE_TOLERANCE_M:
@@ -100,17 +100,17 @@ def _drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, list[s
 
 
 def _skid_factor(axles: Sequence[float]) -> float:
-    """Return the factor k of turning_scale = 1 + k (wheel base / wheel separation)², for axles at these positions in m.
+    """Return the factor k of turning_scale = 1 + k (wheel base / wheel separation)², for axles at x = `axles` in m.
 
-    Coulomb friction at the corners of a rectangle gives 1. The factors were measured with `simscen robot check`, for
-    wheels at equal distances. Wheels in the middle roll instead of skidding, and keep the others from slipping ahead.
+    Coulomb friction at the corners of a rectangle gives 1. The factors were measured with `simscen robot check`. They
+    differ, because wheels in the middle roll instead of skidding, and keep the others from slipping.
     """
     gaps = sum(after - before > AXLE_TOLERANCE_M for before, after in pairwise(sorted(axles)))
     return {1: 1.2, 2: 0.1}.get(gaps, 0.3)
 
 
 def _max_steering(wheels: list[WheelJoint], ratio: float) -> float:
-    """Return the largest angle in rad of the virtual wheel in the middle, from the limits of the steering joints.
+    """Return the largest steering angle in rad of a virtual wheel in the middle, from the limits of steering joints.
 
     The inner wheel turns more: cot(middle) = cot(inner) + ratio, where ratio is wheel separation / (2 * wheel base).
     """
@@ -122,8 +122,8 @@ def _max_steering(wheels: list[WheelJoint], ratio: float) -> float:
     return math.atan(tangent / (1 + tangent * ratio))
 
 
-def _found_wheels(wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> str:
-    """Describe the wheels that were found, and why the other movable joints are none."""
+def _describe_wheels(wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> str:
+    """Describe the wheels that were found, and why the other movable joints are not wheels."""
     if not wheels and not others:
         return "it has no movable joints"
     groups: dict[str, list[str]] = {"left": [], "right": []}
@@ -144,17 +144,17 @@ def _shortened(names: Sequence[str]) -> str:
     return ", ".join(names[:MAX_LISTED]) + more if names else "none"
 
 
-def _limits(wheels: list[WheelJoint], drive: Drive) -> Limits:
+def _infer_limits(wheels: list[WheelJoint], drive: Drive) -> Limits:
     speeds = [wheel.joint.limits.velocity * wheel.radius for wheel in wheels if not wheel.is_steered]
     linear = min([1.0, *(speed for speed in speeds if speed > 0)])
     angular = min(1.5, 2 * linear / getattr(drive, "wheel_separation", 1.0))
     return Limits(linear=linear, angular=angular, linear_acceleration=1.0, angular_acceleration=2.0)
 
 
-def _lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint]) -> Mount:
+def _infer_lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint]) -> Mount:
     body = body_from_tree(draft, tree)
     ground = min(wheel.bottom for wheel in wheels)
-    axle = np.mean([wheel.place for wheel in wheels if not wheel.is_steered], axis=0)
+    axle = np.mean([wheel.center for wheel in wheels if not wheel.is_steered], axis=0)
     for name in tree.links:
         if any(word in name.lower() for word in LIDAR_NAMES):
             pose = tree.poses[name]
@@ -166,20 +166,23 @@ def _lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint]) -> 
 
 
 MAX_CASTER_SIZE_RATIO = 0.35
-"""Largest length and width of a caster relative to those of the hull."""
+"""Largest length and width of a link that touches the ground and counts as a caster, relative to those of the hull."""
 
 
 def body_from_urdf(
     spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
 ) -> RobotBody:
-    """Return the body that `spec.urdf` describes, located by `found` or relative to `file`. Raises InvalidInput."""
+    """Return the body that `spec.urdf` describes; see `read_spec_tree`. Raises InvalidInput."""
     return body_from_tree(spec, read_spec_tree(spec, file, roots, read_mesh, found))
 
 
 def read_spec_tree(
     spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
 ) -> LinkTree:
-    """Read the links and joints of `spec.urdf`. Raises InvalidInput."""
+    """Read the links and joints of `spec.urdf`, a path relative to `file` unless `found` is given. Raises InvalidInput.
+
+    The files must be in `roots` (default: the folder of `file`); meshes cannot be read without `read_mesh`.
+    """
     assert spec.urdf is not None
     folder = (file or Path()).resolve().parent
     folders = AllowedFolders.of(roots or (folder,), found.packages if found else None)
@@ -188,13 +191,13 @@ def read_spec_tree(
     except UnusableFile as trouble:
         shown = folders.display_path(file.resolve()) if file else ""
         raise InvalidInput([Problem(shown, 0, 0, CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
-    return read_tree(path, folders, read_mesh, {name: _text(value) for name, value in spec.arguments.items()})
+    return read_tree(path, folders, read_mesh, {name: _xml_text(value) for name, value in spec.arguments.items()})
 
 
 def read_tree(
     path: Path, folders: AllowedFolders, read_mesh: MeshReader | None, arguments: Mapping[str, str] | None = None
 ) -> LinkTree:
-    """Read the links and joints of a URDF or xacro file. Raises InvalidInput."""
+    """Read the links and joints of a URDF or xacro file; `arguments` are those of xacro. Raises InvalidInput."""
     path = folders.resolve_parent(path)
     robot = read_xml(path, folders)
     expanded = path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes
@@ -209,13 +212,13 @@ def read_tree(
     return build_tree(robot, MeshSource(path.parent, folders, read_mesh, expanded))
 
 
-def _text(argument: str | float | bool) -> str:
+def _xml_text(argument: str | float | bool) -> str:
     """Return an argument as text for an XML file."""
     return str(argument).lower() if isinstance(argument, bool) else str(argument)
 
 
 def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
-    """Build the robot. Joints that are neither wheels nor steering stay at zero."""
+    """Build the body of a robot from its links. All joints except those of wheels are fixed at zero."""
     joints = select_wheels(tree, spec.drive)
     _check_wheels(spec, tree, joints)
     rolling = {link for wheel in joints for link in tree.subtree(wheel.joint.child)}
@@ -229,8 +232,8 @@ def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
         raise InvalidInput([tree.element.problem("no link has a <collision>, so nothing of the robot can collide")])
     base_from_root = _base_from_root(joints, solids)
     hull = tuple(replace(solid, pose=base_from_root.compose(solid.pose)) for solid in solids)
-    scale = _scale(spec, tree)
-    wheels = tuple(_wheel(tree, joint, base_from_root, scale, spec) for joint in joints)
+    scale = _mass_scale(spec, tree)
+    wheels = tuple(_build_wheel(tree, joint, base_from_root, scale, spec) for joint in joints)
     if wheels:
         hull = _without_casters(tree, hull)  # an omnidirectional base has no ground contact
     return assemble(spec, hull, wheels, _chassis_mass(tree, fixed, base_from_root, scale))
@@ -244,18 +247,18 @@ def _check_wheels(spec: RobotSpec, tree: LinkTree, wheels: list[WheelJoint]) -> 
     driven = [wheel for wheel in wheels if not wheel.is_steered]
     if len({wheel.is_left for wheel in driven}) < 2:
         hint = "name the wheel joints in the drive's `left` and `right`"
-        message = f"no driven wheels found on both sides: {_found_wheels(*examine_joints(tree))}"
+        message = f"no driven wheels found on both sides: {_describe_wheels(*examine_joints(tree))}"
         raise InvalidInput([tree.element.problem(message, hint)])
     if spec.drive.type == "ackermann" and not any(wheel.is_steered for wheel in wheels):
         hint = "name the steering joints in the drive's `steering`"
         raise InvalidInput([tree.element.problem("no steered wheels found", hint)])
-    check_front_steering(wheels)
+    _check_front_steering(wheels)
 
 
 def _check_corners(tree: LinkTree, wheels: list[WheelJoint]) -> None:
     """Raise InvalidInput unless there is one wheel at each corner, as mecanum wheels must be."""
-    middle = np.mean([wheel.place[:2] for wheel in wheels], axis=0) if wheels else (0.0, 0.0)
-    corners = {(wheel.place[0] > middle[0], wheel.place[1] > middle[1]) for wheel in wheels}
+    middle = np.mean([wheel.center[:2] for wheel in wheels], axis=0) if wheels else (0.0, 0.0)
+    corners = {(wheel.center[0] > middle[0], wheel.center[1] > middle[1]) for wheel in wheels}
     if len(wheels) != 4 or len(corners) != 4:
         names = ", ".join(wheel.joint.name for wheel in wheels) or "none"
         message = f"a mecanum drive has one wheel at each of four corners; found: {names[:200]}"
@@ -263,13 +266,13 @@ def _check_corners(tree: LinkTree, wheels: list[WheelJoint]) -> None:
         raise InvalidInput([tree.element.problem(message, hint)])
 
 
-def check_front_steering(wheels: Sequence[WheelJoint]) -> None:
+def _check_front_steering(wheels: Sequence[WheelJoint]) -> None:
     """Raise InvalidInput for a car whose steered wheels are not in front of the driven ones."""
     steered = [wheel for wheel in wheels if wheel.is_steered]
     if not steered:
         return
     front, rear = (
-        float(np.mean([w.place[0] for w in group])) for group in (steered, [w for w in wheels if not w.is_steered])
+        float(np.mean([w.center[0] for w in group])) for group in (steered, [w for w in wheels if not w.is_steered])
     )
     if front <= rear:
         message = (
@@ -282,17 +285,17 @@ def check_front_steering(wheels: Sequence[WheelJoint]) -> None:
 def _base_from_root(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:
     """Return the root frame in the base frame, which is on the ground below the center of the driven axles."""
     if not wheels:
-        return Pose3(0.0, 0.0, -min(_lowest(solid) for solid in solids))
-    x, y, _ = np.mean([wheel.place for wheel in wheels if not wheel.is_steered], axis=0).tolist()
+        return Pose3(0.0, 0.0, -min(_lowest_z(solid) for solid in solids))
+    x, y, _ = np.mean([wheel.center for wheel in wheels if not wheel.is_steered], axis=0).tolist()
     return Pose3(-x, -y, -min(wheel.bottom for wheel in wheels))
 
 
-def _lowest(solid: Solid) -> float:
+def _lowest_z(solid: Solid) -> float:
     return float(solid.pose.apply(hull_points(solid.shape))[:, 2].min())
 
 
-def _scale(spec: RobotSpec, tree: LinkTree) -> float:
-    """Return the factor on all masses for which the robot has the specified mass."""
+def _mass_scale(spec: RobotSpec, tree: LinkTree) -> float:
+    """Return the factor by which all masses must be multiplied so that the robot has the specified mass."""
     total = sum(link.mass.mass for link in tree.links.values() if link.mass is not None)
     if total <= 0:
         raise InvalidInput([tree.element.problem("no link has a mass", "give its <inertial> a <mass>")])
@@ -310,8 +313,8 @@ def _chassis_mass(tree: LinkTree, links: Sequence[str], base_from_root: Pose3, s
     return MassProperties(whole.mass * scale, whole.center, whole.tensor * scale)
 
 
-def _wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale: float, spec: RobotSpec) -> Wheel:
-    x, y, _ = base_from_root.compose(Pose3(*wheel.place)).position
+def _build_wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale: float, spec: RobotSpec) -> Wheel:
+    x, y, _ = base_from_root.compose(Pose3(*wheel.center)).position
     links = [(tree.poses[name], tree.links[name].mass) for name in tree.subtree(wheel.joint.child)]
     parts = [mass.transformed(pose) for pose, mass in links if mass is not None and mass.mass > 0]
     mass = scale * sum(part.mass for part in parts)
@@ -327,7 +330,10 @@ def _wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale: floa
 
 
 def _without_casters(tree: LinkTree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
-    """Return the hull without casters. Raises InvalidInput if the hull itself would drag over the ground."""
+    """Return the hull without small parts that touch the ground, which are casters.
+
+    Raises InvalidInput if a large part touches the ground, because it would drag over the ground.
+    """
     points = [solid.pose.apply(hull_points(solid.shape)) for solid in hull]
     whole = np.ptp(np.concatenate(points)[:, :2], axis=0)
     kept = []

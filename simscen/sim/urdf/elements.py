@@ -1,4 +1,4 @@
-"""Links and joints of a URDF (wiki.ros.org/urdf/XML), without their visual elements, as a tree."""
+"""Parses the links and joints of a URDF (wiki.ros.org/urdf/XML) to a tree. Visual elements are ignored."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -20,11 +20,12 @@ MAX_MESH_EXTENT_M = 20.0
 """Largest allowed absolute coordinate of a mesh in its own frame in m."""
 
 MeshReader = Callable[[Path], Mesh]
+"""Returns the triangles of a mesh file in m; raises ValueError for an invalid file."""
 
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A rigid link: its collision shapes and mass properties in its own frame; `mass` is None without <inertial>."""
+    """A rigid link: its collision shapes and mass properties in its own frame. `mass` is None without `<inertial>`."""
 
     name: str
     solids: tuple[Solid, ...]
@@ -56,17 +57,16 @@ class Joint:
 
 @dataclass(frozen=True)
 class MeshSource:
-    """Folders of meshes, and the function that reads them.
+    """Finds and reads the meshes of a URDF.
 
-    `folder` is that of the URDF, and `folders` are those that may be read. `read` returns the triangles of a file in
-    meters, and raises ValueError for an invalid file; None if meshes cannot be read. `from_xacro` states whether the
-    URDF was generated from a xacro file, which allows absolute paths.
+    `folder` is the folder of the URDF, and `folders` are those that may be read. `read` is None if meshes cannot be
+    read. `is_from_xacro` states that the URDF was expanded from a xacro file, so that absolute paths are allowed.
     """
 
     folder: Path
     folders: AllowedFolders
     read: MeshReader | None
-    from_xacro: bool = False
+    is_from_xacro: bool = False
 
     def mesh(self, element: Element) -> Mesh:
         """Read the mesh of a `<mesh>` element; raises InvalidElement with its line."""
@@ -92,7 +92,7 @@ class MeshSource:
 
     def _find(self, uri: str) -> Path:
         try:
-            return self.folders.find(uri, self.folder, absolute=self.from_xacro)
+            return self.folders.find(uri, self.folder, absolute=self.is_from_xacro)
         except NoSuchFile:
             if uri.startswith(PACKAGE_SCHEMES):  # a missing package gives a more helpful error
                 self.folders.package_folder(uri.partition("://")[2].partition("/")[0], self.folder)
@@ -191,9 +191,9 @@ MAX_LINKS = 200
 
 @dataclass(frozen=True, eq=False)
 class LinkTree:
-    """Links and joints by name. `poses` are those of the links in the frame of the `root` link.
+    """Links and joints by name. `poses` are the poses of the links in the frame of the `root` link, all joints at zero.
 
-    `child_joints` are the joints below each link, by the name of the link.
+    `child_joints` are the joints whose parent is a link, by the name of the link.
     """
 
     name: str

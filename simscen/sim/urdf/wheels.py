@@ -14,31 +14,31 @@ from simscen.sim.body.outline import hull_points
 from simscen.sim.urdf.elements import Joint, LinkTree
 
 MIN_AXIS_COSINE = 0.99
-"""Cosine of the largest angle (8 degrees) between a joint axis and the direction that it is compared with."""
-
+"""Cosine of the largest angle (8 degrees) between a joint axis and an axis of the root frame that it is parallel to."""
 ROTARY_JOINT_TYPES = ("revolute", "continuous")
 """Types of joints that can steer or turn a wheel; a vertical prismatic joint is a suspension."""
 ROUNDNESS_TOLERANCE = 0.05
-"""Largest difference of the extents of a round mesh, and of its center from its axis, relative to the radius."""
+"""Largest difference between the radii of a round mesh, and largest offset from its axis, relative to the radius."""
 MIN_CASTER_TRAIL_RADII = 0.1
-"""Smallest distance along x, in wheel radii, of a caster's wheel from its swivel axis; a steered wheel has none."""
+"""Distance along x, in wheel radii, between wheel and swivel axis, above which it is a caster, not a steered wheel."""
 MIN_WHEEL_RANGE_RAD = 20 * math.pi
 """Smallest range of a revolute joint that counts as continuous: ten turns."""
 MAX_WHEEL_GAP_RADII = 0.25
-"""Largest height of a wheel above the lowest one, in radii of the wheel; higher ones do not stand on the ground."""
+"""Largest height of a wheel that stands on the ground above the lowest wheel, in radii of the wheel."""
 MIN_DRIVEN_RADIUS_RATIO = 0.75
-"""Smallest radius of a driven wheel relative to the largest one; smaller wheels that are not steered are rollers."""
+"""Smallest radius of a driven wheel relative to the largest one; smaller ones are rollers, unless they are steered."""
 
 
 @dataclass(frozen=True, eq=False)
 class WheelJoint:
-    """A wheel in the root frame: the `place` of its center, `radius`, and `width` in meters.
+    """A wheel with its `center` in the root frame; lengths are in m.
 
-    `steering` is its steering joint, if it has one, and `trail` its distance in m along x from the axis of that joint.
+    `joint` is the joint about which it rolls, and `steering` is its steering joint, if any. `trail` is the distance
+    along x between its center and the axis of the steering joint.
     """
 
     joint: Joint
-    place: tuple[float, float, float]
+    center: tuple[float, float, float]
     radius: float
     width: float
     is_steered: bool
@@ -48,42 +48,42 @@ class WheelJoint:
     @property
     def bottom(self) -> float:
         """Height in m of its lowest point in the root frame."""
-        return self.place[2] - self.radius
+        return self.center[2] - self.radius
 
     @property
     def is_left(self) -> bool:
         """Whether it is on the left side."""
-        return self.place[1] > 0
+        return self.center[1] > 0
 
     @property
     def is_caster(self) -> bool:
-        """Whether the wheel follows the motion of the robot instead of being steered."""
+        """Whether it swivels freely instead of being steered."""
         return self.is_steered and self.trail > MIN_CASTER_TRAIL_RADII * self.radius
 
 
-def infer_wheels(tree: LinkTree) -> list[WheelJoint]:
-    """Return the wheels in a URDF: joints with a lateral axis and a round link that stands on the ground."""
-    return examine_joints(tree)[0]
-
-
 def examine_joints(tree: LinkTree) -> tuple[list[WheelJoint], Mapping[str, list[str]]]:
-    """Return the wheels in a URDF, and the names of the other movable joints by the reason why they are none."""
+    """Return the wheels in a URDF, and the names of the other movable joints by the reason why they are not wheels.
+
+    A wheel is a joint with a lateral axis, whose child link is round and stands on the ground.
+    """
     joints = [joint for joint in tree.joints.values() if joint.type != "fixed"]
-    steering_joints = [joint for joint in joints if joint.type in ROTARY_JOINT_TYPES and _axis(tree, joint) == "z"]
-    steered = steered_links(tree, steering_joints)
+    steering_joints = [
+        joint for joint in joints if joint.type in ROTARY_JOINT_TYPES and _parallel_axis(tree, joint) == "z"
+    ]
+    steered = _steered_links(tree, steering_joints)
     wheels: list[WheelJoint] = []
     others: dict[str, list[str]] = {}
     for joint in joints:
-        wheel = wheel_joint(tree, joint, joint.child in steered)
-        if reason := _why_no_wheel(tree, joint, wheel):
+        wheel = _measure_wheel(tree, joint, joint.child in steered)
+        if reason := _reason_for_no_wheel(tree, joint, wheel):
             others.setdefault(reason, []).append(joint.name)
         elif wheel is not None:
-            wheels.append(_with_trail(tree, wheel, steering_joints))
+            wheels.append(_with_steering(tree, wheel, steering_joints))
     ground = min((wheel.bottom for wheel in wheels), default=0.0)
-    largest = max((wheel.radius for wheel in wheels if not wheel.is_steered and _is_on(ground, wheel)), default=0.0)
+    largest = max((wheel.radius for wheel in wheels if not wheel.is_steered and _stands_on(ground, wheel)), default=0.0)
     kept = []
-    for wheel in sorted(wheels, key=lambda w: (w.place[0], -w.place[1], w.joint.name)):
-        if not _is_on(ground, wheel):
+    for wheel in sorted(wheels, key=lambda w: (w.center[0], -w.center[1], w.joint.name)):
+        if not _stands_on(ground, wheel):
             others.setdefault(f"{wheel.bottom - ground:.3g} m above the ground", []).append(wheel.joint.name)
         elif not wheel.is_steered and wheel.radius < MIN_DRIVEN_RADIUS_RATIO * largest:
             reason = f"radius {wheel.radius:.3g} m, much less than that of the largest wheel"
@@ -93,15 +93,15 @@ def examine_joints(tree: LinkTree) -> tuple[list[WheelJoint], Mapping[str, list[
     return kept, others
 
 
-def _is_on(ground: float, wheel: WheelJoint) -> bool:
+def _stands_on(ground: float, wheel: WheelJoint) -> bool:
     return wheel.bottom - ground <= MAX_WHEEL_GAP_RADII * wheel.radius
 
 
-def _why_no_wheel(tree: LinkTree, joint: Joint, wheel: WheelJoint | None) -> str:
-    """Return why a joint has no wheel, or "" if it has one."""
+def _reason_for_no_wheel(tree: LinkTree, joint: Joint, wheel: WheelJoint | None) -> str:
+    """Return why a joint has no wheel, or "" if it has one. `wheel` is the one of `_measure_wheel`."""
     if not _turns_freely(joint):
         return f"{joint.type} joint with limits" if joint.type == "revolute" else f"{joint.type} joint"
-    axis = _axis(tree, joint)
+    axis = _parallel_axis(tree, joint)
     if axis != "y":
         return f"axis along {axis}, not y" if axis else "axis not along y"
     if wheel is not None:
@@ -114,11 +114,11 @@ def _turns_freely(joint: Joint) -> bool:
     return joint.type in ROTARY_JOINT_TYPES and joint.limits.upper - joint.limits.lower >= MIN_WHEEL_RANGE_RAD
 
 
-def _with_trail(tree: LinkTree, wheel: WheelJoint, steering_joints: Sequence[Joint]) -> WheelJoint:
-    """Return a wheel with its steering joint, if it has one."""
+def _with_steering(tree: LinkTree, wheel: WheelJoint, steering_joints: Sequence[Joint]) -> WheelJoint:
+    """Return a wheel with its steering joint and trail, if it has a steering joint."""
     for joint in steering_joints:
         if wheel.joint.child in tree.subtree(joint.child):
-            return replace(wheel, trail=abs(wheel.place[0] - tree.poses[joint.child].x), steering=joint)
+            return replace(wheel, trail=abs(wheel.center[0] - tree.poses[joint.child].x), steering=joint)
     return wheel
 
 
@@ -134,16 +134,16 @@ def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
             f"no joint called {unknown[0]!r}", f"joints: {', '.join(sorted(tree.joints))[:300]}"
         )
         raise InvalidInput([problem])
-    wheels = infer_wheels(tree)
+    wheels, _ = examine_joints(tree)
     if not named:
         # A wheel that swivels is a caster of a differential drive, not a steered wheel: it becomes part of the hull.
         return [w for w in wheels if not w.is_steered] if isinstance(drive, Differential) else wheels
-    turned = steered_links(tree, [tree.joints[name] for name in steering or []])
+    turned = _steered_links(tree, [tree.joints[name] for name in steering or []])
     given = [
         WheelJoint(
             joint, tree.poses[joint.child].position, drive.wheel_radius, drive.wheel_width, joint.child in turned
         )
-        if (inferred := wheel_joint(tree, joint, joint.child in turned)) is None
+        if (inferred := _measure_wheel(tree, joint, joint.child in turned)) is None
         else inferred
         for joint in (tree.joints[name] for name in (*(drive.left or []), *(drive.right or [])))
     ]
@@ -151,13 +151,13 @@ def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
     return given + [w for w in wheels if w.joint.name not in rolling and w.joint.child in turned]
 
 
-def steered_links(tree: LinkTree, knuckles: Sequence[Joint]) -> set[str]:
+def _steered_links(tree: LinkTree, knuckles: Sequence[Joint]) -> set[str]:
     """Return the names of all links below the steering joints."""
     return {link for joint in knuckles for link in tree.subtree(joint.child)}
 
 
-def wheel_joint(tree: LinkTree, joint: Joint, steered: bool) -> WheelJoint | None:
-    """Return the wheel on a joint by its collision shape, or None if that is not round."""
+def _measure_wheel(tree: LinkTree, joint: Joint, steered: bool) -> WheelJoint | None:
+    """Return the wheel on a joint, measured by its collision shapes, or None if none of them is round."""
     for solid in tree.links[joint.child].solids:
         place = tree.poses[joint.child].compose(solid.pose).position
         match solid.shape:
@@ -176,7 +176,7 @@ def wheel_joint(tree: LinkTree, joint: Joint, steered: bool) -> WheelJoint | Non
 def _round_mesh(joint: Joint, solid: Solid) -> tuple[Pose3, float, float] | None:
     """Return center (in the frame of the joint), radius, and width of a mesh in m; None if it is not round.
 
-    The extents in eight directions across the axis of the joint must be equal.
+    It is round if its extents in eight directions across the axis of the joint are equal.
     """
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     across = np.linalg.svd(axis[None])[2][1:]  # two unit vectors (2, 3) perpendicular to the axis
@@ -192,22 +192,23 @@ def _round_mesh(joint: Joint, solid: Solid) -> tuple[Pose3, float, float] | None
     return Pose3(x, y, z), radius, float(np.ptp(along))
 
 
-def _axis(tree: LinkTree, joint: Joint) -> str:
+def _parallel_axis(tree: LinkTree, joint: Joint) -> str:
     """Return the axis of the root frame that a joint axis is parallel to: x, y, z, or "" for none."""
     rotation = tree.poses[joint.child]._replace(x=0.0, y=0.0, z=0.0)
     parts = rotation.compose(Pose3(*joint.axis)).position
     return "".join(name for name, part in zip("xyz", parts, strict=True) if abs(part) >= MIN_AXIS_COSINE)
 
 
-CODE = "SC405"
+ALIGNMENT_CODE = "SC405"
+"""Code of all warnings about the heights of wheels and casters."""
 HEIGHT_TOLERANCE_M = 0.0005
 """Largest difference in m between the heights of parts that stand on the ground."""
 MAX_CASTER_GAP_M = 0.003
-"""Largest gap in m below a caster; the robot then stands on another caster, or tilts slightly."""
+"""Largest gap in m below a caster without a warning; the robot then stands on another caster, or tilts slightly."""
 MAX_CASTER_HEIGHT_M = 0.02
-"""Height in m above the ground below which a small link is meant to be a caster."""
+"""Height in m above the ground up to which a small link is probably meant to be a caster."""
 MAX_CASTER_SIZE_M = 0.1
-"""Largest length and width of a caster in m."""
+"""Largest length and width of a small link in m."""
 
 
 def alignment_warnings(tree: LinkTree, drive: Drive) -> list[Problem]:
@@ -217,7 +218,7 @@ def alignment_warnings(tree: LinkTree, drive: Drive) -> list[Problem]:
         return []
     ground = min(wheel.bottom for wheel in wheels)
     found = [*_wheel_warnings(wheels, ground), *_caster_warnings(tree, wheels, ground, drive.type == "differential")]
-    return [Problem(p.path, p.line, p.col, CODE, p.message, p.hint, "warning", p.source) for p in found]
+    return [Problem(p.path, p.line, p.col, ALIGNMENT_CODE, p.message, p.hint, "warning", p.source) for p in found]
 
 
 def _wheel_warnings(wheels: list[WheelJoint], ground: float) -> Iterator[Problem]:
@@ -231,7 +232,7 @@ def _wheel_warnings(wheels: list[WheelJoint], ground: float) -> Iterator[Problem
 def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, needs_caster: bool) -> Iterator[Problem]:
     rolling = {link for wheel in wheels for link in tree.subtree(wheel.joint.child)}
     gaps = {
-        name: _lowest(tree, name) - ground for name in tree.links if name not in rolling and tree.links[name].solids
+        name: _lowest_z(tree, name) - ground for name in tree.links if name not in rolling and tree.links[name].solids
     }
     for name, gap in gaps.items():
         if gap < -HEIGHT_TOLERANCE_M:
@@ -249,14 +250,14 @@ def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, ne
         yield tree.links[nearest].element.problem(message, hint)
 
 
-def _points(tree: LinkTree, name: str) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
+def _collision_points(tree: LinkTree, name: str) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
     pose = tree.poses[name]
     return np.concatenate([pose.compose(s.pose).apply(hull_points(s.shape)) for s in tree.links[name].solids])
 
 
-def _lowest(tree: LinkTree, name: str) -> float:
-    return float(_points(tree, name)[:, 2].min())
+def _lowest_z(tree: LinkTree, name: str) -> float:
+    return float(_collision_points(tree, name)[:, 2].min())
 
 
 def _is_small(tree: LinkTree, name: str) -> bool:
-    return bool((np.ptp(_points(tree, name)[:, :2], axis=0) <= MAX_CASTER_SIZE_M).all())
+    return bool((np.ptp(_collision_points(tree, name)[:, :2], axis=0) <= MAX_CASTER_SIZE_M).all())

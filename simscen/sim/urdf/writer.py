@@ -1,4 +1,4 @@
-"""Writes the body of a robot as URDF, for viewers of the topic /robot_description in a log."""
+"""Writes the body of a robot as URDF, which viewers read from the topic /robot_description of a log."""
 
 import math
 from xml.etree import ElementTree as ET
@@ -9,16 +9,16 @@ from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.body.undercarriage import Wheel
 
-BASE = "base_link"
+BASE_LINK = "base_link"
 
 
 def to_urdf(body: RobotBody) -> str:
     """Return URDF text: the base link with the hull in the base frame, and a continuous joint for each wheel.
 
-    Shapes that URDF does not support are replaced by their bounding boxes.
+    Capsules become cylinders, and other shapes that URDF does not support become their bounding boxes.
     """
     robot = ET.Element("robot", name=body.name)
-    base = ET.SubElement(robot, "link", name=BASE)
+    base = ET.SubElement(robot, "link", name=BASE_LINK)
     center = Pose3(*body.chassis.center.tolist())
     _add_inertial(base, body.chassis.mass, center, [[float(value) for value in row] for row in body.chassis.tensor])
     for solid in (*body.hull, *body.casters):
@@ -35,7 +35,7 @@ def _add_wheel(robot: ET.Element, wheel: Wheel) -> None:
     _add_inertial(link, wheel.inertia.mass, Pose3(), tensor)
     _add_shape(link, Solid(Cylinder(wheel.radius, wheel.width), Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0)))
     joint = ET.SubElement(robot, "joint", name=wheel.name, type="continuous")
-    ET.SubElement(joint, "parent", link=BASE)
+    ET.SubElement(joint, "parent", link=BASE_LINK)
     ET.SubElement(joint, "child", link=f"{wheel.name}_link")
     ET.SubElement(joint, "origin", xyz=_text(wheel.x, wheel.y, wheel.radius), rpy="0 0 0")
     ET.SubElement(joint, "axis", xyz="0 1 0")

@@ -1,4 +1,4 @@
-"""Elements of URDF files, with errors that refer to their line."""
+"""Reads URDF and xacro files as XML elements, with errors that refer to the line of an element."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from simscen.assets.folders import AllowedFolders, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 
 CODE = "SC400"
-"""Code of all problems with a robot's URDF; the message distinguishes them."""
+"""Code of all errors in a robot's URDF."""
 
 
 class InvalidElement(Exception):
-    """An element is invalid; `problem` has the reason and the line."""
+    """An element is invalid. `problem` contains the reason and the line."""
 
     def __init__(self, element: "Element", message: str, hint: str = "") -> None:
         self.problem = element.problem(message, hint)
@@ -34,7 +34,7 @@ class Element(markup.Element):
         return found
 
     def text(self, attribute: str) -> str:
-        """Return a required attribute; raises InvalidElement if it is missing or empty."""
+        """Return the text of a required attribute; raises InvalidElement if it is missing or empty."""
         if not self.attributes.get(attribute):
             raise InvalidElement(self, f'<{self.tag}> without {attribute}="…"')
         return self.attributes[attribute]
@@ -42,7 +42,10 @@ class Element(markup.Element):
     def numbers(
         self, attribute: str, count: int, default: tuple[float, ...] | None = None, largest: float = 1e6
     ) -> tuple[float, ...]:
-        """Return `count` numbers of an attribute with at most this size, or the default; raises InvalidElement."""
+        """Return the numbers of an attribute, or `default` if the attribute is missing and `default` is not None.
+
+        Raises InvalidElement unless there are `count` numbers, each from -`largest` to `largest`.
+        """
         if attribute not in self.attributes and default is not None:
             return default
         words = self.text(attribute).split()
@@ -57,20 +60,20 @@ class Element(markup.Element):
         return values
 
     def positive(self, attribute: str, count: int = 1) -> tuple[float, ...]:
-        """Return `count` positive numbers of an attribute; raises InvalidElement."""
+        """Return the numbers of a required attribute; raises InvalidElement unless there are `count` positive ones."""
         values = self.numbers(attribute, count)
         if min(values) <= 0:
             raise InvalidElement(self, f"{attribute} must be greater than 0")
         return values
 
     def problem(self, message: str, hint: str = "") -> Problem:
-        """Return a problem of this element."""
+        """Return an error that refers to the line of this element."""
         source = self.source.line(self.line)
         return Problem(self.source.name, self.line, self.col, CODE, message, hint, source=source)
 
 
 def parse_xml(data: bytes, file: str) -> Element:
-    """Parse an XML text. Raises InvalidInput with the line of an error."""
+    """Parse an XML text; `file` is its path in errors. Raises InvalidInput with the line of an error."""
     try:
         return markup.parse(data, markup.Source.of(data, file), Element)
     except markup.MalformedXml as error:
@@ -78,21 +81,20 @@ def parse_xml(data: bytes, file: str) -> Element:
         raise InvalidInput([problem]) from error
 
 
-# Maximum sizes of the files of a robot description.
-MAX_URDF_BYTES = 2 * 2**20
-MAX_MESH_BYTES = 20 * 2**20
+MAX_URDF_BYTES, MAX_MESH_BYTES = 2 * 2**20, 20 * 2**20
+"""Maximum sizes of a URDF or xacro file, and of a mesh file."""
 
 
 @dataclass(frozen=True)
 class RobotFiles:
-    """Paths of the files that a `*.robot.yaml` names: its URDF, and the folders of ROS packages by name."""
+    """Located files of a `*.robot.yaml`: the path of its URDF, and the folders of ROS packages by name."""
 
     urdf: Path
     packages: Mapping[str, Path]
 
 
 def read_xml(path: Path, folders: AllowedFolders) -> Element:
-    """Read a URDF or an included file without expansion. Raises InvalidInput."""
+    """Read a URDF or xacro file without expanding it. Raises InvalidInput."""
     shown_path = folders.display_path(path)
     try:
         _, data = folders.read_file(path, MAX_URDF_BYTES)

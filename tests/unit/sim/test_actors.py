@@ -13,7 +13,7 @@ def test_a_scripted_body_is_where_its_script_says(simulate):
     path = MotionPath((0.0, 2.0), (Pose2(3, 0, 0), Pose2(3, 2, math.pi / 2)), start=1.0)
     simulation = simulate(bodies=[Body("cart", CRATE, Pose3(3.0), path=path)])
     simulation.step(480)
-    assert simulation.objects()["cart"].plane == pytest.approx(Pose2(3, 1, math.pi / 4))
+    assert simulation.robot.objects()["cart"].plane == pytest.approx(Pose2(3, 1, math.pi / 4))
     simulation.step(480)
     assert simulation.truth().objects["cart"].plane == pytest.approx(Pose2(3, 2, math.pi / 2))
 
@@ -47,7 +47,7 @@ def test_spawned_bodies_are_there_and_removed_ones_are_gone(simulate):
 def test_spawning_a_name_again_replaces_it(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(1.0, 2.0))])
     simulation.spawn(Body("crate", CRATE, Pose3(-2.0)))
-    assert dict(simulation.objects()) == {"crate": Pose3(-2.0)}
+    assert dict(simulation.robot.objects()) == {"crate": Pose3(-2.0)}
 
 
 def test_a_cart_pushes_a_crate_along(simulate):

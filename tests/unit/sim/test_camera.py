@@ -10,7 +10,7 @@ FIELD, WIDTH, HEIGHT = 1.2, 64, 48
 
 
 def picture(simulation, mount=Pose3(z=0.5)):
-    return simulation.image(mount, WIDTH, HEIGHT, FIELD, 10.0)
+    return simulation.robot.image(mount, WIDTH, HEIGHT, FIELD, 10.0)
 
 
 def test_a_wall_straight_ahead_is_as_deep_everywhere_as_it_is_far(simulate):
@@ -63,4 +63,4 @@ def test_camera_does_not_change_the_motion(simulate):
     for _ in range(60):
         seen.step(6)
         unseen.step(6)
-        assert seen.truth() == unseen.truth() and seen.collisions() == unseen.collisions()
+        assert seen.truth() == unseen.truth() and seen.robot.collisions() == unseen.robot.collisions()

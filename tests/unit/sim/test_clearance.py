@@ -133,4 +133,4 @@ def test_wheels_rub_along_nothing_that_their_guards_do_not_touch(simulate):
     for simulation in (free, beside):
         simulation.step(480)
     assert beside.truth().pose.x == pytest.approx(free.truth().pose.x, abs=1e-3)
-    assert beside.collisions() == ()
+    assert beside.robot.collisions() == ()

@@ -21,7 +21,7 @@ def collisions(simulation, ticks, every=6):
     events = []
     for _ in range(ticks // every):
         simulation.step(every)
-        events += simulation.collisions()
+        events += simulation.robot.collisions()
     return events
 
 
@@ -40,7 +40,7 @@ def test_driving_into_a_wall_is_one_collision_with_its_place_speed_and_culprit(s
     assert hit.data["speed"] == pytest.approx(0.5, abs=0.01)
     assert hit.data["impulse"] > 0.5
     assert hit.data["robot_caused"] is True
-    assert simulation.touching()
+    assert simulation.robot.touching()
 
 
 def test_a_collision_ends_a_tenth_of_a_second_after_the_last_touch(simulate):
@@ -50,7 +50,7 @@ def test_a_collision_ends_a_tenth_of_a_second_after_the_last_touch(simulate):
     events = collisions(simulation, 240)
     assert [event.kind for event in events] == ["collision.ended"]
     assert events[0].data["impulse"] > 0.5
-    assert not simulation.touching()
+    assert not simulation.robot.touching()
 
 
 def test_grazing_a_wall_counts_although_the_robot_hardly_moves_towards_it(simulate):
@@ -118,7 +118,7 @@ def test_no_contact_is_missed_compared_with_asking_after_every_tick(simulate, mo
         for k, command in enumerate(commands):
             simulation.drive(command)
             if k == 15:
-                simulation.push((3.0, 1.0))
+                simulation.robot.push((3.0, 1.0))
             events += collisions(simulation, 96)
         return events, simulation.truth().pose
 

@@ -32,7 +32,7 @@ def watch(simulation, ticks, every=EVERY):
     for _ in range(ticks // every):
         simulation.step(every)
         truth = simulation.truth()
-        events += simulation.collisions()
+        events += simulation.robot.collisions()
         samples.append((simulation.tick, truth.clearance, pressed(simulation)))
     return events, samples
 
@@ -50,7 +50,7 @@ def test_a_collision_ends_when_the_robot_has_left_however_far_it_then_is(simulat
     assert kinds(events) == [EventKind.COLLISION_ENDED]
     left = next(tick for tick, clearance, _ in samples if clearance > 0.005)
     assert events[0].tick <= left + 24 + every
-    assert not simulation.touching()
+    assert not simulation.robot.touching()
 
 
 @pytest.mark.parametrize("height", [0.02, 0.028])
@@ -91,7 +91,7 @@ def test_ruling_contacts_out_gives_the_events_and_the_clearance_of_asking_at_eve
         for k in range(24):
             simulation.drive(Twist(rng.uniform(-0.5, 0.5), 0.0, rng.uniform(-2, 2)))
             if k % 8 == 5:
-                simulation.push((rng.uniform(-4, 4), rng.uniform(-4, 4)))
+                simulation.robot.push((rng.uniform(-4, 4), rng.uniform(-4, 4)))
             if k == 17:  # not into the cart: how Bullet parts what overlaps depends on where it saw both before
                 simulation.place_robot(Pose2(0.0, 0.0, rng.uniform(-3, 3)))
             more = watch(simulation, 96)
@@ -155,7 +155,7 @@ def test_a_push_does_not_carry_the_robot_into_something_unseen(simulate, monkeyp
     def run():
         simulation = simulate(solids=[box("wall", 0.22 + gap + 0.05, 0, 0.1, 4)])
         watch(simulation, 24)
-        simulation.push((8.0, 0.0))
+        simulation.robot.push((8.0, 0.0))
         return watch(simulation, 48, 24)
 
     ruled_out = run()

@@ -181,7 +181,7 @@ def test_robot_collides_with_an_actor_that_was_deferred(simulate, every):
         simulation.step(every)
         clearance = simulation.truth().clearance
     assert clearance <= 0.0
-    assert [event.name for event in simulation.collisions()] == ["far"]
+    assert [event.name for event in simulation.robot.collisions()] == ["far"]
 
 
 def test_no_actor_is_deferred_if_one_can_be_pushed(simulate):

@@ -32,7 +32,7 @@ for k in range(60):
     simulation.step(24)
     truth = simulation.truth()
     print(truth.pose, truth.twist, truth.clearance, sorted(truth.objects.items()), simulation.encoders())
-print(simulation.collisions())
+print(simulation.robot.collisions())
 """
 
 

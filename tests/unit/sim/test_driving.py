@@ -164,7 +164,7 @@ def test_being_set_down_elsewhere_leaves_the_robot_at_rest_and_its_encoders_unaw
 def test_a_push_moves_the_robot_the_way_it_points(simulate):
     for robot in ("turtlebot", "jackal", "omni"):
         simulation = simulate(robot)
-        simulation.push((0.0, 30.0))
+        simulation.robot.push((0.0, 30.0))
         simulation.step(30)
         pose = simulation.truth().pose
         assert pose.y > 0.01
@@ -181,9 +181,9 @@ def test_a_push_in_free_flight_gives_the_robot_its_impulse(simulate):
     pybullet.resetBasePositionAndOrientation(
         simulation.robot.base.id, up, turn, physicsClientId=simulation._scene.client
     )
-    simulation.push((0.9, 0.0))
+    simulation.robot.push((0.9, 0.0))
     simulation.step(1)
-    assert simulation.base_velocity()[0][0] == pytest.approx(0.9 / 1.8, rel=0.02)
+    assert simulation.robot.base_velocity()[0][0] == pytest.approx(0.9 / 1.8, rel=0.02)
 
 
 def test_physics_that_diverges_ends_the_run_with_the_time(simulate):

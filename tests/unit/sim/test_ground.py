@@ -52,7 +52,7 @@ def driven(simulation, seconds):
     for _ in range(round(seconds * TICKS / 24)):
         simulation.step(24)
         simulation.truth()
-        hit += [event.name for event in simulation.collisions()]
+        hit += [event.name for event in simulation.robot.collisions()]
     return hit
 
 
@@ -171,7 +171,7 @@ def test_objects_and_robots_are_placed_on_top_of_a_platform(on_ground):
     simulation.place_robot(Pose2(2.8, -0.2, 0.5))
     assert driven(simulation, 1) == []
     assert simulation.truth().pose.z == pytest.approx(0.03, abs=1e-3)
-    assert simulation.objects()["crate"].z == pytest.approx(0.03, abs=2e-3)
+    assert simulation.robot.objects()["crate"].z == pytest.approx(0.03, abs=2e-3)
 
 
 def test_an_imu_on_a_slope_feels_gravity_ahead(on_ground):

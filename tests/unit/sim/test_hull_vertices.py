@@ -55,5 +55,5 @@ def test_object_with_80_000_faces_can_be_pushed_and_rendered(simulate):
         simulation.step(24)
         told.append(simulation.truth().clearance)
     assert told[1] == pytest.approx(told[0], abs=2e-3)
-    _, depth = simulation.image(Pose3(z=0.3), 32, 24, 1.0, 10.0)
+    _, depth = simulation.robot.image(Pose3(z=0.3), 32, 24, 1.0, 10.0)
     assert depth[12, 16] == pytest.approx(1.2, abs=0.02)

@@ -46,7 +46,7 @@ def test_scan_does_not_depend_on_other_lidars(simulate):
         homes = simulation.robot.rest_poses
         other or other.append(LiveRayCaster(RayScene(merge_solids([WALL])), simulation.robot, frozenset({"crate 1"})))
         other[0].sweep(FAN, Pose3.from_rpy(0.0, 0.5, 0.3, 0.1, 0.2, 0.0), 9.0)
-        at_home.append({name for name, pose in simulation.objects().items() if homes.get(name) == pose})
+        at_home.append({name for name, pose in simulation.robot.objects().items() if homes.get(name) == pose})
 
     _, alone = drive(simulate, 3612, lambda _: None)
     _, watched = drive(simulate, 36, look)

@@ -58,7 +58,7 @@ def test_a_pushed_crate_that_hits_the_robot_is_felt(simulate):
     simulation = simulate(bodies=[crate(1.0)])
     simulation.push_object("crate", (-25.0, 0.0))
     simulation.step(240)
-    assert [event.name for event in simulation.collisions()][:1] == ["crate"]
+    assert [event.name for event in simulation.robot.collisions()][:1] == ["crate"]
 
 
 def test_push_of_an_unmovable_or_removed_object_fails(simulate):
@@ -103,7 +103,7 @@ def test_a_force_on_the_robot_adds_up_to_its_impulse_evenly_and_ends(simulate):
     speeds = []
     for _ in range(3):
         simulation.step(12)
-        speeds.append(simulation.base_velocity()[0][0])
+        speeds.append(simulation.robot.base_velocity()[0][0])
     assert speeds == pytest.approx([0.25, 0.5, 0.5], rel=0.03)
 
 
@@ -111,11 +111,14 @@ def test_a_robot_that_is_placed_elsewhere_touches_only_what_is_there(simulate):
     simulation = simulate(bodies=[crate(0.5, mass=0.0)])
     simulation.drive(Twist(0.5, 0.0, 0.0))
     simulation.step(240)
-    assert simulation.touching()
+    assert simulation.robot.touching()
     simulation.place_robot(Pose2(-3.0, 0.0))
-    assert not simulation.touching()
+    assert not simulation.robot.touching()
     assert simulation.truth().clearance > 1.0
-    assert [event.kind for event in simulation.collisions()] == [EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED]
+    assert [event.kind for event in simulation.robot.collisions()] == [
+        EventKind.COLLISION_STARTED,
+        EventKind.COLLISION_ENDED,
+    ]
     simulation.place_robot(Pose2(0.5, 0.0))
-    assert simulation.touching()
+    assert simulation.robot.touching()
     assert simulation.truth().clearance <= 0.0

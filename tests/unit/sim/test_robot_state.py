@@ -16,15 +16,15 @@ def test_the_engine_is_asked_for_a_robots_pose_once_for_each_tick(simulate, monk
         simulation.step(6)
         truth = simulation.truth()
         assert simulation.base_pose() == truth.pose
-        assert simulation.base_twist() == truth.twist
-        simulation.base_velocity()
+        assert simulation.robot.base_twist() == truth.twist
+        simulation.robot.base_velocity()
     assert len(asked) == 10
 
 
 def test_a_robot_that_was_set_down_elsewhere_is_seen_there_within_the_same_tick(simulate):
     simulation = simulate(drive=(0.3, 0.0, 0.0))
     simulation.step(120)
-    assert simulation.base_velocity()[0][0] > 0.1
+    assert simulation.robot.base_velocity()[0][0] > 0.1
     simulation.place_robot(Pose2(2.0, 1.0, 0.5))
     assert simulation.base_pose().plane.distance(Pose2(2.0, 1.0)) < 1e-6
-    assert abs(simulation.base_velocity()[0][0]) < 1e-9
+    assert abs(simulation.robot.base_velocity()[0][0]) < 1e-9

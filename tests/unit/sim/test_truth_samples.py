@@ -29,8 +29,8 @@ def test_samples_looked_at_later_are_those_of_the_moment(simulate, mass: float) 
             simulation.step(6)
         seen.append(asked.truth())
         late.append(waiting.robot.sample(6))
-    collisions = asked.collisions()
-    assert [event.tick for event in waiting.collisions()] == [event.tick for event in collisions] != []
+    collisions = asked.robot.collisions()
+    assert [event.tick for event in waiting.robot.collisions()] == [event.tick for event in collisions] != []
     waited = sum(not isinstance(sample, Truth) for sample in late)
     assert 0 < waited < len(late)
     looked_at = [sample if isinstance(sample, Truth) else sample.truth() for sample in late]
@@ -51,7 +51,7 @@ def test_samples_among_things_that_sleep_and_are_pushed_are_those_of_the_moment(
         seen.append(asked.truth())
         late.append(waiting.robot.sample(6))
     assert [sample if isinstance(sample, Truth) else sample.truth() for sample in late] == seen
-    assert [event.name for event in asked.collisions()] == [event.name for event in waiting.collisions()]
+    assert [event.name for event in asked.robot.collisions()] == [event.name for event in waiting.robot.collisions()]
     first, last = (truth.objects for truth in (seen[0], seen[-1]))
     assert last["crate 0"].x > first["crate 0"].x + 0.5  # by the robot
     assert last["crate 2"].x > first["crate 2"].x + 0.5  # by the cart

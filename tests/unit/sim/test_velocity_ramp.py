@@ -15,7 +15,7 @@ speeds = st.floats(-3, 3)
 
 @given(st.lists(st.builds(Twist, speeds, speeds, speeds), min_size=1, max_size=40))
 def test_no_command_makes_it_faster_or_harder_than_the_limits(commands):
-    ramp, before = VelocityRamp(LIMITS, PERIOD, holonomic=False), STOP
+    ramp, before = VelocityRamp(LIMITS, PERIOD, is_holonomic=False), STOP
     for command in commands:
         ramp.command(command)
         ramp.advance()
@@ -28,14 +28,14 @@ def test_no_command_makes_it_faster_or_harder_than_the_limits(commands):
 
 
 def test_velocity_ramp_reaches_the_command_and_then_stops():
-    ramp = VelocityRamp(LIMITS, PERIOD, holonomic=False)
+    ramp = VelocityRamp(LIMITS, PERIOD, is_holonomic=False)
     ramp.command(Twist(0.25, 0.0, 0.0))
     assert [ramp.advance() for _ in range(4)] == [True, True, True, False]
     assert ramp.velocity == Twist(0.25, 0.0, 0.0)
 
 
 def test_turning_round_brakes_to_a_stop_first():
-    ramp = VelocityRamp(LIMITS, PERIOD, holonomic=False)
+    ramp = VelocityRamp(LIMITS, PERIOD, is_holonomic=False)
     ramp.command(Twist(0.1, 0.0, 0.0))
     ramp.advance()
     ramp.command(Twist(-0.5, 0.0, 0.0))
@@ -46,7 +46,7 @@ def test_turning_round_brakes_to_a_stop_first():
 
 
 def test_only_a_holonomic_base_goes_sideways():
-    ramp = VelocityRamp(LIMITS, PERIOD, holonomic=True)
+    ramp = VelocityRamp(LIMITS, PERIOD, is_holonomic=True)
     ramp.command(Twist(0.0, 5.0, 0.0))
     for _ in range(20):
         ramp.advance()

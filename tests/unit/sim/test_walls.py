@@ -46,7 +46,7 @@ def test_a_large_world_is_that_in_which_all_walls_stand_from_the_start(simulate,
         course = []
         for _ in range(160):
             simulation.step(6)
-            course.append((simulation.truth().pose, simulation.object_pose("crate"), simulation.collisions()))
+            course.append((simulation.truth().pose, simulation.object_pose("crate"), simulation.robot.collisions()))
         courses.append(course)
     at_once, near = courses
     touched = next((k for k, (_, crate, events) in enumerate(at_once) if events or crate.x < -7.8), None)
