@@ -9,7 +9,7 @@ from simscen.model.robot import RobotSpec
 from simscen.sim.body.inertia import MassProperties, inertia_of_solids
 from simscen.sim.body.robot_body import RobotBody, assemble, check_ground_clearance, check_robot_size
 from simscen.sim.body.undercarriage import wheels_for_drive
-from simscen.sim.urdf.body import body_from_urdf
+from simscen.sim.urdf.body import body_from_tree, read_spec_tree
 from simscen.sim.urdf.elements import MeshReader
 from simscen.sim.urdf.xml_source import RobotFiles
 
@@ -29,7 +29,10 @@ def build_robot_body(
     `file` is the `*.robot.yaml`; `spec.urdf` is relative to its folder, unless `found` gives the path of the URDF. All
     files must be in `roots` (default: the folder of `file`). Without `read_mesh`, a URDF must not have meshes.
     """
-    body = _body_from_shapes(spec, file) if spec.urdf is None else body_from_urdf(spec, file, roots, read_mesh, found)
+    if spec.urdf is None:
+        body = _body_from_shapes(spec, file)
+    else:
+        body = body_from_tree(spec, read_spec_tree(spec, file, roots, read_mesh, found))
     check_robot_size(body, file)
     return body
 

@@ -43,12 +43,9 @@ def _outline(shape: Shape, pose: Pose3, z_range: tuple[float, float]) -> Polygon
     if corners[:, 2].min() >= z_range[1] or corners[:, 2].max() <= z_range[0]:
         return ()
     upright = isinstance(shape, Extrusion) and pose.qx == pose.qy == 0
-    outline = _bottom(corners) if upright else convex_hull(corners[:, :2])
+    bottom = corners[: len(corners) // 2, :2]
+    outline = tuple((x, y) for x, y in bottom.tolist()) if upright else convex_hull(corners[:, :2])
     return outline if len(outline) > 2 else ()
-
-
-def _bottom(corners: Array) -> Polygon:
-    return tuple((x, y) for x, y in corners[: len(corners) // 2, :2].tolist())
 
 
 def hull_points(shape: Shape) -> Array:
@@ -57,9 +54,9 @@ def hull_points(shape: Shape) -> Array:
         case Box(size):
             return np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]) * size
         case Cylinder(radius, length):
-            return np.concatenate((_ring(radius, -length / 2), _ring(radius, length / 2)))
+            return _rings(np.array([radius, radius]), np.array([-length / 2, length / 2]))
         case Cone(radius, length):
-            return np.concatenate((_ring(radius, -length / 2), [[0.0, 0.0, length / 2]]))
+            return np.concatenate((_rings(np.array([radius]), np.array([-length / 2])), [[0.0, 0.0, length / 2]]))
         case Sphere(radius):
             return _ball((radius, radius, radius))
         case Ellipsoid(radii):
@@ -112,10 +109,6 @@ def _chain(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
             chain.pop()
         chain.append((x, y))
     return chain
-
-
-def _ring(radius: float, z: float) -> Array:
-    return _rings(np.array([radius]), np.array([z]))
 
 
 def _rings(radii: Array, heights: Array) -> Array:

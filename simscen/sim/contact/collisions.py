@@ -93,9 +93,6 @@ class CollisionTracker:
                 self._events.append(_started_event(tick, contact, before))
             else:
                 collision.last_tick, collision.impulse = tick, collision.impulse + contact.impulse
-        self._end_collisions(tick)
-
-    def _end_collisions(self, tick: int) -> None:
         self._end(tick, sorted(name for name, one in self._ongoing.items() if tick - one.last_tick >= self._end_delay))
 
     def end_all(self, tick: int) -> None:
@@ -116,17 +113,13 @@ class CollisionTracker:
         return events
 
 
-def _no_ground(*_: float) -> bool:
-    return False
-
-
 def contact_points(
     client: int,
     robot_id: int,
     names: Mapping[int, str | None],
     static_solid_at: Callable[[Vector], str],
     tick_seconds: float,
-    is_ground_contact: IsGroundContact = _no_ground,
+    is_ground_contact: IsGroundContact,
 ) -> list[ContactPoint]:
     """Return the current contacts of a robot, one for each touched object, sorted by name.
 

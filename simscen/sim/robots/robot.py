@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -28,10 +29,7 @@ from simscen.sim.scene.walls import Walls
 
 @dataclass(frozen=True)
 class TimedPush:
-    """Push over several ticks, from `start_tick` to before `end_tick`.
-
-    `push` applies `impulse`, in N s along x and y of the world, during each tick.
-    """
+    """Call of `push` with `impulse` (N s, world frame) at each tick from `start_tick` to before `end_tick`."""
 
     push: Callable[[tuple[float, float]], None]
     impulse: tuple[float, float]
@@ -146,18 +144,11 @@ class Robot:
         self._placements, self._placed_tick = 0, -1
         is_uneven = bool(scene.terrain and self.base.ground_links)
         self.clearance = Clearance(
-            scene.client,
-            scene.tick_rate,
-            static,
-            obstacles,
-            is_uneven,
-            body,
-            self.base,
-            self._state,
-            scene.actors,
+            scene.client, scene.tick_rate, static, obstacles, is_uneven, body, self.base, self._state, scene.actors,
             clearance_range,
-        )
+        )  # fmt: skip
         self.sampler = TruthSampler(self.clearance.static_clearance)
+        self._is_ground_contact = partial(is_ground_contact, scene.terrain.names, self.base.ground_links)
         self._names: dict[int, str | None] = {}
         self._query_point: Vector = (math.inf, math.inf, math.inf)
 
@@ -349,9 +340,6 @@ class Robot:
         if enclosing is not None and enclosing not in {contact.name for contact in contacts}:
             contacts.append(enclosed_contact(enclosing, before.robot.origin))
         self._collisions.update(tick, contacts, before)
-
-    def _is_ground_contact(self, other: int, link: int, normal_z: float) -> bool:
-        return is_ground_contact(self._scene.terrain.names, self.base.ground_links, other, link, normal_z)
 
     def close(self) -> None:
         """Compute deferred samples and release the engine clients of the clearance."""

@@ -75,16 +75,9 @@ class WheeledBase:
         # The sphere extends beyond the sides of a narrow wheel; against obstacles, the wheel guard in the hull is used.
         engine.set_collision_filter(self._client, self.id, link, engine.WHEEL, engine.GROUND | engine.TERRAIN)
         pybullet.changeDynamics(
-            self.id,
-            link,
-            lateralFriction=1.0,
-            restitution=0.0,
-            linearDamping=0,
-            angularDamping=0,
-            jointDamping=0,
-            localInertiaDiagonal=(xx, yy + wheel.rotor_inertia, zz),
-            physicsClientId=self._client,
-        )
+            self.id, link, lateralFriction=1.0, restitution=0.0, linearDamping=0, angularDamping=0, jointDamping=0,
+            localInertiaDiagonal=(xx, yy + wheel.rotor_inertia, zz), physicsClientId=self._client,
+        )  # fmt: skip
 
     def place(self, pose: Pose2) -> None:
         """Place the base at rest with its base frame on the ground."""

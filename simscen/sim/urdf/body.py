@@ -169,13 +169,6 @@ MAX_CASTER_SIZE_RATIO = 0.35
 """Largest length and width of a link that touches the ground and counts as a caster, relative to those of the hull."""
 
 
-def body_from_urdf(
-    spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
-) -> RobotBody:
-    """Return the body that `spec.urdf` describes; see `read_spec_tree`. Raises InvalidInput."""
-    return body_from_tree(spec, read_spec_tree(spec, file, roots, read_mesh, found))
-
-
 def read_spec_tree(
     spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: RobotFiles | None
 ) -> LinkTree:
@@ -218,7 +211,7 @@ def _xml_text(argument: str | float | bool) -> str:
 
 
 def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
-    """Build the body of a robot from its links. All joints except those of wheels are fixed at zero."""
+    """Build the body of a robot from its links. All joints but those of wheels are fixed at 0. Raises InvalidInput."""
     joints = select_wheels(tree, spec.drive)
     _check_wheels(spec, tree, joints)
     rolling = {link for wheel in joints for link in tree.subtree(wheel.joint.child)}

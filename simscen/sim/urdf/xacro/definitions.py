@@ -1,11 +1,11 @@
-"""Definitions in xacro files: macros with their parameters, and properties."""
+"""Definitions in xacro files: parses macros, binds the arguments of their calls, and defines properties."""
 
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from simscen.sim.urdf.xacro.limits import ExpansionError, parse_bool, parse_literal
-from simscen.sim.urdf.xacro.text import Block, Lazy, Scope, ScopeValue, TextEvaluator, required_attribute
+from simscen.sim.urdf.xacro.text import Block, LazyText, Scope, ScopeValue, TextEvaluator, required_attribute
 from simscen.sim.urdf.xml_source import Element
 
 PARAMETER = re.compile(
@@ -14,19 +14,24 @@ PARAMETER = re.compile(
         (?=\s|\Z)""",
     re.VERBOSE,
 )
+"""One parameter in `params`, such as `name`, `*block`, `name:=default`, or `name:=^|default`."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a macro. `*name` and `**name` are blocks; `forward` uses the caller's property of that name."""
+    """A parameter of a macro. If its name begins with `*` or `**`, its argument is a block.
+
+    Without an argument, the value is the caller's property of the same name if the parameter `is_forwarded` (`^`), else
+    `default`. An argument is required if `default` is None.
+    """
 
     name: str
-    forward: bool = False
+    is_forwarded: bool = False
     default: str | None = None
 
     @property
     def is_block(self) -> bool:
-        """Whether its argument is an element."""
+        """Whether its argument is a block: a child element of the call."""
         return self.name.startswith("*")
 
 
@@ -40,23 +45,26 @@ class Macro:
 
 
 @dataclass(eq=False)
-class Macros:
-    """Macros by name in nested scopes, the inner ones first; `spaces` are the namespaces of included files."""
+class MacroScope:
+    """Macros by name that are defined in a scope. Those of its `parent` are visible, too.
 
-    parent: "Macros | None" = None
+    `namespaces` are the scopes of files that are included with a namespace.
+    """
+
+    parent: "MacroScope | None" = None
     macros: dict[str, Macro] = field(default_factory=dict)
-    spaces: "dict[str, Macros]" = field(default_factory=dict)
+    namespaces: "dict[str, MacroScope]" = field(default_factory=dict)
 
     def find(self, name: str) -> Macro | None:
         """Return the innermost macro with this name."""
         return next((scope.macros[name] for scope in self._outwards() if name in scope.macros), None)
 
-    def space(self, name: str) -> "Macros | None":
+    def find_namespace(self, name: str) -> "MacroScope | None":
         """Return the innermost namespace with this name."""
-        return next((scope.spaces[name] for scope in self._outwards() if name in scope.spaces), None)
+        return next((scope.namespaces[name] for scope in self._outwards() if name in scope.namespaces), None)
 
-    def _outwards(self) -> "Iterator[Macros]":
-        scope: Macros | None = self
+    def _outwards(self) -> "Iterator[MacroScope]":
+        scope: MacroScope | None = self
         while scope is not None:
             yield scope
             scope = scope.parent
@@ -82,12 +90,14 @@ def _parameters(text: str) -> list[Parameter]:
     return found
 
 
-# Resolve which macro a call means and bind its parameters.
-def resolve_macro(qualified_name: str, scope: Scope, macros: Macros) -> tuple[Macro, Scope, Macros]:
-    """Return the macro `name` or `namespace.name` with its enclosing scopes; raises ExpansionError."""
+def resolve_macro(qualified_name: str, scope: Scope, macros: MacroScope) -> tuple[Macro, Scope, MacroScope]:
+    """Return the macro `name` or `namespace.name`, and the scopes of properties and macros in which it is defined.
+
+    Raises ExpansionError if it does not exist.
+    """
     *spaces, name = qualified_name.split(".")
     for space in spaces:
-        owner, inner = scope.owner(space), macros.space(space)
+        owner, inner = scope.find_scope(space), macros.find_namespace(space)
         found = owner.values[space] if owner is not None else None
         if inner is None or not isinstance(found, Scope):
             raise ExpansionError(f"there is no namespace {space[:60]!r}")
@@ -101,9 +111,9 @@ def resolve_macro(qualified_name: str, scope: Scope, macros: Macros) -> tuple[Ma
 def bind_parameters(
     macro: Macro, call: Element, blocks: list[Element], scope: Scope, inside: Scope, texts: TextEvaluator
 ) -> Scope:
-    """Return `inside`, the scope of the macro's body, with the arguments of a call, evaluated in the caller's `scope`.
+    """Add the arguments of a call to `inside`, the scope of the macro's body, and return it. Raises ExpansionError.
 
-    Raises ExpansionError.
+    Arguments are evaluated in the caller's `scope`. `blocks` are the expanded child elements of the call.
     """
     missing = {parameter.name: parameter for parameter in macro.parameters}
     for name, text in call.attributes.items():
@@ -115,7 +125,7 @@ def bind_parameters(
         block = next(unused_blocks, None)
         if block is None:
             raise ExpansionError(f"macro {macro.name!r} needs a block for {name!r}")
-        inside.values[name] = Block(block, whole=not name.startswith("**"))
+        inside.values[name] = Block(block, includes_element=not name.startswith("**"))
         del missing[name]
     if extra := next(unused_blocks, None):
         raise ExpansionError(f"macro {macro.name!r} has no parameter for the block <{extra.tag[:60]}>")
@@ -125,17 +135,16 @@ def bind_parameters(
 
 
 def _default(parameter: Parameter, scope: Scope, macro: Macro, texts: TextEvaluator) -> ScopeValue:
-    if parameter.forward and scope.owner(parameter.name) is not None:
+    if parameter.is_forwarded and scope.find_scope(parameter.name) is not None:
         return texts.property(scope, parameter.name)
     if parameter.default is not None:
         return texts.literal(parameter.default, scope)
-    what = "there is no property to forward to" if parameter.forward else "a call lacks the argument"
+    what = "there is no property to forward to" if parameter.is_forwarded else "a call lacks the argument"
     raise ExpansionError(f"macro {macro.name!r}: {what} {parameter.name!r}")
 
 
-# Properties that `<xacro:property>` defines.
 def define_property(source: Element, scope: Scope, texts: TextEvaluator) -> None:
-    """Define a property, set its default, or remove it; raises ExpansionError."""
+    """Execute a `<xacro:property>`: define a property, set its default, or remove it. Raises ExpansionError."""
     name = texts.text(required_attribute(source, "name"), scope)
     if not name.isidentifier() or name.startswith("__"):
         raise ExpansionError(f"{name[:60]!r} is not a valid name of a property")
@@ -143,7 +152,7 @@ def define_property(source: Element, scope: Scope, texts: TextEvaluator) -> None
     remove = parse_bool(texts.value(source.attributes.get("remove", "false"), scope))
     if (value is not None) + (default is not None) + remove > 1:
         raise ExpansionError("value, default and remove exclude each other")
-    known = scope.owner(name) is not None
+    known = scope.find_scope(name) is not None
     if remove and known:
         scope.remove(name)
     elif default is None or not known:
@@ -155,9 +164,9 @@ def _set(source: Element, name: str, value: str | None, scope: Scope, texts: Tex
     where = source.attributes.get("scope", "")
     into = {"global": scope.top(), "parent": scope.caller()}.get(where, scope)
     if value is None:
-        into.values[f"**{name}"] = Block(source, whole=False)
+        into.values[f"**{name}"] = Block(source, includes_element=False)
     elif lazy and into is scope:
         plain = parse_literal(value)
-        into.values[name] = Lazy(plain) if isinstance(plain, str) else plain
+        into.values[name] = LazyText(plain) if isinstance(plain, str) else plain
     else:
         into.values[name] = texts.literal(value, scope)

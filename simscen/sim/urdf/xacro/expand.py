@@ -1,4 +1,4 @@
-"""Expands a xacro file to URDF elements (wiki.ros.org/xacro) that keep their file and line.
+"""Expands a xacro file (wiki.ros.org/xacro) to URDF elements that keep their file and line.
 
 Comments and text between elements are ignored, because they do not describe the robot.
 """
@@ -11,7 +11,7 @@ from simscen.assets.folders import AllowedFolders, NoSuchFile, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 from simscen.sim.urdf.xacro.definitions import (
     Macro,
-    Macros,
+    MacroScope,
     bind_parameters,
     define_property,
     parse_macro,
@@ -22,15 +22,16 @@ from simscen.sim.urdf.xacro.text import Block, Scope, TextEvaluator, required_at
 from simscen.sim.urdf.xml_source import MAX_URDF_BYTES, Element
 
 MAX_FILES = 200
-"""Maximum number of included files; each is at most as large as a URDF."""
+"""Maximum number of included files; each may have MAX_URDF_BYTES."""
 MAX_ELEMENTS = 100_000
+"""Maximum number of elements after expansion."""
 
 FileReader = Callable[[Path], Element]
 """Reads a file inside the allowed folders; raises InvalidInput."""
 
 
 class UnknownArgument(InvalidInput):
-    """An argument is given that no `<xacro:arg>` declares; `declared` are the declared ones."""
+    """The argument `name` is given, but no `<xacro:arg>` declares it; `declared` are the names of those that exist."""
 
     def __init__(self, robot: Element, name: str, declared: Iterable[str]) -> None:
         self.name, self.declared = name, sorted(declared)
@@ -41,33 +42,38 @@ class UnknownArgument(InvalidInput):
 def expand(
     robot: Element, file: Path, folders: AllowedFolders, read: FileReader, arguments: Mapping[str, str] | None = None
 ) -> Element:
-    """Expand the `robot` of a xacro `file`; `arguments` override the defaults.
+    """Return the expansion of the element `robot` of a xacro `file`; `arguments` override defaults of `<xacro:arg>`.
 
-    Raises InvalidInput, or its subclass UnknownArgument.
+    `read` reads included files, which must be in `folders`. Raises InvalidInput, or its subclass UnknownArgument.
     """
     container = replace(robot, tag="", attributes={}, children=[])
     expansion = _Expansion(file, folders, read, arguments or {})
     try:
-        expansion.element(robot, container, Scope(), Macros())
+        expansion.element(robot, container, Scope(), MacroScope())
     except InvalidInput:
         if not expansion.missing:
             raise
     if expansion.missing:  # without these files, other errors follow
         raise InvalidInput(list(expansion.missing.values()))
-    declared = expansion.declared | declared_in(robot)
+    declared = expansion.declared | declared_arguments(robot)
     for name in arguments or {}:
         if name not in declared:
             raise UnknownArgument(robot, name, declared)
     return container.children[0]
 
 
-def declared_in(element: Element) -> set[str]:
-    """Return all arguments that a file declares, also in parts that are not expanded."""
+def declared_arguments(element: Element) -> set[str]:
+    """Return the names of all arguments that an element declares, also in parts that are not expanded."""
     own = {element.name} if element.tag == "xacro:arg" else set()
-    return own.union(*map(declared_in, element.children))
+    return own.union(*map(declared_arguments, element.children))
 
 
 class _Expansion:
+    """Expansion of one file. Each handler appends the expansion of `source` to the children of `into`.
+
+    `scope` has the visible properties, and `macros` the visible macros.
+    """
+
     def __init__(self, file: Path, folders: AllowedFolders, read: FileReader, arguments: Mapping[str, str]) -> None:
         self._budget = Budget()
         self._texts = TextEvaluator(folders, file, self._budget, arguments)
@@ -90,7 +96,7 @@ class _Expansion:
             "xacro:call": self._call_by_name,
         }
 
-    def element(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def element(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         """Append the expansion of an element to the children of `into`."""
         try:
             with self._budget:
@@ -102,13 +108,13 @@ class _Expansion:
             hint = "; ".join(filter(None, [error.hint, *calls]))
             raise InvalidInput([source.problem(error.message, hint)]) from error
 
-    def _children(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _children(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         for child in source.children:
             self.element(child, into, scope, macros)
 
-    def _plain(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
-        own = {name: text for name, text in source.attributes.items() if not _is_xacro_attribute(name)}
-        attributes = {name: self._texts.text(text, scope) for name, text in own.items()}
+    def _plain(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+        own = [(n, text) for n, text in source.attributes.items() if not n.startswith("xacro:") and n != "xmlns:xacro"]
+        attributes = {name: self._texts.text(text, scope) for name, text in own}
         self._elements += 1
         self._bytes += len(source.tag) + sum(len(name) + len(text) for name, text in attributes.items())
         if self._elements > MAX_ELEMENTS or self._bytes > MAX_URDF_BYTES:
@@ -117,66 +123,68 @@ class _Expansion:
         into.children.append(copy)
         self._children(source, copy, scope, macros)
 
-    def _macro(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _macro(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         macro = parse_macro(source)
         macros.macros[macro.name] = macro
 
-    def _argument(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _argument(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         name = required_attribute(source, "name")
         self.declared.add(name)
         if name not in self._texts.arguments:
-            self._texts.arguments[name] = self._texts.text(required_attribute(source, "default", empty=True), scope)
+            self._texts.arguments[name] = self._texts.text(
+                required_attribute(source, "default", may_be_empty=True), scope
+            )
 
-    def _if(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _if(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         if parse_bool(self._texts.value(required_attribute(source, "value"), scope)) is (source.tag == "xacro:if"):
             self._children(source, into, scope, macros)
 
-    def _attribute(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _attribute(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         name = self._texts.text(required_attribute(source, "name"), scope)
-        into.attributes[name] = self._texts.text(required_attribute(source, "value", empty=True), scope)
+        into.attributes[name] = self._texts.text(required_attribute(source, "value", may_be_empty=True), scope)
 
-    def _element(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _element(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         self.element(
             replace(source, tag=self._texts.text(required_attribute(source, "xacro:name"), scope)), into, scope, macros
         )
 
-    def _insert(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _insert(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         name = required_attribute(source, "name")
         for key in (f"**{name}", f"*{name}"):
-            owner = scope.owner(key)
+            owner = scope.find_scope(key)
             if owner is not None and isinstance(block := owner.values[key], Block):
-                insert = self._plain if block.whole else self._children
+                insert = self._plain if block.includes_element else self._children
                 insert(block.element, into, scope, macros)
                 return
         raise ExpansionError(f"there is no block {name[:60]!r}")
 
-    def _call_by_name(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _call_by_name(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         name = self._texts.text(required_attribute(source, "macro"), scope)
         rest = {key: value for key, value in source.attributes.items() if key != "macro"}
         self._call(replace(source, tag=f"xacro:{name}", attributes=rest), into, scope, macros)
 
-    def _call(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _call(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         self._budget.spend(10)
         macro, enclosing, enclosing_macros = resolve_macro(source.tag.removeprefix("xacro:"), scope, macros)
         arguments = replace(source, attributes={}, children=[])
         self._children(source, arguments, scope, macros)
         inside = bind_parameters(macro, source, arguments.children, scope, Scope(enclosing), self._texts)
         self._calls.append((macro, source))
-        self._children(macro.body, into, inside, Macros(enclosing_macros))
+        self._children(macro.body, into, inside, MacroScope(enclosing_macros))
         self._calls.pop()
 
-    def _include(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _include(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         try:
             self._include_file(source, into, scope, macros)
         except MissingFile as missing:
             self.missing.setdefault(missing.message, source.problem(missing.message, missing.hint))
 
-    def _include_file(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+    def _include_file(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
         filename = self._texts.text(required_attribute(source, "filename"), scope)
         if space := self._texts.text(source.attributes.get("ns", ""), scope):
-            enclosing, scope = scope, Scope(scope, namespace=True)
+            enclosing, scope = scope, Scope(scope, is_namespace=True)
             enclosing.values[space] = scope
-            macros.spaces[space] = macros = Macros()
+            macros.namespaces[space] = macros = MacroScope()
         try:
             found = self._folders.find(filename, self._texts.file.parent, absolute=True)
             path = self._folders.check_file(found, MAX_URDF_BYTES)
@@ -193,9 +201,5 @@ class _Expansion:
             if len(self._read) >= MAX_FILES:
                 raise ExpansionError(f"more than {MAX_FILES} files are included")
             self._read[path] = self._read_file(path)
-            self.declared |= declared_in(self._read[path])
+            self.declared |= declared_arguments(self._read[path])
         return self._read[path]
-
-
-def _is_xacro_attribute(attribute: str) -> bool:
-    return attribute.startswith("xacro:") or attribute == "xmlns:xacro"

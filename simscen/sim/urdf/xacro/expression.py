@@ -1,4 +1,4 @@
-"""Evaluates `${…}` expressions with Python's grammar: arithmetic and harmless functions; anything else is an error."""
+"""Evaluates `${…}` expressions in Python's grammar. Only arithmetic and the functions in this module are allowed."""
 
 import ast
 import math
@@ -84,7 +84,8 @@ METHODS: Mapping[tuple[type, str], Function] = {
 }  # fmt: skip
 
 
-MAX_CHARACTERS = 1000
+MAX_EXPRESSION_CHARACTERS = 1000
+"""Maximum length of an expression."""
 
 BINARY: dict[type[ast.operator], Callable[[Any, Any], object]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -98,29 +99,29 @@ COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], object]] = {
     ast.GtE: operator.ge, ast.Is: operator.is_, ast.IsNot: operator.is_not,
     ast.In: lambda one, many: one in many, ast.NotIn: lambda one, many: one not in many,
 }  # fmt: skip
-HINT = "supported are numbers, texts, lists, comparisons, `a if b else c`, math functions, and properties"
+EXPRESSION_HINT = "supported are numbers, texts, lists, comparisons, `a if b else c`, math functions, and properties"
 
 
-class Names(Protocol):
-    """Lookup of the names in an expression."""
+class NameLookup(Protocol):
+    """Looks up the properties that an expression uses."""
 
     def value(self, path: tuple[str, ...]) -> Value:
-        """Return the property with this name, given as its parts; raises KeyError."""
+        """Return the value of a property, given by the dotted parts of its name; raises KeyError if there is none."""
 
 
-def evaluate(text: str, names: Names, budget: Budget) -> Value:
-    """Evaluate an expression; raises ExpansionError."""
-    if len(text) > MAX_CHARACTERS:
-        raise ExpansionError(f"an expression is longer than {MAX_CHARACTERS} characters")
+def evaluate(text: str, names: NameLookup, budget: Budget) -> Value:
+    """Return the value of an expression, and count its steps in `budget`; raises ExpansionError."""
+    if len(text) > MAX_EXPRESSION_CHARACTERS:
+        raise ExpansionError(f"an expression is longer than {MAX_EXPRESSION_CHARACTERS} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: deeply nested brackets
-        raise ExpansionError("not an expression", HINT) from None
+        raise ExpansionError("not an expression", EXPRESSION_HINT) from None
     return _Evaluation(names, budget).value(tree.body)
 
 
 class _Evaluation:
-    def __init__(self, names: Names, budget: Budget) -> None:
+    def __init__(self, names: NameLookup, budget: Budget) -> None:
         self._names, self._budget = names, budget
 
     def value(self, node: ast.expr) -> Value:
@@ -156,14 +157,14 @@ class _Evaluation:
             case ast.Call(function, arguments, keywords):
                 return self._call(function, arguments, keywords)
             case _:
-                raise ExpansionError(f"{_describe(node)} is not supported", HINT)
+                raise ExpansionError(f"{_describe(node)} is not supported", EXPRESSION_HINT)
 
     def _name(self, node: ast.expr) -> object:
         path = _path(node)
         try:
             return self._names.value(path)
         except KeyError:
-            known = _known(path)
+            known = _find_builtin(path)
         if isinstance(known, int | float):
             return known
         raise ExpansionError(
@@ -203,14 +204,14 @@ class _Evaluation:
             return isinstance(self.value(arguments[0]), TYPES[kind])
         known: Function | float | None
         if path:
-            known, receiver = _known(path), []
+            known, receiver = _find_builtin(path), []
         elif isinstance(function, ast.Attribute):
             value = self.value(function.value)
             known, receiver = METHODS.get((type(value), function.attr)), [value]
         else:
             known, receiver = None, []
         if not callable(known):
-            raise ExpansionError(f"{ast.unparse(function)[:60]}() is not supported", HINT)
+            raise ExpansionError(f"{ast.unparse(function)[:60]}() is not supported", EXPRESSION_HINT)
         named = {keyword.arg: self.value(keyword.value) for keyword in keywords if keyword.arg is not None}
         if keywords and (known is not dict or len(named) < len(keywords)):
             raise ExpansionError("arguments by name are not supported")
@@ -236,14 +237,14 @@ def _path(node: ast.expr) -> tuple[str, ...]:
         case ast.Attribute(value, name):
             return (*_path(value), name)
         case _:
-            raise ExpansionError(f"{_describe(node)} is not a name", HINT)
+            raise ExpansionError(f"{_describe(node)} is not a name", EXPRESSION_HINT)
 
 
 def _is_namespace(node: ast.expr) -> bool:
     return isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in NAMESPACES
 
 
-def _known(path: tuple[str, ...]) -> Function | float | None:
+def _find_builtin(path: tuple[str, ...]) -> Function | float | None:
     match path:
         case (name,):
             return GLOBALS.get(name)

@@ -1,9 +1,15 @@
-"""Limits of an expansion, counted in steps rather than seconds, so that they are the same on every machine."""
+"""Limits of a xacro expansion, its errors, and conversion of property values.
+
+Limits are counted in steps rather than seconds, so that they are the same on every machine.
+"""
 
 from typing import Union
 
 MAX_STEPS = 300_000
-"""Maximum of elements, macros (10 each), characters / 16, and parts of expressions; a TurtleBot 4 needs 10 000."""
+"""Maximum number of steps: one for each element, part of an expression, or 16 characters, and 10 for a macro call.
+
+A TurtleBot 4 needs 10 000.
+"""
 MAX_DEPTH = 150
 """Maximum nesting of elements, macros, includes, properties, and expressions; Python's own stack allows 900."""
 MAX_LENGTH = 1 << 16
@@ -11,7 +17,7 @@ MAX_LENGTH = 1 << 16
 
 
 class ExpansionError(Exception):
-    """A text or expression cannot be expanded; the message has no line number, `hint` says what to do."""
+    """A text or expression cannot be expanded. The message has no line number; `hint` says what to do, if not empty."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.message, self.hint = message, hint
@@ -19,11 +25,14 @@ class ExpansionError(Exception):
 
 
 class MissingFile(ExpansionError):
-    """A file or package does not exist; the expansion can continue to find further problems."""
+    """A file or package does not exist. The expansion can continue, to find further problems."""
 
 
 class Budget:
-    """Counts steps and, as a context manager, the nesting depth. Raises ExpansionError above a limit."""
+    """Counts steps and nesting depth, and raises ExpansionError above MAX_STEPS or MAX_DEPTH.
+
+    Nested elements, calls, and expressions are evaluated in nested `with budget` statements.
+    """
 
     def __init__(self) -> None:
         self._steps, self._depth = 0, 0
@@ -44,15 +53,14 @@ class Budget:
         self._depth -= 1
 
 
-# Values of properties: plain data of bounded size.
 Value = Union[int, float, str, bool, None, "list[Value]", "dict[str, Value]"]
-
+"""Value of a property."""
 MAX_BITS = 256
-"""Maximum size of an integer; its arithmetic then takes no noticeable time."""
+"""Maximum number of bits of an integer, up to which arithmetic takes no noticeable time."""
 
 
 def check_bounds(value: object) -> Value:
-    """Return `value` if it is plain data of bounded size; raises ExpansionError."""
+    """Return `value`; raises ExpansionError if its type is not allowed, or if it exceeds MAX_BITS or MAX_LENGTH."""
     match value:
         case None | bool() | float():
             return value
@@ -69,7 +77,7 @@ def check_bounds(value: object) -> Value:
 
 
 def size(value: Value) -> int:
-    """Return the number of characters of a text, or of values in a list, including nested ones."""
+    """Return the total number of characters, lists, dictionaries, and other values that a value consists of."""
     match value:
         case str():
             return len(value)
@@ -82,7 +90,7 @@ def size(value: Value) -> int:
 
 
 def parse_literal(text: str) -> Value:
-    """Convert the text of an attribute: 'quoted' is text, otherwise a number or a boolean if it is one."""
+    """Return the value of an attribute: a number or boolean if the text is one, else the text without single quotes."""
     if len(text) >= 2 and text[0] == text[-1] == "'":
         return text[1:-1]
     if "_" in text:  # Python would read 1_000 as a number
@@ -96,7 +104,7 @@ def parse_literal(text: str) -> Value:
 
 
 def parse_bool(value: Value) -> bool:
-    """Convert the value of `<xacro:if value=…>`; raises ExpansionError."""
+    """Return the value of `<xacro:if value=…>` as a boolean; raises ExpansionError for texts that are none."""
     if not isinstance(value, str):
         return bool(value)
     if value in ("true", "True", "false", "False"):

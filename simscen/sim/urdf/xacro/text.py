@@ -13,8 +13,8 @@ from simscen.sim.urdf.xml_source import Element
 
 
 @dataclass(frozen=True, eq=False)
-class Lazy:
-    """Text of a property that is evaluated on first use."""
+class LazyText:
+    """Text of a property that has not been used yet, and is evaluated on first use."""
 
     text: str
 
@@ -24,27 +24,30 @@ class Block:
     """Elements to insert: the children of `element`, or with `whole` the element itself."""
 
     element: Element
-    whole: bool
+    includes_element: bool
 
 
 @dataclass(eq=False)
-class Resolving:
-    """Marks a property that is being evaluated; using it again is a circular definition."""
+class Unfinished:
+    """Marks a property that is being evaluated. Using it meanwhile means that its definition is circular."""
 
 
-ScopeValue = Union[Value, Lazy, Block, Resolving, "Scope"]
+ScopeValue = Union[Value, LazyText, Block, Unfinished, "Scope"]
 
 
 @dataclass(eq=False)
 class Scope:
-    """Properties of a file, of an included namespace, or of one call of a macro."""
+    """Properties and blocks of a file, of an included namespace, or of one call of a macro.
+
+    Those of its `parent` are visible, too. In `values`, the names of blocks begin with `*` or `**`.
+    """
 
     parent: "Scope | None" = None
-    namespace: bool = False
+    is_namespace: bool = False
     values: dict[str, ScopeValue] = field(default_factory=dict)
 
-    def owner(self, name: str) -> "Scope | None":
-        """Return the innermost scope with a property of this name."""
+    def find_scope(self, name: str) -> "Scope | None":
+        """Return the innermost scope with a property of this name, or None."""
         scope: Scope | None = self
         while scope is not None and name not in scope.values:
             scope = scope.parent
@@ -58,9 +61,9 @@ class Scope:
         return scope
 
     def caller(self) -> "Scope":
-        """Return the scope for `scope="parent"`: the enclosing one; in a macro, beyond namespaces."""
+        """Return the scope for `scope="parent"`: the parent; in a macro, the innermost one that is not a namespace."""
         scope = self.parent
-        while scope is not None and scope.namespace and not self.namespace:
+        while scope is not None and scope.is_namespace and not self.is_namespace:
             scope = scope.parent
         return scope or self.top()
 
@@ -73,10 +76,11 @@ class Scope:
 
 
 TOKEN = re.compile(r"\$\$+[{(]|\$\{[^}]*\}|\$\([^)]*\)|[^$]+|\$[^{($]+|\$\Z")
+"""Part of a text: an escaped `$${` or `$$(`, an expression, a substitution, or plain text."""
 
 
 class TextEvaluator:
-    """Evaluates texts; `file` is the one being expanded, `arguments` are those of `<xacro:arg>`."""
+    """Evaluates texts of the expanded `file`; `arguments` are the values of `<xacro:arg>` by name."""
 
     def __init__(self, folders: AllowedFolders, file: Path, budget: Budget, arguments: Mapping[str, str]) -> None:
         self.budget, self.file = budget, file
@@ -84,7 +88,7 @@ class TextEvaluator:
         self._folders = folders
 
     def value(self, text: str, scope: Scope) -> Value:
-        """Evaluate a text in a scope; a single expression keeps its type. Raises ExpansionError."""
+        """Return the value of a text: of any type for a single expression, else text. Raises ExpansionError."""
         self.budget.spend(1 + len(text) // 16)
         if "$" not in text:
             return text
@@ -104,22 +108,22 @@ class TextEvaluator:
         return joined
 
     def text(self, text: str, scope: Scope) -> str:
-        """Evaluate a text and return text; raises ExpansionError."""
+        """Return the value of a text as text; raises ExpansionError."""
         return str(self.value(text, scope))
 
     def literal(self, text: str, scope: Scope) -> Value:
-        """Evaluate a text and convert it to a number or boolean if it is one; raises ExpansionError."""
+        """Return the value of a text as a number or boolean if it is one; raises ExpansionError."""
         value = self.value(text, scope)
         return parse_literal(value) if isinstance(value, str) else value
 
     def property(self, scope: Scope, name: str) -> "Value | Scope":
-        """Return a property of a scope, evaluated on first use; raises KeyError or ExpansionError."""
-        owner = scope.owner(name)
+        """Return a property that is visible in a scope, or a namespace; raises KeyError or ExpansionError."""
+        owner = scope.find_scope(name)
         if owner is None:
             raise KeyError(name)
         match owner.values[name]:
-            case Lazy(text) as lazy:
-                owner.values[name] = Resolving()
+            case LazyText(text) as lazy:
+                owner.values[name] = Unfinished()
                 try:
                     with self.budget:
                         value = self.literal(text, owner)
@@ -128,7 +132,7 @@ class TextEvaluator:
                     raise
                 owner.values[name] = value
                 return value
-            case Resolving():
+            case Unfinished():
                 raise ExpansionError(f"the property {name!r} is defined by itself")
             case Block():
                 raise KeyError(name)
@@ -141,7 +145,7 @@ class TextEvaluator:
         if token.startswith("${"):
             expression = str(self.value(token[2:-1], scope))
             try:
-                return evaluate(expression, _ScopeNames(self, scope), self.budget)
+                return evaluate(expression, _ScopeLookup(self, scope), self.budget)
             except ExpansionError as error:
                 if error.message.startswith("${"):
                     raise
@@ -176,7 +180,7 @@ class TextEvaluator:
             raise MissingFile(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
 
 
-class _ScopeNames:
+class _ScopeLookup:
     def __init__(self, texts: TextEvaluator, scope: Scope) -> None:
         self._texts, self._scope = texts, scope
 
@@ -191,9 +195,9 @@ class _ScopeNames:
         return current
 
 
-def required_attribute(element: Element, attribute: str, empty: bool = False) -> str:
-    """Return a required attribute without evaluation; raises ExpansionError if it is missing."""
+def required_attribute(element: Element, attribute: str, may_be_empty: bool = False) -> str:
+    """Return the text of a required attribute, not evaluated; raises ExpansionError if it is missing or empty."""
     text = element.attributes.get(attribute)
-    if text is None or not (text or empty):
+    if text is None or not (text or may_be_empty):
         raise ExpansionError(f'<{element.tag[:60]}> without {attribute}="…"')
     return text
