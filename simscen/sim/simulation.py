@@ -32,7 +32,7 @@ SETTLING_TICKS = 60
 
 
 class RobotPlacement(NamedTuple):
-    """Body and initial pose of a robot, and its obstacles; None means that the whole static world is its obstacles."""
+    """Body and initial pose of a robot, and the part of the static world that blocks it (None: all of it)."""
 
     body: RobotBody
     pose: Pose2
@@ -210,7 +210,7 @@ class Simulation:
                     robot.add_bodies(dict.fromkeys(new_walls))
 
     def call_before_steps(self, period: int, function: Callable[[], None]) -> None:
-        """Call `function` before each step that begins at a multiple of `period` ticks (only one function)."""
+        """Call `function` before each step that begins at a multiple of `period` ticks; replaces an earlier one."""
         self._periodic_call = period, function
 
     # Changing the world
@@ -232,7 +232,7 @@ class Simulation:
         self._scene.after_change()
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Let a body follow a path that begins now, and never be pushed again; raises KeyError for an unknown name."""
+        """Let a body follow a path from now on, without being pushed any more; raises KeyError for an unknown name."""
         self._scene.before_change()
         self._scene.actors.move(name, path, self.tick)
         self._scene.after_change()

@@ -14,7 +14,7 @@ from simscen.sim.simulation import RobotPlacement, Simulation
 
 
 class SingleRobotSimulation(Simulation):
-    """A simulation with one unnamed robot, `robot`, some of whose methods it offers as its own."""
+    """A simulation with one unnamed robot. Offers some methods of `robot` as its own."""
 
     def __init__(
         self,

@@ -14,7 +14,7 @@ from simscen.sim.body.outline import footprint
 WHEEL_MASS_RATIO = 0.03
 """Default mass of a wheel relative to that of the robot; the wheels of a TurtleBot3 and of a Jackal have 2 to 3 %."""
 ROTOR_INERTIA = {"differential": 0.25, "ackermann": 0.25, "skid_steer": 0.5}
-"""Rotor inertia of a wheel's motor at the output of its gear, divided by robot mass x wheel radius², by drive.
+"""Rotor inertia of a wheel's motor at the output of its gear for each drive, in units of robot mass x wheel radius².
 
 It grows with the square of the gear ratio and is far larger than the inertia of the wheel. It also lets ten solver
 iterations converge: without it, a robot at rest creeps. For skidding wheels, it brings the direction of friction closer
@@ -22,7 +22,7 @@ to Coulomb's law. A larger inertia would tip the robot, because the reaction tor
 chassis.
 """
 STALL_TORQUE = {"differential": 0.7, "ackermann": 0.7, "skid_steer": 1.5}
-"""Stall torque of a motor divided by the torque at which its wheel loses grip, by drive.
+"""Stall torque of a motor for each drive, relative to the torque at which its wheel loses grip.
 
 A differential drive stalls against a wall rather than spinning its wheels. Skid steering needs more than the friction
 torque, because it also accelerates the rotors.

@@ -5,7 +5,7 @@ import math
 MAX_SUNK_DEPTH_M = 0.2
 """Depth in m below the floor at which the center of a body has fallen through it.
 
-A landing body penetrates by millimeters, and a light body that a scripted one presses down by some centimeters.
+A landing body sinks in by millimeters, and a light body that a scripted body presses down by some centimeters.
 """
 MAX_COORDINATE_M = 1e5
 """Largest valid coordinate in m; worlds extend to 10 km."""

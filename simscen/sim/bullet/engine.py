@@ -82,12 +82,12 @@ def set_physics_parameters(
     pybullet.setGravity(0, 0, -GRAVITY_M_S2, physicsClientId=client)
 
 
-def set_collision_filter(client: int, body: int, link: int, group: int, others: int) -> None:
+def set_collision_filter(client: int, body: int, link: int, group: int, mask: int) -> None:
     """Set the collision group of a link (-1 for the base), and the mask of the groups that it collides with.
 
     Two links collide if the mask of each one contains the group of the other one.
     """
-    pybullet.setCollisionFilterGroupMask(body, link, group, others, physicsClientId=client)
+    pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
 
 
 def create_static_faces(client: int, vertices: Array, faces: Faces) -> list[int]:

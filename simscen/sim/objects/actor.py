@@ -116,7 +116,7 @@ class Actor:
         return pose
 
     def path_velocity(self, tick: int, tick_rate: int) -> tuple[Vector, float]:
-        """Return the velocity in m/s and the turn rate in rad/s with which it reaches its pose at the next tick."""
+        """Return the velocity in m/s and turn rate in rad/s that lead to its pose at the next tick; 0 for a jump."""
         pose, following = self.path_pose(tick, tick_rate), self.path_pose(tick + 1, tick_rate)
         vx, vy = (following.x - pose.x) * tick_rate, (following.y - pose.y) * tick_rate
         if math.hypot(vx, vy) > MAX_STEP_M * tick_rate:  # a jump of the path is a teleportation, not a motion
@@ -164,7 +164,7 @@ class ActorBuilder:
         self._triangulate, self._visual_shape = triangulate, visual_shape
 
     def make_actor(self, body: Body, tick: int, is_steered: bool = False) -> Actor:
-        """Return the actor of a body, which is not in the engine yet. Raises RunError for a path that is too fast."""
+        """Return an actor for a body without creating it in the engine. Raises RunError for a path that is too fast."""
         radius, height = radius_and_height(body.solids)
         if body.path is not None and (step := largest_step(body.path, 1 / self._tick_rate, radius)) > MAX_STEP_M:
             raise RunError("invalid", too_fast_message(body.name, step))

@@ -236,7 +236,7 @@ class Actors:
         return is_resting and tick <= min(self._no_contact_before.values())
 
     def set_no_contact_before(self, robot_id: int, tick: int) -> None:
-        """Note that this robot cannot touch any actor before `tick`."""
+        """Store the tick before which this robot cannot touch any actor."""
         self._no_contact_before[robot_id] = tick
 
     # Stepping

@@ -2,8 +2,8 @@
 
 Bullet only lets a body sleep after two seconds at rest. Therefore, the world settles before tick 0, and objects at rest
 are then put to sleep. The speed of each object is sampled meanwhile. An object is at rest if it is slow at every sample
-and not faster at each sample than at the one before. A speed that always increases shows that the object begins to
-slide or tip over; other small speeds are jitter of the contact solver.
+and its speed does not increase from each sample to the next. A speed that always increases shows that the object begins
+to slide or tip over; other small speeds are jitter of the contact solver.
 
 Bullet does not wake a body that is touched by a scripted object, because this has no mass (see `actor`). Pushable
 objects are therefore woken before a scripted object reaches them. Any other contact wakes them in the engine, together

@@ -14,7 +14,7 @@ EXTRA_RADIUS_M = 2.0
 REQUERY_DISTANCE_M = 1.0
 """Distance that a robot can move before it queries deferred actors again."""
 EARLY_QUERY_DISTANCE_M = 0.5
-"""Shorter distance that applies every ACTIVATION_PERIOD_S, so that REQUERY_DISTANCE_M is not exceeded between ticks."""
+"""Shorter distance that applies every ACTIVATION_PERIOD_S, so that REQUERY_DISTANCE_M is not exceeded in between."""
 ACTIVATION_PERIOD_S = 0.05
 """Time between early queries, in which robots, slower than 10 m/s, move at most EARLY_QUERY_DISTANCE_M."""
 ROUNDING_MARGIN_M = 1e-3
@@ -36,13 +36,13 @@ class NearbyActors(NamedTuple):
     resting: tuple[tuple[Actor, tuple[float, float], float], ...] | None
 
     def covers(self, point: Vector, distance: float, tick: int, max_step: float) -> bool:
-        """Return whether all other actors, moving up to `max_step` m per tick, are farther than `distance` m away."""
+        """Return whether all other actors, moving up to `max_step` m per tick, are over `distance` m from `point`."""
         return math.dist(point, self.point) + max_step * (tick - self.tick) + distance <= self.distance
 
     def prepare_nearby(
         self, client: int, point: Vector, distance: float, ground_distance: float, poses: Mapping[str, Pose3]
     ) -> list[int]:
-        """Move the scripted actors near a point in the engine, and return the ids; see `Actors.prepare_nearby`."""
+        """Move the scripted actors near a point in the engine, return the ids of near ones; see `Actors.prepare_nearby`."""
         if self.resting is not None:
             return [
                 actor.id for actor, xy, radius in self.resting if math.dist(xy, point[:2]) <= ground_distance + radius
@@ -70,7 +70,7 @@ def find_nearby(
     tick: int,
     asleep_since: int | None,
 ) -> NearbyActors:
-    """Return the actors within `distance` + EXTRA_RADIUS_M of a point."""
+    """Return the actors within `distance` + EXTRA_RADIUS_M of a point; see NearbyActors for `asleep_since`."""
     distance += EXTRA_RADIUS_M
     is_awake = asleep_since is None
     nearby = tuple(

@@ -53,7 +53,7 @@ class VelocityRamp:
 
 
 def _step_towards(now: float, target: float, speed_up: float, slow_down: float) -> float:
-    """Return the next velocity; a change of direction first brakes to zero."""
+    """Return the velocity after one step; a change of direction first brakes to zero."""
     step = speed_up if now * target >= 0 and abs(target) > abs(now) else slow_down
     if now * target < 0:
         target = 0.0
@@ -148,7 +148,7 @@ def mean_angles(client: int, robot: int, joints: Sequence[int], left_count: int)
 STEERING_RATE_RAD_S = 3.2
 """Largest steering rate, that of the servo of an F1TENTH car (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
 MIN_STEERING_SPEED_M_S = 0.01
-"""Commanded speed below which the curvature is too uncertain, so that the steering angle remains."""
+"""Commanded speed below which the steering angle does not change, because the curvature is undefined at rest."""
 
 
 class AckermannDrive:

@@ -28,9 +28,9 @@ climbs 0.29 r from standstill, and 0.4 r with some speed; a caster is pushed ove
 
 
 class Terrain:
-    """The solids of a static world that wheels can roll on, as bodies in the engine; false if the world is flat.
+    """The solids of a static world that wheels can roll on, as bodies in the engine.
 
-    `solids` are their indices, and `names` are their names by body id.
+    `solids` are their indices, and `names` are their names by body id. A terrain without solids is false.
     """
 
     def __init__(self, client: int, static: TriangleMesh, max_step: float) -> None:

@@ -52,8 +52,8 @@ ROBOT_FILE_HINT = "write a *.robot.yaml next to it with its drive, limits, and s
 def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader | None = None) -> RobotSpec:
     """Infer the specification of a robot from its URDF: the drive, its limits, and a lidar, odometry, and an IMU.
 
-    Wheels on one axle make a differential drive, on several axles a skid-steer drive, with steered wheels a car. Limits
-    are 1 m/s, 1.5 rad/s, 1 m/s², and 2 rad/s², or those of the wheel joints if they are lower. The lidar is at the link
+    Driven wheels make a differential drive if they are on one axle, else a skid-steer drive; steered wheels make a car.
+    Limits are 1 m/s, 1.5 rad/s, 1 m/s², and 2 rad/s², or lower if the wheel joints are slower. The lidar is at the link
     with a name like LIDAR_NAMES, or on top. Raises InvalidInput if the file is invalid or its drive cannot be inferred.
     """
     folders = AllowedFolders.of(roots or (path.resolve().parent,))

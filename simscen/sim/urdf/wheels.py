@@ -98,7 +98,7 @@ def _stands_on(ground: float, wheel: WheelJoint) -> bool:
 
 
 def _reason_for_no_wheel(tree: LinkTree, joint: Joint, wheel: WheelJoint | None) -> str:
-    """Return why a joint has no wheel, or "" if it has one. `wheel` is the one of `_measure_wheel`."""
+    """Return why a joint has no wheel, or "" if it has one. `wheel` is the result of `_measure_wheel`."""
     if not _turns_freely(joint):
         return f"{joint.type} joint with limits" if joint.type == "revolute" else f"{joint.type} joint"
     axis = _parallel_axis(tree, joint)

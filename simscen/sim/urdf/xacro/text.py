@@ -21,7 +21,7 @@ class LazyText:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Elements to insert: the children of `element`, or with `whole` the element itself."""
+    """Argument for `<xacro:insert_block>`: inserts `element` if `includes_element`, else only its children."""
 
     element: Element
     includes_element: bool
