@@ -42,7 +42,7 @@ class NearbyActors(NamedTuple):
     def prepare_nearby(
         self, client: int, point: Vector, distance: float, ground_distance: float, poses: Mapping[str, Pose3]
     ) -> list[int]:
-        """Move the scripted actors near a point in the engine, return the ids of near ones; see `Actors.prepare_nearby`."""
+        """Move scripted actors near a point in the engine, return the ids of near ones; see `Actors.prepare_nearby`."""
         if self.resting is not None:
             return [
                 actor.id for actor, xy, radius in self.resting if math.dist(xy, point[:2]) <= ground_distance + radius

@@ -24,7 +24,7 @@ class RobotState(NamedTuple):
 
     @property
     def twist(self) -> Twist:
-        """The velocity in the base frame: forward, left, and turn rate. Has the same bits as with `geometry.rotated`."""
+        """The velocity in the base frame: forward, left, and turn rate. Same bits as with `geometry.rotated`."""
         (_, _, _, x, y, z, w), (a, b, c), (f, g, h) = self
         x, y, z = -x, -y, -z
         p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
