@@ -30,11 +30,11 @@ TERRAIN, GROUND, HULL, WHEEL, STATIC = 128, 64, 32, 16, 2
 """Collision groups: uneven ground, ground plane, hull and wheels of robots, and Bullet's own group of static bodies."""
 NOTHING, EVERYTHING = 0, -1
 """Masks of no and of all collision groups."""
+STATIC_MASK = ~(STATIC | GROUND | TERRAIN)
+"""Mask of bodies without mass: Bullet would otherwise search for their contacts with the ground at each step."""
 DEFAULT_VISUAL = -1
 """Id of the visual shape that equals the collision shape; the renderer does not show most triangle meshes."""
-
 ORIGIN = Pose3()
-
 PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
 """Shapes that the engine supports as primitives."""
 
@@ -230,8 +230,8 @@ def create_rigid_body(
         body_id, -1, lateralFriction=friction, restitution=0.0, linearDamping=0.0, angularDamping=0.0,
         physicsClientId=client,
     )  # fmt: skip
-    if mass == 0:  # otherwise, Bullet would search for contacts with the ground at each step
-        set_collision_filter(client, body_id, -1, STATIC, ~(STATIC | GROUND | TERRAIN))
+    if mass == 0:
+        set_collision_filter(client, body_id, -1, STATIC, STATIC_MASK)
         sleeps = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
         pybullet.changeDynamics(body_id, -1, activationState=sleeps, physicsClientId=client)
     if mass > 0:
@@ -263,7 +263,7 @@ def disable_collisions(client: int, body_id: int) -> None:
 
 def enable_collisions(client: int, body_id: int) -> None:
     """Let a body without mass collide again, as if it had been created now."""
-    set_collision_filter(client, body_id, -1, STATIC, ~STATIC)
+    set_collision_filter(client, body_id, -1, STATIC, STATIC_MASK)
 
 
 def create_static_body(
@@ -277,7 +277,7 @@ def create_static_body(
     body_id: int = pybullet.createMultiBody(
         0.0, shape, visual, pose.position, pose.quaternion, useMaximalCoordinates=1, physicsClientId=client
     )
-    set_collision_filter(client, body_id, -1, STATIC, ~(STATIC | GROUND | TERRAIN))
+    set_collision_filter(client, body_id, -1, STATIC, STATIC_MASK)
     pybullet.changeDynamics(
         body_id, -1, lateralFriction=friction, restitution=0.0, activationState=pybullet.ACTIVATION_STATE_SLEEP,
         physicsClientId=client,

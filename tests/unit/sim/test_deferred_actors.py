@@ -11,9 +11,10 @@ from playground import box, shipped
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.motion_paths import pose_at
-from simscen.core.geometry.shapes import Body, MotionPath
+from simscen.core.geometry.shapes import Body, Box, MotionPath, Solid
 from simscen.core.records.events import EventKind
 from simscen.sim.body.from_spec import build_robot_body
+from simscen.sim.bullet import engine, pybullet
 from simscen.sim.objects.actor import Actor
 from simscen.sim.objects.proximity import REQUERY_DISTANCE_M, DeferredActors, ProximityQuery
 from simscen.sim.simulation import RobotPlacement, Simulation
@@ -202,3 +203,16 @@ def test_distance_to_a_deferred_actor_is_an_error(simulate):
     simulation = simulate(bodies=[FAR], has_images=False)
     with pytest.raises(LookupError, match='"far" is not in the engine'):
         simulation._scene.actors.prepare_nearby(simulation.robot.base.id, (7.0, 0.0, 0.0), 2.0, 2.0, 0)
+
+
+def test_scripted_body_that_collides_again_has_no_contact_with_the_ground(simulate):
+    """As if it had been created now: such a contact would cost time at each step."""
+    client = simulate()._scene.client
+    shape = engine.create_compound_shape(client, [Solid(Box((0.4, 0.4, 0.4)), Pose3())])
+    inertia = ((0.0, 0.0, 0.0), Pose3())
+    body = engine.create_rigid_body(client, 0.0, shape, Pose3(5.0, 0.0, 0.2), inertia, friction=0.6)
+    engine.disable_collisions(client, body)
+    engine.enable_collisions(client, body)
+    pybullet.resetBaseVelocity(body, (0.1, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=client)
+    pybullet.stepSimulation(client)
+    assert not pybullet.getContactPoints(body, physicsClientId=client)
