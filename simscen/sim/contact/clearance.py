@@ -23,10 +23,9 @@ CONTACT_TOLERANCE_M = 0.002
 
 
 class _StaticNearest(NamedTuple):
-    """A measurement for which the static world was nearest: all else was farther away, by at least `margin` m.
+    """State at a tick at which all else was farther away from the robot than the static world, by at least `margin` m.
 
-    tick, pose:  when and where the robot was
-    others:      positions of the other robots
+    `pose` is the pose of the robot, and `others` are the positions of the other robots.
     """
 
     tick: int
@@ -137,7 +136,7 @@ class Clearance:
         return self._distance
 
     def _find_static_nearest(self, tick: int, pose: Pose3) -> _StaticNearest | None:
-        """Return the measurement of this tick if the static world was nearest; None if that is not certain."""
+        """Return the state at the current `tick` if the static world is nearest for sure, else None."""
         reach, point = self._distance + self.size, pose[:3]
         margin = self._actors.free_distance(self._base.id, point, reach, tick)
         if margin is None:
@@ -153,8 +152,8 @@ class Clearance:
     def can_defer(self, tick: int, period: int, pose: Pose3) -> bool:
         """Return whether the clearance at the current `tick` can be computed later, by `static_clearance(pose)`.
 
-        It can if the static world is nearer than all actors and no contact is possible for `period` ticks. This is
-        decided without a measurement, by how far robot and actors have moved since the last one and can move.
+        It can if the static world is nearest and no contact is possible for `period` ticks. This is decided without a
+        measurement, by how far robots and actors have moved since the last measurement and can still move.
         """
         if tick + period <= self._deferrable_until:
             return True

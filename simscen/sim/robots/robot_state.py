@@ -96,5 +96,4 @@ class TruthSampler:
         deferred, self._deferred = self._deferred, []
         for sample in deferred:
             state = sample.state
-            clearance = self._static_clearance(state.pose)
-            sample.result = _new(Truth, (state.pose, state.twist, clearance, sample.objects))
+            sample.result = _new(Truth, (state.pose, state.twist, self._static_clearance(state.pose), sample.objects))
