@@ -1,4 +1,4 @@
-"""Generated office floors for the localization benchmark: walls, glass, and furniture as boxes seen from above."""
+"""Generate office floors for the localization benchmark. Walls, glass, and furniture are axis-aligned boxes."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,20 +12,20 @@ from simscen.core.random_streams import Streams
 from simscen.worlds.geometry.triangulation import merge_solids
 
 HEIGHT_M = 1.0
-"""Height of all walls and furniture. Its value has no effect, because the lidar measures in a horizontal plane."""
+"""Height of all boxes. Any value above 0 gives the same scans, because the lidar is at half this height."""
 
 
 def boxes(rows: Iterable[Sequence[float]]) -> Array:
-    """Return boxes as an array (n, 4) of left, bottom, right, top in m."""
+    """Return an array (n, 4) of boxes from rows of left, bottom, right, top: the smallest and largest x and y in m."""
     return np.array(list(rows), dtype=np.float64).reshape(-1, 4)
 
 
 def wall_boxes(
     start: tuple[float, float], end: tuple[float, float], thickness: float, openings: Sequence[tuple[float, float]] = ()
 ) -> Array:
-    """Return the boxes (n, 4) of a wall along x or y.
+    """Return the boxes (n, 4) of a wall along x or y, with its center line from `start` to `end`. All lengths are in m.
 
-    `openings` are sorted intervals (from, to) along the wall, in m from its start.
+    `openings` are sorted intervals (from, to) along the wall, measured from its start.
     """
     along = 0 if start[1] == end[1] else 1
     edges = [start[along], *(start[along] + edge for opening in openings for edge in opening), end[along]]
@@ -37,7 +37,7 @@ def wall_boxes(
 
 
 def extruded_mesh(*parts: Array) -> TriangleMesh:
-    """Return the mesh of boxes (n, 4) from the floor to HEIGHT_M."""
+    """Return one mesh of the boxes in all `parts`, each an array (n, 4), extruded from the floor to HEIGHT_M."""
     rows = np.concatenate(parts).tolist()
     return merge_solids(
         Solid(Box((r - x, t - y, HEIGHT_M)), Pose3((x + r) / 2, (y + t) / 2, HEIGHT_M / 2)) for x, y, r, t in rows
@@ -55,23 +55,24 @@ def box_distances(rows: Array, point: Sequence[float]) -> Array:
 
 
 FLOOR_LENGTH_M, FLOOR_DEPTH_M, CORRIDOR_WIDTH_M = (41.0, 48.0), (17.0, 24.0), (1.8, 2.6)
-"""Smallest and largest value of each size."""
+"""Smallest and largest value of each random size, also in the next line."""
 ROOM_WIDTH_M, DOOR_WIDTH_M, WALL_THICKNESS_M = (3.2, 8.5), (0.95, 1.3), (0.12, 0.2)
-GLASS_WALL_SHARE = 0.15
-"""Share of the rooms with a glass wall to the corridor."""
-CONNECTING_DOOR_SHARE = 0.3
-"""Share of neighboring rooms with a door between them."""
+GLASS_WALL_FRACTION = 0.15
+"""Fraction of the rooms that have a glass wall to the corridor."""
+CONNECTING_DOOR_FRACTION = 0.3
+"""Fraction of the walls between neighboring rooms that have a door."""
 DOOR_CLEARANCE_M = 0.8
-"""Radius around a door without furniture."""
-MOVED_SHARE, REMOVED_SHARE, ADDED_SHARE = 0.25, 0.1, 0.15
-"""Shares of the furniture that was moved, removed, and added since the map was made."""
+"""Distance around each door that is kept free of furniture."""
+MOVED_FRACTION, REMOVED_FRACTION, ADDED_FRACTION = 0.25, 0.1, 0.15
+"""Fractions of the furniture on the map that `rearranged_furniture` moves, removes, and adds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Building:
-    """An office floor: boxes (n, 4) of `walls`, `glass` and `furniture`, and the centers of `rooms` and `doors` (n, 2).
+    """An office floor: boxes (n, 4) of `walls`, `glass` and `furniture`, and the centers (n, 2) of `rooms` and `doors`.
 
-    `size` is in m. `middle` is the x of the wall between the two halves of the floor, which only the corridor crosses.
+    `size` is the length along x and the depth along y in m. The left and the right half meet at x = `middle`; only the
+    corridor connects them.
     """
 
     size: tuple[float, float]
@@ -84,9 +85,9 @@ class Building:
 
 
 def generate_building(number: int, rebuilt: int = 0) -> Building:
-    """Return the building with this number, the same every time.
+    """Return the building with this number. The result depends on the arguments only.
 
-    A number `rebuilt` other than 0 changes the rooms and the furniture right of the middle.
+    If `rebuilt` is not 0, the right half has other rooms and furniture; each value gives a different right half.
     """
     streams = Streams(number)
     rng = streams.generator("floor")
@@ -108,9 +109,10 @@ def generate_building(number: int, rebuilt: int = 0) -> Building:
 def _half(
     rng: np.random.Generator, ends: tuple[float, float], levels: tuple[float, ...], thickness: float
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Return walls, glass, furniture, rooms and doors of one half of a floor.
+    """Return walls, glass, furniture, rooms and doors of one half of a floor, as in Building.
 
-    `ends` are its smallest and largest x. `levels` are the y of the outer walls and of the corridor walls, in order.
+    `ends` are its smallest and largest x. `levels` are the y of the outer wall, both corridor walls, and the other
+    outer wall, in ascending order.
     """
     walls, glass, furniture, rooms, doors = ([np.empty((0, k))] for k in (4, 4, 4, 2, 2))
     for outer, inner in ((levels[0], levels[1]), (levels[3], levels[2])):
@@ -120,10 +122,10 @@ def _half(
                 walls.append(wall_boxes((a, back), (b, back), thickness))
             opening = _opening(rng, b - a)
             front = wall_boxes((a, inner), (b, inner), thickness, [opening])
-            (glass if rng.random() < GLASS_WALL_SHARE else walls).append(front)
+            (glass if rng.random() < GLASS_WALL_FRACTION else walls).append(front)
             low, high = sorted((back, inner))
             door = np.array([[a + sum(opening) / 2, inner]])
-            if b < ends[1] and rng.random() < CONNECTING_DOOR_SHARE:
+            if b < ends[1] and rng.random() < CONNECTING_DOOR_FRACTION:
                 gap = _opening(rng, high - low)
                 walls.append(wall_boxes((b, low), (b, high), thickness, [gap]))
                 door = np.concatenate((door, [[b, low + sum(gap) / 2]]))
@@ -137,7 +139,7 @@ def _half(
 
 
 def _room_bounds(rng: np.random.Generator, begin: float, end: float) -> list[float]:
-    """Return the x of the walls between the rooms of a row, with both ends of the row."""
+    """Return the x of the walls of a row of rooms, from `begin` to `end`."""
     bounds = [begin]
     while end - bounds[-1] > ROOM_WIDTH_M[1]:
         bounds.append(min(bounds[-1] + rng.uniform(*ROOM_WIDTH_M), end - ROOM_WIDTH_M[0]))
@@ -145,7 +147,7 @@ def _room_bounds(rng: np.random.Generator, begin: float, end: float) -> list[flo
 
 
 def _opening(rng: np.random.Generator, length: float) -> tuple[float, float]:
-    """Return the interval of a door in a wall of this length, in m."""
+    """Return start and end of a random door in a wall of this length, in m from the start of the wall."""
     width = rng.uniform(*DOOR_WIDTH_M)
     begin = rng.uniform(0.3, length - width - 0.3)
     return begin, begin + width
@@ -154,7 +156,7 @@ def _opening(rng: np.random.Generator, length: float) -> tuple[float, float]:
 def _furniture(
     rng: np.random.Generator, room: tuple[float, float, float, float], doors: Array
 ) -> Iterator[tuple[float, float, float, float]]:
-    """Yield boxes of furniture in a room: most along its walls, some in the middle."""
+    """Yield boxes of furniture in a room (left, bottom, right, top): most along its walls, some in the middle."""
     left, low, right, high = room
     for _ in range(int((right - left) * (high - low) / rng.uniform(4, 9))):
         a, b = rng.uniform((0.5, 0.3), (1.8, 0.8))
@@ -184,14 +186,14 @@ def _is_clear_of(doors: Array, box: tuple[float, float, float, float]) -> bool:
 
 
 def rearranged_furniture(floor: Building, rng: np.random.Generator) -> Array:
-    """Return the furniture (n, 4) after some of it was moved, removed, and added since the map was made."""
+    """Return the furniture (n, 4) with random pieces moved, removed, and added, as if the map were out of date."""
     draws = rng.random(len(floor.furniture))
-    furniture = floor.furniture[draws > REMOVED_SHARE].copy()
-    moved = draws[draws > REMOVED_SHARE] < REMOVED_SHARE + MOVED_SHARE
+    furniture = floor.furniture[draws > REMOVED_FRACTION].copy()
+    moved = draws[draws > REMOVED_FRACTION] < REMOVED_FRACTION + MOVED_FRACTION
     shift = rng.normal(0, 0.6, (int(moved.sum()), 2))
     furniture[moved] += np.hstack((shift, shift))
     added = []
-    for _ in range(int(ADDED_SHARE * len(floor.furniture))):
+    for _ in range(int(ADDED_FRACTION * len(floor.furniture))):
         x, y = floor.rooms[rng.integers(len(floor.rooms))] + rng.normal(0, 1.2, 2)
         a, b = rng.uniform(0.3, 0.9, 2)
         if _is_clear_of(floor.doors, (x, y, x + a, y + b)):

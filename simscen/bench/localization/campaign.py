@@ -1,4 +1,4 @@
-"""Benchmark of `simscen bench localization`: AMCL with several parameter sets on the same generated logs."""
+"""Benchmark of `simscen bench localization`: runs AMCL with several parameter sets on the same generated logs."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,27 +29,29 @@ PARAMETER_SETS: Mapping[str, AmclParameters] = {
     "scan_matching_amcl, consistent": ScanMatchingAmcl(parameters="consistent"),
 }
 LOGS_PER_BUILDING: Mapping[str, int] = {name: 5 if name == "tracked" else 1 for name in CIRCUMSTANCES}
-"""Number of logs of each building for each circumstance."""
+"""Number of logs of each building by circumstance (a key of CIRCUMSTANCES)."""
 CONSISTENCY_CIRCUMSTANCES = ("clean", "slipping", "tracked", "outdated", "half")
-"""Circumstances in which the error is compared with the covariance."""
+"""Circumstances in which errors are compared with covariances: all but an unknown start and kidnapping."""
 RELOCALIZATION_LIMIT_S = 60.0
-"""Time in which a robot with an unknown start, or after a kidnapping, must be localized."""
+"""Time limit for localizing a robot with an unknown start, or a kidnapped robot."""
 LOST_M, FOUND_M = 1.0, 0.5
-"""Error from which a robot counts as lost, and below which it counts as localized again."""
-MOMENTS_S = (15.0, 30.0, 45.0, 60.0, 75.0)
+"""Position error above which a robot is lost, and below which it is found again."""
+CHECK_TIMES_S = (15.0, 30.0, 45.0, 60.0, 75.0)
 """Times in a log at which the error is compared with the covariance."""
 ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), None, 0.6, 0.3, 0.0, 1.0, 1.0, 1.0, 2.0)
+"""Robot of all logs. AMCL needs a robot model, but the logs are generated without it."""
 
 Interval = tuple[float, float] | None
+"""Lower and upper limit of a 95 % confidence interval; None if there are too few buildings for one."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Result of one log: errors in m, times in s. The names of the fields are keys of the JSON output.
+    """Result of one parameter set on one log. The names of the fields are keys of the JSON output.
 
-    `tracked`: the error never exceeded LOST_M. `found` is the time until the robot was localized for good, or None.
-    `nees` are the normalized estimation errors squared at MOMENTS_S. `ms` is the mean CPU time per scan, and
-    `slowest_ms` the largest.
+    `median` and `largest` are position errors in m. `tracked` means that the error never exceeded LOST_M. `found` is
+    the time in s, from the start or the kidnapping, until the robot was found and not lost again; None if never. `nees`
+    has the NEES at each of CHECK_TIMES_S. `ms` is CPU time per scan, and `slowest_ms` that of the slowest message.
     """
 
     building: int
@@ -65,15 +67,15 @@ class Trial:
 
     @property
     def succeeded(self) -> bool:
-        """Whether the robot was found in time, or with a known start, whether it was never lost."""
+        """Whether the robot was never lost; with an unknown start or kidnapping, whether it was found in time."""
         if self.circumstance in ("unknown", "kidnapped"):
             return self.found is not None and self.found <= RELOCALIZATION_LIMIT_S
         return self.tracked
 
 
 @dataclass(frozen=True)
-class Share:
-    """Share of successful logs: `count` of `of` logs, with the 95 % interval by bootstrap over buildings."""
+class SuccessRate:
+    """Success on `count` of `of` logs, with the confidence interval of this rate by bootstrap over buildings."""
 
     count: int
     of: int
@@ -82,11 +84,12 @@ class Share:
 
 @dataclass(frozen=True)
 class Consistency:
-    """Comparison of squared error and covariance: ANEES over all logs and moments; 3 for a consistent localizer.
+    """Comparison of squared errors and covariances by the average NEES (ANEES), which is 3 for a consistent localizer.
 
-    `bounds` contain the ANEES of a covariance that is right on average, from the variation between buildings; None for
-    too few buildings. `inside` is the share of poses within their 95 % ellipsoid. `moments` are the ANEES over logs at
-    each of MOMENTS_S, and `moment_bounds` their bounds for normal errors and independent logs.
+    `anees` is the average over all logs and CHECK_TIMES_S. It lies within `bounds` (95 %, see grouped_anees_bounds) if
+    the covariance is right on average. `inside` is the fraction of poses within their 95 % ellipsoid. `moments` are the
+    averages over logs at each of CHECK_TIMES_S; they lie within `moment_bounds` (95 %) if the localizer is consistent,
+    errors are normal, and logs are independent.
     """
 
     anees: float
@@ -97,16 +100,16 @@ class Consistency:
 
 
 @dataclass(frozen=True)
-class Row:
-    """Results of one parameter set. The names of the fields are keys of the JSON output.
+class ParameterSetResults:
+    """Results of the parameter set `parameters` on all logs. The names of the fields are keys of the JSON output.
 
-    `shares` are the successful logs by circumstance. `median` is the median over tracked logs of the median error in a
-    log, in m. `sure` is the consistency by circumstance. `ms` is the mean CPU time per scan with odometry, and
-    `slowest_ms` that of the slowest scan.
+    `shares` has the success rates and `sure` the consistency, both by circumstance. `median` is the median over the
+    logs with circumstance "tracked" of their median error, in m. `ms` is the mean CPU time per scan, including the
+    odometry before it, and `slowest_ms` that of the slowest message.
     """
 
     parameters: str
-    shares: Mapping[str, Share]
+    shares: Mapping[str, SuccessRate]
     median: float
     median_interval: Interval
     sure: Mapping[str, Consistency]
@@ -117,13 +120,13 @@ class Row:
 def run_buildings(
     buildings: Sequence[int], names: Sequence[str], workers: int
 ) -> Iterator[Mapping[str, Sequence[Trial]]]:
-    """Yield the trials of each building, by the name of the parameter set. Deterministic except for CPU times."""
+    """Yield the trials of each building, by the `names` of parameter sets. Deterministic except for CPU times."""
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield from pool.map(run_building, buildings, [tuple(names)] * len(buildings))
 
 
 def run_building(building: int, names: Sequence[str]) -> Mapping[str, Sequence[Trial]]:
-    """Run all logs of a building through each of these parameter sets."""
+    """Generate all logs of a building, and run AMCL on each log with each of the parameter sets `names`."""
     trials: dict[str, list[Trial]] = {name: [] for name in names}
     for circumstance, count in LOGS_PER_BUILDING.items():
         for number in range(count):
@@ -134,13 +137,13 @@ def run_building(building: int, names: Sequence[str]) -> Mapping[str, Sequence[T
 
 
 def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
-    """Run a log through a localizer. The same arguments give the same result except for CPU times."""
+    """Run a localizer on a log. The same arguments give the same result except for CPU times."""
     spec = StackSpec(localizer=localizer)
     localized = localize(log.sensed, spec, Surroundings(ROBOT, log.map, TICK_RATE_HZ), log.estimate, seed)
     errors = compare_with_reference(localized, log.sensed, LOST_M)
     assert errors is not None  # a generated log has a reference from its first reading to its last
     truth = log.sensed.truth
-    rows = np.searchsorted(localized.times, MOMENTS_S)
+    rows = np.searchsorted(localized.times, CHECK_TIMES_S)
     pose_errors = localized.poses[rows] - truth[rows]
     pose_errors[:, 2] = (pose_errors[:, 2] + np.pi) % (2 * np.pi) - np.pi
     lost_at = KIDNAPPED_AT_S if log.circumstance == "kidnapped" else 0.0
@@ -159,20 +162,23 @@ def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
 
 
 def _time_found(times: Array, distance: Array) -> float | None:
-    """Return the first time with an error below FOUND_M after the last one above LOST_M, or None."""
+    """Return the first time (not negative) with an error below FOUND_M after the last error above LOST_M, or None.
+
+    `times` (n,) are in s since the robot was lost. `distance` (n,) is the error in m.
+    """
     lost = np.flatnonzero((distance > LOST_M) & (times >= 0))
     begin = int(lost[-1]) + 1 if len(lost) else int(np.searchsorted(times, 0.0))
     near = np.flatnonzero(distance[begin:] < FOUND_M)
     return max(0.0, float(times[begin + near[0]])) if len(near) else None
 
 
-def summarize(name: str, trials: Sequence[Trial]) -> Row:
-    """Return the results of a parameter set."""
+def summarize(name: str, trials: Sequence[Trial]) -> ParameterSetResults:
+    """Return the results of the parameter set `name` from all of its trials."""
     groups = {group: [trial for trial in trials if trial.circumstance == group] for group in CIRCUMSTANCES}
     tracked = groups["tracked"]
-    return Row(
+    return ParameterSetResults(
         parameters=name,
-        shares={group: _share(members) for group, members in groups.items()},
+        shares={group: _success_rate(members) for group, members in groups.items()},
         median=float(np.median([trial.median for trial in tracked])),
         median_interval=_interval(_means_by_building(tracked, [trial.median for trial in tracked])),
         sure={group: _consistency(groups[group]) for group in CONSISTENCY_CIRCUMSTANCES if groups[group]},
@@ -187,19 +193,19 @@ def _consistency(trials: Sequence[Trial]) -> Consistency:
         anees=anees(values),
         bounds=grouped_anees_bounds(_means_by_building(trials, [anees(trial.nees) for trial in trials])),
         inside=share_in_ellipsoid(values),
-        moments=[anees([trial.nees[k] for trial in trials]) for k in range(len(MOMENTS_S))],
+        moments=[anees([trial.nees[k] for trial in trials]) for k in range(len(CHECK_TIMES_S))],
         moment_bounds=anees_bounds(len(trials)),
     )
 
 
-def _share(trials: Sequence[Trial]) -> Share:
+def _success_rate(trials: Sequence[Trial]) -> SuccessRate:
     successes = [trial.succeeded for trial in trials]
     means = _means_by_building(trials, [float(success) for success in successes])
-    return Share(sum(successes), len(trials), _interval(means))
+    return SuccessRate(sum(successes), len(trials), _interval(means))
 
 
 def _means_by_building(trials: Sequence[Trial], values: Sequence[float]) -> list[float]:
-    """Return the mean of the values of each building."""
+    """Return the mean value of each building; `values` has one value for each trial."""
     numbers = sorted({trial.building for trial in trials})
     return [
         float(np.mean([value for trial, value in zip(trials, values, strict=True) if trial.building == number]))
@@ -212,16 +218,16 @@ def _interval(values: Sequence[float]) -> Interval:
 
 
 MIN_GROUPS = 3
-"""Minimum number of buildings for bounds from the variation between buildings."""
+"""Minimum number of buildings for `grouped_anees_bounds`. With two, Student's t would make the interval useless."""
 
 
 def nees(error: Array, covariance: Array) -> float:
-    """Return e' P^-1 e of an error (3,) in m, m, rad with covariance P (3, 3); inf for a singular P."""
+    """Return the NEES e' P^-1 e of an error e (3,) in m, m, rad with covariance P (3, 3); inf for a singular P."""
     return float(nees_of_errors(error[np.newaxis], covariance[np.triu_indices(3)][np.newaxis])[0])
 
 
 def nees_at(trace: Trace, seconds: float) -> float | None:
-    """Return the NEES of the belief at a time of a run; None before the first belief and after the end."""
+    """Return the NEES of the belief at a time of a run in s; None before the first belief and after the end."""
     samples, tick = nees_samples(trace), round(seconds * trace.tick_rate)
     if not len(samples) or tick < samples.ticks[0] or tick > trace.end:
         return None
@@ -229,30 +235,29 @@ def nees_at(trace: Trace, seconds: float) -> float | None:
 
 
 def anees(values: Sequence[float]) -> float:
-    """Return the average NEES, which is 3 for a consistent localizer in the plane."""
+    """Return the average of NEES values, which is 3 for a consistent localizer in the plane."""
     return float(np.mean(values))
 
 
 def share_in_ellipsoid(values: Sequence[float], dimensions: int = DIMENSIONS, probability: float = 0.95) -> float:
-    """Return the share of NEES within the ellipsoid that contains normal errors with this probability."""
+    """Return the fraction of NEES `values` within the ellipsoid that contains a normal error with this probability."""
     return float(np.mean(np.asarray(values) <= chi2_quantile(probability, dimensions)))
 
 
 def anees_bounds(runs: int, dimensions: int = DIMENSIONS, probability: float = 0.95) -> tuple[float, float]:
-    """Return the bounds of the ANEES of a consistent localizer with this probability: chi2(d N) / N."""
+    """Return bounds that contain the ANEES of a consistent localizer over independent `runs` with this probability."""
     return nees_mean_bounds(runs, dimensions, probability)
 
 
 def grouped_anees_bounds(
     groups: Sequence[float], dimensions: int = DIMENSIONS, probability: float = 0.95
 ) -> tuple[float, float] | None:
-    """Return the bounds of the mean of `groups` with this probability if the covariance is right on average.
+    """Return bounds that contain the mean of `groups` with this probability if the covariance is right on average.
 
-    `groups` are the ANEES of buildings with the same number of values. Values within a building may depend on each
-    other and have any distribution, so only the variation between buildings shows the uncertainty of the mean. The
-    interval is that of its logarithm, because ANEES is a scale: Student's t times the relative standard error (delta
-    method), with one degree of freedom less than there are buildings. None for fewer than MIN_GROUPS buildings or an
-    infinite value.
+    Each of `groups` is the ANEES of one building, over equally many values. Values of one building may depend on each
+    other and have any distribution. So the uncertainty of the mean is estimated from the variation between buildings.
+    The bounds are Student's t interval of the logarithm of the mean (delta method), because ANEES is a ratio. None for
+    fewer than MIN_GROUPS buildings or an infinite value.
     """
     count, mean = len(groups), float(np.mean(groups))
     if count < MIN_GROUPS or not 0.0 < mean < math.inf:

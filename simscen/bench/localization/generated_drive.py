@@ -1,4 +1,4 @@
-"""Simulated drive through a generated building: true poses, wheel odometry, people, and lidar ranges."""
+"""Simulate a drive through a generated building: true poses, wheel odometry, people, and lidar ranges."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 STEP_S = 0.075
-"""Time between two poses, and between two odometry messages."""
+"""Time between two true poses, and between two odometry messages."""
 CLEARANCE_M = 0.35
-"""Distance from the center of the robot to all obstacles."""
+"""Minimum distance of paths to all obstacles."""
 MAX_SPEED_M_S, MAX_TURN_RATE_RAD_S = 0.6, 1.0
 SEARCH_CELL_M = 0.1
 """Cell size of the path search."""
 MAX_FAILED_GOALS = 30
-"""Number of unreachable goals in a row after which the robot counts as enclosed."""
+"""Maximum number of consecutive unreachable goals. After one more, the robot counts as enclosed."""
 
 
 class EnclosedStart(ValueError):
@@ -31,9 +31,10 @@ class EnclosedStart(ValueError):
 def drive_between_rooms(
     floor: Building, furniture: Array, seconds: float, rng: np.random.Generator, alternate: bool
 ) -> Array:
-    """Return true poses (k, 3), STEP_S apart, of a drive on shortest paths between random points in rooms.
+    """Return true poses (k, 3), STEP_S apart, of a drive of `seconds` along shortest paths between random rooms.
 
-    With `alternate`, the rooms lie in the left and the right half in turn, starting on the left. Raises EnclosedStart.
+    With `alternate`, the drive starts in the left half of the floor, and each goal is in the other half. Raises
+    EnclosedStart.
     """
     paths = ShortestPaths(
         extruded_mesh(floor.walls, floor.glass, furniture),
@@ -60,7 +61,7 @@ def drive_between_rooms(
 
 
 def _waypoints(floor: Building, paths: ShortestPaths, rng: np.random.Generator, alternate: bool) -> Iterator[Array]:
-    """Yield the corners of shortest paths between random points in rooms, without end."""
+    """Yield an endless sequence of corners (2,) of shortest paths between random points in rooms."""
     position: Array | None = None
     right, failed = False, 0
     while True:
@@ -78,7 +79,10 @@ def _waypoints(floor: Building, paths: ShortestPaths, rng: np.random.Generator, 
 
 
 def mapping_tour(floor: Building) -> Array:
-    """Return poses (k, 3), 0.5 m apart, on paths through all reachable rooms of an unfurnished floor."""
+    """Return poses (k, 3) with yaw 0, 0.5 m apart, on paths through all reachable rooms of a floor without furniture.
+
+    A map is drawn from scans over 360° at these poses.
+    """
     mesh = extruded_mesh(floor.walls, floor.glass)
     paths = ShortestPaths(mesh, (0.0, 0.0, *floor.size), CLEARANCE_M, min_resolution=SEARCH_CELL_M)
     order = floor.rooms[np.argsort(floor.rooms[:, 0], kind="stable")]
@@ -96,18 +100,19 @@ def mapping_tour(floor: Building) -> Array:
 
 
 MEAN_SLIP_INTERVAL_S = 25.0
-"""Mean time between two intervals of slipping wheels."""
+"""Mean time from the end of one slip to the start of the next."""
 SLIP_DURATION_S = (0.3, 1.5)
-"""Shortest and longest interval of slipping wheels."""
+"""Shortest and longest duration of a slip."""
 
 
 @dataclass(frozen=True)
 class OdometryErrors:
-    """Standard deviations, over robots, of the constant errors of wheel odometry, and whether the wheels slip.
+    """Standard deviations of the systematic errors of wheel odometry, and whether the wheels slip.
 
-    `scale` is the relative error of distances (wheel radius), `turn` that of angles (wheel separation), and `bend` the
-    curvature error in rad/m (unequal wheels). See Borenstein and Feng, Measurement and correction of systematic
-    odometry errors in mobile robots, T-RA 12 (1996).
+    Each error is drawn once for each log: the relative error of distances (`scale`, from the wheel radius), the
+    relative error of angles (`turn`, from the wheel separation), and the curvature error in rad/m (`bend`, from unequal
+    wheels). See Borenstein and Feng, Measurement and correction of systematic odometry errors in mobile robots,
+    T-RA 12 (1996).
     """
 
     scale: float = 0.015
@@ -117,13 +122,16 @@ class OdometryErrors:
 
 
 RANDOM_ERRORS_ONLY = OdometryErrors(0.0, 0.0, 0.0, False)
-"""Wheels with only the random errors of the simulated odometry sensor."""
+"""No systematic errors and no slip. The random errors of WheelOdometry remain."""
 
 
 def simulate_odometry(
     truth: Array, seconds: float, errors: OdometryErrors, spec: WheelOdometry, rng: np.random.Generator
 ) -> Array:
-    """Return poses (k, 3) in the odom frame for true poses (k, 3) that are `seconds` apart."""
+    """Return poses (k, 3) in the odom frame, as wheel odometry measures them for true poses (k, 3) `seconds` apart.
+
+    `spec` has the parameters of the random errors.
+    """
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(Pose2(*row) for row in truth))])
     distance = np.hypot(steps[:, 0], steps[:, 1])
     scale, turn, bend = (
@@ -145,7 +153,7 @@ def simulate_odometry(
 
 
 def _slip_factors(count: int, seconds: float, slips: bool, rng: np.random.Generator) -> Array:
-    """Return the ratio (count,) of wheel to robot motion: 1, and 0.9 … 1.4 in short intervals if the wheels slip."""
+    """Return the ratio of wheel motion to robot motion in each of `count` steps: 1, or 0.9 to 1.4 during a slip."""
     factor = np.ones(count)
     if not slips:
         return factor
@@ -163,9 +171,10 @@ WALKING_SPEED_M_S = 1.1
 
 
 def simulate_people(floor: Building, count: int, seconds: float, people: int, rng: np.random.Generator) -> Array:
-    """Return poses (count, people, 3), `seconds` apart: half of the people walk in the corridor, half in rooms.
+    """Return poses (count, people, 3) of `people` at `count` times that are `seconds` apart.
 
-    Each person walks back and forth on a line, ignores the robot, and walks through furniture.
+    Half of the people walk in the corridor, half in rooms. Each person walks back and forth on a line, ignores the
+    robot, and walks through furniture.
     """
     times = np.arange(count) * seconds
     corridor = float(np.median(floor.doors[:, 1]))
@@ -189,19 +198,22 @@ def simulate_people(floor: Building, count: int, seconds: float, people: int, rn
 LEG_RADIUS_M, LEG_OFFSET_M = 0.07, 0.14
 """Radius of a leg, and its distance from the center of the person."""
 LEG_RANGE_M = 15.0
-"""Distance beyond which legs are ignored."""
+"""Distance from the lidar beyond which legs are ignored."""
 GLASS_TRANSMISSION = 0.8
-"""Share of the lidar beams that pass through glass."""
+"""Probability that a beam passes through the glass that it hits."""
 
 
 class PartlyTransparentScene:
-    """Ray caster for a building in which most beams pass through glass."""
+    """Ray caster for a building in which most beams pass through glass.
+
+    Casts each beam twice: in the mesh of `opaque` boxes only, and in the mesh of `everything`, including glass.
+    """
 
     def __init__(self, opaque: TriangleMesh, everything: TriangleMesh) -> None:
         self._opaque, self._everything = RayScene(opaque), RayScene(everything)
 
     def distances(self, poses: Array, angles: Array, max_range: float, rng: np.random.Generator) -> Array:
-        """Return true ranges (n, b) from lidar `poses` (n, 3) along `angles` (b,); inf beyond `max_range`."""
+        """Return true ranges (n, b) from lidar `poses` (n, 3) along `angles` (b,) in rad; inf beyond `max_range`."""
         heading = (poses[:, 2:] + angles).ravel()
         origins = np.column_stack((np.repeat(poses[:, :2], len(angles), axis=0), np.full(len(heading), HEIGHT_M / 2)))
         directions = np.column_stack((np.cos(heading), np.sin(heading), np.zeros(len(heading))))
@@ -222,7 +234,10 @@ def beam_angles(spec: Lidar) -> Array:
 
 
 def occlude_by_people(people: Array, poses: Array, angles: Array, ranges: Array) -> Array:
-    """Return the ranges (n, b) shortened where the legs of `people` (n, p, 3) block beams from `poses` (n, 3)."""
+    """Return `ranges` (n, b) in m, shortened where legs block the beam.
+
+    Beams start at lidar `poses` (n, 3) along `angles` (b,) in rad. `people` (n, p, 3) are the poses at the same times.
+    """
     offset = np.stack((-np.sin(people[..., 2]), np.cos(people[..., 2])), axis=-1) * LEG_OFFSET_M
     legs = np.concatenate((people[..., :2] + offset, people[..., :2] - offset), axis=1) - poses[:, None, :2]
     heading = poses[:, 2:] + angles
@@ -240,7 +255,7 @@ def occlude_by_people(people: Array, poses: Array, angles: Array, ranges: Array)
 
 
 def add_lidar_noise(distances: Array, spec: Lidar, rng: np.random.Generator) -> Array:
-    """Return measured ranges for true distances, with the noise, resolution and limits of the simulated lidar."""
+    """Return measured ranges for true `distances` in m: inf above and -inf below the range limits of the lidar."""
     ranges: Array = (
         np.round((distances + rng.normal(0, spec.noise, distances.shape)) / spec.resolution) * spec.resolution
     )

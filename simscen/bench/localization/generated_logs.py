@@ -1,4 +1,4 @@
-"""Generated logs for the localization benchmark: the readings of a drive, its truth, and a map of the building."""
+"""Generate logs for the localization benchmark: sensor readings and true poses of a drive, and a map."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -33,17 +33,18 @@ from simscen.record.localization_logs.rows import TICK_RATE_HZ
 
 CELL_M = 0.05
 MAP_MARGIN_M = 1.0
-"""Margin of the map around the floor."""
+"""Width of the margin that the map has around the floor."""
 MAP_RANGE_M = 12.0
-"""Range at which longer beams are cut off when the map is drawn."""
-OCCUPIED_SHARE = 0.25
-"""A cell is occupied if at least this share of the beams that reach it end in it."""
+"""Length to which longer beams are cut when the map is drawn."""
+OCCUPIED_FRACTION = 0.25
+"""Fraction of the beams into a cell that must end in the cell so that it is occupied."""
 
 
 def draw_map(poses: Array, angles: Array, ranges: Array, size: tuple[float, float]) -> OccupancyGrid:
-    """Return a map of scans (n, b) taken at `poses` (n, 3), as SLAM would draw it.
+    """Return the map that SLAM would draw from scans with `ranges` (n, b) in m along `angles` (b,) in rad.
 
-    Cells that no beam passed or hit are unknown. `size` is the width and depth of the floor in m.
+    `poses` (n, 3) are those of the lidar. `size` is the length and depth of the floor in m. Cells that no beam passed
+    or hit are unknown.
     """
     width, height = (int(np.ceil((edge + 2 * MAP_MARGIN_M) / CELL_M)) for edge in size)
     heading = poses[:, 2:] + angles
@@ -64,7 +65,7 @@ def draw_map(poses: Array, angles: Array, ranges: Array, size: tuple[float, floa
             passed += count_per_cell(along, selected)
     cells = np.full(height * width, UNKNOWN, dtype=np.int8)
     cells[passed > 0] = FREE
-    cells[(ended > 0) & (ended >= OCCUPIED_SHARE * (ended + passed))] = OCCUPIED
+    cells[(ended > 0) & (ended >= OCCUPIED_FRACTION * (ended + passed))] = OCCUPIED
     return OccupancyGrid(cells.reshape(height, width), CELL_M, Pose2(-MAP_MARGIN_M, -MAP_MARGIN_M, 0.0))
 
 
@@ -76,13 +77,13 @@ def left_half(grid: OccupancyGrid, middle: float) -> OccupancyGrid:
 
 
 LIDARS = ((181, 5.0), (361, 5.0), (181, 10.0), (361, 10.0))
-"""Beams over 180° and scans per second, as in public logs with a SICK LMS."""
+"""Number of beams over 180° and scans per second, as in public logs with a SICK LMS. Drives use them in turn."""
 LIDAR_MOUNT = Pose2(0.1, 0.0, 0.0)
-PEOPLE = 8
-"""Number of people on a floor."""
+"""Pose of the lidar in the base frame."""
+PEOPLE_COUNT = 8
 LOG_DURATION_S, KIDNAPPED_AT_S = 90.0, 30.0
 MAPPING_POSE_STD = (0.02, 0.02, 0.004)
-"""Standard deviations (m, m, rad) of the errors of the poses from which the map is drawn."""
+"""Standard deviations (m, m, rad) of the pose errors with which the map is drawn."""
 CIRCUMSTANCES = {
     "tracked": "known start",
     "clean": "known start, odometry with random errors only, no people, furniture as on the map",
@@ -92,16 +93,16 @@ CIRCUMSTANCES = {
     "half": "known start; the map ends at the middle of the floor",
     "kidnapped": "known start; after 30 s the robot is placed elsewhere",
 }
+"""Name and description of the conditions under which logs are generated."""
 UNCHANGED_WORLD = ("clean", "slipping")
 """Circumstances without people and with the furniture of the map."""
 
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """Generated log with the map and the initial estimate of the localizer.
+    """Generated log with the map and the initial estimate for a localizer.
 
-    `sensed` holds the readings and the true poses. `building` and `number` identify the log among those of one
-    circumstance.
+    `sensed` has the sensor readings and the true poses. `number` is the number of the drive in the building.
     """
 
     building: int
@@ -113,7 +114,10 @@ class Log:
 
 
 def generate_log(building: int, number: int, circumstance: str, seconds: float = LOG_DURATION_S) -> Log:
-    """Return drive `number` through a building under one of CIRCUMSTANCES, the same every time."""
+    """Return the log of drive `number` through a building under one of CIRCUMSTANCES.
+
+    The result depends on the arguments only.
+    """
     rng = Streams(building).generator(f"{circumstance} {number}")
     beams, rate = LIDARS[number % len(LIDARS)]
     lidar = Lidar(
@@ -140,7 +144,7 @@ def generate_log(building: int, number: int, circumstance: str, seconds: float =
     )
     ranges = scene.distances(lidar_poses, angles, lidar.max_range, rng)
     if circumstance not in UNCHANGED_WORLD:
-        people = simulate_people(floor, len(poses), scan_every * STEP_S, PEOPLE, rng)
+        people = simulate_people(floor, len(poses), scan_every * STEP_S, PEOPLE_COUNT, rng)
         ranges = occlude_by_people(people, lidar_poses, angles, ranges)
     ranges = add_lidar_noise(ranges, lidar, rng)
     readings = _readings(odometry, ranges, scan_every, lidar)
@@ -159,7 +163,10 @@ def generate_log(building: int, number: int, circumstance: str, seconds: float =
 def _drive(
     floor: Building, circumstance: str, seconds: float, rng: np.random.Generator, furniture: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return the true poses (k, 3) and the furniture (n, 4). Rearranges it again if it encloses the robot."""
+    """Return the true poses (k, 3) of a drive, and the furniture (n, 4): `furniture` if given, or that of the log.
+
+    If the furniture encloses the start, another start is drawn, and unless `furniture` is given, other furniture.
+    """
     while True:
         current = furniture
         if current is None:
@@ -172,7 +179,7 @@ def _drive(
 
 @lru_cache(maxsize=2)
 def building_map(building: int) -> OccupancyGrid:
-    """Return the map of a building, drawn from an earlier drive through all its rooms without people."""
+    """Return the map of a building, drawn from a drive through all rooms, before anything was moved or rebuilt."""
     floor, rng = generate_building(building), Streams(building).generator("map")
     poses = mapping_tour(floor)
     angles = np.linspace(-np.pi, np.pi, 480, endpoint=False)

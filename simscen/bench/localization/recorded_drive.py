@@ -1,4 +1,4 @@
-"""Evaluation of a localizer on a recorded drive: run the log through it, and compare its beliefs with a reference."""
+"""Evaluate a localizer on a log: pass it the recorded readings, and compare its beliefs with reference poses."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from simscen.stack.protocols import Surroundings
 from simscen.stack.setting import Setting
 
 MAX_GAP_S = 1.0
-"""Longest gap between two poses of the reference over which it is interpolated."""
+"""Maximum time between two reference poses for interpolation between them."""
 MAX_TIME_DIFFERENCE_S = 0.05
-"""Beliefs this close in time to a pose of the reference are compared with it even next to a longer gap."""
+"""In a longer gap, only beliefs within this time of a reference pose are compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class Localized:
     """Beliefs of a localizer on a log: `times` (n,) in s, `poses` (n, 3) in the map frame, and `covariances` (n, 3, 3).
 
-    `scans` is the number of processed scans. `cpu` is the total CPU time in s, and `slowest` that of the slowest
-    message; both differ between runs.
+    `scans` is the number of processed scans. `cpu` is the CPU time in s for all readings, and `slowest` that for the
+    slowest reading. CPU times differ each time; everything else is deterministic.
     """
 
     times: Array
@@ -51,9 +51,10 @@ class LostInterval:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Errors at `times` (n,) in s: `distance` (n,) in m and `yaw` (n,) in rad, and the intervals with a lost robot.
+    """Errors of a localizer at `times` (n,) in s: `distance` (n,) in m and signed `yaw` (n,) in rad.
 
-    `compared` is the share of the beliefs at times at which there is a reference.
+    `lost` are the intervals in which the robot was lost. `compared` is the fraction of the localizer's beliefs that
+    could be compared with the reference.
     """
 
     times: Array
@@ -63,7 +64,7 @@ class Errors:
     compared: float
 
     def figures(self) -> dict[str, float]:
-        """Return median, RMSE, largest and last distance in m, and the RMSE of the heading in rad."""
+        """Return median, RMSE, largest and last position error in m, and the RMSE of the yaw in rad, by name."""
         return {
             "median": float(np.median(self.distance)),
             "rmse": float(np.sqrt(np.mean(self.distance**2))),
@@ -78,7 +79,7 @@ def localize(
 ) -> Localized:
     """Pass all readings of a log to the localizer of a stack, and return its belief after each odometry message.
 
-    The same arguments give the same beliefs, which are also those of a run with this seed.
+    `estimate` is the initial pose estimate. The beliefs are the same as in a run with the same readings and seed.
     """
     localizer = CheckedLocalizer(spec.localizer, Setting(surroundings, "localizer", Streams(seed)))
     localizer.reset(estimate)
@@ -100,10 +101,10 @@ def localize(
 
 
 def compare_with_reference(localized: Localized, log: LocalizationLog, lost_distance: float) -> Errors | None:
-    """Return the errors at all times with a reference, or None if there are none.
+    """Return the errors of the beliefs that can be compared with the true poses of the log; None if there are none.
 
-    The reference is interpolated, except over gaps longer than MAX_GAP_S; within a gap, only beliefs at its ends count.
-    The robot is lost while the error exceeds `lost_distance` in m.
+    The true poses are interpolated, except over gaps longer than MAX_GAP_S. The robot is lost while the position error
+    exceeds `lost_distance` in m.
     """
     if len(log.ticks) < 2:
         return None
@@ -132,7 +133,7 @@ def compare_with_reference(localized: Localized, log: LocalizationLog, lost_dist
 
 
 def lost_intervals(times: Array, lost: Array) -> list[LostInterval]:
-    """Return the intervals in which `lost` (n,) is true."""
+    """Return the intervals of `times` (n,) in which `lost` (n,) is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], lost.astype(np.int8), [0]))))
     return [
         LostInterval(float(times[begin]), float(times[end]) if end < len(times) else None)

@@ -1,4 +1,4 @@
-"""Comparison of localizers on sparse logs: scans are 1 m or 0.5 rad apart, as in many public data sets."""
+"""Compare localizers on sparse logs, with scans 1 m or 0.5 rad apart, as in many public data sets."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -22,7 +22,7 @@ from simscen.record.localization_logs.rows import TICK_RATE_HZ
 from simscen.stack.protocols import Surroundings
 
 RECOVERY = {"recovery_alpha_slow": 0.001, "recovery_alpha_fast": 0.1}
-"""Random particles as nav2_amcl's documentation recommends."""
+"""Parameters with which AMCL adds random particles, with the values of nav2_amcl's documentation."""
 LOCALIZERS: Mapping[str, AmclParameters] = {
     "likelihood_field": Amcl(laser_model_type="likelihood_field"),
     "likelihood_field, recovery": Amcl.model_validate({"laser_model_type": "likelihood_field", **RECOVERY}),
@@ -31,15 +31,17 @@ LOCALIZERS: Mapping[str, AmclParameters] = {
     "scan_matching_amcl": ScanMatchingAmcl(),
 }
 SEED_COUNT = 5
+"""Number of trials of each localizer on each log."""
 SPACING_M, SPACING_RAD = 1.0, 0.5
-"""Motion between two scans: at least one of these."""
+"""Translation or rotation after which the next scan is kept."""
 DURATION_S = 180.0
+"""Duration of a log before it is thinned."""
 END_TURN_RAD = 1.0
-"""Rotation over the last two steps between scans of a log that ends after a turn."""
-MISSED_TURN_SHARE, MISSED_TURN_STD_RAD = 0.05, 0.6
-"""Share of the steps between scans with a turn that odometry does not report, and its standard deviation.
+"""Minimum rotation from the third-last to the last scan of a log that ends after a turn."""
+MISSED_TURN_FRACTION, MISSED_TURN_STD_RAD = 0.05, 0.6
+"""Fraction of the scans after which odometry misreports one rotation, and standard deviation of this error.
 
-The odometry of the public log MIT CSAIL has a few such steps.
+The odometry of the public log MIT CSAIL has a few such errors.
 """
 MISSED_TURNS = "as mapped, turns that odometry misses"
 KINDS: Mapping[str, tuple[str, bool]] = {
@@ -50,12 +52,15 @@ KINDS: Mapping[str, tuple[str, bool]] = {
     "half rebuilt": ("outdated", False),
     "half a map": ("half", False),
 }
-"""Circumstance of each kind of log, and whether it ends after a turn."""
+"""Kinds of sparse logs: the circumstance (a key of CIRCUMSTANCES), and whether the log ends after a turn."""
 
 
 @dataclass(frozen=True)
 class SparseTrial:
-    """Result of one seed on one log: errors in m, and whether the error ever exceeded LOST_M."""
+    """Result of one localizer and seed on one log: median and last position error in m.
+
+    `lost` means that the error exceeded LOST_M at some time.
+    """
 
     kind: str
     localizer: str
@@ -67,9 +72,9 @@ class SparseTrial:
 
 
 def thin_scans(log: Log, ends_after_turn: bool = False) -> Log:
-    """Return the log with scans at least SPACING_M or SPACING_RAD apart by odometry.
+    """Return the log with all odometry, but only with scans that are SPACING_M or SPACING_RAD apart by odometry.
 
-    With `ends_after_turn`, it ends at the last scan after a turn of END_TURN_RAD, if there is one.
+    With `ends_after_turn`, the log ends at the last scan after a turn of END_TURN_RAD, if there is one.
     """
     readings: list[Odometry | Scan] = []
     selected: list[tuple[int, Pose2]] = []  # tick and odometry of each selected scan
@@ -93,7 +98,7 @@ def thin_scans(log: Log, ends_after_turn: bool = False) -> Log:
 
 
 def with_missed_turns(log: Log) -> Log:
-    """Return a sparse log whose odometry misses some turns, so that its heading is wrong afterwards."""
+    """Return the log with odometry that misses some turns, so that its heading is wrong afterwards."""
     rng = Streams(log.building).generator("missed turns")
     readings: list[Odometry | Scan] = []
     previous, reported, turn = Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0), 0.0
@@ -103,7 +108,7 @@ def with_missed_turns(log: Log) -> Log:
             reported, turn = reported.compose(Pose2(step.x, step.y, step.yaw + turn)), 0.0
             readings.append(replace(reading, pose=reported))
         elif isinstance(reading, Scan):
-            turn = float(rng.normal(0.0, MISSED_TURN_STD_RAD)) if rng.random() < MISSED_TURN_SHARE else 0.0
+            turn = float(rng.normal(0.0, MISSED_TURN_STD_RAD)) if rng.random() < MISSED_TURN_FRACTION else 0.0
             readings.append(reading)
     return replace(log, sensed=replace(log.sensed, readings=readings))
 
@@ -114,26 +119,26 @@ def _is_far_enough(last: Pose2, now: Pose2) -> bool:
 
 @lru_cache(maxsize=1)
 def sparse_log(kind: str, building: int) -> Log:
-    """Return the sparse log of a kind in a building, the same every time."""
+    """Return the sparse log of one of KINDS in a building. The result depends on the arguments only."""
     circumstance, ends_after_turn = KINDS[kind]
     log = thin_scans(generate_log(building, building, circumstance, DURATION_S), ends_after_turn)
     return with_missed_turns(log) if kind == MISSED_TURNS else log
 
 
 def run_sparse(buildings: Sequence[int], workers: int) -> Iterator[Sequence[SparseTrial]]:
-    """Yield the trials of all localizers and seeds, one log at a time."""
+    """Yield the trials of all localizers and seeds on one log after the other, with all KINDS in all buildings."""
     logs = [(kind, building) for kind in KINDS for building in buildings]
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield from pool.map(run_sparse_log, *zip(*logs, strict=True))
 
 
 def run_sparse_log(kind: str, building: int) -> Sequence[SparseTrial]:
-    """Run the log of a kind in a building through all localizers, with each seed."""
+    """Run all localizers with each seed on the log of a kind in a building."""
     return [run_sparse_trial(kind, building, name, seed) for name in LOCALIZERS for seed in range(1, SEED_COUNT + 1)]
 
 
 def run_sparse_trial(kind: str, building: int, name: str, seed: int) -> SparseTrial:
-    """Run the log of a kind in a building through a localizer."""
+    """Run the localizer `name` on the log of a kind in a building."""
     log, spec = sparse_log(kind, building), StackSpec.model_validate({"localizer": LOCALIZERS[name]})
     localized = localize(log.sensed, spec, Surroundings(ROBOT, log.map, TICK_RATE_HZ), log.estimate, seed)
     errors = compare_with_reference(localized, log.sensed, LOST_M)
@@ -143,9 +148,9 @@ def run_sparse_trial(kind: str, building: int, name: str, seed: int) -> SparseTr
 
 
 def sparse_table(trials: Sequence[SparseTrial]) -> list[tuple[str, ...]]:
-    """Return the rows of a table: the kind of log, then for each localizer lost runs, median error and end error.
+    """Return a table with a header, a row for each kind of log, and a column for each localizer.
 
-    The errors are medians over buildings and seeds.
+    A cell has the number of lost trials, and the medians over trials of the median error and of the last error.
     """
     rows = [("log", *LOCALIZERS)]
     for kind in KINDS:

@@ -83,8 +83,8 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Row:
-    """Row of the table for the experiment `case`. The names of the fields are keys of the JSON output.
+class ExperimentSummary:
+    """ExperimentSummary of the table for the experiment `case`. The names of the fields are keys of the JSON output.
 
     Rates refer to all runs; `seconds` (mean time to the goal) and `path_ratio` (driven divided by shortest length) to
     the runs that reached all goals. `score` is the mean BARN score. `sct` is None without goals. `success_interval` is
@@ -106,13 +106,13 @@ class Row:
     sct: float | None
 
 
-def summarize(experiment: str, trials: Sequence[Trial]) -> Row:
+def summarize(experiment: str, trials: Sequence[Trial]) -> ExperimentSummary:
     """Return the row of an experiment. `trials` must not be empty."""
     outcomes = [trial.drive_outcome for trial in trials]
     sct_values = [trial.sct for trial in trials]
     successful = [trial for trial in trials if trial.drive_outcome is DriveOutcome.SUCCESS]
     arrived = [trial for trial in successful if trial.metric("time_to_goal") is not None]
-    return Row(
+    return ExperimentSummary(
         case=experiment,
         runs=len(trials),
         success=_rate(outcomes, DriveOutcome.SUCCESS),

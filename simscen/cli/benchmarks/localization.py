@@ -17,7 +17,7 @@ from simscen.loading.schema.messages import quoted
 from simscen.report.display_text import detect_style
 
 if TYPE_CHECKING:
-    from simscen.bench.localization.campaign import Consistency, Interval, Row, Share, Trial
+    from simscen.bench.localization.campaign import Consistency, Interval, ParameterSetResults, SuccessRate, Trial
     from simscen.bench.localization.sparse_logs import SparseTrial
 
 
@@ -111,7 +111,7 @@ COLUMN_NAMES = {
 """Heading of the column for each circumstance of the logs."""
 
 
-def as_text(rows: "Sequence[Row]", columns: int | None = None) -> str:
+def as_text(rows: "Sequence[ParameterSetResults]", columns: int | None = None) -> str:
     """Return one line per set of parameters, then the consistency of each, wrapped at `columns` (None: unlimited)."""
     head = ("parameters", *COLUMN_NAMES.values(), "median error", "ms a scan", "slowest")
     table = [_cells(row) for row in rows]
@@ -121,7 +121,7 @@ def as_text(rows: "Sequence[Row]", columns: int | None = None) -> str:
     return "\n".join(wrap_lines([*lines, "", *(line for row in rows for line in _consistency_lines(row))], columns))
 
 
-def _cells(row: "Row") -> tuple[str, ...]:
+def _cells(row: "ParameterSetResults") -> tuple[str, ...]:
     return (
         row.parameters,
         *(_share_text(row.shares[name]) for name in COLUMN_NAMES),
@@ -131,7 +131,7 @@ def _cells(row: "Row") -> tuple[str, ...]:
     )
 
 
-def _share_text(share: "Share") -> str:
+def _share_text(share: "SuccessRate") -> str:
     return f"{share.count} of {share.of}{_interval_text(share.interval, '.2f')}"
 
 
@@ -139,9 +139,9 @@ def _interval_text(interval: "Interval", form: str = ".3f") -> str:
     return "" if interval is None else f" ({interval[0]:{form}} … {interval[1]:{form}})"
 
 
-def _consistency_lines(row: "Row") -> list[str]:
+def _consistency_lines(row: "ParameterSetResults") -> list[str]:
     """Return the ANEES for each circumstance, with the values that a consistent covariance would give."""
-    from simscen.bench.localization.campaign import MOMENTS_S
+    from simscen.bench.localization.campaign import CHECK_TIMES_S
 
     def lines(name: str, consistency: "Consistency") -> list[str]:
         low, high = consistency.bounds or (0.0, 0.0)
@@ -150,7 +150,7 @@ def _consistency_lines(row: "Row") -> list[str]:
             if consistency.bounds is None
             else f"; if the covariance is right on average: {low:.2f} … {high:.2f} (95 %)"
         )
-        pairs = zip(MOMENTS_S, consistency.moments, strict=True)
+        pairs = zip(CHECK_TIMES_S, consistency.moments, strict=True)
         moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in pairs)
         low, high = consistency.moment_bounds
         return [

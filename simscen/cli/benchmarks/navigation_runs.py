@@ -8,7 +8,7 @@ from pathlib import Path
 
 from simscen.bench.localization.campaign import anees, anees_bounds, nees_at
 from simscen.bench.navigation.experiments import Drive, Experiment
-from simscen.bench.navigation.summary import Row, Trial, mean, summarize
+from simscen.bench.navigation.summary import ExperimentSummary, Trial, mean, summarize
 from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
@@ -57,7 +57,7 @@ class ExperimentResult:
     The names of the fields are keys of the JSON output.
     """
 
-    tally: Row
+    tally: ExperimentSummary
     localized: LocalizationAccuracy | None = None
 
 

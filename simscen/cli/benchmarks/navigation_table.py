@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from simscen.bench.navigation.barn import PUBLISHED_DWA_RESULTS
-from simscen.bench.navigation.summary import Difference, DriveComparison, Row
+from simscen.bench.navigation.summary import Difference, DriveComparison, ExperimentSummary
 from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
 from simscen.cli.benchmarks.tables import align_columns, fits, label_cells, stack_rows, wrap_lines
 
@@ -78,7 +78,7 @@ def _change(difference: Difference | None, form: str) -> str:
     return f"{difference.mean:+{form}} ({difference.interval[0]:+{form}} … {difference.interval[1]:+{form}})"
 
 
-def _cells(row: Row) -> tuple[str, ...]:
+def _cells(row: ExperimentSummary) -> tuple[str, ...]:
     interval = row.success_interval
     return (
         row.case,

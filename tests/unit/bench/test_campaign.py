@@ -8,7 +8,7 @@ import pytest
 
 from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.bench.localization.buildings import box_distances, generate_building, wall_boxes
-from simscen.bench.localization.campaign import MOMENTS_S, PARAMETER_SETS, ROBOT, Share, Trial, summarize
+from simscen.bench.localization.campaign import CHECK_TIMES_S, PARAMETER_SETS, ROBOT, SuccessRate, Trial, summarize
 from simscen.bench.localization.generated_logs import Log, generate_log
 from simscen.bench.localization.recorded_drive import compare_with_reference, localize
 from simscen.core.environment.occupancy_grid import FREE, UNKNOWN
@@ -78,16 +78,16 @@ def test_a_robot_is_tracked_on_raw_odometry_and_found_on_a_floor_of_forty_meters
 
 def test_a_row_counts_what_was_tracked_and_what_was_found_in_time() -> None:
     def one(number: int, circumstance: str, tracked: bool, found: float | None) -> Trial:
-        return Trial(number, 0, circumstance, tracked, 0.05 * number, 1.0, found, (3.0,) * len(MOMENTS_S), 1.0, 2.0)
+        return Trial(number, 0, circumstance, tracked, 0.05 * number, 1.0, found, (3.0,) * len(CHECK_TIMES_S), 1.0, 2.0)
 
     trials = [one(n, c, n != 2, 30.0 * n) for n in (1, 2, 3) for c in ("tracked", "clean", "slipping", "unknown")]
     row = summarize("some", [*trials, one(1, "kidnapped", False, None), one(1, "outdated", True, 0.0)])
-    assert row.shares["tracked"] == Share(2, 3, None)
+    assert row.shares["tracked"] == SuccessRate(2, 3, None)
     assert row.shares["unknown"].count == 2
-    assert row.shares["kidnapped"] == Share(0, 1, None)
+    assert row.shares["kidnapped"] == SuccessRate(0, 1, None)
     assert row.median == pytest.approx(0.1)
     clean = row.sure["clean"]
-    assert clean.moments == [3.0] * len(MOMENTS_S)
+    assert clean.moments == [3.0] * len(CHECK_TIMES_S)
     assert (clean.anees, clean.bounds, clean.inside) == (3.0, (3.0, 3.0), 1.0)
     assert row.sure["outdated"].bounds is None
     assert "half" not in row.sure

@@ -1,16 +1,15 @@
 import json
 from dataclasses import replace
 
-from simscen.bench.localization.campaign import CONSISTENCY_CIRCUMSTANCES, Consistency, Share
-from simscen.bench.localization.campaign import Row as Numbers
-from simscen.bench.navigation.summary import Difference, DriveComparison, Row
+from simscen.bench.localization.campaign import CONSISTENCY_CIRCUMSTANCES, Consistency, ParameterSetResults, SuccessRate
+from simscen.bench.navigation.summary import Difference, DriveComparison, ExperimentSummary
 from simscen.cli.benchmarks.localization import COLUMN_NAMES
 from simscen.cli.benchmarks.localization import as_text as localization
 from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
 from simscen.cli.benchmarks.navigation_table import as_json, as_text
 
-BARN = Row("BARN", 30, 29 / 30, (0.833, 0.994), 1 / 30, 0.0, 0.0, 0.0, 7.24, 0.476, 1.031, 0.71)
-TOUR = Row("localization, tour", 20, 1.0, None, 0.0, 0.0, 0.0, 0.0, 48.8, None, 0.99, 0.625)
+BARN = ExperimentSummary("BARN", 30, 29 / 30, (0.833, 0.994), 1 / 30, 0.0, 0.0, 0.0, 7.24, 0.476, 1.031, 0.71)
+TOUR = ExperimentSummary("localization, tour", 20, 1.0, None, 0.0, 0.0, 0.0, 0.0, 48.8, None, 0.99, 0.625)
 KNOWN = LocalizationAccuracy(0.0301, 0.0402, {5.0: 0.02, 10.0: 2.5}, (2.02, 4.17))
 
 TABLE = """\
@@ -73,9 +72,9 @@ def test_json_contains_every_number() -> None:
 
 
 def test_localization_table_fits_a_narrow_terminal() -> None:
-    shares = {name: Share(9, 10, (0.7, 1.0)) for name in COLUMN_NAMES}
+    shares = {name: SuccessRate(9, 10, (0.7, 1.0)) for name in COLUMN_NAMES}
     sure = dict.fromkeys(CONSISTENCY_CIRCUMSTANCES, Consistency(1.0, (2.1, 4.2), 0.951, (1.0,) * 5, (0.9, 6.34)))
-    row = Numbers("amcl, likelihood_field", shares, 0.029, (0.021, 0.042), sure, 1.5, 189.0)
+    row = ParameterSetResults("amcl, likelihood_field", shares, 0.029, (0.021, 0.042), sure, 1.5, 189.0)
     lines = localization([row], columns=80).splitlines()
     assert max(map(len, lines)) <= 80
     assert lines[:2] == [row.parameters, "  tracked 9 of 10 (0.70 … 1.00)  start unknown 9 of 10 (0.70 … 1.00)"]
