@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.bench.navigation.experiments import narrow_fields
+from simscen.bench.navigation.experiments import write_narrow_fields
 from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import PreparedScenario, prepare
@@ -30,7 +30,7 @@ def seconds(prepared: PreparedScenario, seed: int) -> float:
 @pytest.mark.slow
 def test_odometry_drift_of_a_meter_hardly_slows_narrow_fields(tmp_path: Path) -> None:
     """In sum: one drive in seven swings once whatever drifts. With samples everywhere six take 1.7 times as long."""
-    _, twenty_centimeters, _ = narrow_fields(tmp_path, [9101, 9102, 9103])
+    _, twenty_centimeters, _ = write_narrow_fields(tmp_path, [9101, 9102, 9103])
     true = slipping = 0.0
     for drive in twenty_centimeters.drives:
         slips = drive.file.with_name(f"slipping_{drive.file.name}")

@@ -1,7 +1,7 @@
-"""Worlds and scenarios of the BARN navigation challenge, and generated fields like those of BARN and DynaBARN.
+"""Read the worlds of the BARN navigation challenge, and generate obstacle fields like those of BARN and DynaBARN.
 
-BARN (Perille et al., SSRR 2020; the-barn-challenge, run.py): a robot with the size of a Jackal drives 10 m through a
-field of cylinders without a map. Any contact ends the run.
+In BARN (Perille et al., SSRR 2020; the-barn-challenge, run.py), a robot with the size of a Jackal drives 10 m through a
+field of cylinders without a map. In DynaBARN, the cylinders move. Any contact ends the run.
 """
 
 import csv
@@ -18,17 +18,16 @@ from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.core.random_streams import Streams
 
-TIME_LIMIT_S = 100.0
 PUBLISHED_DWA_RESULTS = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
-"""Published results of the dynamic window approach (DWA) at 0.5 m/s in 50 worlds with 10 runs each."""
+"""Published rates and mean score of the dynamic window approach (DWA) at 0.5 m/s, in 50 worlds with 10 runs each."""
 
 START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
-"""Start of the robot in BARN, and its goal."""
+"""Start and goal of the robot in BARN."""
 
 ODOMETRY_LOCALIZER = "type: slip_ekf, rotation_noise: 0.5"
-"""Keys of a localizer like robot_localization on the Jackal: distance from the wheels, rotation from the gyroscope."""
+"""YAML keys of a localizer that takes distance from the wheels and rotation from the gyroscope, as on the Jackal."""
 SCAN_MATCHING_LOCALIZER = f"{{{ODOMETRY_LOCALIZER}, match_scans: true}}"
-"""The same localizer with a laser scan matcher, which corrects the distance when the wheels slip."""
+"""YAML of the same localizer with a laser scan matcher, which corrects the distance when the wheels slip."""
 COSTMAP = "{obstacle_max_range: 8 m, raytrace_max_range: 10 m, update_frequency: 10 Hz}"
 TUNED_STACK = f"""\
   localizer: {SCAN_MATCHING_LOCALIZER}
@@ -39,11 +38,11 @@ TUNED_STACK = f"""\
     desired_linear_vel: 2 m/s
     regulated_linear_scaling_min_radius: 2 m
 """
-"""Stack parameters for 2 m/s, the speed of the challenge."""
+"""YAML lines of `stack:` for 2 m/s, the speed of the challenge."""
 TUNED_STACK_FOR_MOVING_WORLDS = TUNED_STACK.replace(SCAN_MATCHING_LOCALIZER, f"{{{ODOMETRY_LOCALIZER}}}")
-"""TUNED_STACK without scan matching, for worlds in which everything that the lidar sees may move."""
+"""TUNED_STACK without scan matching, which needs stationary objects."""
 DEFAULT_STACK = f"  localizer: {SCAN_MATCHING_LOCALIZER}\n"
-"""Stack parameters with the default controller and its speed of 0.5 m/s."""
+"""YAML lines of `stack:` with the default controller at its default speed of 0.5 m/s."""
 CONTROLLERS = {
     f"{name} at 0.5 m/s": f"  localizer: {SCAN_MATCHING_LOCALIZER}\n  costmap: {COSTMAP}\n  controller: {parameters}\n"
     for name, parameters in (
@@ -52,7 +51,7 @@ CONTROLLERS = {
         ("mppi", "{type: mppi, vx_max: 0.5 m/s}"),
     )
 }
-"""Stack parameters of each shipped controller at 0.5 m/s, the speed of the published results."""
+"""YAML lines of `stack:` for each shipped controller at 0.5 m/s, the speed of the published results."""
 
 SCENARIO_TEMPLATE = """\
 map: none
@@ -68,19 +67,19 @@ pass:
   - goals_reached: {tolerance: 1 m}
   - collisions: {max: 0}
 """
-"""Scenario without name and world. `<start>`, `<stack>` and `<goal>` are placeholders; the goal is beyond the field."""
+"""Scenario without name and world. `<start>`, `<stack>` and `<goal>` are placeholders."""
 
 
 @dataclass(frozen=True)
 class BarnWorld:
-    """World file of the challenge, and the length in m of the reference path for its score."""
+    """World file of the challenge, and the length in m of the reference path in the BARN score."""
 
     file: Path
     reference_length: float
 
 
-def barn_worlds(folder: Path) -> list[BarnWorld]:
-    """Return the worlds that scenarios.csv in `folder` lists. Raises UsageError if the file is invalid."""
+def read_barn_worlds(folder: Path) -> list[BarnWorld]:
+    """Return the worlds that `folder`/scenarios.csv lists. Raises UsageError if the file is missing or invalid."""
     file = folder / "scenarios.csv"
     try:
         with file.open(newline="", encoding="utf-8") as lines:
@@ -105,8 +104,8 @@ def _parse_rows(file: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorl
         yield BarnWorld(file.parent / f"world_{world}.world", length)
 
 
-def scenario(name: str, world: str, start: Pose2 = START, goal: Pose2 = GOAL, stack: str = TUNED_STACK) -> str:
-    """Return the text of a scenario. `world` is the value of `world:`, `stack` the lines below `stack:`."""
+def scenario_text(name: str, world: str, start: Pose2 = START, goal: Pose2 = GOAL, stack: str = TUNED_STACK) -> str:
+    """Return the YAML of a scenario. `world` is the value of `world:`, and `stack` the lines below `stack:`."""
     text = SCENARIO_TEMPLATE.replace("<stack>", stack).replace("<start>", _pose(start)).replace("<goal>", _pose(goal))
     return f"simscen: 1\nname: {name}\nworld: {world}\n{text}"
 
@@ -116,31 +115,36 @@ def _pose(pose: Pose2) -> str:
 
 
 CELL_SIZE_M = 0.15
-"""Size of a grid cell. A filled cell contains a cylinder with this diameter."""
+"""Side of a grid cell. A filled cell contains a cylinder with this diameter."""
 COLUMNS, FIELD_ROWS, ROWS = 30, 30, 64
-"""Size of the grid in cells: the lane that the robot drives along has ROWS x COLUMNS.
+"""Number of cells: the robot drives along a lane of ROWS x COLUMNS.
 
-The field fills the last FIELD_ROWS (largest y). The first and last columns are walls of cylinders.
+The obstacle field is the last FIELD_ROWS of the lane (largest y). The first and last columns are walls of cylinders.
 """
 HEIGHT_M = 1.0
 """Height of all cylinders."""
 FILL_RANGE = (0.20, 0.35)
-"""Range of the share of cells that are filled at random, before smoothing.
+"""Range of the fraction of cells that are filled at random, before smoothing.
 
 After smoothing, 5 to 22 % of the cells between the walls are filled, as in six worlds of BARN.
 """
 FILL_NEIGHBORS, CLEAR_NEIGHBORS = 5, 1
-"""Smallest number of filled neighbors, of eight, that fills a cell, and largest number that clears it."""
+"""Smoothing fills a cell with at least 5 filled neighbors (of 8), and clears a cell with at most 1."""
 CROSSING_RADIUS_M = 0.37
-"""Radius of the disc that can cross every field, as it can cross every world of BARN."""
+"""Radius of a disc that can cross every field, as it can cross every world of BARN."""
 MAX_ATTEMPTS = 1000
+"""Maximum number of random fields or paths that are drawn until one meets the requirements."""
 
 Cells = npt.NDArray[np.bool_]
+"""Array (rows, columns) that is true for filled cells."""
 
 
 @dataclass(frozen=True, eq=False)
 class ObstacleField:
-    """Centers (n, 2) of the cylinders, and the length in m of the shortest path of the disc from START to GOAL."""
+    """Centers (n, 2) of the cylinders in m.
+
+    `shortest` is the length in m of the shortest path from START to GOAL of a disc with the crossing radius.
+    """
 
     number: int
     centers: Array
@@ -148,14 +152,14 @@ class ObstacleField:
 
     @property
     def density(self) -> float:
-        """Share of filled cells between the walls."""
+        """Fraction of the cells of the field that are filled, without the walls."""
         inside = (np.abs(self.centers[:, 0] + COLUMNS * CELL_SIZE_M / 2) < (COLUMNS / 2 - 1) * CELL_SIZE_M) & (
             self.centers[:, 1] > (ROWS - FIELD_ROWS) * CELL_SIZE_M
         )
         return float(np.count_nonzero(inside)) / (FIELD_ROWS * (COLUMNS - 2))
 
 
-def obstacle_field(
+def generate_obstacle_field(
     number: int, crossing_radius: float = CROSSING_RADIUS_M, blocked_radius: float | None = None
 ) -> ObstacleField:
     """Generate the field with this number (from 1). The result depends on the arguments only.
@@ -175,7 +179,7 @@ def obstacle_field(
 
 
 def _smoothed_field(rng: np.random.Generator) -> Cells:
-    """Return a field of random density that is smoothed two to four times as in BARN, with walls on both sides."""
+    """Return a field of random density, smoothed two to four times as in BARN, with walls on both sides."""
     cells: Cells = rng.random((FIELD_ROWS, COLUMNS)) < rng.uniform(*FILL_RANGE)
     for _ in range(int(rng.integers(2, 5))):
         cells[:, [0, -1]] = True
@@ -194,7 +198,7 @@ def _count_neighbors(cells: Cells) -> npt.NDArray[np.int64]:
 
 
 def _cylinder_centers(field: Cells) -> Array:
-    """Return the cylinders (n, 2) of the lane: the walls, which are closed behind the start, and the field."""
+    """Return the cylinders (n, 2) of the lane: the field, the walls on both sides, and a wall behind the start."""
     lane = np.zeros((ROWS, COLUMNS), np.bool_)
     lane[:, [0, -1]], lane[0] = True, True
     lane[ROWS - FIELD_ROWS :] = field
@@ -235,31 +239,32 @@ def _shortest_path_length(centers: Array, radius: float) -> float:
 
 
 ARENA_HALF_WIDTH_M = 10.0
-"""Half of the side length of the square arena of DynaBARN."""
+"""Half of the side of the square arena of DynaBARN, which has its center at the origin."""
 MOVER_RADIUS_M = 0.5
+"""Radius of a moving cylinder."""
 MOVER_COUNT_RANGE = (5, 24)
 """Smallest and largest number of moving cylinders."""
 SPEEDS_M_S = (0.74, 1.23, 1.72)
 """Mean speeds of the easy, medium and hard worlds of DynaBARN."""
 MAX_SPEED_DEVIATION_M_S = 0.25
-"""Largest difference of a cylinder's mean speed from the field's, and of its speeds from its mean speed."""
+"""Maximum deviation of a cylinder's mean speed from that of the field, and of its speeds from its mean speed."""
 SPEED_STD_RANGE_M_S = (0.05, 0.25)
 """Range of the standard deviation of a cylinder's speeds."""
 DEGREE_RANGE = (1, 5)
-"""Range of the degree of the polynomials."""
+"""Range of the degree of the polynomials that the cylinders follow."""
 KEYFRAME_DISTANCE_M = 2.0
-"""Distance between two keyframes."""
+"""Approximate distance between two keyframes of a cylinder's motion."""
 MIN_PATH_LENGTH_M = 8.0
-"""Minimum length of a path in the arena. Shorter paths are drawn again."""
+"""Minimum length of a cylinder's path in the arena. Shorter paths are drawn again."""
 DYNABARN_START, DYNABARN_GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14159)
-"""Start of the robot in DynaBARN, 1 m outside of the arena, and its goal."""
+"""Start of the robot in DynaBARN, 1 m outside of the arena, and its goal in the arena."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mover:
-    """Motion of a cylinder through `points` (n, 2) at `times` (n,) in s, back and forth.
+    """A cylinder that moves back and forth along `points` (n, 2), which it passes at `times` (n,) in s.
 
-    At the start of the run, the cylinder is `phase` seconds into this motion.
+    At the start of the run, it is `phase` seconds into this motion.
     """
 
     times: Array
@@ -269,15 +274,15 @@ class Mover:
 
 @dataclass(frozen=True, eq=False)
 class DynamicField:
-    """Moving cylinders of a field, and their requested mean `speed` in m/s."""
+    """Field of moving cylinders whose mean speeds are `speed` (m/s) with random deviations."""
 
     number: int
     speed: float
     movers: tuple[Mover, ...]
 
 
-def dynamic_field(number: int, speed: float) -> DynamicField:
-    """Generate the field with this number (from 1) and mean speed in m/s. The result depends on nothing else."""
+def generate_dynamic_field(number: int, speed: float) -> DynamicField:
+    """Generate the field with this number (from 1) and mean speed in m/s. The result depends on the arguments only."""
     rng = Streams(number).generator(f"dynamic field {speed:g}")
     count = int(rng.integers(MOVER_COUNT_RANGE[0], MOVER_COUNT_RANGE[1] + 1))
     return DynamicField(number, speed, tuple(_mover(rng, speed) for _ in range(count)))
@@ -296,7 +301,7 @@ def _mover(rng: np.random.Generator, speed: float) -> Mover:
 
 
 def _path(rng: np.random.Generator) -> Array:
-    """Return points (n, 2) about KEYFRAME_DISTANCE_M apart along a polynomial, with random axis and direction.
+    """Return points (n, 2) along a random polynomial y(x) or x(y), about KEYFRAME_DISTANCE_M apart.
 
     Raises RuntimeError after MAX_ATTEMPTS, which did not happen for any field so far.
     """
@@ -315,7 +320,7 @@ def _path(rng: np.random.Generator) -> Array:
 
 
 def _polynomial_in_arena(rng: np.random.Generator) -> Array:
-    """Return the longest piece, in the arena, of a polynomial through random points, as points (n, 2)."""
+    """Return the longest piece within the arena of a polynomial y(x) through random points, as points (n, 2)."""
     order = int(rng.integers(DEGREE_RANGE[0], DEGREE_RANGE[1] + 1))
     # Spread over the arena, so that the polynomial does not oscillate between points that nearly coincide.
     edges = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 2)

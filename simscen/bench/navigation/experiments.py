@@ -1,6 +1,7 @@
-"""Experiments of `simscen bench nav`: scenarios with seeds.
+"""Experiments of `simscen bench nav`, each a list of scenario files with seeds.
 
-Generated scenarios are written as files, so that each run can be repeated with `simscen run`.
+The functions `write_…` generate the scenarios as files in `folder`, so that each run can be repeated with
+`simscen run`. Generated fields and drives have a `number`, from which all of their random values are derived.
 """
 
 import json
@@ -14,15 +15,16 @@ from typing import Any
 import numpy as np
 
 from simscen.bench.navigation import barn
-from simscen.bench.navigation.barn import CELL_SIZE_M, HEIGHT_M, ObstacleField, obstacle_field
+from simscen.bench.navigation.barn import CELL_SIZE_M, HEIGHT_M, ObstacleField, generate_obstacle_field
 from simscen.core.random_streams import Streams
 
 
 @dataclass(frozen=True)
 class Drive:
-    """Scenario file, the seeds to run it with, and the reference length of BARN in m, if there is one.
+    """Scenario file, the seeds to run it with, and the length in m of the reference path for the BARN score, if any.
 
-    `world` groups drives for confidence intervals, because drives in the same world are not independent.
+    `world` is a name that drives in the same world share. Confidence intervals need it, because such drives are not
+    independent.
     """
 
     file: Path
@@ -33,13 +35,11 @@ class Drive:
 
 @dataclass(frozen=True)
 class Experiment:
-    """Drives that become one row of the table.
+    """Drives whose results form one row of the table.
 
-    Attributes:
-        root: Folder of the scenarios.
-        world_path: Folders for `--world-path`.
-        localization: Whether to measure the consistency of the pose estimates.
-        mapless: Whether the robot has no map, so that only some localizers work.
+    `root` is the folder that all scenario files lie in, and `world_path` the folders for `--world-path`.
+    `localization`: the error and consistency of the pose estimates are measured as well. `mapless`: the robot has no
+    map, so that only some localizers work.
     """
 
     name: str
@@ -51,64 +51,71 @@ class Experiment:
 
 
 NARROW_MARGINS_M = (0.30, 0.20, 0.10)
-"""Width of the widest path through a narrow field minus the width of the robot."""
+"""Minimum width of the widest path through a narrow field, minus the width of the robot; it is at most 0.1 m more."""
 ROBOT_WIDTH_M = 0.42
-"""Width of the robot across its wheels."""
+"""Width of the Jackal across its wheels."""
 LOCALIZATIONS = ("tour", "start 0.5 m and 20° off", "start unknown", "kidnapped")
 """Names of the localization experiments."""
 
 
-def barn_challenge(
+def write_barn_challenge(
     folder: Path, dataset: Path, seeds: Sequence[int], variant: str = "", stack: str = barn.TUNED_STACK
 ) -> Experiment:
-    """Return the drives in the worlds of BARN. `stack` are the lines below `stack:`. Raises UsageError for bad data."""
+    """Write the drives in the worlds of BARN, with `stack` as the YAML lines below `stack:`.
+
+    `variant` is the name of this stack; empty for TUNED_STACK. Raises UsageError if the `dataset` is invalid.
+    """
     name = f"BARN, {variant}" if variant else "BARN"
     drives = []
-    for world in barn.barn_worlds(dataset):
-        text = barn.scenario(world.file.stem, world.file.name, stack=stack)
+    for world in barn.read_barn_worlds(dataset):
+        text = barn.scenario_text(world.file.stem, world.file.name, stack=stack)
         file = folder / "barn" / (variant.replace("/", " per ") or "tuned") / f"{world.file.stem}.scenario.yaml"
-        drives.append(Drive(write_scenario(file, text), seeds, world.reference_length))
+        drives.append(Drive(write_text(file, text), seeds, world.reference_length))
     return Experiment(name, tuple(drives), folder, (dataset,), mapless=True)
 
 
-def generated_fields(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Return drives in generated fields like those of BARN, with one seed each."""
-    drives = [_field_drive(folder / "fields", obstacle_field(number)) for number in numbers]
+def write_generated_fields(folder: Path, numbers: Iterable[int]) -> Experiment:
+    """Write a drive through each of the generated fields with these numbers, which are also the seeds."""
+    drives = [_field_drive(folder / "fields", generate_obstacle_field(number)) for number in numbers]
     return Experiment("generated fields", tuple(drives), folder, mapless=True)
 
 
-def narrow_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
-    """Return one experiment for each of NARROW_MARGINS_M, with fields whose widest path has this margin."""
+def write_narrow_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
+    """Write one experiment for each of NARROW_MARGINS_M, with generated fields whose widest path has this margin."""
     experiments = []
     for margin in NARROW_MARGINS_M:
         crossing_radius, blocked_radius = (ROBOT_WIDTH_M + margin) / 2, (ROBOT_WIDTH_M + margin + 0.1) / 2
         target = folder / f"narrow/{round(100 * margin)}_cm"
-        drives = [_field_drive(target, obstacle_field(number, crossing_radius, blocked_radius)) for number in numbers]
-        experiments.append(Experiment(narrow_name(margin), tuple(drives), folder, mapless=True))
+        drives = [
+            _field_drive(target, generate_obstacle_field(number, crossing_radius, blocked_radius)) for number in numbers
+        ]
+        experiments.append(Experiment(narrow_fields_name(margin), tuple(drives), folder, mapless=True))
     return experiments
 
 
-def narrow_name(margin: float) -> str:
+def narrow_fields_name(margin: float) -> str:
     """Return the name of the experiment with a margin in m."""
     return f"narrow fields, robot + {100 * margin:.0f} cm"
 
 
 def _field_drive(folder: Path, field: ObstacleField) -> Drive:
-    world = write_scenario(folder / f"field_{field.number}.world.yaml", _world_text(field))
-    text = barn.scenario(f"field {field.number}", world.name)
-    file = write_scenario(folder / f"field_{field.number}.scenario.yaml", text)
+    world = write_text(folder / f"field_{field.number}.world.yaml", _world_text(field))
+    text = barn.scenario_text(f"field {field.number}", world.name)
+    file = write_text(folder / f"field_{field.number}.scenario.yaml", text)
     return Drive(file, [field.number], field.shortest)
 
 
-def dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
-    """Return one experiment for each mean speed, with fields of moving cylinders and one seed each."""
+def write_dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
+    """Write one experiment for each of barn.SPEEDS_M_S, with generated fields of moving cylinders."""
     experiments = []
     for speed in barn.SPEEDS_M_S:
         drives = []
         for number in numbers:
             stem = f"dynamic/field_{number}_at_{speed:.2f}"
-            world = write_scenario(folder / f"{stem}.world.yaml", _moving_world_text(barn.dynamic_field(number, speed)))
-            text = barn.scenario(
+            world = write_text(
+                folder / f"{stem}.world.yaml", _moving_world_text(barn.generate_dynamic_field(number, speed))
+            )
+            text = barn.scenario_text(
                 f"dynamic field {number}",
                 world.name,
                 barn.DYNABARN_START,
@@ -116,24 +123,27 @@ def dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
                 barn.TUNED_STACK_FOR_MOVING_WORLDS,
             )
             length = barn.DYNABARN_START.distance(barn.DYNABARN_GOAL)
-            drives.append(Drive(write_scenario(folder / f"{stem}.scenario.yaml", text), [number], length))
-        experiments.append(Experiment(dynamic_name(speed), tuple(drives), folder, mapless=True))
+            drives.append(Drive(write_text(folder / f"{stem}.scenario.yaml", text), [number], length))
+        experiments.append(Experiment(dynamic_fields_name(speed), tuple(drives), folder, mapless=True))
     return experiments
 
 
-def dynamic_name(speed: float) -> str:
+def dynamic_fields_name(speed: float) -> str:
     """Return the name of the experiment with a mean speed in m/s."""
     return f"dynamic fields, {speed:.2f} m/s"
 
 
-def sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
-    """Return the system test of Nav2, without and with a box that is not on the map."""
+def write_sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
+    """Write the drive of Nav2's system test, without and with a box that is not on the map.
+
+    `nav2` is the folder with the data of nav2_minimal_turtlebot_simulation.
+    """
     return [
         Experiment(
             name,
             (
                 Drive(
-                    write_scenario(folder / f"nav2/{stem}.scenario.yaml", sandbox_scenario(name, box)),
+                    write_text(folder / f"nav2/{stem}.scenario.yaml", sandbox_scenario(name, box)),
                     seeds,
                 ),
             ),
@@ -145,12 +155,12 @@ def sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
 
 
 def corner_cases(scenarios: Path, root: Path, seeds: Sequence[int]) -> list[Experiment]:
-    """Return one experiment for each shipped corner case."""
+    """Return one experiment for each corner case in the folder `scenarios`."""
     return [Experiment(case_name(file), (Drive(file, seeds),), root) for file in case_files(scenarios)]
 
 
 def case_files(scenarios: Path) -> list[Path]:
-    """Return the scenario files of the shipped corner cases."""
+    """Return the scenario files of the corner cases in the folder `scenarios`."""
     return sorted(scenarios.glob("corner_cases/*.scenario.yaml"))
 
 
@@ -159,27 +169,28 @@ def case_name(file: Path) -> str:
     return file.name.split(".")[0].replace("_", " ")
 
 
-def localization_experiments(folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequence[int]) -> list[Experiment]:
-    """Return the localization experiments in the shipped house.
+def write_localization_experiments(
+    folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequence[int]
+) -> list[Experiment]:
+    """Write the experiments LOCALIZATIONS in the shipped house, which is in the folder `worlds`.
 
-    The robot drives a tour with a known start for each of `seeds`. For each seed in `lost`, the initial estimate is
-    wrong by 0.5 m and 20 degrees, is unknown, or the robot is kidnapped.
+    The tour with a known start is driven with each of `seeds`, all others with each seed in `lost`.
     """
 
-    def experiment(name: str, *drives: Drive, known: bool = False) -> Experiment:
-        return Experiment(f"localization, {name}", drives, folder, (worlds,), localization=known)
+    def experiment(name: str, *drives: Drive, has_estimate: bool = False) -> Experiment:
+        return Experiment(f"localization, {name}", drives, folder, (worlds,), localization=has_estimate)
 
     def drive(stem: str, text: str, seeds: Sequence[int]) -> Drive:
-        return Drive(write_scenario(folder / f"localization/{stem}.scenario.yaml", text), seeds)
+        return Drive(write_text(folder / f"localization/{stem}.scenario.yaml", text), seeds)
 
     directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in lost}
     wrong_start = [drive(f"wrong_start_{n}", wrong_start_scenario(directions[n], n % 2 == 0), [n]) for n in lost]
-    tour = experiment(LOCALIZATIONS[0], drive("tour", tour_scenario(), seeds), known=True)
+    tour = experiment(LOCALIZATIONS[0], drive("tour", tour_scenario(), seeds), has_estimate=True)
     if not lost:
         return [tour]
     return [
         tour,
-        experiment(LOCALIZATIONS[1], *wrong_start, known=True),
+        experiment(LOCALIZATIONS[1], *wrong_start, has_estimate=True),
         experiment(LOCALIZATIONS[2], drive("start_unknown", start_unknown_scenario(), lost)),
         experiment(LOCALIZATIONS[3], drive("kidnapped", kidnapped_scenario(), lost)),
     ]
@@ -209,17 +220,18 @@ def _moving_world_text(field: barn.DynamicField) -> str:
     return f"simscen: 1\nname: dynamic field {field.number}\nobjects:\n{''.join(lines)}"
 
 
-def write_scenario(file: Path, text: str) -> Path:
-    """Write a scenario or world file, and return its path."""
+def write_text(file: Path, text: str) -> Path:
+    """Write a scenario or another text file, and return its path."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(text, encoding="utf-8")
     return file
 
 
 def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
-    """Return the same drives with additional stack parameters, as files in `folder` that extend the scenarios.
+    """Write the same drives with additional stack parameters, as scenarios in `folder` that extend the original ones.
 
-    If the drives have no map, `localizer` of `stack` is ignored.
+    `stack` is the value of `stack:`. Its key `localizer` is ignored if the drives have no map. `name` is the name of
+    the new experiment.
     """
     drives = []
     stack = {key: value for key, value in stack.items() if not (experiment.mapless and key == "localizer")}
@@ -227,7 +239,7 @@ def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str,
         stem = drive.file.name.split(".")[0]
         file = folder / f"{number}_{stem}.scenario.yaml"
         text = f"simscen: 1\nextends: {json.dumps(os.path.relpath(drive.file, folder))}\nstack: {json.dumps(stack)}\n"
-        drives.append(replace(drive, file=write_scenario(file, text), world=drive.world or str(drive.file)))
+        drives.append(replace(drive, file=write_text(file, text), world=drive.world or str(drive.file)))
     return replace(
         experiment,
         name=name,
@@ -238,11 +250,11 @@ def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str,
 
 
 SANDBOX_BOX = "obstacles:\n    - {name: cardboard box, box: [0.5, 0.4, 0.3], pose: {x: -1.0, y: 0.6}}\n"
-"""The `cardboard_box` of Gazebo at the place of the unmapped obstacle of Nav2."""
+"""Gazebo's `cardboard_box`, where Nav2's system test places an obstacle that is not on the map."""
 
 
-def sandbox_scenario(name: str, box: bool) -> str:
-    """Return the text of the scenario, which needs --world-path for its world and map."""
+def sandbox_scenario(name: str, has_box: bool) -> str:
+    """Return the YAML of the drive of Nav2's system test. Its world and map are found in `--world-path`."""
     return f"""\
 simscen: 1
 name: "{name}"
@@ -250,7 +262,7 @@ world:
   simscen: 1
   name: tb3_sandbox
   sdf: worlds/tb3_sandbox.sdf.xacro
-  {SANDBOX_BOX if box else ""}
+  {SANDBOX_BOX if has_box else ""}
 map: tb3_sandbox.yaml
 robot: {{model: turtlebot, pose: {{x: -2.0, y: -0.5, yaw: 0}}}}
 goals:
@@ -263,9 +275,9 @@ pass:
 
 
 START = (0.8, 4.95, 0.0)
-"""Pose of the dock in the house: x, y in m, yaw in rad."""
+"""Pose of the dock in the house, where all drives start: x, y in m, yaw in rad."""
 ESTIMATE_OFFSET_M, ESTIMATE_ROTATION_RAD = 0.5, math.radians(20.0)
-"""Error of the initial estimate in m and rad."""
+"""Error of a wrong initial estimate."""
 
 GOALS = """\
 goals:
@@ -276,7 +288,7 @@ goals:
 
 
 def tour_scenario() -> str:
-    """Return the text of a tour through three rooms with a known start and default noise."""
+    """Return the YAML of a tour through three rooms with a known start and default noise."""
     return f"""\
 simscen: 1
 name: tour of the house
@@ -289,13 +301,14 @@ robot: {{pose: dock}}
 """
 
 
-def wrong_start_scenario(direction: float, left: bool) -> str:
-    """Return the text of a drive with a wrong initial estimate, and a correct one required at the goal.
+def wrong_start_scenario(direction: float, turns_left: bool) -> str:
+    """Return the YAML of a drive with a wrong initial estimate. The estimate must be correct at the goal.
 
-    The estimate is off by ESTIMATE_OFFSET_M in `direction` (rad), and by ESTIMATE_ROTATION_RAD to the `left` or right.
+    The initial estimate is moved by ESTIMATE_OFFSET_M in `direction` (rad), and rotated by ESTIMATE_ROTATION_RAD to the
+    left or right.
     """
     x, y = START[0] + ESTIMATE_OFFSET_M * math.cos(direction), START[1] + ESTIMATE_OFFSET_M * math.sin(direction)
-    yaw = START[2] + (ESTIMATE_ROTATION_RAD if left else -ESTIMATE_ROTATION_RAD)
+    yaw = START[2] + (ESTIMATE_ROTATION_RAD if turns_left else -ESTIMATE_ROTATION_RAD)
     return f"""\
 simscen: 1
 name: wrong initial estimate
@@ -321,11 +334,11 @@ pass:
   - localization_error: {final: 0.2 m}
   - collisions: {max: 0, caused_by_robot: true}
 """
-"""All parameters have their defaults. A robot that cannot plan localizes itself while a recovery turns it."""
+"""End of the scenarios in which the robot must find its own pose. Recoveries turn the robot until it has."""
 
 
 def start_unknown_scenario() -> str:
-    """Return the text of a drive without an initial estimate."""
+    """Return the YAML of a drive without an initial estimate."""
     return f"""\
 simscen: 1
 name: start unknown
@@ -335,7 +348,7 @@ robot: {{pose: dock, initial_estimate: unknown}}
 
 
 def kidnapped_scenario() -> str:
-    """Return the text of a drive in which the robot is kidnapped after 3 m, from the corridor to the study."""
+    """Return the YAML of a drive in which the robot is kidnapped after 3 m, from the corridor to the study."""
     return f"""\
 simscen: 1
 name: kidnapped

@@ -1,4 +1,4 @@
-"""Drives between random poses in the free space of a world, with and without sensor faults."""
+"""Experiments with drives between random free poses of a world, with and without sensor faults."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -7,17 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.bench.navigation.experiments import Drive, Experiment, write_scenario
+from simscen.bench.navigation.experiments import Drive, Experiment, write_text
 from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Pose2
 from simscen.core.random_streams import Streams
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 WALL_MARGIN_M = 0.12
-"""Minimum distance of the robot to walls at its start and goal."""
+"""Minimum distance of the robot's edge to walls, everywhere on its shortest path."""
 MOVABLE_MARGIN_M = 1.5
-"""Minimum distance of start and goal to doors and movable objects."""
+"""Minimum distance of start and goal to doors and movable objects, which are not on the map."""
 MAX_ATTEMPTS = 2000
+"""Number of random pairs of start and goal that are tried for a drive."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,9 @@ class RandomDrive:
 def random_drives(
     built: BuiltWorld, radius: float, numbers: Iterable[int], min_length: float = 5.0
 ) -> Iterator[RandomDrive]:
-    """Yield a drive for each number, for a robot that is a disc of `radius` m. Paths have at least `min_length` m.
+    """Yield a drive for each number, for a disc-shaped robot of `radius` m, with a path of at least `min_length` m.
 
-    The same number gives the same drive. A number without a drive after MAX_ATTEMPTS is skipped.
+    The same number always gives the same drive. A number without a drive after MAX_ATTEMPTS is skipped.
     """
     paths = ShortestPaths(built.mesh, built.world.bounds, radius + WALL_MARGIN_M)
     free = np.argwhere(built.map.cells == 0)
@@ -53,14 +54,14 @@ def random_drives(
 
 
 def _is_near_movable(pose: Pose2, built: BuiltWorld) -> bool:
-    """Return whether a movable object, which is not on the map, is near."""
+    """Return whether a door or movable object is within MOVABLE_MARGIN_M."""
     return any(math.hypot(pose.x - body.pose.x, pose.y - body.pose.y) < MOVABLE_MARGIN_M for body in built.world.bodies)
 
 
 ROBOT_RADIUS_M = 0.22
 """Radius of the default robot, a TurtleBot."""
 MIN_AVERAGE_SPEED_M_S = 0.2
-"""Average speed that the time limit requires."""
+"""Average speed on the shortest path that is enough for the time limit."""
 FAULTS = {
     "lidar noise": ("{sensor: lidar, noise: {std: …}}", ("3 cm", "6 cm", "12 cm")),
     "lidar garbage": ("{sensor: lidar, garbage: {probability: …}}", ("10 %", "50 %", "80 %")),
@@ -71,14 +72,17 @@ FAULTS = {
     "odometry slip": ("{sensor: odom, slip: {left: …, right: 0 %}}", ("3 %", "10 %", "25 %")),
     "late commands": ("{sensor: cmd_vel, delay: {latency: …}}", ("50 ms", "120 ms", "250 ms")),
 }
-"""Template of a fault during the whole drive, and its values for the three STRENGTHS."""
+"""YAML of each fault, which lasts for the whole drive, and the values that replace … at each of STRENGTHS."""
 STRENGTHS = ("weak", "medium", "strong")
 FIRST_FAULTY_DRIVE = 1_000_000
-"""First number of the drives with a fault, so that they differ from those without."""
+"""Smallest number of a drive with a fault. It is large so that these drives differ from those without faults."""
 
 
-def scenario(name: str, world: str, drive: RandomDrive, faults: Sequence[str] = ()) -> str:
-    """Return the text of a scenario with one drive of the default robot, which must not collide."""
+def scenario_text(name: str, world: str, drive: RandomDrive, faults: Sequence[str] = ()) -> str:
+    """Return the YAML of a scenario in which the default robot must make this drive without a collision.
+
+    `world` is the value of `world:`, and each of `faults` an item of `faults:`.
+    """
     fault_lines = "".join(["faults:\n", *(f"  - {fault}\n" for fault in faults)]) if faults else ""
     limit = drive.length / MIN_AVERAGE_SPEED_M_S + 30.0
     return (
@@ -88,24 +92,28 @@ def scenario(name: str, world: str, drive: RandomDrive, faults: Sequence[str] = 
     )
 
 
-def random_goals(
+def write_random_goals(
     name: str, folder: Path, worlds: Mapping[str, BuiltWorld], numbers: Sequence[int], world_path: tuple[Path, ...] = ()
 ) -> Experiment:
-    """Return the drives with these numbers in each world. Scenarios refer to the keys of `worlds`."""
+    """Write an experiment with the random drives of these numbers in each world.
+
+    The keys of `worlds` are the values of `world:` in the scenarios, relative to a folder of `world_path`.
+    """
     drives = []
     for world, built in worlds.items():
         for drive in random_drives(built, ROBOT_RADIUS_M, numbers):
             file = folder / f"{_stem(world)}_{drive.number}.scenario.yaml"
-            drives.append(Drive(write_scenario(file, scenario(name, world, drive)), [drive.number], world=world))
+            drives.append(Drive(write_text(file, scenario_text(name, world, drive)), [drive.number], world=world))
     return Experiment(name, tuple(drives), folder, world_path)
 
 
-def degraded(
+def write_degraded_sensing(
     folder: Path, worlds: Mapping[str, BuiltWorld], first: int, world_path: tuple[Path, ...] = ()
 ) -> list[Experiment]:
-    """Return one experiment for each strength, with the same drives: one for each world and fault.
+    """Write one experiment for each of STRENGTHS with the same drives: one for each of `worlds` and FAULTS.
 
-    `first` is the number of the first drives and the seed.
+    `worlds` and `world_path` are as in `write_random_goals`. The drives are derived from `first`, which is also the
+    seed.
     """
     faults = dict(enumerate(FAULTS, start=FIRST_FAULTY_DRIVE + first * len(FAULTS)))
     drives_by_world = {world: list(random_drives(built, ROBOT_RADIUS_M, faults)) for world, built in worlds.items()}
@@ -116,9 +124,9 @@ def degraded(
             for drive in world_drives:
                 fault = faults[drive.number]
                 template, values = FAULTS[fault]
-                text = scenario(f"{fault}, {strength}", world, drive, [template.replace("…", values[level])])
+                text = scenario_text(f"{fault}, {strength}", world, drive, [template.replace("…", values[level])])
                 file = folder / strength / f"{_stem(fault)}_{_stem(world)}.scenario.yaml"
-                drives.append(Drive(write_scenario(file, text), [first], world=world))
+                drives.append(Drive(write_text(file, text), [first], world=world))
         experiments.append(Experiment(f"degraded sensing, {strength}", tuple(drives), folder, world_path))
     return experiments
 

@@ -1,7 +1,6 @@
-"""Summary of many runs in the columns of published navigation benchmarks, and comparison of two stacks.
+"""Summarize the runs of `simscen bench nav` with the scores of published navigation benchmarks, and compare two stacks.
 
-A drive is a scenario in a world, which is run with several seeds. A trial is one of its runs. The trials of all drives
-of an experiment become one row of the table.
+An experiment has several drives (scenarios), and each drive is run with several seeds. A trial is one of these runs.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -16,12 +15,13 @@ from simscen.core.statistics import MIN_PAIRS, bootstrap_mean_interval, wilson_i
 from simscen.judge.metrics.compute import barn_score
 
 Interval = tuple[float, float]
+"""Lower and upper limit of a 95 % confidence interval."""
 TIME_LIMIT_REACHED = "time limit"
 """Value of `ended` of a run that reached its time limit."""
 
 
 class DriveOutcome(str, Enum):
-    """Outcome of a run in a benchmark table. FAILED is any other failure; ERROR is a run that ended with an error."""
+    """Outcome of a trial. FAILED is any failure without collision or timeout; ERROR means that the run had an error."""
 
     SUCCESS = "success"
     COLLISION = "collision"
@@ -32,9 +32,9 @@ class DriveOutcome(str, Enum):
 
 @dataclass(frozen=True)
 class Trial:
-    """A run with the reference length in m for its BARN score (None without a score), and its world.
+    """A run, the length in m of the reference path for its BARN score (None without a score), and its world.
 
-    `top_speed` is the maximum speed of the robot in m/s.
+    `top_speed` is the maximum speed of the robot in m/s, or None if unknown.
     """
 
     run: RunFinished
@@ -44,7 +44,7 @@ class Trial:
 
     @property
     def drive_outcome(self) -> DriveOutcome:
-        """Outcome of the run. Collisions have priority over all other failures, and timeouts over FAILED."""
+        """Outcome of the run. If it had a collision and a timeout, COLLISION is returned."""
         if self.run.outcome is Outcome.ERROR:
             return DriveOutcome.ERROR
         if any(v.criterion == "collisions" and v.status is Status.FAIL for v in self.run.result.verdicts):
@@ -55,7 +55,7 @@ class Trial:
 
     @property
     def score(self) -> float | None:
-        """BARN score, or None without a reference length."""
+        """BARN score, or None without a reference length. A trial without success scores 0."""
         if self.reference_length is None:
             return None
         seconds = self.metric("time_to_goal")
@@ -65,9 +65,10 @@ class Trial:
 
     @property
     def sct(self) -> float | None:
-        """Success weighted by completion time (Yokoyama et al. 2021), or None if the run has no goal.
+        """Success weighted by completion time (SCT, Yokoyama et al. 2021): minimum time divided by driven time.
 
-        The shortest path at top speed gives the minimum time.
+        The minimum time is that of the shortest path at top speed. 0 without success. None if a time is unknown, for
+        example in a run without goals.
         """
         if self.drive_outcome is not DriveOutcome.SUCCESS:
             return 0.0
@@ -78,18 +79,18 @@ class Trial:
         return min_seconds / max(min_seconds, seconds)
 
     def metric(self, name: str) -> float | None:
-        """Return a metric of the run, averaged over all robots."""
+        """Return a metric of the run, averaged over all robots; None if the run does not have it."""
         return mean([value for key, value in self.run.result.metrics.items() if key.split("/")[-1] == name])
 
 
 @dataclass(frozen=True)
 class ExperimentSummary:
-    """ExperimentSummary of the table for the experiment `case`. The names of the fields are keys of the JSON output.
+    """Row of the table for the experiment `case`. The names of the fields are keys of the JSON output.
 
-    Rates refer to all runs; `seconds` (mean time to the goal) and `path_ratio` (driven divided by shortest length) to
-    the runs that reached all goals. `score` is the mean BARN score. `sct` is None without goals. `success_interval` is
-    the 95 % confidence interval of the success rate from resampling the worlds, or None with fewer than five worlds.
-    Resampling single runs would underestimate it, because runs with other seeds in the same world are not independent.
+    `success`, `collisions`, `timeouts`, `failed` and `errors` are rates over all runs. `success_interval` is that of
+    `success_interval()`. `score` (BARN) and `sct` are means over all runs. `seconds` (time to the goal) and
+    `path_ratio` (driven length divided by shortest length) are means over the runs that reached all goals. A mean is
+    None if no run has the value; `sct` also if a single run does not have it.
     """
 
     case: str
@@ -107,7 +108,7 @@ class ExperimentSummary:
 
 
 def summarize(experiment: str, trials: Sequence[Trial]) -> ExperimentSummary:
-    """Return the row of an experiment. `trials` must not be empty."""
+    """Return the summary of an experiment."""
     outcomes = [trial.drive_outcome for trial in trials]
     sct_values = [trial.sct for trial in trials]
     successful = [trial for trial in trials if trial.drive_outcome is DriveOutcome.SUCCESS]
@@ -129,7 +130,10 @@ def summarize(experiment: str, trials: Sequence[Trial]) -> ExperimentSummary:
 
 
 def success_interval(trials: Sequence[Trial]) -> Interval | None:
-    """Return the 95 % interval of the success rate over worlds, or None with fewer than five worlds."""
+    """Return the interval of the success rate by resampling worlds, or None with fewer than five worlds.
+
+    Resampling runs would give a too small interval, because runs in the same world are not independent.
+    """
     return ClusteredMean.from_pairs(
         (trial.world, float(trial.drive_outcome is DriveOutcome.SUCCESS)) for trial in trials
     ).rate_interval()
@@ -147,13 +151,16 @@ def mean(values: Sequence[float | None]) -> float | None:
 
 @dataclass(frozen=True)
 class ClusteredMean:
-    """Values of trials, grouped by world. Every trial has the same weight; the bootstrap resamples whole worlds."""
+    """Mean of the values of trials, with a confidence interval by bootstrap over worlds (cluster bootstrap).
+
+    Each trial has the same weight.
+    """
 
     values_by_world: tuple[tuple[float, ...], ...]
 
     @classmethod
     def from_pairs(cls, pairs: Iterable[tuple[str, float]]) -> "ClusteredMean":
-        """Group the values in pairs of a world and a value."""
+        """Group values by world; a pair is a world and the value of a trial."""
         worlds: dict[str, list[float]] = {}
         for world, value in pairs:
             worlds.setdefault(world, []).append(value)
@@ -166,26 +173,26 @@ class ClusteredMean:
         return sum(map(sum, self.values_by_world)) / trials if trials else None
 
     def interval(self) -> Interval | None:
-        """Return the 95 % bootstrap interval of the mean, or None with fewer than five worlds."""
+        """Return the bootstrap interval of the mean, or None with fewer than five worlds."""
         means = [sum(values) / len(values) for values in self.values_by_world]
         return bootstrap_mean_interval(
             means, Streams(1).generator("worlds"), [len(values) for values in self.values_by_world]
         )
 
     def rate_interval(self) -> Interval | None:
-        """Return the 95 % interval of a rate.
+        """Return the interval of a rate, or None with fewer than five worlds.
 
-        If all worlds have the same rate, the bootstrap interval has zero width. Then, the result is the Wilson interval
-        with one trial per world.
+        If all worlds have the same rate, the bootstrap interval would have zero width. Then, the result is the Wilson
+        interval with one trial per world.
         """
         rate = self._common_mean()
         count = len(self.values_by_world)
         return self.interval() if rate is None else wilson_interval(rate * count, count)
 
     def rate_difference_interval(self) -> Interval | None:
-        """Return the 95 % interval of a difference of rates.
+        """Return the interval of a difference of rates, or None with fewer than five worlds.
 
-        It is a Wilson interval if all worlds have the same difference.
+        If all worlds have the same difference, it is a Wilson interval, as in `rate_interval`.
         """
         change = self._common_mean()
         if change is None:
@@ -196,17 +203,18 @@ class ClusteredMean:
         return (low, high) if change > 0.0 else (-high, -low)
 
     def _common_mean(self) -> float | None:
-        """Return the value that all worlds have, or None if they differ or are too few."""
+        """Return the mean that all worlds have, or None if the means differ or there are fewer than five worlds."""
         means = {sum(values) / len(values) for values in self.values_by_world}
         return means.pop() if len(self.values_by_world) >= MIN_PAIRS and len(means) == 1 else None
 
 
 Pair = tuple[Trial, Trial]
+"""Trials of the reference stack and of the other stack in the same drive with the same seed."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Mean of `other` minus `reference`, and its 95 % interval over worlds, None with fewer than five worlds."""
+    """Mean of the other stack's value minus the reference's, with its interval; None with fewer than five worlds."""
 
     mean: float
     interval: Interval | None
@@ -214,11 +222,11 @@ class Difference:
 
 @dataclass(frozen=True)
 class DriveComparison:
-    """Differences `other` minus `reference` for the experiment `case`.
+    """Comparison of two stacks in the experiment `case`. The names of the fields are keys of the JSON output.
 
-    The names of the fields are keys of the JSON output. The differences are in success rate, in seconds to the goal
-    (only pairs in which both succeeded), in SCT, and in BARN score. `better` and `worse` count
-    the pairs in which only `other` or only `reference` succeeded.
+    `pairs` is the number of pairs of trials without errors. In `better` of them only the other stack succeeded, and in
+    `worse` only the reference. `success` is the difference in success rate, `seconds` in the time to the goal if both
+    succeeded, `sct` in SCT, and `score` in BARN score; None if no pair has both values.
     """
 
     case: str
@@ -232,7 +240,7 @@ class DriveComparison:
 
 
 def compare_drives(experiment: str, reference: Sequence[Trial], other: Sequence[Trial]) -> DriveComparison:
-    """Compare trials of the same drives and seeds in the same order. Raises ValueError if they differ."""
+    """Compare trials of two stacks. Raises ValueError unless they have the same drives and seeds in the same order."""
     pairs = list(zip(reference, other, strict=True))
     if any(first.world != second.world or first.run.key.seed != second.run.key.seed for first, second in pairs):
         raise ValueError(f"{experiment}: the runs are not of the same drives")
@@ -258,7 +266,7 @@ def _has_succeeded(trial: Trial) -> bool:
 def _difference(
     pairs: Sequence[Pair], measure: Callable[[Trial], float | None], rate: bool = False
 ) -> Difference | None:
-    """Return the difference of a measure, or None if no pair has it."""
+    """Return the mean difference of a measure, which is a rate or not; None if no pair has both values."""
     both = ((first.world, measure(first), measure(second)) for first, second in pairs)
     differences = ClusteredMean.from_pairs((world, b - a) for world, a, b in both if a is not None and b is not None)
     if differences.mean is None:

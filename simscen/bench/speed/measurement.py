@@ -1,4 +1,4 @@
-"""Measured figures of a benchmark, and a stopwatch for the parts of a run."""
+"""Data class for a measured figure of a benchmark, and a stopwatch for the parts of a run."""
 
 import statistics
 import time
@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Measurement:
-    """Measured `value` in `unit`: the median of `rounds`, if there were several."""
+    """Measured `value` in `unit` ("" for a ratio or count). If it was measured repeatedly, the median of `rounds`."""
 
     value: float
     unit: str
@@ -18,26 +18,27 @@ class Measurement:
 
     @classmethod
     def of(cls, rounds: Sequence[float], unit: str, *, more_is_better: bool = False) -> "Measurement":
-        """Return the median of several rounds."""
+        """Return the measurement whose value is the median of the rounds."""
         return cls(statistics.median(rounds), unit, tuple(rounds), more_is_better)
 
 
 Measurements = dict[str, Measurement]
-"""Figures by name, in the printed order."""
+"""Measurements by name, in the order in which they are printed."""
 
 
 @dataclass
 class Stopwatch:
-    """Measures the wall time of methods by wrapping them on their instances.
+    """Measures the wall time of the parts of a run by replacing methods of instances with wrappers.
 
-    Time in a nested part counts for the nested part only. `seconds` has the parts in the order of their first `watch`.
+    If a watched method calls another one, the time of the inner call counts for the inner part only. `seconds` is the
+    wall time by part, in the order of the first `watch`.
     """
 
     seconds: dict[str, float] = field(default_factory=dict)
     _nested_seconds: list[float] = field(default_factory=list)
 
     def watch(self, part: str, instance: object, *methods: str) -> None:
-        """Measure these methods of `instance` as `part`."""
+        """Add the wall time of these methods of `instance` to `part` from now on."""
         self.seconds.setdefault(part, 0.0)
         for name in methods:
             setattr(instance, name, self._timed(part, getattr(instance, name)))

@@ -1,4 +1,4 @@
-"""Speed of a whole run and its parts, compared with PyBullet without simscen in the same world."""
+"""Measure the CPU time of a run and of its parts, compared with a baseline: PyBullet alone in the same world."""
 
 import gc
 import statistics
@@ -27,19 +27,22 @@ from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 PATROL = Path(__file__).parents[2] / "data" / "bench" / "patrol.scenario.yaml"
+"""Scenario of most speed benchmarks: a robot drives among racks and a moving cart in a hall."""
 SEED = 1
 ProgressCallback = Callable[[str], None]
 """Receives the name of the current measurement."""
 BEAMS = 720
+"""Number of beams of a scan in measure_obstacle_field."""
 
 
 @dataclass(frozen=True)
-class Patrol:
-    """CPU times in s of a run with `simulated` seconds. The names of the fields are keys of the JSON output.
+class PatrolTimes:
+    """CPU times in s of a run of PATROL. The names of the fields are keys of the JSON output.
 
-    cpu, cpus:      whole run, median and all rounds
-    parts, parted:  by part, median and all rounds
-    bare, bares:    PyBullet baseline with the same steps and scans, median and all rounds; measured after each run
+    simulated:      simulated time of a run in s
+    cpu, cpus:      whole run: median, and each round
+    parts, parted:  each part of the run by name: median, and each round
+    bare, bares:    PyBullet baseline with the same steps and scans: median, and each round, measured after the run
     """
 
     simulated: float
@@ -52,12 +55,12 @@ class Patrol:
 
     @property
     def ratios(self) -> tuple[float, ...]:
-        """Ratio of the CPU time of each run to that of the PyBullet baseline."""
+        """CPU time of each run divided by that of the PyBullet baseline."""
         return tuple(cpu / bare for cpu, bare in zip(self.cpus, self.bares, strict=True))
 
     @property
     def ratio(self) -> float:
-        """Median of the ratios. A slow phase of the machine affects both times of a ratio."""
+        """Median of `ratios`. It varies less than CPU times, because a slow machine affects both times of a ratio."""
         return statistics.median(self.ratios)
 
     @property
@@ -67,10 +70,10 @@ class Patrol:
 
 
 @dataclass(frozen=True)
-class Field:
-    """Time of a scan with 720 beams and of a step among obstacles.
+class ObstacleFieldTimes:
+    """CPU times of a scan with BEAMS beams in ms, and of a physics step in µs, among `obstacles` cylinders.
 
-    The `bare_` times are those of the PyBullet baseline with one body for each obstacle.
+    simscen merges the cylinders into one mesh. The `bare_` times are those of PyBullet with a body for each cylinder.
     """
 
     obstacles: int
@@ -81,37 +84,40 @@ class Field:
 
 
 def no_progress(_: str) -> None:
-    """Ignore the progress."""
+    """Ignore the progress (a ProgressCallback)."""
 
 
-def measure_patrol(rounds: int, report_progress: ProgressCallback = no_progress) -> Patrol:
-    """Measure several runs of the patrol with a log, then the parts of half as many more runs."""
+def measure_patrol(rounds: int, report_progress: ProgressCallback = no_progress) -> PatrolTimes:
+    """Measure `rounds` runs of PATROL with a log, then the parts of half as many more runs."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
-    simulated, *_ = timed_run(prepared)  # the first run pays for imports and caches
+    simulated, *_ = time_run(prepared)  # the first run pays for imports and caches
     cpus, bares = list[float](), list[float]()
     for number in range(rounds):
         report_progress(f"patrol, round {number + 1} of {rounds}")
-        cpus.append(timed_run(prepared)[1])
+        cpus.append(time_run(prepared)[1])
         bares.append(time_baseline_patrol(prepared, simulated))
     cpu = statistics.median(cpus)
     report_progress("parts of the patrol")
     part_rounds = [_measure_parts(prepared, cpu) for _ in range((rounds + 1) // 2)]
     parted = {name: tuple(parts[name] for parts in part_rounds) for name in part_rounds[0]}
     parts = {name: statistics.median(times) for name, times in parted.items()}
-    return Patrol(simulated, cpu, parts, statistics.median(bares), tuple(cpus), tuple(bares), parted)
+    return PatrolTimes(simulated, cpu, parts, statistics.median(bares), tuple(cpus), tuple(bares), parted)
 
 
 def _measure_parts(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
-    """Return the CPU time in s of each part. The wall times of the stopwatch are scaled to a run without stopwatch."""
+    """Return the CPU time in s of each part of a run.
+
+    They are wall times of the stopwatch, scaled by the ratio of `cpu` (CPU time without a stopwatch) to the wall time.
+    """
     watch = Stopwatch()
-    _, _, whole = timed_run(prepared, watch)
+    _, _, whole = time_run(prepared, watch)
     parts = {name: seconds * cpu / whole for name, seconds in watch.seconds.items()}
     parts["lockstep, set-up, verdicts"] = cpu - sum(parts.values())
     return parts
 
 
-def timed_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tuple[float, float, float]:
-    """Return simulated, CPU, and wall seconds of a run from setup to verdicts. `watch` measures its parts."""
+def time_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tuple[float, float, float]:
+    """Return simulated, CPU, and wall time in s of a run from setup to verdicts. `watch` measures its parts."""
     gc.collect()
     gc.freeze()  # as the fork server does, so that older objects are not searched for garbage
     previous = gc.get_threshold()
@@ -127,7 +133,7 @@ def timed_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> tup
 
 
 def _watch_parts(watch: Stopwatch, setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
-    """Measure the parts of a run, and its listeners: trace and log."""
+    """Let `watch` measure the parts of a run, including its `listeners`: trace and log. Return no further listeners."""
     (agent,) = setup.robots
     watch.watch("physics", setup.simulation, "step")
     watch.watch("physics", agent.robot, "drive")
@@ -145,7 +151,7 @@ def _watch_parts(watch: Stopwatch, setup: RunSetup, listeners: Sequence[MomentSi
 
 
 def time_baseline_patrol(prepared: PreparedScenario, simulated: float) -> float:
-    """Return the CPU time in s that the PyBullet baseline takes for as many steps and scans in the same world."""
+    """Return the CPU time in s of PyBullet alone for the steps and scans of `simulated` seconds in the same world."""
     lidar = next(sensor.lidar for sensor in prepared.robot.sensors.values() if sensor.lidar)
     baseline = PyBulletBaseline(prepared.built.mesh, prepared.body, prepared.start, triangulate)
     directions = _circle(lidar.beams)
@@ -158,10 +164,10 @@ def time_baseline_patrol(prepared: PreparedScenario, simulated: float) -> float:
     return cpu
 
 
-def measure_field(obstacles: int) -> Field:
-    """Measure scans and steps among cylinders, as dense as in a BARN world (0.9 per square meter)."""
+def measure_obstacle_field(obstacles: int) -> ObstacleFieldTimes:
+    """Measure scans and physics steps among cylinders that are as dense as in a BARN world (0.9 per square meter)."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
-    solids = cylinders(obstacles)
+    solids = random_cylinders(obstacles)
     mesh, start, height = merge_solids(solids), Pose2(0.0, 0.0, 0.0), lidar_height(prepared.robot)
     rays = RayScene(mesh)
     planar = _circle(BEAMS)
@@ -169,7 +175,7 @@ def measure_field(obstacles: int) -> Field:
     origins = np.tile([0.0, 0.0, height], (BEAMS, 1))
     merged = PyBulletBaseline(mesh, prepared.body, start, triangulate)
     separate = PyBulletBaseline(solids, prepared.body, start, triangulate)
-    field = Field(
+    field = ObstacleFieldTimes(
         obstacles,
         scan_ms=1e3 * _cpu_per_call(lambda: rays.cast(origins, directions), 200),
         step_us=1e6 * _cpu_per_call(lambda: merged.step(1), 2000),
@@ -182,13 +188,13 @@ def measure_field(obstacles: int) -> Field:
 
 
 def _circle(beams: int) -> Array:
-    """Return evenly spaced directions (beams, 2)."""
+    """Return evenly spaced unit vectors (beams, 2)."""
     angles = np.linspace(-np.pi, np.pi, beams, endpoint=False)
     return np.column_stack((np.cos(angles), np.sin(angles)))
 
 
-def cylinders(count: int) -> list[Solid]:
-    """Return `count` random cylinders with a radius of 7.5 cm, none within 1 m of the origin."""
+def random_cylinders(count: int) -> list[Solid]:
+    """Return `count` cylinders at random positions, with a radius of 7.5 cm, none within 1 m of the origin."""
     rng = np.random.default_rng(SEED)
     edge = (count / 0.9) ** 0.5 / 2
     positions = rng.uniform(-edge, edge, (4 * count + 40, 2))

@@ -1,7 +1,7 @@
-"""Growth of the CPU time per simulated second with the size of a scenario.
+"""Measure how the CPU time per simulated second grows with the size of a scenario.
 
-Measured are the patrol, a drive among racks and a moving cart in a hall, with more obstacles, beams, robots, and so on,
-one quantity at a time, and drives in large worlds.
+`measure_growth` increases one quantity of the scenario PATROL at a time: obstacles, beams, robots, and so on.
+`measure_worlds` measures drives in large worlds.
 """
 
 import gc
@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from simscen.bench.speed.measurement import Measurement, Measurements
-from simscen.bench.speed.run_speed import PATROL, ProgressCallback, no_progress, timed_run
+from simscen.bench.speed.run_speed import PATROL, ProgressCallback, no_progress, time_run
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Solid
@@ -31,7 +31,7 @@ from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.ros_map import save_map
 
 DURATION_S = 15
-"""Simulated time of each run."""
+"""Simulated time of each run of the patrol."""
 QUANTITIES = {
     "obstacles": (0, 100, 1000),
     "objects": (20, 100),
@@ -40,30 +40,30 @@ QUANTITIES = {
     "particles": (500, 2000, 8000),
     "robots": (2, 4),
 }
-"""Quantities that are varied, and their values."""
+"""Quantities of the patrol that are varied, and their values."""
 ROBOT = PATROL.parent.parent / "robots" / "turtlebot.robot.yaml"
 OBJECTS_PER_ROW = 25
-"""Number of objects in a row behind the patrol's hall, 0.6 m apart."""
+"""Number of added obstacles or objects in a row; the rows are outside of the patrol's hall."""
 UNIT = "ms per simulated second"
 
 
 def measure_growth(rounds: int, report_progress: ProgressCallback = no_progress) -> Measurements:
-    """Return the CPU time per simulated second for each value, as median of several runs."""
+    """Return the CPU time per simulated second for each value of QUANTITIES, as the median of `rounds` runs."""
     figures: Measurements = {}
     with TemporaryDirectory() as folder:
         for quantity, counts in QUANTITIES.items():
             for count in counts:
                 report_progress(f"{count} {quantity}")
                 prepared = prepare(load_scenario(write_scaled_patrol(Path(folder), quantity, count), Path(folder)))
-                timed_run(prepared)  # the first run pays for caches
-                runs = [timed_run(prepared) for _ in range(rounds)]
+                time_run(prepared)  # the first run pays for caches
+                runs = [time_run(prepared) for _ in range(rounds)]
                 costs = [1e3 * cpu / simulated for simulated, cpu, _ in runs]
                 figures[f"{count} {quantity}"] = Measurement.of(costs, UNIT)
     return figures
 
 
 def write_scaled_patrol(folder: Path, quantity: str, count: int) -> Path:
-    """Write the patrol as a scenario file with `count` of the quantity `quantity`."""
+    """Write the patrol with `count` of the `quantity` (a key of QUANTITIES), and return the scenario file."""
     text = PATROL.read_text(encoding="utf-8").replace("time_limit: 60 s", f"time_limit: {DURATION_S} s")
     match quantity:
         case "obstacles":
@@ -89,7 +89,10 @@ def write_scaled_patrol(folder: Path, quantity: str, count: int) -> Path:
 
 
 def _crates(count: int, extra_keys: str) -> str:
-    """Return the YAML of crates. In `extra_keys`, {end_x} stands for x + 0.2 m of the crate, and {y} for its y."""
+    """Return the YAML of `count` crates, each with `extra_keys`.
+
+    In `extra_keys`, {end_x} is replaced by the crate's x + 0.2 m, and {y} by its y.
+    """
     return "".join(
         f"    - {{name: crate {n}, box: [0.3, 0.3, 0.4], pose: {{x: {x}, y: {y}}}"
         f"{extra_keys.format(end_x=round(x + 0.2, 2), y=y)}}}\n"
@@ -117,13 +120,13 @@ def _robots(count: int) -> str:
     return f"robots: {json.dumps(robots)}\n"
 
 
-HOUSE = Path(__file__).parents[2] / "data" / "bench" / "house.scenario.yaml"
+HOUSE = PATROL.with_name("house.scenario.yaml")
 MOVABLE_COUNT = 40
 """Number of movable meshes in the hall."""
 STATIC_COUNT, MOVING_COUNT = 4980, 20
-"""Numbers of objects in the warehouse."""
+"""Numbers of static objects and moving carts in the warehouse."""
 MAP_SIDE_CELLS = 2000
-"""Number of cells of 5 cm along each side of the map: 100 x 100 m."""
+"""Number of cells of 5 cm along each side of the arena's map: 100 x 100 m."""
 SCENARIO = """\
 simscen: 1
 seed: 1
@@ -137,15 +140,15 @@ pass:
 
 
 @dataclass(frozen=True)
-class Cost:
-    """Cost of runs in a world. The names of the fields are keys of the JSON output.
+class WorldCost:
+    """CPU time and memory of runs in a world. The names of the fields are keys of the JSON output.
 
     name:         description of the world
     triangles:    number of triangles of static solids
     movable:      number of movable bodies
     simulated:    simulated time of a run in s
     milliseconds: CPU time per simulated second in ms
-    preparing:    CPU time for the preparation in s, once for all runs
+    preparing:    CPU time in s to load and prepare the scenario, once for all runs
     memory:       maximum memory of this process so far in MB
     """
 
@@ -158,8 +161,8 @@ class Cost:
     memory: float
 
 
-def measure_worlds(rounds: int) -> Iterator[Cost]:
-    """Yield the costs of a house, a hall with movable meshes, a warehouse, and a map of 100 x 100 m."""
+def measure_worlds(rounds: int) -> Iterator[WorldCost]:
+    """Yield the costs of `rounds` runs in each world: a house, a hall, a warehouse, and an arena with a large map."""
     with TemporaryDirectory() as folder:
         yield _measure_world("house, patrol of five rooms", HOUSE, rounds)
         yield _measure_world(f"hall, {MOVABLE_COUNT} movable meshes", write_hall(Path(folder, "hall")), rounds)
@@ -168,17 +171,17 @@ def measure_worlds(rounds: int) -> Iterator[Cost]:
         yield _measure_world("map of 100 x 100 m", write_arena(Path(folder, "arena")), rounds)
 
 
-def _measure_world(name: str, file: Path, rounds: int) -> Cost:
+def _measure_world(name: str, file: Path, rounds: int) -> WorldCost:
     import time
 
     gc.collect()  # the memory of the previous world must not count
     start = time.process_time()
     prepared = prepare(load_scenario(file, file.parent))
     preparing = time.process_time() - start
-    timed_run(prepared)  # the first run pays for imports and caches
-    runs = [timed_run(prepared) for _ in range(rounds)]
+    time_run(prepared)  # the first run pays for imports and caches
+    runs = [time_run(prepared) for _ in range(rounds)]
     simulated = runs[0][0]
-    return Cost(
+    return WorldCost(
         name,
         triangles=len(prepared.built.mesh.faces),
         movable=len(prepared.built.world.bodies),
@@ -195,10 +198,7 @@ def _peak_memory_mb() -> float:
 
 
 def write_hall(folder: Path) -> Path:
-    """Write a hall of 30 x 20 m with chairs, movable meshes of 432 triangles, as an SDF world.
-
-    Returns its scenario file.
-    """
+    """Write a hall of 30 x 20 m as an SDF world; return its scenario file. Its chairs are meshes of 432 triangles."""
     folder.mkdir()
     for number in range(4):
         (folder / f"mesh_{number}.obj").write_text(_obj_text(_chair(0.4 + 0.05 * number)))
@@ -218,7 +218,7 @@ def write_hall(folder: Path) -> Path:
 
 
 def _chair(width: float) -> list[Solid]:
-    """Return a chair: slats of a seat and of a back, on four legs."""
+    """Return the parts of a chair: slats of a seat and of a back, and four legs."""
     half, slats = width / 2 - 0.02, np.linspace(-1, 1, 16).tolist()
     parts = [((width, width / 20, 0.04), (0.0, half * offset, 0.46)) for offset in slats]
     parts += [((0.04, width / 20, 0.5), (-half, half * offset, 0.73)) for offset in slats]
@@ -287,7 +287,7 @@ def _box_or_drum(number: int) -> str:
 
 
 def write_arena(folder: Path) -> Path:
-    """Write a ROS map of 100 x 100 m with 400 blocks and 0.5 % noise, as from SLAM; return its scenario file."""
+    """Write a ROS map of 100 x 100 m with 400 blocks, and noise in 0.5 % of the cells; return its scenario file."""
     folder.mkdir()
     rng = np.random.default_rng(7)
     cells = np.full((MAP_SIDE_CELLS, MAP_SIDE_CELLS), FREE, dtype=np.int8)

@@ -1,7 +1,4 @@
-"""Overhead of a run, of the start of a session, of a suite of runs, and of an external stack.
-
-A cycle is a control cycle of the stack (a beat in simscen.run.lockstep).
-"""
+"""Measure what a run costs besides simulation: setup, process, and external stack. Measure a session with many runs."""
 
 import gc
 import statistics
@@ -36,20 +33,23 @@ from simscen.run.simulate import simulate
 SHORT_RUN_S = 0.1
 """Simulated time of a run that consists almost only of overhead."""
 WALL_LIMIT_S = 300.0
+"""Wall time after which the supervisor ends a measured run."""
 MILLISECONDS, MEGABYTES = "ms", "MB"
 
 
 @dataclass(frozen=True)
 class Overhead:
-    """Overhead in several rounds: CPU time in ms. The names of the fields are keys of the JSON output.
+    """Overhead of runs in several rounds. The names of the fields are keys of the JSON output.
+
+    All values are CPU times in ms, except `wall` and `memory`.
 
     run:        a run of SHORT_RUN_S in this process
-    outside:    time of `run` before the first and after the last cycle: setup, start and end of the log, verdicts
-    process:    the same run in a session, from the fork on, with its picture
+    outside:    the part of `run` before the first and after the last beat: setup, start and end of the log, verdicts
+    process:    the same run in a process of its own, from the fork on, with its picture
     wall:       wall time of the run of `process` in ms
     memory:     maximum memory of the run of `process` in MB
-    preparing:  world, map, and shortest paths, once for all runs
-    start:      import of the engines, once per session
+    preparing:  preparing the scenario (world, map, shortest paths), once for all of its runs
+    start:      importing the modules of the fork server, such as the physics engine, once per session
     validate:   `simscen validate`
     """
 
@@ -64,7 +64,7 @@ class Overhead:
 
     @property
     def figures(self) -> Measurements:
-        """The medians by name."""
+        """Median of each field by its printed name."""
         return {
             f"a run of {SHORT_RUN_S} s": Measurement.of(self.run, MILLISECONDS),
             "of that outside the simulation": Measurement.of(self.outside, MILLISECONDS),
@@ -78,25 +78,25 @@ class Overhead:
 
 
 class _SimulationTimer:
-    """Listener that measures the CPU time from the first to the last cycle of a run, including the first plan."""
+    """Listener that measures the CPU time from the end of the setup of a run to its last beat."""
 
     def attach(self, setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
-        """Start the timer at the start of a run."""
+        """Start the timer, and return it as a listener of the run."""
         self.start = self.end = time.process_time()
         return (self,)
 
     def append(self, moment: Moment) -> None:
-        """Update the end of the run."""
+        """Take the time of the latest beat."""
         self.end = time.process_time()
 
     @property
     def duration(self) -> float:
-        """CPU time of the last run in ms."""
+        """Measured CPU time in ms."""
         return 1e3 * (self.end - self.start)
 
 
 def measure_overhead(rounds: int, entry: Sequence[str], report_progress: ProgressCallback = no_progress) -> Overhead:
-    """Measure short runs of the scenario PATROL. `entry` are the Python arguments that start the fork server."""
+    """Measure runs of PATROL of SHORT_RUN_S. `entry` are the Python arguments that start the fork server."""
     report_progress("overhead of a run")
     with TemporaryDirectory() as folder:
         file = short_patrol(Path(folder))
@@ -134,7 +134,7 @@ def measure_overhead(rounds: int, entry: Sequence[str], report_progress: Progres
 
 
 def short_patrol(folder: Path, seconds: float = SHORT_RUN_S) -> Path:
-    """Write the patrol with another time limit."""
+    """Write PATROL with another time limit, and return the scenario file."""
     file = folder / "short.scenario.yaml"
     file.write_text(PATROL.read_text(encoding="utf-8").replace("time_limit: 60 s", f"time_limit: {seconds} s"))
     return file
@@ -157,18 +157,21 @@ def _child_cpu_ms(*arguments: str) -> float:
 
 
 BASELINE_DURATION_S = 60.0
+"""Simulated time of the PyBullet baseline."""
 
 
 @dataclass(frozen=True)
-class Suite:
-    """A session with several runs. The names of the fields are keys of the JSON output.
+class SuiteResult:
+    """Time and memory of a session with one run for each scenario. The names of the fields are keys of the JSON output.
 
+    runs:       number of runs
+    unfinished: tests whose run ended with an error
+    workers:    number of parallel processes
     simulated:  simulated time of all runs in s
     wall:       wall time of the session in s
     cpu:        CPU time of all runs in s
     memory:     maximum memory of each run's process in MB
-    bare:       CPU time in s of the PyBullet baseline per simulated second of the patrol, measured before and after
-    unfinished: runs that ended with an error
+    bare:       CPU time of the PyBullet baseline per simulated second, mean of one measurement before and one after
     """
 
     runs: int
@@ -182,7 +185,7 @@ class Suite:
 
     @property
     def figures(self) -> Measurements:
-        """The figures that are printed and compared."""
+        """Figures that are printed and compared, by name."""
         baseline_s = self.bare * self.simulated
         return {
             "suite: runs a minute": Measurement(60 * self.runs / self.wall, "", more_is_better=True),
@@ -195,7 +198,7 @@ class Suite:
 
 
 def evenly_spaced(scenarios: Sequence[LoadedScenario], max_count: int) -> list[LoadedScenario]:
-    """Return at most `max_count` scenarios, evenly spaced."""
+    """Return `max_count` scenarios that are evenly spaced in the sequence, or all if there are fewer."""
     if len(scenarios) <= max_count:
         return list(scenarios)
     return [scenarios[number * len(scenarios) // max_count] for number in range(max_count)]
@@ -207,8 +210,8 @@ def measure_suite(
     out: Path,
     entry: Sequence[str],
     report_progress: ProgressCallback = no_progress,
-) -> Suite:
-    """Run each scenario once with a log. `entry` are the Python arguments that start the fork server."""
+) -> SuiteResult:
+    """Measure a session that runs each scenario once. `entry` are the Python arguments that start the fork server."""
     patrol = prepare(load_scenario(PATROL, PATROL.parent))
     baselines = [time_baseline_patrol(patrol, BASELINE_DURATION_S)]
     start = time.perf_counter()
@@ -223,7 +226,7 @@ def measure_suite(
                 report_progress(f"{len(finished_runs)} of {len(jobs)} runs")
     wall = time.perf_counter() - start
     baselines.append(time_baseline_patrol(patrol, BASELINE_DURATION_S))
-    return Suite(
+    return SuiteResult(
         runs=len(jobs),
         unfinished=tuple(finished.key.test for finished in finished_runs if finished.result.error is not None),
         workers=workers,
@@ -237,9 +240,9 @@ def measure_suite(
 
 @dataclass(frozen=True)
 class ExternalStackCost:
-    """Wall time in µs that the engine waits for the stack in each cycle.
+    """Mean wall time in µs that a run waits for the stack in each beat, over `cycles` beats.
 
-    `in_process_us` is with the stack in the process of the engine, `external_us` with the stack as an external process.
+    `in_process_us` is measured with the stack in the process of the run, `external_us` with it in another process.
     """
 
     cycles: int
@@ -248,12 +251,12 @@ class ExternalStackCost:
 
     @property
     def ratio(self) -> float:
-        """Ratio of both times."""
+        """Waiting time for the external stack divided by that for the stack in the process."""
         return self.external_us / self.in_process_us
 
 
 def measure_external(rounds: int) -> ExternalStackCost:
-    """Measure several patrols without a log, with the stack in this process and as an external process."""
+    """Run PATROL `rounds` times with the stack in this process, and `rounds` times with it in another process."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     in_process = [_wait_per_cycle(prepared) for _ in range(rounds)]
     external = [_wait_per_cycle(with_external_reference(prepared)) for _ in range(rounds)]
@@ -263,8 +266,8 @@ def measure_external(rounds: int) -> ExternalStackCost:
 
 
 def _wait_per_cycle(prepared: PreparedScenario) -> tuple[int, float]:
-    """Return the number of cycles of a run, and the mean wall time in µs that the engine waits for the stack."""
-    watch, counter = Stopwatch(), _CycleCounter()
+    """Return the number of beats of a run, and the mean wall time in µs that it waits for the stack in each beat."""
+    watch, counter = Stopwatch(), _BeatCounter()
 
     def attach(setup: RunSetup, _: Sequence[MomentSink]) -> Sequence[MomentSink]:
         watch.watch("stack", setup.robots[0].stack, "decide")
@@ -274,12 +277,12 @@ def _wait_per_cycle(prepared: PreparedScenario) -> tuple[int, float]:
     return counter.count, 1e6 * watch.seconds["stack"] / counter.count
 
 
-class _CycleCounter:
-    """Listener that counts the cycles of a run."""
+class _BeatCounter:
+    """Listener that counts the beats of a run."""
 
     def __init__(self) -> None:
         self.count = 0
 
     def append(self, moment: Moment) -> None:
-        """Count a cycle."""
+        """Count the beat at which the moment was recorded."""
         self.count += 1

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.bench.navigation import barn, experiments, office_maps, random_goals
+from simscen.bench.navigation import barn, experiments, generated_worlds, random_goals
 from simscen.bench.navigation.experiments import Experiment
-from simscen.bench.navigation.office_maps import write_building
+from simscen.bench.navigation.generated_worlds import write_office_map
 
 if TYPE_CHECKING:
     from simscen.core.environment.world_model import BuiltWorld
@@ -97,9 +97,9 @@ def _parts(name: str, scenarios: Path) -> list[str]:
         case "BARN":
             return [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)]
         case "narrow fields":
-            return [experiments.narrow_name(margin) for margin in experiments.NARROW_MARGINS_M]
+            return [experiments.narrow_fields_name(margin) for margin in experiments.NARROW_MARGINS_M]
         case "dynamic fields":
-            return [experiments.dynamic_name(speed) for speed in barn.SPEEDS_M_S]
+            return [experiments.dynamic_fields_name(speed) for speed in barn.SPEEDS_M_S]
         case "random goals":
             return ["random goals, ROS maps"]
         case "degraded sensing":
@@ -124,26 +124,33 @@ def _groups_without_parts(
         ExperimentGroup(
             "generated fields",
             generated,
-            lambda: [experiments.generated_fields(generated, sizes.numbers(sizes.fields))],
+            lambda: [experiments.write_generated_fields(generated, sizes.numbers(sizes.fields))],
         ),
         ExperimentGroup(
-            "narrow fields", generated, lambda: experiments.narrow_fields(generated, sizes.numbers(sizes.fields // 2))
+            "narrow fields",
+            generated,
+            lambda: experiments.write_narrow_fields(generated, sizes.numbers(sizes.fields // 2)),
         ),
         ExperimentGroup(
-            "dynamic fields", generated, lambda: experiments.dynamic_fields(generated, sizes.numbers(sizes.dynamic))
+            "dynamic fields",
+            generated,
+            lambda: experiments.write_dynamic_fields(generated, sizes.numbers(sizes.dynamic)),
         ),
         ExperimentGroup("random goals", worlds, lambda: list(_random_goals(generated, worlds, sizes))),
         ExperimentGroup("degraded sensing", worlds, lambda: _degraded(generated, worlds, sizes)),
         ExperimentGroup(
-            "ramps", generated, lambda: [office_maps.ramps(generated / "ramps", sizes.numbers(sizes.goals))]
+            "ramps", generated, lambda: [generated_worlds.write_ramps(generated / "ramps", sizes.numbers(sizes.goals))]
         ),
         ExperimentGroup(
             "two robots",
             generated,
-            lambda: [office_maps.two_robots(generated / "corridors", sizes.numbers(sizes.goals))],
+            lambda: [generated_worlds.write_two_robots(generated / "corridors", sizes.numbers(sizes.goals))],
         ),
         ExperimentGroup(
-            "tb3_sandbox", nav2, lambda: experiments.sandbox(generated, nav2 or Path(), sizes.seeds_or(20)), NAV2_SOURCE
+            "tb3_sandbox",
+            nav2,
+            lambda: experiments.write_sandbox(generated, nav2 or Path(), sizes.seeds_or(20)),
+            NAV2_SOURCE,
         ),
         ExperimentGroup(
             "corner cases", scenarios, lambda: experiments.corner_cases(scenarios, scenarios.parent, sizes.seeds_or(20))
@@ -151,7 +158,7 @@ def _groups_without_parts(
         ExperimentGroup(
             "localization",
             worlds,
-            lambda: experiments.localization_experiments(
+            lambda: experiments.write_localization_experiments(
                 generated, worlds, sizes.seeds_or(20), sizes.numbers(sizes.lost)
             ),
         ),
@@ -161,19 +168,19 @@ def _groups_without_parts(
 def _barn(generated: Path, barn_data: Path, sizes: Sizes) -> Iterator[Experiment]:
     """Yield the BARN challenge at 2 m/s, with default parameters, and with each controller at 0.5 m/s."""
     seeds = sizes.seeds_or(5)
-    yield experiments.barn_challenge(generated, barn_data, seeds)
-    yield experiments.barn_challenge(generated, barn_data, seeds, "default parameters", barn.DEFAULT_STACK)
+    yield experiments.write_barn_challenge(generated, barn_data, seeds)
+    yield experiments.write_barn_challenge(generated, barn_data, seeds, "default parameters", barn.DEFAULT_STACK)
     for controller, stack in barn.CONTROLLERS.items():
-        yield experiments.barn_challenge(generated, barn_data, seeds, controller, stack)
+        yield experiments.write_barn_challenge(generated, barn_data, seeds, controller, stack)
 
 
 def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:
     folder, maps = generated / "random_goals", generated / "buildings"
-    yield random_goals.random_goals(
+    yield random_goals.write_random_goals(
         "random goals", folder, _shipped_worlds(folder, worlds), sizes.numbers(sizes.goals), (worlds.absolute(),)
     )
     buildings = _generated_buildings(maps, sizes.numbers(sizes.goals))
-    yield random_goals.random_goals("random goals, ROS maps", maps, buildings, range(1, 4))
+    yield random_goals.write_random_goals("random goals, ROS maps", maps, buildings, range(1, 4))
 
 
 def _degraded(generated: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
@@ -183,7 +190,7 @@ def _degraded(generated: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
     buildings = _generated_buildings(maps, sizes.numbers(max(0, count - len(SHIPPED_WORLDS))))
     built = {**_shipped_worlds(folder, worlds), **buildings}
     selected = {name: built[name] for name in list(built)[:count]}
-    return random_goals.degraded(folder, selected, sizes.first, (worlds.absolute(), maps.absolute()))
+    return random_goals.write_degraded_sensing(folder, selected, sizes.first, (worlds.absolute(), maps.absolute()))
 
 
 def _shipped_worlds(folder: Path, worlds: Path) -> Mapping[str, BuiltWorld]:
@@ -191,7 +198,7 @@ def _shipped_worlds(folder: Path, worlds: Path) -> Mapping[str, BuiltWorld]:
 
 
 def _generated_buildings(folder: Path, numbers: Sequence[int]) -> Mapping[str, BuiltWorld]:
-    return _build_worlds(folder, folder, [write_building(number, folder).name for number in numbers])
+    return _build_worlds(folder, folder, [write_office_map(number, folder).name for number in numbers])
 
 
 def _build_worlds(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:

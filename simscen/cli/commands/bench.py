@@ -18,9 +18,9 @@ from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit
 
 if TYPE_CHECKING:
-    from simscen.bench.speed.run_speed import Field, Patrol
-    from simscen.bench.speed.scaling import Cost
-    from simscen.bench.speed.session_speed import ExternalStackCost, Overhead, Suite
+    from simscen.bench.speed.run_speed import ObstacleFieldTimes, PatrolTimes
+    from simscen.bench.speed.scaling import WorldCost
+    from simscen.bench.speed.session_speed import ExternalStackCost, Overhead, SuiteResult
 
 
 def growth_command(
@@ -74,7 +74,7 @@ def worlds_command(
     print_text(json.dumps([asdict(cost) for cost in costs], indent=2) if as_json else worlds_text(costs))
 
 
-def worlds_text(costs: "Sequence[Cost]") -> str:
+def worlds_text(costs: "Sequence[WorldCost]") -> str:
     """Return one line per world; ratios are relative to the first one."""
     width = max(len(cost.name) for cost in costs)
     lines = [f"{'':{width}}  triangles  movable  CPU a second   ratio  preparing   memory"]
@@ -125,7 +125,7 @@ def suite_command(
         sys.exit(Exit.INCOMPLETE)
 
 
-def suite_text(suite: "Suite") -> str:
+def suite_text(suite: "SuiteResult") -> str:
     """Return the lines about the wall time, the CPU time, and the memory of the runs of a suite."""
     figures, baseline = suite.figures, suite.bare * suite.simulated
     duration = f"{suite.simulated:.0f} s simulated in {suite.wall:.1f} s of wall time, {suite.workers} at a time"
@@ -187,7 +187,7 @@ def command(
         patrol = run_speed.measure_patrol(rounds, print_progress)
         overhead = measure_overhead(rounds, FORK_SERVER, print_progress)
         print_progress("fields of obstacles")
-        fields = [run_speed.measure_field(count) for count in (209, 2090)]
+        fields = [run_speed.measure_obstacle_field(count) for count in (209, 2090)]
         print_progress("the stack as an external process")
         external = measure_external(max(1, rounds // 2))
     figures = {**_patrol_figures(patrol), **overhead.figures, **_other_figures(fields, external)}
@@ -197,7 +197,7 @@ def command(
 
 
 def _sections(
-    patrol: "Patrol", overhead: "Overhead", fields: "list[Field]", external: "ExternalStackCost"
+    patrol: "PatrolTimes", overhead: "Overhead", fields: "list[ObstacleFieldTimes]", external: "ExternalStackCost"
 ) -> dict[str, Any]:
     return {
         "patrol": {**asdict(patrol), "real_time_factor": patrol.factor, "ratio_to_bare": patrol.ratio},
@@ -207,7 +207,7 @@ def _sections(
     }
 
 
-def _patrol_figures(patrol: "Patrol") -> Measurements:
+def _patrol_figures(patrol: "PatrolTimes") -> Measurements:
     scale, unit = 1e3 / patrol.simulated, "ms per simulated second"
     return {
         "patrol, times PyBullet alone": Measurement.of(patrol.ratios, ""),
@@ -220,7 +220,7 @@ def _patrol_figures(patrol: "Patrol") -> Measurements:
     }
 
 
-def _other_figures(fields: "list[Field]", external: "ExternalStackCost") -> Measurements:
+def _other_figures(fields: "list[ObstacleFieldTimes]", external: "ExternalStackCost") -> Measurements:
     figures = dict[str, Measurement]()
     for field in fields:
         figures[f"scan among {field.obstacles} obstacles"] = Measurement(field.scan_ms, "ms")
@@ -228,7 +228,7 @@ def _other_figures(fields: "list[Field]", external: "ExternalStackCost") -> Meas
     return {**figures, "cycle with the stack as a process": Measurement(external.external_us, "µs")}
 
 
-def _patrol_lines(patrol: "Patrol", rounds: int) -> list[str]:
+def _patrol_lines(patrol: "PatrolTimes", rounds: int) -> list[str]:
     width = max(map(len, patrol.parts))
     shares = sorted(patrol.parts.items(), key=lambda part: -part[1])
     ratio = f"{patrol.ratio:.2f} times the time of PyBullet alone for the same steps and scans"
@@ -251,7 +251,7 @@ def _overhead_lines(overhead: "Overhead") -> list[str]:
     return ["overhead of a run (CPU time unless noted otherwise)", *lines]
 
 
-def _field_lines(fields: "list[Field]") -> list[str]:
+def _field_lines(fields: "list[ObstacleFieldTimes]") -> list[str]:
     return [
         "a scan of 720 beams and a physics step among cylinders",
         "    obstacles      scan   PyBullet alone      step   PyBullet alone",

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.bench.navigation.barn import barn_worlds, scenario
+from simscen.bench.navigation.barn import read_barn_worlds, scenario_text
 from simscen.core.errors import UsageError
 from simscen.loading.scenario import load_scenario
 
@@ -12,7 +12,7 @@ DATA = Path(__file__).parents[4] / "shared" / "data" / "barn_sample"
 def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:
     (tmp_path / "empty.world.yaml").write_text("simscen: 1\n")
     file = tmp_path / "barn.scenario.yaml"
-    file.write_text(scenario("a world", "empty.world.yaml"))
+    file.write_text(scenario_text("a world", "empty.world.yaml"))
     loaded = load_scenario(file, tmp_path)
     assert loaded.map == "none"
     assert loaded.spec.time_limit == 100.0
@@ -31,19 +31,19 @@ def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:
 def test_an_unusable_list_of_worlds_is_named(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "scenarios.csv").write_text(text)
     with pytest.raises(UsageError) as raised:
-        barn_worlds(tmp_path)
+        read_barn_worlds(tmp_path)
     assert f"{tmp_path / 'scenarios.csv'}" in str(raised.value)
     assert said in str(raised.value)
 
 
 def test_a_folder_without_a_list_of_worlds_is_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"cannot read the list of BARN's worlds: .*scenarios\.csv"):
-        barn_worlds(tmp_path)
+        read_barn_worlds(tmp_path)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
 def test_the_worlds_of_the_dataset_are_there_with_their_reference_lengths() -> None:
-    worlds = {world.file.stem: world for world in barn_worlds(DATA)}
+    worlds = {world.file.stem: world for world in read_barn_worlds(DATA)}
     assert len(worlds) == 6
     assert worlds["world_1"].reference_length == 12.431
     assert all(world.file.is_file() for world in worlds.values())

@@ -3,18 +3,18 @@ import pytest
 from shapely import MultiPoint, Point, box
 
 from simscen.bench.navigation import barn
-from simscen.bench.navigation.barn import CELL_SIZE_M, CROSSING_RADIUS_M, GOAL, START, obstacle_field
+from simscen.bench.navigation.barn import CELL_SIZE_M, CROSSING_RADIUS_M, GOAL, START, generate_obstacle_field
 
 
 def test_the_same_number_gives_the_same_field_and_another_one_another() -> None:
-    first, again, other = obstacle_field(3), obstacle_field(3), obstacle_field(4)
+    first, again, other = generate_obstacle_field(3), generate_obstacle_field(3), generate_obstacle_field(4)
     assert np.array_equal(first.centers, again.centers)
     assert not np.array_equal(first.centers, other.centers)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_disc_can_pass_according_to_an_independent_library(number: int) -> None:
-    field = obstacle_field(number)
+    field = generate_obstacle_field(number)
     lane = box(-30 * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
     # 2 mm less than the disc: shapely's circles are polygons, and a lattice finds ways to its resolution only.
     free = lane.difference(MultiPoint(field.centers).buffer(CELL_SIZE_M / 2 + CROSSING_RADIUS_M - 0.002))
@@ -23,12 +23,12 @@ def test_disc_can_pass_according_to_an_independent_library(number: int) -> None:
 
 
 def test_the_shortest_way_is_no_shorter_than_the_straight_one() -> None:
-    assert 10.0 <= obstacle_field(1).shortest < 20.0
+    assert 10.0 <= generate_obstacle_field(1).shortest < 20.0
 
 
 @pytest.mark.slow
 def test_fields_are_as_dense_as_the_worlds_of_barn() -> None:
-    densities = [obstacle_field(number).density for number in range(1, 9)]
+    densities = [generate_obstacle_field(number).density for number in range(1, 9)]
     assert 0.05 < np.mean(densities) < 0.22
 
 
@@ -40,7 +40,7 @@ def test_cellular_automaton_removes_isolated_cells_and_fills_crowded_ones() -> N
 
 def test_narrow_field_width_matches_an_independent_library() -> None:
     crossing_radius, blocked_radius = 0.31, 0.36
-    field = obstacle_field(2, crossing_radius, blocked_radius)
+    field = generate_obstacle_field(2, crossing_radius, blocked_radius)
     lane = box(-30 * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
 
     def crossable(radius: float) -> bool:
@@ -53,4 +53,4 @@ def test_narrow_field_width_matches_an_independent_library() -> None:
 
 
 def test_a_field_of_another_width_leaves_the_usual_ones_as_they_are() -> None:
-    assert obstacle_field(3).shortest == obstacle_field(3, CROSSING_RADIUS_M).shortest
+    assert generate_obstacle_field(3).shortest == generate_obstacle_field(3, CROSSING_RADIUS_M).shortest

@@ -9,10 +9,10 @@ from simscen.bench.navigation.barn import (
     MOVER_COUNT_RANGE,
     SPEEDS_M_S,
     DynamicField,
-    dynamic_field,
+    generate_dynamic_field,
 )
 
-FIELDS = [dynamic_field(number, speed) for speed in SPEEDS_M_S for number in range(1, 21)]
+FIELDS = [generate_dynamic_field(number, speed) for speed in SPEEDS_M_S for number in range(1, 21)]
 
 
 def of(speed: float) -> list[DynamicField]:
@@ -20,9 +20,9 @@ def of(speed: float) -> list[DynamicField]:
 
 
 def test_number_and_speed_determine_the_field() -> None:
-    for a, b in zip(dynamic_field(3, 1.23).movers, dynamic_field(3, 1.23).movers, strict=True):
+    for a, b in zip(generate_dynamic_field(3, 1.23).movers, generate_dynamic_field(3, 1.23).movers, strict=True):
         assert np.array_equal(a.points, b.points) and np.array_equal(a.times, b.times) and a.phase == b.phase
-    assert dynamic_field(3, 1.23).movers[0].phase != dynamic_field(4, 1.23).movers[0].phase
+    assert generate_dynamic_field(3, 1.23).movers[0].phase != generate_dynamic_field(4, 1.23).movers[0].phase
 
 
 def test_there_are_5_to_24_cylinders_and_both_ends_occur() -> None:

@@ -7,10 +7,10 @@ import pytest
 from simscen.bench.navigation.experiments import (
     Experiment,
     corner_cases,
-    dynamic_fields,
-    generated_fields,
-    localization_experiments,
-    sandbox,
+    write_dynamic_fields,
+    write_generated_fields,
+    write_localization_experiments,
+    write_sandbox,
 )
 from simscen.cli.benchmarks.navigation import with_stack
 from simscen.loading.scenario import load_scenario
@@ -25,13 +25,13 @@ def loads(experiment: Experiment) -> None:
 
 
 def test_generated_fields_load_and_carry_their_reference_length(tmp_path: Path) -> None:
-    fields = generated_fields(tmp_path, (1,))
+    fields = write_generated_fields(tmp_path, (1,))
     loads(fields)
     assert (fields.drives[0].reference_length or 0.0) >= 10.0
 
 
 def test_dynamic_fields_load_at_three_speeds(tmp_path: Path) -> None:
-    experiments = dynamic_fields(tmp_path, (1,))
+    experiments = write_dynamic_fields(tmp_path, (1,))
     assert [each.name for each in experiments] == [
         "dynamic fields, 0.74 m/s",
         "dynamic fields, 1.23 m/s",
@@ -42,7 +42,7 @@ def test_dynamic_fields_load_at_three_speeds(tmp_path: Path) -> None:
 
 
 def test_localization_drives_have_different_wrong_estimates(tmp_path: Path) -> None:
-    experiments = localization_experiments(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
+    experiments = write_localization_experiments(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
     for experiment in experiments:
         loads(experiment)
     _, misled, unknown, _ = experiments
@@ -59,7 +59,7 @@ def test_every_corner_case_that_ships_is_an_experiment() -> None:
 
 @pytest.mark.skipif(not SANDBOX.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
 def test_the_sandbox_loads_with_and_without_the_box(tmp_path: Path) -> None:
-    for experiment in sandbox(tmp_path, SANDBOX, [1]):
+    for experiment in write_sandbox(tmp_path, SANDBOX, [1]):
         loads(experiment)
 
 
@@ -75,10 +75,10 @@ def test_every_experiment_accepts_a_nav2_parameter_file(tmp_path: Path) -> None:
     (tmp_path / "nav2.yaml").write_text(NAV2)
     (tmp_path / "ours.stack.yaml").write_text("simscen: 1\nstack: {nav2_params: nav2.yaml}\n")
     experiments = [
-        generated_fields(tmp_path / "made", (1,)),
-        *dynamic_fields(tmp_path / "made", (1,))[:1],
+        write_generated_fields(tmp_path / "made", (1,)),
+        *write_dynamic_fields(tmp_path / "made", (1,))[:1],
         *corner_cases(PROJECT / "scenarios", PROJECT, range(1, 2)),
-        *localization_experiments(tmp_path / "made", PROJECT / "worlds", range(1, 2), range(1, 2)),
+        *write_localization_experiments(tmp_path / "made", PROJECT / "worlds", range(1, 2), range(1, 2)),
     ]
     for other in with_stack(tmp_path / "ours.stack.yaml", experiments, tmp_path / "made", PROJECT):
         for drive in other.drives:

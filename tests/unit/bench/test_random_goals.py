@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from simscen.bench.navigation import office_maps
+from simscen.bench.navigation import generated_worlds
 from simscen.bench.navigation.experiments import with_stack_parameters
-from simscen.bench.navigation.office_maps import FREE, building, write_building
+from simscen.bench.navigation.generated_worlds import FREE, generate_office_map, write_office_map
 from simscen.bench.navigation.random_goals import (
     FAULTS,
     MOVABLE_MARGIN_M,
     WALL_MARGIN_M,
-    degraded,
     random_drives,
-    random_goals,
+    write_degraded_sensing,
+    write_random_goals,
 )
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Pose3
@@ -57,23 +57,23 @@ def test_a_drive_is_that_of_its_number_whichever_others_are_drawn() -> None:
 
 def test_a_building_is_a_map_with_one_large_free_part_that_loads(tmp_path: Path) -> None:
     for number in range(1, 7):
-        mapped, resolution = building(number)
+        mapped, resolution = generate_office_map(number)
         parts, _ = ndimage.label(mapped == FREE)
         largest = np.bincount(parts.ravel())[1:].max()
         assert largest * resolution**2 > 100.0
         assert largest > 0.6 * np.count_nonzero(mapped == FREE)
-    file = write_building(1, tmp_path)
+    file = write_office_map(1, tmp_path)
     world = world_from_file(load_world_file(file, tmp_path), tmp_path)
     assert world.grid is not None
-    assert world.grid.resolution == building(1)[1]
-    assert np.array_equal(world.grid.cells == 0, np.flipud(building(1)[0] == FREE)[::-1])
+    assert world.grid.resolution == generate_office_map(1)[1]
+    assert np.array_equal(world.grid.cells == 0, np.flipud(generate_office_map(1)[0] == FREE)[::-1])
 
 
 def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
-    file = write_building(3, tmp_path)
+    file = write_office_map(3, tmp_path)
     built = {file.name: build_world_and_map(world_from_file(load_world_file(file, tmp_path), tmp_path), 0.2)}
-    plain = random_goals("random goals", tmp_path, built, (1, 2))
-    weak, medium, strong = degraded(tmp_path / "degraded", built, 1, (tmp_path,))
+    plain = write_random_goals("random goals", tmp_path, built, (1, 2))
+    weak, medium, strong = write_degraded_sensing(tmp_path / "degraded", built, 1, (tmp_path,))
     assert len(plain.drives) == 2
     for drive in plain.drives:
         load_scenario(drive.file, plain.root, plain.world_path)
@@ -86,13 +86,16 @@ def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
 
 
 def test_corridors_and_ramps_load_and_are_not_all_alike(tmp_path: Path) -> None:
-    for made in (office_maps.two_robots(tmp_path / "c", (1, 2, 3)), office_maps.ramps(tmp_path / "r", (1, 2, 3))):
+    for made in (
+        generated_worlds.write_two_robots(tmp_path / "c", (1, 2, 3)),
+        generated_worlds.write_ramps(tmp_path / "r", (1, 2, 3)),
+    ):
         names = {load_scenario(drive.file, made.root).spec.name for drive in made.drives}
         assert len(names) == 3
 
 
 def test_no_ramp_is_a_wall_on_the_map_that_the_robots_lidar_would_make(tmp_path: Path) -> None:
-    for drive in office_maps.ramps(tmp_path, range(1, 21)).drives:
+    for drive in generated_worlds.write_ramps(tmp_path, range(1, 21)).drives:
         loaded = load_scenario(drive.file, tmp_path)
         (lidar,) = (sensor.lidar for sensor in loaded.robot.spec.sensors.values() if sensor.lidar)
         (platform,) = loaded.world.spec.obstacles
@@ -103,7 +106,7 @@ OTHER = {"controller": {"desired_linear_vel": 0.3}, "localizer": {"type": "odome
 
 
 def test_a_variant_has_the_same_drives_with_other_parameters(tmp_path: Path) -> None:
-    made = office_maps.ramps(tmp_path / "r", (1, 2))
+    made = generated_worlds.write_ramps(tmp_path / "r", (1, 2))
     other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
     for before, after in zip(made.drives, other.drives, strict=True):
         one = load_scenario(before.file, made.root).spec
@@ -113,7 +116,7 @@ def test_a_variant_has_the_same_drives_with_other_parameters(tmp_path: Path) -> 
 
 
 def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(tmp_path: Path) -> None:
-    made = replace(office_maps.ramps(tmp_path / "r", (1,)), mapless=True)
+    made = replace(generated_worlds.write_ramps(tmp_path / "r", (1,)), mapless=True)
     other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
     spec = load_scenario(other.drives[0].file, other.root, other.world_path).spec
     assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "amcl")

@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 from simscen.bench.speed.measurement import Stopwatch
-from simscen.bench.speed.run_speed import PATROL, timed_run
+from simscen.bench.speed.run_speed import PATROL, time_run
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
 
@@ -17,7 +17,7 @@ def test_every_part_of_the_patrol_takes_time(tmp_path: Path) -> None:
     shutil.copytree(PATROL.parent, shorter.parent)
     shorter.write_text(text.replace("time_limit: 60 s", "time_limit: 15 s"), encoding="utf-8")
     watch = Stopwatch()
-    simulated, _, wall = timed_run(prepare(load_scenario(shorter, shorter.parent)), watch)
+    simulated, _, wall = time_run(prepare(load_scenario(shorter, shorter.parent)), watch)
     assert simulated == 15.0
     assert {"physics", "truth and contacts", "sensors", "localizer", "planner", "controller", "trace", "log"} <= set(
         watch.seconds

@@ -56,8 +56,8 @@ def test_cache_is_shown_and_a_foreign_cache_fails(tmp_path: Path, monkeypatch) -
 
 
 def test_speed_check_compares_a_patrol_with_pybullet(monkeypatch) -> None:
-    def patrol(cpu: float, bare: float) -> run_speed.Patrol:
-        return run_speed.Patrol(60.0, cpu, {"physics": 1.0}, bare, (cpu,), (bare,), {"physics": (1.0,)})
+    def patrol(cpu: float, bare: float) -> run_speed.PatrolTimes:
+        return run_speed.PatrolTimes(60.0, cpu, {"physics": 1.0}, bare, (cpu,), (bare,), {"physics": (1.0,)})
 
     monkeypatch.setattr(run_speed, "measure_patrol", lambda _: patrol(2.0, 0.5))
     assert doctor.check_speed() == "30 times real time on one core, 4.0 times the cost of PyBullet alone"

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from simscen.bench.navigation import office_maps
+from simscen.bench.navigation import generated_worlds
 from simscen.bench.navigation.experiments import Experiment
 from simscen.cli.benchmarks.navigation import with_stack
 from simscen.cli.benchmarks.navigation_runs import _plan_jobs
 
 
 def hall(folder: Path) -> Experiment:
-    return office_maps.ramps(folder, (1, 2))
+    return generated_worlds.write_ramps(folder, (1, 2))
 
 
 def test_runs_with_another_stack_have_different_keys(tmp_path: Path) -> None:

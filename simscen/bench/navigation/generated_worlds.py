@@ -1,6 +1,6 @@
-"""Generated worlds of the benchmark: office maps, corridors in which two robots meet, and halls with ramps.
+"""Generate worlds for the navigation benchmark: office maps, corridors in which two robots meet, and halls with ramps.
 
-Office maps are ROS maps like those of SLAM: cells of 5 to 25 cm, thin walls, unknown cells.
+Office maps are ROS maps like those of SLAM, with cells of 5 to 25 cm, thin walls, and unknown cells.
 """
 
 from collections.abc import Callable, Iterable
@@ -10,44 +10,46 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from simscen.bench.navigation.experiments import Drive, Experiment, write_scenario
+from simscen.bench.navigation.experiments import Drive, Experiment, write_text
 from simscen.core.random_streams import Streams
 
 FINE_CELL_M = 0.05
-"""Cell size in which a floor is drawn, before it is reduced to the resolution of its map."""
+"""Cell size with which a floor is drawn, before it is reduced to the resolution of its map."""
 RESOLUTIONS_M = (0.05, 0.05, 0.10, 0.15, 0.20, 0.25)
+"""Resolutions of maps, which consecutive floor numbers use in turn."""
 FLOOR_WIDTHS_M, FLOOR_DEPTHS_M = (20.0, 45.0), (12.0, 28.0)
 """Ranges of width and depth of a floor in m."""
 CORRIDOR_WIDTHS_M, DOOR_WIDTHS_M = (1.7, 2.6), (0.9, 1.3)
 FREE, WALL, UNKNOWN = 254, 0, 205
-"""Pixel values of map_server."""
+"""Pixel values of a ROS map image."""
 Image = npt.NDArray[np.uint8]
+"""Pixels (rows, columns); row 0 has the lowest y."""
 
 
 @dataclass
 class _Floor:
-    """Image of a floor; row 0 has the lowest y."""
+    """Image of a floor with cells of FINE_CELL_M, on which walls are drawn with `wall_thickness` (m) by default."""
 
     image: Image
     wall_thickness: float
 
-    def wall(self, x0: float, y0: float, x1: float, y1: float, thickness: float | None = None) -> None:
-        """Draw a wall between two points with the same x or y, and a box between other points."""
+    def draw_wall(self, x0: float, y0: float, x1: float, y1: float, thickness: float | None = None) -> None:
+        """Draw a wall between two points with the same x or y; between other points, draw a box. Units are m."""
         half = (self.wall_thickness if thickness is None else thickness) / 2
         rows = slice(max(0, int((min(y0, y1) - half) / FINE_CELL_M)), int((max(y0, y1) + half) / FINE_CELL_M) + 1)
         columns = slice(max(0, int((min(x0, x1) - half) / FINE_CELL_M)), int((max(x0, x1) + half) / FINE_CELL_M) + 1)
         self.image[rows, columns] = WALL
 
 
-def building(number: int) -> tuple[Image, float]:
-    """Generate the map of the floor with this number (from 1). Return the image and its resolution in m."""
+def generate_office_map(number: int) -> tuple[Image, float]:
+    """Generate the map of the office floor with this number (from 1). Return the image and its resolution in m."""
     rng = Streams(number).generator("building")
     resolution = RESOLUTIONS_M[number % len(RESOLUTIONS_M)]
     width, depth = float(rng.uniform(*FLOOR_WIDTHS_M)), float(rng.uniform(*FLOOR_DEPTHS_M))
     image = np.full((int(depth / FINE_CELL_M), int(width / FINE_CELL_M)), FREE, np.uint8)
     floor = _Floor(image, float(rng.choice([0.05, 0.1, 0.2])))
     for wall in ((0, 0, width, 0), (0, depth, width, depth), (0, 0, 0, depth), (width, 0, width, depth)):
-        floor.wall(*wall)
+        floor.draw_wall(*wall)
     corridor_width = float(rng.uniform(*CORRIDOR_WIDTHS_M))
     for y in np.arange(rng.uniform(4, 6), depth - 4, rng.uniform(9, 13)).tolist():
         for side in (-1, 1):
@@ -58,25 +60,25 @@ def building(number: int) -> tuple[Image, float]:
 
 
 def _draw_rooms(floor: _Floor, rng: np.random.Generator, y: float, side: int) -> None:
-    """Draw rooms with doors and furniture along a corridor."""
+    """Draw rooms with doors and furniture along a corridor wall at `y`, above it (`side` 1) or below it (-1)."""
     depth, width = (size * FINE_CELL_M for size in floor.image.shape)
     x = 0.0
     while x < width:
         room, door = float(rng.uniform(3, 7)), float(rng.uniform(*DOOR_WIDTHS_M))
         door_start = float(rng.uniform(0.3, room - door - 0.3))
-        floor.wall(x, y, min(width, x + door_start), y)
-        floor.wall(min(width, x + door_start + door), y, min(width, x + room), y)
+        floor.draw_wall(x, y, min(width, x + door_start), y)
+        floor.draw_wall(min(width, x + door_start + door), y, min(width, x + room), y)
         far = min(max(y + side * float(rng.uniform(3.0, 3.8)), 0.0), depth)
-        floor.wall(min(width, x + room), y, min(width, x + room), far)
+        floor.draw_wall(min(width, x + room), y, min(width, x + room), far)
         for _ in range(int(rng.integers(0, 3))):
             left, low = x + float(rng.uniform(0.5, room - 0.5)), y + side * float(rng.uniform(1.2, 2.8))
             size = rng.uniform(0.2, 0.9, 2).tolist()
-            floor.wall(left, low, left + size[0], low + size[1], FINE_CELL_M)
+            floor.draw_wall(left, low, left + size[0], low + size[1], FINE_CELL_M)
         x += room
 
 
 def _draw_crossing_corridors(floor: _Floor, rng: np.random.Generator, corridor_width: float) -> None:
-    """Draw crossing corridors, whose walls have gaps with the width of doors."""
+    """Draw corridors along y that cut through the rooms, and walls with gaps on both sides."""
     depth, width = (size * FINE_CELL_M for size in floor.image.shape)
     for x in np.arange(rng.uniform(5, 9), width - 3, rng.uniform(12, 20)).tolist():
         floor.image[
@@ -88,7 +90,9 @@ def _draw_crossing_corridors(floor: _Floor, rng: np.random.Generator, corridor_w
             while y < depth - 1:
                 length = float(rng.uniform(2, 6))
                 if rng.random() < 0.6:
-                    floor.wall(x + side * corridor_width / 2, y, x + side * corridor_width / 2, min(depth, y + length))
+                    floor.draw_wall(
+                        x + side * corridor_width / 2, y, x + side * corridor_width / 2, min(depth, y + length)
+                    )
                 y += length + float(rng.uniform(0.9, 1.6))
 
 
@@ -103,39 +107,43 @@ def _reduce_to_map(image: Image, resolution: float, rng: np.random.Generator) ->
     return mapped
 
 
-def write_building(number: int, folder: Path) -> Path:
-    """Write the floor as `building_<number>.yaml` with its image, in the format of map_server."""
-    mapped, resolution = building(number)
+def write_office_map(number: int, folder: Path) -> Path:
+    """Write an office map as `building_<number>.yaml` and image, in the format of map_server; return the YAML file."""
+    mapped, resolution = generate_office_map(number)
     image = folder / f"building_{number}.pgm"
     folder.mkdir(parents=True, exist_ok=True)
     image.write_bytes(f"P5\n{mapped.shape[1]} {mapped.shape[0]}\n255\n".encode() + np.flipud(mapped).tobytes())
     text = f"image: {image.name}\nresolution: {resolution:g}\norigin: [0, 0, 0]\nnegate: 0\n"
-    return write_scenario(image.with_suffix(".yaml"), f"{text}occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+    return write_text(image.with_suffix(".yaml"), f"{text}occupied_thresh: 0.65\nfree_thresh: 0.196\n")
 
 
 MEETING_WIDTHS_M = (1.4, 2.4)
-"""Range of corridor widths. In the narrowest, two robots of 0.44 m pass each other with 17 cm on each side."""
+"""Range of the width of corridors. In the narrowest, two robots 0.44 m wide pass each other with gaps of 17 cm."""
 MEETING_LENGTH_M = 14.0
-SLOPES_DEG, HEIGHTS_M = (2.0, 8.0), (0.03, 0.16)
-"""Ranges of slope in degrees and height in m. A ramp at the height of the lidar would be a wall on the map."""
+"""Length of these corridors."""
+RAMP_SLOPES_DEG, RAMP_HEIGHTS_M = (2.0, 8.0), (0.03, 0.16)
+"""Ranges of slope and height of ramps. A ramp as high as the lidar would be a wall on the map."""
 HALL_WIDTH_M = 2.4
 """Width of the hall with the ramps."""
 
 
-def two_robots(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Return drives of two robots that swap the ends of a corridor. Each number gives one corridor."""
+def write_two_robots(folder: Path, numbers: Iterable[int]) -> Experiment:
+    """Write one corridor for each number, in which two robots drive from opposite ends to the other end."""
     return _numbered_experiment("two robots in a corridor", folder / "corridor", numbers, _meeting_scenario)
 
 
-def ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Return drives up a ramp, over a platform and down again, with random slopes, heights and starts."""
+def write_ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
+    """Write one hall for each number, in which a robot drives up a ramp, over a platform, and down another ramp.
+
+    Slopes, heights, and starts are random.
+    """
     return _numbered_experiment("ramps", folder / "ramp", numbers, _ramp_scenario)
 
 
 def _numbered_experiment(name: str, stem: Path, numbers: Iterable[int], text: Callable[[int], str]) -> Experiment:
-    """Return an experiment with one scenario for each number, which is also its seed."""
+    """Write one scenario for each number, which is also its seed, as `<stem>_<number>.scenario.yaml`."""
     drives = [
-        Drive(write_scenario(stem.with_name(f"{stem.name}_{number}.scenario.yaml"), text(number)), [number])
+        Drive(write_text(stem.with_name(f"{stem.name}_{number}.scenario.yaml"), text(number)), [number])
         for number in numbers
     ]
     return Experiment(name, tuple(drives), stem.parent)
@@ -169,7 +177,7 @@ pass:
 
 def _ramp_scenario(number: int) -> str:
     rng = Streams(number).generator("ramp")
-    slope, height = float(rng.uniform(*SLOPES_DEG)), float(rng.uniform(*HEIGHTS_M))
+    slope, height = float(rng.uniform(*RAMP_SLOPES_DEG)), float(rng.uniform(*RAMP_HEIGHTS_M))
     run, flat = height / float(np.tan(np.radians(slope))), float(rng.uniform(1.5, 3.0))
     top, below = (3.0 + run, 3.0 + run + flat), 3.0 + 2 * run + flat
     end, y = below + 3.0, float(rng.uniform(0.6, HALL_WIDTH_M - 0.6))
