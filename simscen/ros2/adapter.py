@@ -1,4 +1,4 @@
-"""Adapter that makes a ROS graph a stack: it publishes sensor data, sends goals, and returns commands."""
+"""Adapter that lets ROS nodes act as the stack of a run: publishes sensor data, sends goals, and returns commands."""
 
 import math
 import os
@@ -10,19 +10,19 @@ import rclpy
 
 from simscen.peer.goals import Goal, Goals
 from simscen.ros2.bring_up import BringUp
-from simscen.ros2.frames import STATIC_TRANSFORMS, FrameNames
-from simscen.ros2.goal_sender import ACTIONS, ActionSender, Failed, GoalSender, GoalSenders, StackState
-from simscen.ros2.graph import CLOCK, LATCHED, Graph, Received, Topic
+from simscen.ros2.frames import TF_STATIC, FrameNames
+from simscen.ros2.goal_sender import ACTIONS, ActionSender, GoalFailed, GoalSender, GoalSenders, StackState
+from simscen.ros2.graph import CLOCK, LATCHED, Graph, ReceivedMessage, Topic
 from simscen.ros2.launch import LaunchedCommand
-from simscen.ros2.lockstep import Lockstep, Message, Paced
 from simscen.ros2.messages import NANOSECONDS, find_type, read_twist, write_twist
-from simscen.ros2.nav2.actions import MotionActions, Recoveries
+from simscen.ros2.nav2.actions import MotionActions, RecoveryReporter
 from simscen.ros2.nav2.filter_info import FilterInfo
-from simscen.ros2.nav2.report import Line, Nav2Report
+from simscen.ros2.nav2.report import LogLine, Nav2Report
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError, Options, TopicNames
 from simscen.ros2.pose_estimate import PLAN, PoseEstimate
-from simscen.ros2.readiness import COMMAND, TWIST_STAMPED, Readiness
+from simscen.ros2.readiness import COMMAND, TWIST_STAMPED_TYPE, Readiness
+from simscen.ros2.synchronization import LockstepSynchronization, Message, PacedSynchronization
 from simscen.ros2.user_transforms import UserTransforms
 
 SUBSCRIPTIONS = {
@@ -33,15 +33,19 @@ SUBSCRIPTIONS = {
     "/global_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
     "/local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
 }
-"""Topics of the stack besides its commands."""
+"""Topics that are received from the nodes besides /cmd_vel, and their types."""
 THROUGH_POSES = "navigate_through_poses"
 STOP = (0.0,) * 6
-STEP_SHARE = 0.8
-"""Part of a step's wall time that waiting may take, so that the error arrives in time."""
+"""Linear and angular velocity of a zero command."""
+MAX_WAIT_FRACTION = 0.8
+"""Fraction of the wall time of a step after which waiting ends, so that the error reaches simscen in time."""
 
 
 class Adapter:
-    """One run: created with the topics of simscen, then called at every step. `mode` is the scenario's."""
+    """The stack of one run. Call `prepare` first, then `step` repeatedly, and `end` at the end.
+
+    `mode` is the action by which the scenario sends goals.
+    """
 
     def __init__(
         self,
@@ -54,13 +58,15 @@ class Adapter:
         filter_info: FilterInfo,
         restart_reason: str,
     ) -> None:
-        """Join the graph and publish the topics.
+        """Join the ROS graph and create publishers.
 
         Args:
+            topics: Topics of the robot that simscen can publish.
+            launched: The user's launch command; None if the user starts the nodes.
             period_s: Control period.
             answer_limit_s: Wall time for the answer to a step once the graph is ready.
-            filter_info: Description of the masks among `topics`.
-            restart_reason: Why the launched command was started a second time; empty the first time.
+            filter_info: Messages that describe the zone masks among `topics`.
+            restart_reason: Why the launch command was started a second time; empty the first time.
         """
         if not rclpy.ok():
             rclpy.init(args=[])
@@ -86,38 +92,38 @@ class Adapter:
         published = [topic for topic in offered if topic.name in self._graph.publishers]
         self._readiness = Readiness(self._graph, self._barrier, published, self._senders, options, self._frames.bases)
         self._actions = MotionActions(self._graph, self._barrier)
-        self._recoveries = Recoveries(self._graph, goals.report)
+        self._recoveries = RecoveryReporter(self._graph, goals.report)
         self._report = Nav2Report(self._graph, self._barrier) if options.nav2 else None
         self._bring_up = BringUp(self._graph, self._readiness, options, period_s, self._unavailable, self._report)
-        self._lockstep = Lockstep(
+        self._lockstep = LockstepSynchronization(
             self._graph, self._barrier, self._actions, options.rounds, options.wait, options.answer
         )
-        self._paced = Paced(self._graph, options.factor)
+        self._paced = PacedSynchronization(self._graph, options.factor)
 
     @property
     def needed_topics(self) -> Set[str]:
-        """Topics of the protocol that are published, and /tf_static to compare the user's transforms with it."""
+        """Topics that simscen must send: all that are published, and /tf_static if the user's nodes replace it."""
         return {*self._graph.publishers, *self._replaced_topics}
 
     @property
     def latest_start_s(self) -> float:
-        """Simulated time in s at which the graph is ready at the latest."""
+        """Simulated time in s by which the graph must be ready."""
         return self._bring_up.latest_start_s
 
     @property
     def _replaced_topics(self) -> Set[str]:
-        """Topics that the user's nodes publish instead of simscen, and that are compared with simscen's."""
-        return {STATIC_TRANSFORMS} & set(self._options.without)
+        """/tf_static if the user's nodes publish it instead of simscen. It is still compared with simscen's."""
+        return {TF_STATIC} & set(self._options.without)
 
     def _check_launched(self) -> None:
-        """Raise AdapterError when the launched command has ended."""
+        """Raise AdapterError if the launch command has ended."""
         if self._launched is not None and self._launched.ended is not None:
             raise AdapterError(f"the launched command {self._launched.ended}: {self._launched.command}")
 
-    def about(self) -> Dict[str, Any]:
+    def run_facts(self) -> Dict[str, Any]:
         """Return facts about this run for its log and stack.json."""
         synchronized: Any = self._lockstep if self._options.sync == "lockstep" else self._paced
-        about = {
+        facts = {
             "sync": self._options.sync,
             "rclpy": version("rclpy"),
             "distribution": os.environ.get("ROS_DISTRO", "unknown"),
@@ -126,9 +132,9 @@ class Adapter:
             **synchronized.counters,
         }
         if self._options.sync == "paced":
-            about["factor"] = self._options.factor
+            facts["factor"] = self._options.factor
         if self._barrier.not_in_step:
-            about["not_in_step"] = self._barrier.not_in_step
+            facts["not_in_step"] = self._barrier.not_in_step
         warnings = (
             [f"the launched command was started again, because {self.restart_reason}"] if self.restart_reason else []
         )
@@ -136,41 +142,41 @@ class Adapter:
             f"{node} does not answer, so lockstep does not wait for it" for node in sorted(self._barrier.left_out)
         ]
         if self.is_ready and (warnings or self._unused_masks):
-            about["warnings"] = [*warnings, *self._unused_masks]
+            facts["warnings"] = [*warnings, *self._unused_masks]
         if self._sender is not None:
-            about["goals"] = self._sender.name
+            facts["goals"] = self._sender.name
         if self._report is not None:
-            about["parameters"] = self._report.parameters
+            facts["parameters"] = self._report.parameters
         if self._unavailable:
-            about["not_published"] = [f"{topic.name} ({topic.type})" for topic in self._unavailable]
-        return about
+            facts["not_published"] = [f"{topic.name} ({topic.type})" for topic in self._unavailable]
+        return facts
 
     def prepare(self) -> None:
         """Wait before the first step until the graph is complete, or until it probably needs sensor data.
 
-        Transforms that replace simscen's are checked in the first step, which brings simscen's. Raises AdapterError
-        when the launched command ends, or when a node needs a topic that cannot be published.
+        If the user's nodes replace /tf_static, the wait continues in the first step, which contains simscen's
+        /tf_static. Raises AdapterError if the launch command ends, or a node needs a topic that cannot be published.
         """
         if self._bring_up.prepare() and not self._replaced_topics:
             self._begin()
 
     def preempt(self, now: int, goal: Goal) -> None:
-        """Send another goal first."""
+        """Cancel the current goal, and send `goal` before the remaining ones. `now` is the time of the run in ns."""
         self._goals.preempt(goal)
         self._send(now)
 
     def cancel(self, now: int, everything: bool) -> None:
-        """Drop the current goal, or all."""
+        """Cancel the current goal, or all goals with `everything`. `now` is the time of the run in ns."""
         if self._sender is not None and self._goals.current is not None:
             self._sender.cancel(self._state(now), self._barrier)
         self._goals.cancel(everything)
 
-    def step(self, now: int, messages: Sequence[Message], due: bool, limit_s: float) -> List[Message]:
-        """Take one step at `now` nanoseconds within `limit_s` of wall time; return the messages of the stack.
+    def step(self, now: int, messages: Sequence[Message], is_command_due: bool, limit_s: float) -> List[Message]:
+        """Simulate one step for the nodes: publish `messages`, and return the messages of the nodes.
 
-        Once the graph is ready, the time for an answer is limited to `answer_limit_s` as well.
-
-        Raises AdapterError when the graph is not ready or no longer usable.
+        `now` is the time of the run in ns. `is_command_due` means that the robot needs a command now. The answer may
+        take `limit_s` of wall time, and at most `answer_limit_s` once the nodes are ready; the first steps wait until
+        they are. Raises AdapterError if the nodes do not become ready, or a required node fails.
         """
         self._check_launched()
         limit_s = min(limit_s, self._answer_limit_s) if self.is_ready else limit_s
@@ -186,19 +192,19 @@ class Adapter:
             warming_up = warming_up or self._bring_up.lacks_scan(now, messages)
             self._bring_up.keep(messages)
             if not warming_up:
-                self._bring_up.wait(now, STEP_SHARE * limit_s)
+                self._bring_up.wait(now, MAX_WAIT_FRACTION * limit_s)
                 messages = [message for message in messages if message[0] not in LATCHED]
                 self._begin()
         messages = [*messages, *self._bring_up.due_initial_pose()]
-        self._barrier.step_time.begin(STEP_SHARE * limit_s)
+        self._barrier.step_time.begin(MAX_WAIT_FRACTION * limit_s)
         synchronized: Any = self._lockstep if self._options.sync == "lockstep" and not warming_up else self._paced
         if not warming_up and self._goals.current is None:
             self._send(now)
-        received = synchronized.step(now, messages, due, self._goals.current is not None)
+        received = synchronized.step(now, messages, is_command_due, self._goals.current is not None)
         commanded = any(message.topic == COMMAND for message in received)
         # The order of messages on different topics is random.
         answers = sorted((answer for message in received for answer in self._answers(message)), key=lambda a: a[0])
-        if due or commanded:
+        if is_command_due or commanded:
             answers.append((COMMAND, write_twist(self._velocity)))
         if self.is_ready:
             if isinstance(self._sender, ActionSender):
@@ -207,12 +213,12 @@ class Adapter:
             self._report_outcomes(now)
         return answers
 
-    def take_lines(self) -> List[Line]:
-        """Return the lines that Nav2 has reported since the last call, for /rosout of the run's log."""
+    def take_lines(self) -> List[LogLine]:
+        """Return the log lines of Nav2 since the last call, for /rosout of the run's log."""
         return [] if self._report is None else self._report.take_lines()
 
     def _begin(self) -> None:
-        """Subscribe to the topics of the ready graph."""
+        """Subscribe to the topics of the nodes, which are all ready now."""
         self.is_ready = True
         self._bring_up.end()
         self._unused_masks = self._filter_info.unused_masks(
@@ -230,10 +236,10 @@ class Adapter:
         self._sender = self._senders.usable
 
     def _send(self, now: int) -> None:
-        """Send the remaining goals; a rejected goal has failed."""
+        """Send the remaining goals. If they are rejected, the current goal has failed, and the next is sent."""
         while self._sender is not None and self._goals.accept() is not None:
             batch = self._next_batch()
-            self._sent = 1 if self._sender.one_by_one else len(batch)
+            self._sent = 1 if self._sender.takes_single_goals else len(batch)
             failed = self._sender.send(batch, now, self._barrier)
             if failed is None:
                 self._recoveries.begin_goal()
@@ -241,9 +247,9 @@ class Adapter:
             self._goals.failed(failed.code, failed.message, go_on=self.continue_after_failure)
 
     def _next_batch(self) -> List[Goal]:
-        """Return the goals for one action: all remaining ones, or up to where the robot must stop or wait.
+        """Return the remaining goals up to the first one at which the robot must wait or stop, for one action.
 
-        A waypoint follower has its own waiting time, so a new action is sent after each wait.
+        The wait takes place between two actions, because Nav2's waypoint follower knows only its own waiting time.
         """
         assert self._goals.current is not None
         remaining = [self._goals.current, *self._goals.waiting]
@@ -257,7 +263,7 @@ class Adapter:
             if self._goals.current is None:
                 return
             self._sent -= 1
-            if isinstance(outcome, Failed):
+            if isinstance(outcome, GoalFailed):
                 self._sent -= len(self._goals.ahead)
                 self._goals.failed(outcome.code, outcome.message, go_on=self.continue_after_failure)
             else:
@@ -267,13 +273,13 @@ class Adapter:
             self._goals.accept()
 
     def _state(self, now: int) -> StackState:
-        stopped = all(abs(number) < 1e-3 for number in self._velocity)
-        return StackState(now, stopped, self._estimate.pose)
+        is_stopped = all(abs(number) < 1e-3 for number in self._velocity)
+        return StackState(now, is_stopped, self._estimate.pose)
 
-    def _answers(self, message: Received) -> List[Message]:
-        """Return a message of the stack for the protocol; none for a command or an irrelevant message."""
+    def _answers(self, message: ReceivedMessage) -> List[Message]:
+        """Process a message of the nodes. Return it for simscen, unless it is a command or irrelevant."""
         if message.topic == COMMAND:
-            self._velocity = read_twist(message.data, message.type == TWIST_STAMPED)
+            self._velocity = read_twist(message.data, message.type == TWIST_STAMPED_TYPE)
             return []
         relevant = self._estimate.take_received(message)
         if message.topic == PLAN:
@@ -281,7 +287,7 @@ class Adapter:
         return [(message.topic, message.data)] if relevant else []
 
     def _report_plan(self) -> None:
-        """Report each plan as an event; the graph does not contain the reason."""
+        """Report a new plan as an event. Its reason is guessed: the graph does not contain it."""
         goal, plan = self._goals.current, self._estimate.plan
         if goal is None or not plan:
             return
@@ -291,12 +297,12 @@ class Adapter:
         self._goals.report("plan.made", goal.name, reason=reason, length=round(length, 6))
 
     def _with_frames(self, topic: str, data: bytes) -> bytes:
-        """Return the message with the names that frames have in the graph."""
+        """Return the serialized message with the names that frames have in the graph."""
         publisher = self._graph.publishers.get(topic)
         return data if publisher is None else self._frames.apply(topic, publisher.msg_type, data)
 
     def end(self) -> None:
-        """Leave the graph and end the launched command."""
+        """Leave the graph, and end the launch command with all of its processes."""
         self._graph.close()
         if rclpy.ok():
             rclpy.shutdown()
@@ -305,7 +311,7 @@ class Adapter:
 
 
 def require_packages(options: Options) -> None:
-    """Raise AdapterError if this Python lacks message packages without which Nav2 cannot run."""
+    """Raise AdapterError if this Python lacks message packages that a run with Nav2 needs."""
     needed = ["lifecycle_msgs/srv/GetState"]
     needed += [] if {"/tf", "/tf_static"} <= set(options.without) else ["tf2_msgs/msg/TFMessage"]
     needed += [] if options.goals == "goal_pose" else [ACTIONS["navigate_to_pose"]]

@@ -1,9 +1,9 @@
-"""Bring-up: wait until the graph is complete, with sensor data if its nodes need them.
+"""Wait until all nodes of the stack are ready, and publish sensor data meanwhile if they need it.
 
 Nodes such as Nav2's become active only while time advances and sensor data arrive: a costmap waits for
-odom -> base_link, a planner for the pose on the map. The first step brings the readings of the robot at its start. If
-the graph is not complete by then, they are published repeatedly with advancing time while the simulation waits, until
-nothing is missing. So the time of the graph is ahead of the run's time (`Graph.offset_ns`).
+odom -> base_link, a planner for the pose on the map. So `BringUp.prepare` first waits without sensor data. If nodes are
+still missing or inactive, `BringUp.wait` publishes the readings of the first step again and again. ROS time advances
+meanwhile, but the time of the run does not (`Graph.offset_ns` is the difference).
 """
 
 import math
@@ -14,25 +14,25 @@ from typing import Callable, Dict, List, Optional, Sequence
 from rclpy.clock import Clock, ClockType
 
 from simscen.ros2.graph import LATCHED, Graph, Topic
-from simscen.ros2.lockstep import Message
-from simscen.ros2.messages import NANOSECONDS, SCAN
+from simscen.ros2.messages import NANOSECONDS, SCAN_TYPE
 from simscen.ros2.nav2.report import Nav2Report
 from simscen.ros2.options import AdapterError, BringUpAborted, Options
 from simscen.ros2.readiness import MAP, Readiness
+from simscen.ros2.synchronization import Message
 
 INITIAL_POSE = "/initialpose"
 PREPARE_S = 10.0
-"""Longest wait for a graph without sensor data."""
+"""Maximum wall time to wait without sensor data."""
 PREPARE_SETTLE_S = 2.0
-"""Additional time without new nodes after which an incomplete graph probably needs sensor data."""
+"""Wall time without new nodes, in addition to `--settle`, after which nodes probably wait for sensor data."""
 CHECK_PERIOD_S = 0.25
-"""Time between two checks of the graph, which should not slow down nodes that are starting."""
+"""Wall time between two checks of the graph. More checks would slow down nodes that are starting."""
 FIRST_SCAN_S = 2.0
-"""Simulated time that passes at real time, if necessary, until each lidar has measured."""
+"""Maximum simulated time, at real-time speed, to wait for the first scan of each lidar."""
 
 
 class BringUp:
-    """Waits for the nodes of a run, and keeps the latest readings for them until they are ready."""
+    """Waits for the nodes of a run, and keeps the latest readings to publish them until the nodes are ready."""
 
     def __init__(
         self,
@@ -43,7 +43,10 @@ class BringUp:
         unavailable: Sequence[Topic],
         report: Optional[Nav2Report],
     ) -> None:
-        """`period_s` is the control period; `unavailable` are topics whose message type this Python does not have."""
+        """`period_s` is the control period. `unavailable` are topics whose message type this Python does not have.
+
+        `report` has the log of the nodes; None unless the stack is Nav2.
+        """
         self._graph, self._readiness, self._options, self._period = graph, readiness, options, period_s
         self._unavailable, self._report = list(unavailable), report
         self._started_at = time.monotonic()
@@ -52,13 +55,13 @@ class BringUp:
 
     @property
     def latest_start_s(self) -> float:
-        """Simulated time in s at which the graph is ready at the latest."""
+        """Simulated time in s by which the nodes must be ready."""
         return max(self._options.warm_up, FIRST_SCAN_S if self._options.nav2 else 0.0) + self._period
 
     def prepare(self) -> bool:
-        """Wait before the first step; return whether the graph is complete without sensor data.
+        """Wait before the first step; return whether all nodes are ready without sensor data.
 
-        Raises AdapterError when the launched command ends, or when a node needs a topic that cannot be published.
+        Raises AdapterError if the launch command ends, or a node needs a topic that cannot be published.
         """
         changed_at = incomplete_at = time.monotonic()
         nodes = self._graph.nodes()
@@ -82,7 +85,7 @@ class BringUp:
         return is_settled and not missing and not self._options.warm_up
 
     def keep(self, messages: Sequence[Message]) -> None:
-        """Keep the latest message of each topic for `wait`."""
+        """Keep the latest message of each topic, so that `wait` can publish it."""
         self._latest.update(messages)
 
     def keep_initial_pose(self, messages: Sequence[Message]) -> List[Message]:
@@ -91,27 +94,28 @@ class BringUp:
         return [message for message in messages if message[0] != INITIAL_POSE]
 
     def due_initial_pose(self) -> List[Message]:
-        """Return the initial pose once, as soon as there is a subscriber."""
+        """Return the initial pose if it has not been returned yet and a node subscribes to it."""
         if self._initial_pose is None or not self._graph.subscribers_of(self._graph.names(INITIAL_POSE)):
             return []
         pose, self._initial_pose = self._initial_pose, None
         return [(INITIAL_POSE, pose)]
 
     def lacks_scan(self, now: int, messages: Sequence[Message]) -> bool:
-        """Return whether a lidar of a Nav2 robot has not measured yet at `now` nanoseconds, for example a delayed one.
+        """Return whether to simulate on, at most until FIRST_SCAN_S, because a lidar has not measured yet.
 
-        AMCL publishes map -> odom only with scans, so waiting with the readings of this step cannot succeed.
+        Nav2's AMCL needs a scan to publish map -> odom, so `wait` would not succeed without one. `now` is the time of
+        the run in ns, and `messages` are those of this step.
         """
         if not self._options.nav2 or now >= FIRST_SCAN_S * NANOSECONDS:
             return False
         known = {*self._latest, *(topic for topic, _ in messages)}
-        return any(type_name == SCAN and topic not in known for topic, type_name in self._graph.types.items())
+        return any(type_name == SCAN_TYPE and topic not in known for topic, type_name in self._graph.types.items())
 
     def wait(self, now: int, step_limit_s: float) -> None:
-        """Publish the latest readings with advancing time until nothing is missing; `now` is the run's time in ns.
+        """Publish the latest readings with advancing ROS time until all nodes are ready; `now` is the run's time in ns.
 
-        Raises AdapterError with what is missing when `--ready` or `step_limit_s` of wall time is over, and
-        BringUpAborted when the lifecycle manager of a launched Nav2 has given up.
+        Raises AdapterError with what is missing after the wall time `--ready` or `step_limit_s`, and BringUpAborted if
+        the lifecycle manager of a launched Nav2 has given up.
         """
         remaining_s = self._options.ready - (0.0 if self._options.warm_up else time.monotonic() - self._started_at)
         self._readiness.has_map = MAP in self._latest
@@ -152,11 +156,11 @@ class BringUp:
         print(f"simscen ros2: ready after {waited:.1f} s; ROS time = time of the run + {ahead:g} s", file=sys.stderr)
 
     def end(self) -> None:
-        """Forget the readings: the graph is complete."""
+        """Forget the readings, because all nodes are ready."""
         self._latest.clear()
 
     def _reasons(self, missing: Sequence[str]) -> str:
-        """Return the error for a graph that is not ready."""
+        """Return the message of the error for nodes that are not ready."""
         waited = time.monotonic() - self._started_at
         reasons = list(dict.fromkeys([*self._readiness.likely_causes(), *missing]))
         text = "; ".join(reasons) or "nodes keep appearing and disappearing"

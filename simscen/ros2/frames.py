@@ -1,4 +1,4 @@
-"""Frames in the user's graph: their names, and the order in which their transforms are published."""
+"""Rename frames in messages for the user's graph, and order messages so that transforms are published first."""
 
 from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
 
@@ -6,17 +6,17 @@ from simscen.ros2.messages import find_type
 from simscen.ros2.options import AdapterError
 
 BASE_FRAME = "base_link"
-TRANSFORMS, STATIC_TRANSFORMS = "/tf", "/tf_static"
+TF, TF_STATIC = "/tf", "/tf_static"
 SHARED_FRAMES = ("map", "odom")
-"""Frames that the nodes and simscen exchange in both directions, so that they have one name."""
+"""Frames that cannot be renamed, because both simscen and the nodes publish transforms of them."""
 
 
 class FrameNames:
     """Renames frames in the messages that simscen publishes, and gives the base frame a second name.
 
     Args:
-        renames: `FRAME:=NAME`, with the names of simscen and of the user's graph, such as `lidar:=base_scan`.
-        second_base: An additional frame at the same pose as the base frame, such as base_footprint.
+        renames: Texts `FRAME:=NAME`: simscen's name and the name in the user's graph, such as `lidar:=base_scan`.
+        second_base: Second name of the base frame, such as base_footprint; None for no second name.
 
     Raises AdapterError if a rename is not of this form, or names a frame that cannot be renamed.
     """
@@ -35,14 +35,17 @@ class FrameNames:
         """The names of the base frame in the user's graph."""
 
     def apply(self, topic: str, message_type: Any, data: bytes) -> bytes:
-        """Return the serialized message of a topic with the names of the user's graph."""
-        has_second_base = topic == STATIC_TRANSFORMS and len(self.bases) > 1
+        """Return the serialized message `data` of a topic with the frame names of the user's graph.
+
+        On /tf_static, add the transform to the second name of the base frame.
+        """
+        has_second_base = topic == TF_STATIC and len(self.bases) > 1
         if not has_second_base and not any(frame.encode() in data for frame in self._names):
             return data
         from rclpy.serialization import deserialize_message, serialize_message
 
         message = deserialize_message(data, message_type)
-        parts = message.transforms if topic in (TRANSFORMS, STATIC_TRANSFORMS) else [message]
+        parts = message.transforms if topic in (TF, TF_STATIC) else [message]
         for part in parts:
             self._rename(part)
         if has_second_base:
@@ -66,9 +69,9 @@ class FrameNames:
 
 
 def transforms_first(messages: Iterable[Tuple[str, bytes]]) -> List[Tuple[str, bytes]]:
-    """Return the messages with those of /tf_static and /tf before the others, otherwise in the same order.
+    """Return the messages, pairs of topic and CDR, with those of /tf_static and /tf first, otherwise in the same order.
 
-    Some nodes, such as Nav2's collision monitor, wait in a callback until they can transform their newest scan. They
-    do not answer meanwhile, and the barrier would wait for them before the transform is published.
+    Some nodes, such as Nav2's collision monitor, wait in a callback until they can transform their newest scan.
+    Meanwhile, they do not answer the node barrier, and so the transform would never be published.
     """
-    return sorted(messages, key=lambda message: message[0] not in (TRANSFORMS, STATIC_TRANSFORMS))
+    return sorted(messages, key=lambda message: message[0] not in (TF, TF_STATIC))

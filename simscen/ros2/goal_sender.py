@@ -1,4 +1,4 @@
-"""Ways to send goals to a stack: Nav2's actions, or a pose on /goal_pose."""
+"""Send goals to a stack by one of Nav2's actions or by a pose on /goal_pose, and observe whether they are reached."""
 
 import math
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Union
@@ -19,32 +19,32 @@ ACTIONS = {
     "follow_waypoints": "nav2_msgs/action/FollowWaypoints",
 }
 STANDSTILL_NS = NANOSECONDS
-"""Simulated time of a zero command after which a goal on /goal_pose counts as reached."""
+"""Simulated time with zero commands after which a goal on /goal_pose counts as reached."""
 REJECTED, UNKNOWN = 1, 9000
-"""Error codes of Nav2."""
+"""Error codes for a rejected goal and for an unknown reason, as in Nav2."""
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
-"""action_msgs/msg/GoalStatus."""
+"""Values of action_msgs/msg/GoalStatus.status."""
 
 
-class Reached(NamedTuple):
-    """The first of the goals that were sent is reached."""
+class GoalReached(NamedTuple):
+    """The first goal without an outcome, of those that were sent, is reached."""
 
 
-class Failed(NamedTuple):
-    """The first of the goals that were sent has failed."""
+class GoalFailed(NamedTuple):
+    """The first goal without an outcome, of those that were sent, has failed with this error code of Nav2."""
 
     code: int
     message: str
 
 
-Outcome = Union[Reached, Failed]
+Outcome = Union[GoalReached, GoalFailed]
 
 
 class StackState(NamedTuple):
-    """Time of the run in nanoseconds, whether the command is zero, and the stack's own pose estimate."""
+    """Time of the run in ns, whether the stack commands zero velocity, and the stack's own pose estimate, if known."""
 
     now: int
-    stopped: bool
+    is_stopped: bool
     pose: Optional[Pose]
 
 
@@ -56,7 +56,7 @@ class GoalPoseSender:
     the goal then ends by its timeout.
     """
 
-    one_by_one = True
+    takes_single_goals = True
 
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
@@ -66,16 +66,16 @@ class GoalPoseSender:
 
     @property
     def name(self) -> str:
-        """The topic in the graph."""
+        """Name of the topic in the graph."""
         return self._graph.names(GOAL_POSE)
 
     def missing(self) -> List[str]:
-        """Return why goals cannot be sent: nothing subscribes to the topic."""
+        """Return why goals cannot be sent (no subscriber), or an empty list."""
         found = self._graph.subscribers_of(self.name)
         return [] if found else [f"no node takes goals: no subscriber of {self.name} ({POSE_TYPE})"]
 
-    def send(self, goals: Sequence[Goal], now: int, barrier: NodeBarrier) -> Optional[Failed]:
-        """Send the first goal."""
+    def send(self, goals: Sequence[Goal], now: int, barrier: NodeBarrier) -> Optional[GoalFailed]:
+        """Send the first goal. This never fails."""
         from rclpy.serialization import serialize_message
 
         self._goal, self._stopped_since = goals[0], None
@@ -83,10 +83,10 @@ class GoalPoseSender:
         return None
 
     def outcomes(self, state: StackState) -> List[Outcome]:
-        """Return Reached if the robot has stopped at the goal."""
+        """Return GoalReached if the robot has stopped at the goal, or an empty list."""
         if self._goal is None:
             return []
-        if not (state.stopped and state.pose is not None and _within_tolerance(self._goal, state.pose)):
+        if not (state.is_stopped and state.pose is not None and _within_tolerance(self._goal, state.pose)):
             self._stopped_since = None
             return []
         if self._stopped_since is None:
@@ -94,7 +94,7 @@ class GoalPoseSender:
         if state.now - self._stopped_since < STANDSTILL_NS:
             return []
         self._goal = None
-        return [Reached()]
+        return [GoalReached()]
 
     def cancel(self, state: StackState, barrier: NodeBarrier) -> None:
         """Send the current pose as the goal, because a pose cannot be canceled."""
@@ -105,7 +105,7 @@ class GoalPoseSender:
 
 
 class ActionSender:
-    """Client of one of Nav2's actions. Raises AdapterError if the action type is not installed."""
+    """Sends goals by one of Nav2's ACTIONS. Raises AdapterError if the action type is not installed."""
 
     def __init__(self, graph: Graph, action: str) -> None:
         self._graph, self.action, self.name = graph, action, graph.names("/" + action)
@@ -123,21 +123,24 @@ class ActionSender:
         self._passed = self._reported = self.recoveries = 0
 
     @property
-    def one_by_one(self) -> bool:
-        """Whether the action takes one goal at a time."""
+    def takes_single_goals(self) -> bool:
+        """Whether the action takes only one goal."""
         return self.action == "navigate_to_pose"
 
     def missing(self) -> List[str]:
-        """Return why goals cannot be sent: there is no server."""
+        """Return why goals cannot be sent (no action server), or an empty list."""
         if self._client.server_is_ready():
             return []
         return [f"no node takes goals: no action server {self.name} ({self.type})"]
 
-    def send(self, goals: Sequence[Goal], now: int, barrier: NodeBarrier) -> Optional[Failed]:
-        """Send the goals and wait until they are accepted; return Failed if they are rejected."""
+    def send(self, goals: Sequence[Goal], now: int, barrier: NodeBarrier) -> Optional[GoalFailed]:
+        """Send the goals (or the first one), and wait for the answer; return GoalFailed if they are rejected, or None.
+
+        Raises AdapterError if the server does not answer in time.
+        """
         request = self._type.Goal()
         poses = [pose_stamped(goal, now + self._graph.offset_ns) for goal in goals]
-        if self.one_by_one:
+        if self.takes_single_goals:
             request.pose, goals = poses[0], goals[:1]
         elif hasattr(request.poses, "goals"):  # nav_msgs/Goals since Kilted, a plain list before
             request.poses.goals = poses
@@ -151,7 +154,7 @@ class ActionSender:
         self._handle = answer.result()
         if not self._handle.accepted:
             self._handle = None
-            return Failed(REJECTED, f"{self.name} rejected the goal")
+            return GoalFailed(REJECTED, f"{self.name} rejected the goal")
         self._result = self._handle.get_result_async()
         return None
 
@@ -166,7 +169,7 @@ class ActionSender:
             self._passed = max(self._passed, min(feedback.current_waypoint, len(self._goals) - 1))
 
     def outcomes(self, state: StackState) -> List[Outcome]:
-        """Return the new outcomes of the goals that were sent, in order."""
+        """Return the outcomes since the last call, in the order of the goals that were sent."""
         if self._handle is None:
             return []
         if not self._result.done():
@@ -176,38 +179,38 @@ class ActionSender:
         result = answer.result
         if answer.status == SUCCEEDED:
             missed = self._missed_waypoints(result)
-            return [missed.get(index, Reached()) for index in range(self._reported, len(self._goals))]
+            return [missed.get(index, GoalReached()) for index in range(self._reported, len(self._goals))]
         ending = {CANCELED: "was canceled by the stack", ABORTED: "was aborted"}.get(answer.status, "ended")
         code = getattr(result, "error_code", 0) or UNKNOWN
         message = getattr(result, "error_msg", "") or f"{self.name} {ending}"
         # Goals that were not attempted fail with the current one.
-        return [*self._passed_goals(state), *[Failed(code, message)] * (len(self._goals) - self._passed)]
+        return [*self._passed_goals(state), *[GoalFailed(code, message)] * (len(self._goals) - self._passed)]
 
-    def _missed_waypoints(self, result: Any) -> Dict[int, Failed]:
-        missed: Dict[int, Failed] = {}
+    def _missed_waypoints(self, result: Any) -> Dict[int, GoalFailed]:
+        missed: Dict[int, GoalFailed] = {}
         for waypoint in getattr(result, "missed_waypoints", ()):
             index = waypoint.waypoint_index if hasattr(waypoint, "waypoint_index") else waypoint.index
             code, message = getattr(waypoint, "error_code", 0) or UNKNOWN, getattr(waypoint, "error_msg", "")
-            missed[index] = Failed(code, message or f"{self.name} missed it")
+            missed[index] = GoalFailed(code, message or f"{self.name} missed it")
         return missed
 
     def _passed_goals(self, state: StackState) -> List[Outcome]:
-        """Return the outcomes of the goals that were passed since the last call, by the feedback.
+        """Return the outcomes of the goals that the robot has passed since the last call, according to the feedback.
 
-        The feedback of FollowWaypoints does not distinguish reached goals from missed ones.
+        The feedback of FollowWaypoints does not tell reached goals from missed ones, so the pose estimate decides.
         """
         found: List[Outcome] = []
         for goal in self._goals[self._reported : self._passed]:
             arrived = state.pose is not None and _within_tolerance(goal, state.pose)
             if arrived or self.action == "navigate_through_poses":
-                found.append(Reached())
+                found.append(GoalReached())
             else:
-                found.append(Failed(UNKNOWN, f"{self.name} continued without having been there"))
+                found.append(GoalFailed(UNKNOWN, f"{self.name} continued without having been there"))
         self._reported = self._passed
         return found
 
     def cancel(self, state: StackState, barrier: NodeBarrier) -> None:
-        """Cancel the goals that were sent."""
+        """Cancel the goals that were sent. Raises AdapterError if the server does not answer in time."""
         if self._handle is not None:
             barrier.wait(self._handle.cancel_goal_async(), f"{self.name} has not answered to a cancel")
             self._handle = None
@@ -217,7 +220,7 @@ GoalSender = Union[GoalPoseSender, ActionSender]
 
 
 class GoalSenders:
-    """The requested way to send goals, or the first usable one for `auto`."""
+    """Chooses how goals are sent: as the option --goals requests, or for `auto`, by NavigateToPose or /goal_pose."""
 
     def __init__(self, graph: Graph, requested: str) -> None:
         self._senders: List[GoalSender] = []
@@ -229,11 +232,11 @@ class GoalSenders:
 
     @property
     def usable(self) -> Optional[GoalSender]:
-        """The first way for which there is a server or a subscriber."""
+        """The first sender with an action server or a subscriber; None if there is none."""
         return next((sender for sender in self._senders if not sender.missing()), None)
 
     def missing(self) -> List[str]:
-        """Return why goals cannot be sent."""
+        """Return why goals cannot be sent, or an empty list."""
         if self.usable is not None:
             return []
         reasons = [sender.missing()[0] for sender in self._senders]
@@ -241,7 +244,7 @@ class GoalSenders:
 
 
 def pose_stamped(goal: Goal, now: int) -> Any:
-    """Return the goal as geometry_msgs/msg/PoseStamped in the map frame."""
+    """Return the goal as geometry_msgs/msg/PoseStamped in the map frame; the stamp is `now` in ns."""
     message: Any = find_type(POSE_TYPE)()  # type: ignore[misc]
     message.header.frame_id = "map"
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(now, NANOSECONDS)

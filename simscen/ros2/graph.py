@@ -1,7 +1,8 @@
-"""simscen's node in the ROS graph: it publishes and receives CDR bytes, and lists the other nodes.
+"""simscen's own ROS node: it publishes and receives serialized (CDR) messages, and lists the other nodes of the graph.
 
-Time in the graph may be ahead of the time of the run, because it advances while the run waits for the graph to become
-ready. `Graph.offset_ns` is the difference; stamps are converted in both directions here.
+ROS time may be ahead of the time of the run, because it advances while the run waits for nodes to become ready.
+`Graph.offset_ns` is the difference. It is added to the stamps of published messages and subtracted from those of
+received messages.
 """
 
 import time
@@ -15,8 +16,9 @@ from simscen.ros2.messages import find_type, shift_stamps, write_clock
 from simscen.ros2.options import TopicNames
 
 NODE = "simscen"
+"""Name of simscen's own node."""
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
-"""Name of a node whose endpoints are discovered before the node itself."""
+"""Name that ROS gives to a node if it discovers the node's publishers or subscriptions before the node."""
 CLOCK = "/clock"
 LATCHED = frozenset(
     (
@@ -24,16 +26,17 @@ LATCHED = frozenset(
         *("/keepout_costmap_filter_info", "/speed_costmap_filter_info"),
     )
 )
-"""Topics with transient local durability: nodes that subscribe later receive the last message."""
+"""Topics that are published with transient local durability, so that later subscribers receive the last message."""
 DEPTH = {"/tf": 100, "/imu": 100}
-"""Queue lengths for slow subscribers."""
+"""Queue lengths of topics with a high rate, for slow subscribers."""
 DEFAULT_DEPTH = 10
+"""Queue length of other topics that are not latched."""
 Node = Tuple[str, str]
 """Name and namespace of a node."""
 
 
-class Received(NamedTuple):
-    """A message of the stack: topic of the protocol, type, CDR."""
+class ReceivedMessage(NamedTuple):
+    """A message of the nodes: topic of the stack protocol, name of the type, and CDR."""
 
     topic: str
     type: str
@@ -41,14 +44,14 @@ class Received(NamedTuple):
 
 
 class Topic(NamedTuple):
-    """A topic of the protocol and its type."""
+    """A topic of the stack protocol, which may have another name in the graph, and its type."""
 
     name: str
     type: str
 
 
 class Endpoint(NamedTuple):
-    """A publisher or a subscription of another node."""
+    """A publisher or a subscription of another node: full name of the node, type, and QoSProfile."""
 
     node: str
     type: str
@@ -59,18 +62,23 @@ STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 
 
 class Graph:
-    """simscen's node in one ROS domain. `watch` is called while waiting and may raise an exception."""
+    """simscen's node in one ROS domain, with its publishers and subscriptions.
 
-    def __init__(self, names: TopicNames, watch: Callable[[], None]) -> None:
-        self.names, self._watch = names, watch
+    A parameter `topic` is a topic of the protocol; `name` is the name of a topic in the graph.
+    """
+
+    def __init__(self, names: TopicNames, check_alive: Callable[[], None]) -> None:
+        """`check_alive` is called repeatedly while waiting, and may raise an exception to end the wait."""
+        self.names, self._check_alive = names, check_alive
         self.node = rclpy.create_node(NODE, namespace=names.namespace or None, use_global_arguments=False)
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.publishers: Dict[str, Any] = {}
-        """Publishers by topic of the protocol."""
         self.types: Dict[str, str] = {}
+        """Types of the publishers; keys of both are topics of the protocol."""
         self._subscriptions: Dict[str, Tuple[str, Any]] = {}
-        self.inbox: List[Received] = []
+        self.inbox: List[ReceivedMessage] = []
+        """Received messages in the order of arrival, until the caller removes them."""
         self.offset_ns = 0
 
     def advertise(self, topic: str, type_name: str) -> bool:
@@ -84,7 +92,7 @@ class Graph:
         return True
 
     def publish(self, topic: str, data: bytes) -> bool:
-        """Publish CDR on an advertised topic; return whether anyone subscribes to it."""
+        """Publish CDR on a topic; return whether it has subscribers. Does nothing if it is not advertised."""
         publisher = self.publishers.get(topic)
         if publisher is None:
             return False
@@ -92,11 +100,11 @@ class Graph:
         return bool(publisher.get_subscription_count())
 
     def publish_clock(self, now: int) -> None:
-        """Publish the time of the run, in nanoseconds."""
+        """Publish the ROS time that belongs to the time `now` of the run in ns."""
         self.publish(CLOCK, write_clock(now + self.offset_ns))
 
     def subscribe(self, topic: str, type_name: str) -> None:
-        """Keep all messages of a topic in `inbox`, with a quality of service that its publishers offer."""
+        """Add all messages of a topic to `inbox` from now on. Replaces a subscription with another type."""
         message_type = find_type(type_name)
         existing = self._subscriptions.get(topic)
         if message_type is None or (existing is not None and existing[0] == type_name):
@@ -105,14 +113,17 @@ class Graph:
             self.node.destroy_subscription(existing[1])
 
         def callback(data: bytes) -> None:
-            self.inbox.append(Received(topic, type_name, shift_stamps(type_name, bytes(data), -self.offset_ns)))
+            self.inbox.append(ReceivedMessage(topic, type_name, shift_stamps(type_name, bytes(data), -self.offset_ns)))
 
         profile = self.subscription_profile(self.names(topic))
         subscription = self.node.create_subscription(message_type, self.names(topic), callback, profile, raw=True)
         self._subscriptions[topic] = (type_name, subscription)
 
-    def follow_action(self, action: str, callback: Callable[[Any], None]) -> Optional[str]:
-        """Call `callback` with each status of an action (GoalStatusArray); return the node of its server, or None."""
+    def subscribe_to_status(self, action: str, callback: Callable[[Any], None]) -> Optional[str]:
+        """Call `callback` with each GoalStatusArray of an action, and return the full name of its server.
+
+        Return None, without a subscription, if there is no server or more than one.
+        """
         status_type, topic = find_type(STATUS_TYPE), self.names(f"/{action}/_action/status")
         servers = self.publishers_of(topic)
         if status_type is None or len(servers) != 1:
@@ -121,15 +132,15 @@ class Graph:
         return servers[0].node
 
     def subscription_profile(self, name: str) -> QoSProfile:
-        """Return a quality of service that all publishers of the ROS topic `name` offer, except those of this node."""
+        """Return a QoS profile that matches all publishers of a topic, except those of this node."""
         return subscription_qos([end for end in self.node.get_publishers_info_by_topic(name) if end.node_name != NODE])
 
     def spin_once(self, seconds: float = 0.0) -> None:
-        """Handle one event; wait at most this long for it."""
+        """Handle one event of the node (message, answer, timer); wait at most `seconds` of wall time for it."""
         self.executor.spin_once(timeout_sec=seconds)
 
-    def take_all(self) -> None:
-        """Take all messages that have arrived, without waiting."""
+    def receive_all(self) -> None:
+        """Move all messages that have arrived to `inbox`, without waiting."""
         while True:
             before = len(self.inbox)
             self.spin_once()
@@ -144,31 +155,31 @@ class Graph:
             if remaining <= 0:
                 return False
             self.spin_once(min(remaining, 0.1))
-            self._watch()
+            self._check_alive()
         return True
 
     def nodes(self) -> List[Node]:
-        """Return the other nodes, without hidden ones, sorted."""
+        """Return all other nodes that are not hidden, sorted."""
         found = self.node.get_node_names_and_namespaces()
         return sorted({(n, s) for n, s in found if n != NODE and not n.startswith("_")})
 
     def publishers_of(self, name: str) -> List[Endpoint]:
-        """Return the publishers of the ROS topic `name` that belong to other nodes."""
+        """Return the publishers of a topic that belong to other nodes."""
         return _endpoints(self.node.get_publishers_info_by_topic(name))
 
     def subscribers_of(self, name: str) -> List[Endpoint]:
-        """Return the subscriptions to the ROS topic `name` that belong to other nodes."""
+        """Return the subscriptions to a topic that belong to other nodes."""
         return _endpoints(self.node.get_subscriptions_info_by_topic(name))
 
     def subscribed_topics(self, node: Node) -> Set[str]:
-        """Return the topics to which a node subscribes; none if the node has ended."""
+        """Return the names of the topics to which a node subscribes; empty if the node has ended."""
         try:
             return {name for name, _ in self.node.get_subscriber_names_and_types_by_node(*node)}
         except rclpy.node.NodeNameNonExistentError:
             return set()
 
     def topics(self) -> Dict[str, List[str]]:
-        """Return all topics of the graph and their types."""
+        """Return the names of all topics in the graph, with their types."""
         return dict(self.node.get_topic_names_and_types())
 
     def service_type(self, node: Node, name: str) -> Optional[str]:
@@ -187,7 +198,7 @@ class Graph:
 
 
 def full_name(node: Node) -> str:
-    """Return `/namespace/name`."""
+    """Return the full name of a node, `/namespace/name`."""
     return f"{node[1].rstrip('/')}/{node[0]}"
 
 
@@ -201,7 +212,7 @@ def _endpoints(infos: List[Any]) -> List[Endpoint]:
 
 
 def publisher_qos(topic: str) -> QoSProfile:
-    """Return the profile of a topic of simscen: reliable, which every subscription accepts."""
+    """Return the QoS profile with which simscen publishes a topic. Every subscription accepts its reliability."""
     latched = topic in LATCHED
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
@@ -212,7 +223,10 @@ def publisher_qos(topic: str) -> QoSProfile:
 
 
 def subscription_qos(publishers: Sequence[Any]) -> QoSProfile:
-    """Return a profile that matches all publishers: reliable or transient local only if all of them are."""
+    """Return a QoS profile that matches all publishers: reliable, or transient local, only if all of them are.
+
+    `publishers` are objects of rclpy's TopicEndpointInfo.
+    """
     profiles = [publisher.qos_profile for publisher in publishers]
     reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in profiles)
     latched = bool(profiles) and all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in profiles)
@@ -225,7 +239,7 @@ def subscription_qos(publishers: Sequence[Any]) -> QoSProfile:
 
 
 def incompatible_policies(offered: QoSProfile, requested: QoSProfile) -> List[Tuple[str, str, str]]:
-    """Return the policies that keep a subscription from receiving anything from a publisher.
+    """Return the QoS policies that keep a subscription from receiving anything from a publisher.
 
     Each is (policy, value that the publisher offers, value that the subscription requests).
     """

@@ -1,7 +1,8 @@
-"""Run the user's launch command, and end everything that it started even if the adapter is killed.
+"""Run the user's launch command, and end all processes that it started, even if the adapter is killed.
 
-As a program, `python launch.py COMMAND` runs the command in a shell and a process group of its own. When standard input
-closes or the command ends, all of its descendants get SIGINT, as from Ctrl-C, then SIGTERM, then SIGKILL.
+LaunchedCommand runs this file as a program, `python launch.py COMMAND`. The program runs the command in a shell and in
+a session of its own. When the command ends, or standard input closes because the adapter has ended, it sends SIGINT to
+all descendants, as Ctrl-C does, then SIGTERM, then SIGKILL.
 """
 
 import contextlib
@@ -16,12 +17,13 @@ from pathlib import Path
 from typing import Dict, List, Mapping, Optional
 
 PR_SET_CHILD_SUBREAPER = 36
-GRACE_S = ((signal.SIGINT, 4.0), (signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))
-"""Signals, and the seconds to wait after each."""
+"""Option of Linux's prctl that makes a process adopt descendants whose parent has ended."""
+SIGNALS_AND_WAITS_S = ((signal.SIGINT, 4.0), (signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))
+"""Signals to the descendants, each with the maximum time to wait for their end."""
 
 
 class LaunchedCommand:
-    """A running launch command."""
+    """A launch command that has been started."""
 
     def __init__(self, command: str, environment: Mapping[str, str]) -> None:
         self.command = command
@@ -32,21 +34,21 @@ class LaunchedCommand:
 
     @property
     def ended(self) -> Optional[str]:
-        """How the command ended; None while it runs."""
+        """How the command ended, such as "ended with exit code 1"; None while it runs."""
         code = self._process.poll()
         if code is None:
             return None
         return f"ended by signal {code - 128}" if code > 128 else f"ended with exit code {code}"
 
     def end(self) -> None:
-        """End the command and everything that it started."""
+        """End the command and all processes that it started, and wait until they have ended."""
         assert self._process.stdin is not None
         self._process.stdin.close()
         self._process.wait()
 
 
 def descendants(parent: int) -> List[int]:
-    """Return all descendants of a process, children before grandchildren."""
+    """Return the process ids of all running descendants of a process, children before grandchildren."""
     children: Dict[int, List[int]] = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
@@ -62,8 +64,8 @@ def descendants(parent: int) -> List[int]:
 
 
 def end_descendants() -> None:
-    """End all descendants of this process."""
-    for number, seconds in GRACE_S:
+    """End all descendants of this process with SIGNALS_AND_WAITS_S."""
+    for number, seconds in SIGNALS_AND_WAITS_S:
         for child in descendants(os.getpid()):
             with contextlib.suppress(ProcessLookupError):
                 os.kill(child, number)
@@ -78,7 +80,7 @@ def end_descendants() -> None:
 
 def main() -> int:
     """Run the command until it ends or standard input closes; return its exit code."""
-    # A process that loses its parent becomes a child of this one.
+    # A descendant whose parent ends becomes a child of this process, so that `descendants` still finds it.
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: None)

@@ -1,4 +1,4 @@
-"""Adapter side of the stack protocol: perform the handshake, prepare the graph, and answer steps until the run ends."""
+"""Serve one run by the stack protocol: perform the handshake, prepare the nodes, and answer all steps."""
 
 import json
 import os
@@ -20,13 +20,15 @@ from simscen.ros2.options import AdapterError, BringUpAborted, Domain, Options, 
 EVENTS = "/simscen/events"
 DEFAULT_MODE = "navigate_to_pose"
 MODES = (DEFAULT_MODE, "navigate_through_poses", "follow_waypoints")
+"""Nav2 actions by which a scenario can request that goals are sent."""
 PROTOCOL_TOPICS = {published: topic for topic, published in MASKS.items()}
+"""Topics of the protocol by the topics under which the adapter publishes them."""
 READY_MARGIN_S = 15.0
-"""Time that the first answer may take beyond `--ready`: for the check in progress and the first period."""
+"""Wall time that the first answer may take in addition to `--ready`, to finish the last check and the first period."""
 
 
 def main(values: Dict[str, Any]) -> int:
-    """Serve one run. Return 0, or 1 if it ended in an error that simscen has received."""
+    """Serve one run with the Options `values`. Return 0, or 1 after an error or if simscen has disconnected."""
     connection = Connection.inherited()
     # Exceptions unwind, so that the adapter ends what it started.
     signal.signal(signal.SIGTERM, _terminate)
@@ -43,23 +45,24 @@ def main(values: Dict[str, Any]) -> int:
 
 
 class Hello(NamedTuple):
-    """Content of HELLO that the adapter uses."""
+    """The content of HELLO, simscen's first frame, that the adapter uses."""
 
     topics: Dict[int, Tuple[str, str]]
-    """Name in the graph and type of the topics of a robot, by number."""
+    """Name and type of each topic that simscen can send for the robot, by its number in the protocol."""
     stack_topics: Dict[str, int]
-    """Numbers of the topics of the stack."""
+    """Number of each topic that the adapter can send."""
     period_s: float
     """Control period."""
     mode: str
+    """Nav2 action by which the scenario requests to send goals, one of MODES."""
     zone_masks: List[Dict[str, Any]]
-    """What the values of each mask of zones mean."""
+    """Meaning of the values of each zone mask (keys `topic`, `filter`, `percent`, `base`, `multiplier`)."""
     answer_limit_s: float
-    """Wall time for an answer once the graph is ready."""
+    """Wall time for an answer once the nodes are ready."""
 
     @classmethod
     def receive(cls, connection: Connection) -> "Hello":
-        """Receive HELLO. Raises AdapterError for another frame or protocol."""
+        """Receive HELLO. Raises AdapterError for another frame, or another version of the protocol."""
         kind, body = connection.receive()
         if kind != wire.HELLO:
             raise AdapterError(f"a frame of kind {kind} instead of HELLO")
@@ -81,17 +84,17 @@ class Hello(NamedTuple):
 
 
 class ReceivedStep(NamedTuple):
-    """Content of STEP."""
+    """The content of a STEP frame: time of the run in ns, messages (topic, CDR), and wall time for the answer."""
 
     now: int
-    """Time of the run in nanoseconds."""
     messages: List[Tuple[str, bytes]]
-    due: bool
+    is_command_due: bool
+    """Whether the robot needs a command now."""
     limit_s: float
 
 
 class AdapterRun:
-    """Domain, nodes, and adapter of one run. Leaving the context ends and removes them."""
+    """Context manager with the ROS domain, the launch command, and the adapter of one run. Leaving it ends them."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
@@ -104,7 +107,7 @@ class AdapterRun:
         return self
 
     def __exit__(self, *_: Any) -> None:
-        # simscen sends SIGTERM if nodes take long to end; that must not interrupt ending them.
+        # simscen sends SIGTERM if nodes take long to end. It must not interrupt the code that ends them.
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         if self._adapter is not None:
             self._adapter.end()
@@ -112,7 +115,7 @@ class AdapterRun:
             function()
 
     def serve(self, connection: Connection) -> None:
-        """Serve from HELLO to END. Raises AdapterError, and Disconnected when simscen closes the connection."""
+        """Answer frames from HELLO to END. Raises AdapterError, and Disconnected if simscen closes the connection."""
         from simscen.ros2.adapter import Adapter, require_packages
         from simscen.ros2.graph import Topic
 
@@ -130,17 +133,17 @@ class AdapterRun:
 
         adapter = self._adapter = make_adapter("")
         adapter.prepare()
-        about = adapter.about()
+        facts = adapter.run_facts()
         welcome = {
             "protocol": wire.PROTOCOL,
             "name": "simscen ros2",
-            "version": about["rclpy"],
+            "version": facts["rclpy"],
             "step": "control",
             "modes": [*MODES],
             "first_answer_limit": options.ready + READY_MARGIN_S,
             "first_answer_until": adapter.latest_start_s,
             "topics": [PROTOCOL_TOPICS.get(t.name, t.name) for t in topics if t.name in adapter.needed_topics],
-            "about": about,
+            "about": facts,
         }
         connection.send_json(wire.WELCOME, welcome)
         self._answer_steps(connection, hello, make_adapter)
@@ -160,15 +163,15 @@ class AdapterRun:
                 received += [(ROSOUT, messages.log(stamp, *line)) for line in self._adapter.take_lines()]
                 connection.send(wire.answer_frame(header.tick, self._number_messages(received, hello.stack_topics)))
             elif kind == wire.END:
-                connection.send_json(wire.BYE, {"about": self._adapter.about()})
+                connection.send_json(wire.BYE, {"about": self._adapter.run_facts()})
                 return
             else:
                 self._process_frame(kind, wire.from_json(body), now)
 
     def _step(self, step: ReceivedStep, make_adapter: Callable[[str], Any]) -> List[Tuple[str, bytes]]:
-        """Return the answer to a step. If the bring-up was aborted, start the nodes once more and repeat the steps.
+        """Return the messages of the nodes in a step. If Nav2 aborts its bring-up, restart it once, and repeat all steps.
 
-        On a busy machine, the lifecycle manager of Nav2 gives up when a single response is lost.
+        On a busy machine, Nav2's lifecycle manager gives up when a single response is lost.
         """
         if self._adapter.is_ready:
             return list(self._adapter.step(*step))
@@ -191,7 +194,7 @@ class AdapterRun:
             self._steps_until_ready.append(step)
 
     def _options_for(self, mode: str) -> Options:
-        """Return the options with the scenario's action. Raises AdapterError if `--goals` names another one."""
+        """Return the options with the scenario's mode as `goals`. Raises AdapterError if `--goals` contradicts it."""
         requested = self._options.goals
         if mode in (DEFAULT_MODE, requested):
             return self._options
@@ -212,13 +215,13 @@ class AdapterRun:
     def _number_messages(
         self, received: Sequence[Tuple[str, bytes]], stack_topics: Dict[str, int]
     ) -> "List[Tuple[int, bytes]]":
-        """Return the messages of the stack and the events of its goals with the numbers of their topics."""
+        """Return the `received` messages and the events of goals, with the numbers of their topics."""
         out = [(stack_topics[topic], data) for topic, data in received if topic in stack_topics]
         events = (json.dumps(event, allow_nan=False) for event in self.goals.take_events())
         return out + [(stack_topics[EVENTS], messages.string(event)) for event in events]
 
     def _set_environment(self) -> None:
-        """Claim a domain, and set the environment of the nodes."""
+        """Claim a ROS domain, and set the environment of this process, which the nodes inherit."""
         options, environment = self._options, dict(os.environ)
         domain = self._claim_domain(options, environment)
         self._cleanup.append(domain.release)
@@ -230,16 +233,16 @@ class AdapterRun:
 
     @staticmethod
     def _claim_domain(options: Options, environment: Dict[str, str]) -> Domain:
-        """Claim a free domain for launched nodes, or the domain of nodes that the user started."""
+        """Claim the requested domain, a free one for a launch command, or the one in which the user's nodes run."""
         if options.domain is not None or options.launch:
             return claim_domain(options.domain, environment)
         return claim_domain(int(environment.get("ROS_DOMAIN_ID") or 0), environment)
 
 
 def _is_robot_topic(topic: Dict[str, Any]) -> bool:
-    """Return whether a robot has this topic; ground truth and topics of the protocol are not published."""
+    """Return whether a real robot would have this topic, unlike ground truth and simscen's own topics."""
     name: str = topic["topic"]
-    if name in MASKS.values():  # without zones
+    if name in MASKS.values():  # masks without zones; the adapter publishes those with zones under these names
         return False
     return not name.startswith(("/simscen", "/ground_truth")) and not topic.get("exact", False) and name != "/clock"
 

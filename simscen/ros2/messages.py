@@ -1,4 +1,7 @@
-"""Message types of the user's distribution, and the few CDR fields that the adapter reads and writes itself."""
+"""Find installed ROS message types, read and write a few messages as CDR bytes, and compute with 2D poses.
+
+Clocks, commands, and stamps are read and written without deserializing whole messages.
+"""
 
 import functools
 import importlib
@@ -7,11 +10,13 @@ import struct
 from typing import Any, Optional, Sequence, Tuple
 
 LITTLE_ENDIAN = b"\0\1\0\0"
+"""The four bytes before a message in little-endian CDR."""
 NANOSECONDS = 10**9
-TRANSFORMS, PATH = "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Path"
-SCAN, ODOMETRY = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
+"""Nanoseconds per second."""
+TRANSFORMS_TYPE, PATH_TYPE = "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Path"
+SCAN_TYPE, ODOMETRY_TYPE = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
 POSE_BYTES = 56
-"""Size of a pose or a transform: seven doubles."""
+"""Size of a pose or transform in CDR: seven doubles."""
 
 Pose = Tuple[float, float, float]
 """x and y in meters, yaw in radians."""
@@ -30,43 +35,43 @@ def find_type(name: str) -> Optional[Any]:
 
 
 def read_header(message: bytes) -> Tuple[int, str]:
-    """Return stamp in nanoseconds and frame of a message that begins with a std_msgs/Header."""
+    """Return stamp in ns and frame of a serialized message that begins with a std_msgs/Header."""
     order = _byte_order(message)
     seconds, nanoseconds, size = struct.unpack_from(order + "iII", message, 4)
     return seconds * NANOSECONDS + nanoseconds, message[16 : 16 + size - 1].decode("utf-8", "replace")
 
 
-def read_twist(message: bytes, stamped: bool) -> Tuple[float, ...]:
-    """Return linear x, y, z and angular x, y, z of a Twist or a TwistStamped."""
+def read_twist(message: bytes, is_stamped: bool) -> Tuple[float, ...]:
+    """Return linear x, y, z in m/s and angular x, y, z in rad/s of a serialized Twist or TwistStamped."""
     order, start = _byte_order(message), 4
-    if stamped:
+    if is_stamped:
         (size,) = struct.unpack_from(order + "I", message, 12)
         start += -(-(12 + size) // 8) * 8
     return struct.unpack_from(order + "6d", message, start)
 
 
 def write_twist(numbers: Sequence[float]) -> bytes:
-    """Return a geometry_msgs/msg/Twist."""
+    """Return a serialized geometry_msgs/msg/Twist of linear x, y, z and angular x, y, z."""
     return LITTLE_ENDIAN + struct.pack("<6d", *numbers)
 
 
 def write_clock(nanoseconds: int) -> bytes:
-    """Return a rosgraph_msgs/msg/Clock."""
+    """Return a serialized rosgraph_msgs/msg/Clock."""
     return LITTLE_ENDIAN + struct.pack("<iI", nanoseconds // NANOSECONDS, nanoseconds % NANOSECONDS)
 
 
 def shift_stamps(type_name: str, message: bytes, offset_ns: int) -> bytes:
-    """Return the message with `offset_ns` added to all of its stamps; stamps do not become negative."""
+    """Return the serialized message with `offset_ns` added to all of its stamps; a negative stamp becomes 0."""
     if not offset_ns:
         return message
     shifted = bytearray(message)
-    if type_name == TRANSFORMS:
+    if type_name == TRANSFORMS_TYPE:
         (count,) = struct.unpack_from(_byte_order(message) + "I", message, 4)
         position = 8
         for _ in range(count):
             position = _shift_header(shifted, _align(position, 4), offset_ns)
             position = _align(_skip_string(shifted, position), 8) + POSE_BYTES
-    elif type_name == PATH:
+    elif type_name == PATH_TYPE:
         position = _align(_shift_header(shifted, 4, offset_ns), 4)
         (count,) = struct.unpack_from(_byte_order(message) + "I", message, position)
         position += 4
@@ -84,7 +89,7 @@ def _has_header(type_name: str) -> bool:
 
 
 def _shift_header(message: bytearray, position: int, offset_ns: int) -> int:
-    """Shift the stamp of the header at `position`; return the position after the header."""
+    """Add `offset_ns` to the stamp of the header at `position`; return the position after the header."""
     order = _byte_order(message)
     seconds, nanoseconds = struct.unpack_from(order + "iI", message, position)
     stamp = max(0, seconds * NANOSECONDS + nanoseconds + offset_ns)
@@ -99,7 +104,7 @@ def _skip_string(message: bytearray, position: int) -> int:
 
 
 def _align(position: int, width: int) -> int:
-    """Return the next aligned position; CDR aligns relative to the end of the four bytes of encapsulation."""
+    """Return the next aligned position; CDR aligns relative to the end of its first four bytes."""
     return position + -(position - 4) % width
 
 

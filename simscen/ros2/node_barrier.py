@@ -1,13 +1,13 @@
-"""Barrier that waits until all nodes have processed what the adapter published.
+"""Barrier that waits until all nodes have processed the messages that the adapter published.
 
-Executors of rclcpp and rclpy serve timers, subscriptions and services in this order, and every node serves its
-parameters in the executor that also calls its other callbacks. So a node that answers a request for a parameter has
-processed the messages that had reached it before. Consequences of such a message, for example a timer that a new
-/clock makes due, are processed before the answer to the next request. One *round* asks all nodes at once and waits for
-all answers.
+The barrier requests a parameter of each node. Executors of rclcpp and rclpy serve timers, subscriptions and services in
+this order, and a node serves its parameters in the executor that also calls its other callbacks. So a node that answers
+has processed all messages that reached it before the request. If such a message has a further effect, for example if a
+new /clock makes a timer due, the effect has taken place at the answer to the next request. A *round* sends a request to
+all nodes at once, and waits for all answers.
 
-Nodes that answered while the run waited to be ready are *in step*. Others are left out of the rounds, for example
-client nodes that Nav2's behavior tree spins only occasionally.
+Only nodes that answered before the run take part in the rounds. They are *in step*. Others are left out, such as client
+nodes that Nav2's behavior tree spins only occasionally.
 """
 
 import time
@@ -20,11 +20,11 @@ from simscen.ros2.step_time import StepTime
 
 PARAMETER_SERVICE = "rcl_interfaces/srv/GetParameters"
 POLL_S = 0.5
-"""Time to wait for answers of nodes that may be busy."""
+"""Wall time that a poll before the run waits for the answers of nodes, which may be busy."""
 SILENT_AFTER_S = 3.0
-"""Time without an answer after which a node that is not required is left out."""
+"""Wall time without an answer after which the run does not wait for a node that is not required."""
 DISAPPEAR_TIMEOUT_S = 1.0
-"""Time that the service of a node may be missing from the graph."""
+"""Wall time that the service of a node may be missing from the graph before the node counts as exited."""
 
 
 class _Request(NamedTuple):
@@ -33,19 +33,20 @@ class _Request(NamedTuple):
 
 
 class ServicePoll:
-    """Asks the same service of several nodes without being blocked by nodes that do not answer."""
+    """Calls the same service of several nodes repeatedly, without being blocked by nodes that do not answer."""
 
     def __init__(self, graph: Graph, service_type: str, service: str, **request: Any) -> None:
         self._graph, self._service = graph, service
         self._type: Any = find_type(service_type)
         self._request = request
         self.clients: Dict[Node, Any] = {}
+        """Service clients of the tracked nodes."""
         self._waiting: Dict[Node, _Request] = {}
         self.answers: Dict[Node, Any] = {}
-        """The latest answers of the nodes that answered the last request."""
+        """Answers of the nodes that answered during the last `ask`."""
 
     def track(self, nodes: Iterable[Node]) -> None:
-        """Ask exactly these nodes from now on."""
+        """Call exactly these nodes from now on."""
         tracked = set(nodes)
         for node in [node for node in self.clients if node not in tracked]:
             self.forget(node)
@@ -53,7 +54,7 @@ class ServicePoll:
             self.clients[node] = self._graph.node.create_client(self._type, f"{full_name(node)}/{self._service}")
 
     def forget(self, node: Node) -> None:
-        """Stop asking a node."""
+        """Stop calling a node."""
         self._graph.node.destroy_client(self.clients.pop(node))
         self._waiting.pop(node, None)
         self.answers.pop(node, None)
@@ -76,37 +77,39 @@ class ServicePoll:
         return not self._waiting
 
     def waiting_s(self, node: Node) -> float:
-        """Return for how long a node has not answered."""
+        """Return the wall time since the first `ask` that a node has not answered."""
         return time.monotonic() - self._waiting[node].since if node in self._waiting else 0.0
 
 
 class NodeBarrier:
-    """Asks the nodes of the graph. `required` returns the full names of nodes without which the run cannot continue."""
+    """Barrier for all nodes of the graph. Call `poll` before the run, then `begin`, and `round` during the run."""
 
     def __init__(self, graph: Graph, limit_s: float) -> None:
+        """`limit_s` is the maximum wall time for the answers in a round."""
         self._graph, self._limit = graph, limit_s
         self._poll = ServicePoll(graph, PARAMETER_SERVICE, "get_parameters", names=["use_sim_time"])
         self.required: Callable[[], Set[str]] = set
+        """Returns the full names of the nodes without which the run cannot continue."""
         self.without_parameters: List[str] = []
-        """Nodes that do not serve their parameters, so that the barrier cannot determine when they have finished."""
+        """Full names of nodes without a parameter service, whose progress the barrier cannot determine."""
         self.left_out: List[str] = []
-        """Nodes that do not answer, although they serve their parameters."""
+        """Full names of nodes that do not answer, although they have a parameter service."""
         self.step_time = StepTime(graph.spin_until)
 
     @property
     def nodes(self) -> List[str]:
-        """The nodes that are asked in each round."""
+        """Full names of the nodes in step, sorted."""
         return [full_name(node) for node in sorted(self._poll.clients) if full_name(node) not in self.left_out]
 
     @property
     def not_in_step(self) -> List[str]:
-        """The nodes that no round waits for."""
+        """Full names of the nodes for which no round waits, sorted."""
         return sorted([*self.without_parameters, *self.left_out])
 
     def poll(self) -> List[str]:
-        """Ask all nodes of the graph; return the reasons why the run must still wait.
+        """Send a request to all nodes of the graph; return for which of them the run must still wait, one text each.
 
-        A node that is not required and does not answer for SILENT_AFTER_S is no reason.
+        A node that is not required and does not answer for SILENT_AFTER_S is left out.
         """
         nodes = self._graph.nodes()
         serving = [node for node in nodes if self._graph.service_type(node, "get_parameters") is not None]
@@ -128,21 +131,22 @@ class NodeBarrier:
 
     @property
     def sim_time(self) -> Dict[str, bool]:
-        """Parameter `use_sim_time` of the nodes that answered the last poll."""
+        """Parameter `use_sim_time` of the nodes that answered the last poll, by full name."""
         answers = self._poll.answers.items()
         return {full_name(node): answer.values[0].bool_value for node, answer in answers if answer.values}
 
     def begin(self) -> None:
-        """Use the nodes that answered the last poll in all rounds."""
+        """Begin the run: all rounds wait for the nodes that answered the last poll."""
         required = self.required()  # a node that exits later is still required, though the graph forgets it
         self.required = lambda: required
         for node in [node for node in self._poll.clients if node not in self._poll.answers]:
             self._poll.forget(node)
 
     def round(self) -> None:
-        """Wait until every node has processed the messages sent to it.
+        """Wait until every node in step has processed the messages sent to it.
 
-        Raises AdapterError naming required nodes that do not answer; leaves out others.
+        If nodes do not answer, raises AdapterError with their names if they are required, and otherwise leaves them out
+        of further rounds.
         """
         clients = self._poll.clients
         absent = [node for node in clients if not clients[node].service_is_ready()]
@@ -155,7 +159,7 @@ class NodeBarrier:
         if not self.step_time.wait_for(lambda: [full_name(n) for n, f in futures.items() if not f.done()], self._limit):
             late = [node for node in sorted(futures) if not futures[node].done()]
             self._leave_out(late, f"has not answered for {self._limit:g} s: it hangs, or was killed")
-        self._graph.take_all()
+        self._graph.receive_all()
 
     def _leave_out(self, nodes: List[Node], reason: str) -> None:
         required = [full_name(node) for node in nodes if full_name(node) in self.required()]
@@ -165,14 +169,14 @@ class NodeBarrier:
             self._poll.forget(node)
             self.left_out.append(full_name(node))
 
-    def wait(self, future: Any, otherwise: str) -> None:
-        """Wait until `future` is done. Raises AdapterError with `otherwise` when that takes too long."""
+    def wait(self, future: Any, problem: str) -> None:
+        """Wait until `future` is done. Raises AdapterError if that takes too long; `problem` begins its message."""
         limit = min(self._limit, self.step_time.remaining)
         if not self._graph.spin_until(future.done, limit):
-            raise AdapterError(f"{otherwise} for {limit:.3g} s")
+            raise AdapterError(f"{problem} for {limit:.3g} s")
 
     def call(self, client: Any, request: Any) -> Any:
-        """Return the answer of a service; None if it is missing or does not answer within a second each."""
+        """Call a service, and return its answer; None if it does not exist or does not answer within a second."""
         if not self._graph.spin_until(client.service_is_ready, 1.0):
             return None
         future = client.call_async(request)

@@ -1,4 +1,4 @@
-"""Values of the parameters of other nodes."""
+"""Read the parameters of other nodes."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ if TYPE_CHECKING:
 FIELDS = ("bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array", "double_array")
 """Fields of rcl_interfaces/msg/ParameterValue in the order of ParameterType, from PARAMETER_BOOL = 1."""
 STRING_ARRAY = 9
+"""ParameterType.PARAMETER_STRING_ARRAY."""
 
 
 class NodeParameters:
-    """Asks nodes for their parameters. A node that does not answer within seconds has none."""
+    """Reads parameters by the services of the nodes. For a node that does not answer in time, results are empty."""
 
     def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
         self._graph, self._barrier = graph, barrier
 
     def names(self, node: str) -> list[str]:
-        """Return the names of all parameters of a node, given by its full name."""
+        """Return the names of all parameters of the node with this full name, sorted."""
         answer = self._call(node, "ListParameters", "list_parameters")
         return [] if answer is None else sorted(answer.result.names)
 
     def values(self, node: str, names: Sequence[str]) -> dict[str, Any]:
-        """Return the values of these parameters of a node, as values of JSON."""
+        """Return the values of these parameters of the node with this full name, as JSON values."""
         answer = self._call(node, "GetParameters", "get_parameters", names=list(names)) if names else None
         return {} if answer is None else dict(zip(names, map(plain_value, answer.values)))
 
@@ -42,7 +43,7 @@ class NodeParameters:
 
 
 def plain_value(value: Any) -> Any:
-    """Return a rcl_interfaces/msg/ParameterValue as a value of JSON; None if it is not set."""
+    """Return an rcl_interfaces/msg/ParameterValue as a JSON value: nan and inf as text, None if it is not set."""
     if value.type == 0:
         return None
     field = "string_array" if value.type == STRING_ARRAY else FIELDS[value.type - 1]

@@ -1,7 +1,7 @@
-"""Options of `simscen ros2`, the error that ends a run, topic names of the user's graph, and ROS domains.
+"""Options and errors of `simscen ros2`, and what follows from the options: topic names and the ROS domain of a run.
 
-Each run gets a ROS_DOMAIN_ID that no other run of this user on this machine uses at the same time. Every domain has a
-file that its holder locks; the kernel releases the lock when the process ends.
+A run has a ROS_DOMAIN_ID that no other run of this user on this machine uses at the same time. To ensure this, a run
+locks the file of its domain. The kernel releases the lock when the process ends.
 """
 
 import fcntl
@@ -25,7 +25,7 @@ class BringUpAborted(AdapterError):
 
 
 class Options(NamedTuple):
-    """Options as `simscen ros2 --help` explains them; times in seconds."""
+    """Options of `simscen ros2`; see its --help. Times are in s."""
 
     launch: Optional[str] = None
     domain: Optional[int] = None
@@ -50,14 +50,14 @@ class Options(NamedTuple):
 
 
 GLOBAL_TOPICS = ("/clock",)
-"""Topics outside of the namespace: nodes of all namespaces share one time."""
+"""Topics that are not moved to the namespace, because nodes of all namespaces use the same clock."""
 
 
 class TopicNames:
-    """Maps topics of the protocol to topics of the graph.
+    """Callable that maps topics of the stack protocol to their names in the graph.
 
-    A remapping is written `/scan:=/front/scan`. A target without a leading slash is relative to the namespace. Topics
-    without a remapping, except /clock, are moved to the namespace.
+    A remapping has the form `/scan:=/front/scan`. A target without a leading slash is relative to the namespace. Topics
+    without a remapping, except /clock, are moved to the namespace. Raises AdapterError for a remapping of another form.
     """
 
     def __init__(self, namespace: str, remappings: Iterable[str]) -> None:
@@ -78,13 +78,13 @@ class TopicNames:
 
 
 ROBOT_VARIABLE = "SIMSCEN_ROBOT"
-"""Environment variable with the robot's name, if a scenario has several."""
+"""Environment variable with the name of the robot; set if the scenario has several robots."""
 DOMAINS = range(1, 102)
-"""Above 101, ports of a domain may be ephemeral ports of Linux; 0 is the default domain of all ROS users."""
+"""ROS domains for runs. 0 is the default of all ROS users, and above 101, ports may be ephemeral ports of Linux."""
 
 
 class Domain:
-    """A claimed domain, held until `release` or the end of the process."""
+    """A ROS domain that is reserved for this run until `release` or the end of the process."""
 
     def __init__(self, number: int, lock: IO[str]) -> None:
         self.number = number
@@ -96,7 +96,7 @@ class Domain:
 
 
 def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Domain:
-    """Claim the domain `requested`, or the first free one. Raises AdapterError if there is none."""
+    """Reserve the domain `requested`, or for None the first free one. Raises AdapterError if it is in use."""
     folder = _lock_folder(environment)
     for number in DOMAINS if requested is None else (requested,):
         lock = (folder / f"{number}.lock").open("a+")
@@ -120,7 +120,7 @@ def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Do
 
 
 def _lock_folder(environment: Mapping[str, str]) -> Path:
-    """Return the folder of the lock files, which all sessions of a user share."""
+    """Return the folder of the lock files, which is the same in all sessions of a user."""
     runtime = environment.get("XDG_RUNTIME_DIR")
     if not runtime or not os.access(runtime, os.W_OK):
         runtime = str(Path(tempfile.gettempdir(), f"simscen-{os.getuid()}"))
@@ -132,7 +132,7 @@ def _lock_folder(environment: Mapping[str, str]) -> Path:
 
 
 def ros_environment(domain: int, log_folder: str, environment: Mapping[str, str]) -> Mapping[str, str]:
-    """Return the environment of the adapter and its nodes: one domain, restricted to this machine."""
+    """Return the environment variables of the adapter and its nodes: the ROS domain, restricted to this machine."""
     env = dict(environment, ROS_DOMAIN_ID=str(domain), ROS_LOG_DIR=log_folder)
     # simscen's virtual environment would hide the Python that has rclpy from the user's commands.
     env["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), environment.get("PATH", os.defpath)])

@@ -1,9 +1,9 @@
-"""The stack's own estimate of the robot's pose, and its newest plan."""
+"""Derive the stack's own estimate of the robot's pose, and its newest plan, from messages."""
 
 from typing import Any, List, Optional, Tuple
 
 from simscen.ros2 import messages
-from simscen.ros2.graph import Received
+from simscen.ros2.graph import ReceivedMessage
 from simscen.ros2.messages import Pose
 from simscen.ros2.options import AdapterError
 
@@ -12,15 +12,15 @@ PLAN = "/plan"
 
 
 class PoseEstimate:
-    """Pose estimate from the messages of the stack.
+    """Pose estimate and plan of the stack, from the messages that simscen and the nodes publish.
 
-    Sources, in this order: map -> odom of /tf composed with odometry; /amcl_pose; the initial pose composed with
-    odometry.
+    The pose is the first of these that is available: map -> odom of /tf composed with odometry; /amcl_pose; the initial
+    pose composed with odometry.
     """
 
     def __init__(self) -> None:
         self.plan: List[Tuple[float, float]] = []
-        """Points of the newest plan."""
+        """Points (x, y) of the newest plan in m."""
         self._map_from_odom: Optional[Pose] = None
         self._amcl_pose: Optional[Pose] = None
         self._initial: Optional[Pose] = None
@@ -28,7 +28,7 @@ class PoseEstimate:
 
     @property
     def pose(self) -> Optional[Pose]:
-        """x, y, yaw on the map; None if unknown."""
+        """Estimated pose in the map frame; None if unknown."""
         if self._map_from_odom is not None and self._odometry is not None:
             return messages.compose(self._map_from_odom, self._odometry)
         if self._amcl_pose is not None:
@@ -38,14 +38,14 @@ class PoseEstimate:
         return None
 
     def take_published(self, topic: str, data: bytes) -> None:
-        """Take a message that simscen publishes."""
+        """Process a message that simscen publishes."""
         if topic == "/odom":
             self._odometry = _pose(_read("nav_msgs/msg/Odometry", data).pose.pose)
         elif topic == "/initialpose":
             self._initial = _pose(_read("geometry_msgs/msg/PoseWithCovarianceStamped", data).pose.pose)
 
-    def take_received(self, message: Received) -> bool:
-        """Take a message of the stack; return False for a /tf without map -> odom.
+    def take_received(self, message: ReceivedMessage) -> bool:
+        """Process a message of the nodes; return False for a /tf without map -> odom, which is irrelevant.
 
         Raises AdapterError for a pose or plan in another frame than `map`.
         """
@@ -60,7 +60,7 @@ class PoseEstimate:
             return self._take_transforms(message)
         return True
 
-    def _take_transforms(self, message: Received) -> bool:
+    def _take_transforms(self, message: ReceivedMessage) -> bool:
         found = False
         for link in _read(message.type, message.data).transforms:
             if link.child_frame_id.lstrip("/") != ODOM_FRAME:
@@ -75,7 +75,7 @@ class PoseEstimate:
         return found
 
 
-def _require_map_frame(message: Received) -> None:
+def _require_map_frame(message: ReceivedMessage) -> None:
     frame = messages.read_header(message.data)[1]
     if frame.lstrip("/") != MAP_FRAME:
         raise AdapterError(f"{message.topic} is in the frame {frame!r}; simscen's map frame is {MAP_FRAME!r}")

@@ -1,18 +1,18 @@
-"""Checks of the graph before a run: what is missing, what does not match, which nodes are not active yet."""
+"""Check whether the nodes of the user's graph are ready for a run, and describe what is missing or does not match."""
 
 from typing import Any, Iterable, List, Optional, Sequence, Set, Tuple
 
 from simscen.ros2.goal_sender import GOAL_POSE, GoalPoseSender, GoalSenders
 from simscen.ros2.graph import Endpoint, Graph, Topic, full_name, incompatible_policies
-from simscen.ros2.messages import ODOMETRY, find_type
-from simscen.ros2.nav2.parameters import NODES
+from simscen.ros2.messages import ODOMETRY_TYPE, find_type
+from simscen.ros2.nav2.parameter_rules import NODES
 from simscen.ros2.nav2.readiness import Nav2Readiness
 from simscen.ros2.node_barrier import POLL_S, NodeBarrier, ServicePoll
 from simscen.ros2.options import Options
 from simscen.ros2.user_transforms import UserTransforms
 
 COMMAND = "/cmd_vel"
-TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
+TWIST_TYPE, TWIST_STAMPED_TYPE = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 MAP = "/map"
 STATE_SERVICE = "lifecycle_msgs/srv/GetState"
 ACTIVE = 3
@@ -22,7 +22,7 @@ SHARED_TOPICS = ("/tf", "/tf_static", "/initialpose", GOAL_POSE)
 
 
 class Readiness:
-    """Checks the graph repeatedly until nothing is missing. `topics` are those that simscen publishes."""
+    """Checks of the graph that are repeated until nothing is missing. All checks return one text for each problem."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class Readiness:
         options: Options,
         bases: Sequence[str],
     ) -> None:
-        """`bases` are the names of the base frame in the graph."""
+        """`topics` are those that simscen publishes. `bases` are the names of the base frame in the graph."""
         self._graph, self._barrier, self._topics, self._senders = graph, barrier, list(topics), senders
         self._options = options
         self._states = ServicePoll(graph, STATE_SERVICE, "get_state") if find_type(STATE_SERVICE) else None
@@ -44,15 +44,15 @@ class Readiness:
         barrier.required = self.required_nodes
 
     def use_transforms(self, transforms: UserTransforms) -> None:
-        """Require the user's transforms, and accept their frames as base frames."""
+        """Require that the user's nodes publish these transforms, and accept their frames as base frames."""
         self._user_transforms = self._nav2.user_transforms = transforms
 
     def no_nodes(self) -> List[str]:
-        """Return what is missing if there is no other node."""
+        """Return a problem if there is no other node."""
         return [] if self._graph.nodes() else ["there is no other node in this ROS domain"]
 
     def missing(self) -> List[str]:
-        """Return what is missing now, one sentence each."""
+        """Return everything that is missing or does not match now."""
         if self.no_nodes():
             return self.no_nodes()
         busy = self._barrier.poll()
@@ -67,7 +67,7 @@ class Readiness:
         return busy + found + self._wall_time() + self._inactive()
 
     def likely_causes(self) -> List[str]:
-        """Return a missing map and wrong parameters of Nav2's nodes, which may prevent nodes from becoming active."""
+        """Return problems that may prevent nodes from becoming active: no map, and wrong parameters of Nav2's nodes."""
         return self._missing_map() + (self._nav2.wrong_parameters() if self._options.nav2 else [])
 
     def _missing_map(self) -> List[str]:
@@ -81,7 +81,7 @@ class Readiness:
     def required_nodes(self) -> Set[str]:
         """Return the full names of nodes without which the run cannot continue.
 
-        These are lifecycle nodes, publishers of commands, and subscribers of goals.
+        These are lifecycle nodes, publishers of commands, subscribers of goals, and nodes that Nav2 needs.
         """
         names = {end.node for end in self._graph.publishers_of(self._graph.names(COMMAND))}
         if isinstance(self._senders.usable, GoalPoseSender):
@@ -91,28 +91,30 @@ class Readiness:
         return names | {full_name(node) for node in self._lifecycle_nodes()}
 
     def command_type(self) -> str:
-        """Return the type of the commands, Twist or TwistStamped."""
+        """Return the type with which commands are published, Twist or TwistStamped."""
         return next(end.type for end in self._graph.publishers_of(self._graph.names(COMMAND)))
 
     def _commands(self) -> List[str]:
         name = self._graph.names(COMMAND)
         ends = self._graph.publishers_of(name)
         if not ends:
-            others = self._on_other_topics((TWIST, TWIST_STAMPED), self._graph.publishers_of)
+            others = self._on_other_topics((TWIST_TYPE, TWIST_STAMPED_TYPE), self._graph.publishers_of)
             hints = [
                 f"; {end.node} publishes {topic} ({end.type}): --remap {COMMAND}:={topic}" for topic, end in others
             ]
-            return [f"no node publishes {name} ({TWIST} or {TWIST_STAMPED}){''.join(hints[:2])}"]
-        wrong = [end for end in ends if end.type not in (TWIST, TWIST_STAMPED)]
+            return [f"no node publishes {name} ({TWIST_TYPE} or {TWIST_STAMPED_TYPE}){''.join(hints[:2])}"]
+        wrong = [end for end in ends if end.type not in (TWIST_TYPE, TWIST_STAMPED_TYPE)]
         if wrong:
-            return [f"{end.node} publishes {name} as {end.type}, not {TWIST} or {TWIST_STAMPED}" for end in wrong]
+            return [
+                f"{end.node} publishes {name} as {end.type}, not {TWIST_TYPE} or {TWIST_STAMPED_TYPE}" for end in wrong
+            ]
         if len({end.type for end in ends}) > 1:
             listed = ", ".join(f"{end.node} ({end.type})" for end in ends)
             return [f"{name} is published both as Twist and as TwistStamped: {listed}"]
         return []
 
     def _subscribers(self, topic: Topic) -> List[str]:
-        """Return why subscribers of a topic of simscen receive nothing."""
+        """Return subscribers of a topic of simscen that receive nothing, because type or QoS do not match."""
         name, found = self._graph.names(topic.name), []
         for end in self._graph.subscribers_of(name):
             if end.type != topic.type:
@@ -136,9 +138,12 @@ class Readiness:
         ]
 
     def _unused_sensors(self) -> List[str]:
-        """Return sensors without a subscriber while a node waits for the same type under another name."""
+        """Return sensors without a subscriber, if a node waits for the same type under another name.
+
+        Also return a problem if no sensor has a subscriber.
+        """
         found = []
-        sensors = [topic for topic in self._topics if topic.type.startswith(("sensor_msgs/", ODOMETRY))]
+        sensors = [topic for topic in self._topics if topic.type.startswith(("sensor_msgs/", ODOMETRY_TYPE))]
         for topic in sensors:
             name = self._graph.names(topic.name)
             if self._graph.subscribers_of(name):
@@ -155,7 +160,10 @@ class Readiness:
         return found
 
     def _on_other_topics(self, types: Iterable[str], endpoints_of: Any) -> List[Tuple[str, Endpoint]]:
-        """Return the endpoints of these types on topics that are not simscen's."""
+        """Return topic names and endpoints of these types, for topics that are not simscen's.
+
+        `endpoints_of` is Graph.publishers_of or Graph.subscribers_of.
+        """
         own = {self._graph.names(topic.name) for topic in self._topics} | {self._graph.names(COMMAND)}
         found = []
         for name, existing in sorted(self._graph.topics().items()):
@@ -176,7 +184,7 @@ class Readiness:
         return [node for node in self._graph.nodes() if self._graph.service_type(node, "get_state") == STATE_SERVICE]
 
     def _inactive(self) -> List[str]:
-        """Return the lifecycle nodes that are not active; nodes that do not answer are reported by the barrier."""
+        """Return the lifecycle nodes that are not active, or do not report their state."""
         if self._states is None:
             return []
         self._states.track(self._lifecycle_nodes())

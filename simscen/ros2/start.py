@@ -1,6 +1,7 @@
-"""Program that the user's ROS Python runs: `python start.py OPTIONS`, with the options as JSON.
+"""Program of the adapter, `python start.py OPTIONS`, for the user's ROS Python. OPTIONS are the Options in JSON.
 
-simscen is not installed there. Its folder is made importable as the package `simscen`, without running `__init__.py`.
+simscen is not installed in that Python. So this program makes simscen's folder importable as the package `simscen`. Its
+`__init__.py` is not run, because it may need packages or a newer Python that are missing there.
 """
 
 import json

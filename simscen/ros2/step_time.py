@@ -1,4 +1,4 @@
-"""Wall time of one step of the run: who is waited for, and an error with their names when the time is over."""
+"""Limit the wall time of one step of the run, and name the slowest nodes in the error when the limit is exceeded."""
 
 import math
 import time
@@ -6,31 +6,32 @@ from typing import Callable, Dict, Iterable
 
 from simscen.ros2.options import AdapterError
 
-LISTED = 3
-"""Number of nodes that the error names."""
+MAX_LISTED_NODES = 3
+"""Maximum number of nodes that the error names."""
 
 
 class StepTime:
-    """Limits all waiting in a step together. `spin_until` handles events until a condition holds."""
+    """Limits the total wall time of all waits in a step."""
 
     def __init__(self, spin_until: Callable[[Callable[[], bool], float], bool]) -> None:
+        """`spin_until` is Graph.spin_until."""
         self._spin_until = spin_until
         self._end, self._limit = math.inf, math.inf
         self._waited: Dict[str, float] = {}
 
     def begin(self, limit_s: float) -> None:
-        """Begin a step, which may take `limit_s` of wall time."""
+        """Begin a step that may take `limit_s`."""
         self._end, self._limit, self._waited = time.monotonic() + limit_s, limit_s, {}
 
     @property
     def remaining(self) -> float:
-        """Seconds of wall time that are left."""
+        """Wall time in s that is left for the step; inf before the first step."""
         return max(0.0, self._end - time.monotonic())
 
     def wait_for(self, awaited: Callable[[], Iterable[str]], limit_s: float) -> bool:
-        """Handle events until `awaited` names no more nodes; return False if that takes longer than `limit_s`.
+        """Handle events until `awaited` returns no more nodes; return False if that takes longer than `limit_s`.
 
-        Raises AdapterError with the nodes that took longest when the time of the step is over.
+        Raises AdapterError with the nodes that took longest if the time of the step is over.
         """
         start = time.monotonic()
         waiting = set(awaited())
@@ -53,7 +54,7 @@ class StepTime:
             self._waited[node] = self._waited.get(node, 0.0) + time.monotonic() - start
 
     def _message(self) -> str:
-        slowest = sorted(self._waited, key=lambda node: (-self._waited[node], node))[:LISTED]
+        slowest = sorted(self._waited, key=lambda node: (-self._waited[node], node))[:MAX_LISTED_NODES]
         times = ", ".join(f"{node} ({self._waited[node]:.1f} s)" for node in slowest)
         return (
             f"a step took more than {self._limit:.3g} s of wall time, because these nodes answered late: {times}; "

@@ -1,31 +1,32 @@
-"""The user's transforms of sensors, for example those of a robot_state_publisher, in place of simscen's /tf_static."""
+"""Check transforms that the user's nodes publish instead of simscen's /tf_static, such as a robot_state_publisher."""
 
 from typing import Any, List, Set
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
-from simscen.ros2.frames import SHARED_FRAMES, STATIC_TRANSFORMS, FrameNames
+from simscen.ros2.frames import SHARED_FRAMES, TF_STATIC, FrameNames
 from simscen.ros2.graph import Graph
-from simscen.ros2.messages import TRANSFORMS, find_type
+from simscen.ros2.messages import TRANSFORMS_TYPE, find_type
 
 PROFILES = {
-    STATIC_TRANSFORMS: QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+    TF_STATIC: QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL),
     "/tf": QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT),
 }
+"""Topics of transforms, with the QoS profiles of the subscriptions."""
 
 
 class UserTransforms:
-    """Finds out whether the user's nodes publish all frames that simscen would publish on /tf_static."""
+    """Collects the frames of the user's nodes, and finds those of simscen's /tf_static that are missing."""
 
     def __init__(self, graph: Graph, names: FrameNames, replaced: bytes) -> None:
-        """Subscribe to the transforms; `replaced` is simscen's message on /tf_static, which is not published."""
+        """Subscribe to the transforms. `replaced` is simscen's own message for /tf_static, which is not published."""
         self._required: List[str] = []
         self._published: Set[str] = set()
-        message_type: Any = find_type(TRANSFORMS)
+        message_type: Any = find_type(TRANSFORMS_TYPE)
         if message_type is None:
             return
-        message = deserialize_message(names.apply(STATIC_TRANSFORMS, message_type, replaced), message_type)
+        message = deserialize_message(names.apply(TF_STATIC, message_type, replaced), message_type)
         self._required = [link.child_frame_id for link in message.transforms]
         for topic, profile in PROFILES.items():
             graph.node.create_subscription(message_type, graph.names(topic), self._take, profile)
@@ -37,14 +38,14 @@ class UserTransforms:
 
     @property
     def robot_frames(self) -> List[str]:
-        """The frames of the robot that the user's nodes publish."""
+        """Frames of the robot that the user's nodes publish, sorted."""
         return sorted(self._published)
 
     def missing(self) -> List[str]:
-        """Return the frames that no node publishes, one sentence each."""
+        """Return a text for each frame of simscen's /tf_static that no node publishes."""
         known = ", ".join(self.robot_frames) or "none"
         return [
-            f"no node publishes the frame {frame}, and {STATIC_TRANSFORMS} of simscen is left out: "
+            f"no node publishes the frame {frame}, and {TF_STATIC} of simscen is left out: "
             f"--frame {frame}:=NAME uses the name of your URDF (frames of your nodes: {known})"
             for frame in self._required
             if frame not in self._published

@@ -17,7 +17,7 @@ from simscen.cli.diagnostics import as_text, print_text, relative_to_working_fol
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.loading.stacks.nav2_parameters import Nav2Parameters, read_nav2_parameters
 from simscen.ros2.frames import FrameNames
-from simscen.ros2.nav2.parameters import Offer
+from simscen.ros2.nav2.parameter_rules import PublishedNames
 from simscen.ros2.options import AdapterError
 
 SOCKET_VARIABLE = "SIMSCEN_STACK_FD"
@@ -160,7 +160,7 @@ def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, bases:
     if kind is not GraphKind.NAV2 or parameters is None:
         command = shlex.join(["simscen", *sys.argv[1:]])
         raise UsageError(f"no run to connect to; use simscen run SCENARIO --stack mine={shlex.quote(command)}")
-    problems = parameters.problems(Offer(["/scan"], "/odom", bases))
+    problems = parameters.problems(PublishedNames(["/scan"], "/odom", bases))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(problems)
     if problems:

@@ -13,7 +13,7 @@ from simscen.loading.yaml.tree import (
     Node,
     Position,
 )
-from simscen.ros2.nav2.parameters import Offer, check
+from simscen.ros2.nav2.parameter_rules import PublishedNames, check
 
 PARAMETERS = "ros__parameters"
 """Key under which ROS 2 expects the parameters of a node."""
@@ -36,16 +36,16 @@ class Nav2Parameters:
     notes: tuple[Problem, ...] = ()
     """Warnings about duplicate keys and nodes."""
 
-    def problems(self, offer: Offer) -> list[Problem]:
-        """Return problems with parameters that do not fit the topics and frames `offer`, in the order of the file."""
+    def problems(self, published: PublishedNames) -> list[Problem]:
+        """Return the parameters that do not match the `published` topics and frames, in the order of the file."""
         found = [
             Problem(
-                *self.positions[finding.node, finding.parameter],
+                *self.positions[problem.node, problem.parameter],
                 code="SC340",
-                message=f"{finding.node}: {finding.message}",
-                severity="error" if finding.severe else "warning",
+                message=f"{problem.node}: {problem.message}",
+                severity="error" if problem.is_severe else "warning",
             )
-            for finding in check(self.nodes, offer)
+            for problem in check(self.nodes, published)
         ]
         lines = self.text.split("\n")
         return [replace(problem, source=lines[problem.line - 1]) for problem in sorted(found)]

@@ -1,1 +1,1 @@
-"""What the adapter knows about Nav2: its nodes, parameters, actions, logs, and costmap filters."""
+"""Parts of the adapter that are specific to Nav2: its nodes, parameters, actions, logs, and costmap filters."""

@@ -1,12 +1,12 @@
-"""Actions of Nav2's servers that the robot executes: commands that are overdue, and recoveries.
+"""Observe the actions of Nav2's servers, to find out which commands are overdue, and to report recoveries.
 
-A server whose action moves the robot must send commands while it executes it. The loops of Nav2 up to Jazzy run on wall
-time; without waiting for their commands, the simulation would run ahead of a controller that takes longer than a
-control period, for example MPPI on a slow machine.
+**Overdue commands.** A server must send commands while it executes an action that moves the robot. The control loops of
+Nav2 up to Jazzy run on wall time. So the simulation waits for due commands; otherwise it would run ahead of a
+controller that takes longer than a control period, for example MPPI on a slow machine.
 
-A recovery is a behavior that Nav2's behavior server executes, or the clearing of a costmap. A behavior is an action;
-its status shows when it starts and how it ends. Clearing a costmap is a service, whose calls are not visible; only the
-feedback of the navigation action counts it (`number_of_recoveries`, which also counts behaviors).
+**Recoveries.** A recovery is a behavior of Nav2's behavior server, or the clearing of a costmap. A behavior is an
+action, whose status shows when it starts and how it ends. Clearing a costmap is a service, whose calls are not visible.
+Only the feedback of the navigation action counts both kinds (`number_of_recoveries`).
 """
 
 from __future__ import annotations
@@ -22,35 +22,36 @@ if TYPE_CHECKING:
     from simscen.ros2.node_barrier import NodeBarrier
 
 EXECUTING = 2
-"""GoalStatus.STATUS_EXECUTING."""
+"""action_msgs/msg/GoalStatus.STATUS_EXECUTING."""
 RATE_PARAMETERS = {
     "follow_path": "controller_frequency",
     "spin": "cycle_frequency",
     "backup": "cycle_frequency",
     "drive_on_heading": "cycle_frequency",
 }
-"""Actions that move the robot, and the parameter of their server with the rate of its commands in Hz."""
+"""Actions that move the robot, each with the parameter of its server that is the rate of commands in Hz."""
 MISSING_LIMIT_NS = NANOSECONDS
-"""Simulated time that may pass without a due command, because the server may itself wait for simulated time.
+"""Simulated time without a due command after which the run fails. The server may wait for simulated time itself.
 
-Nav2's controller server, for example, waits for a current costmap for `costmap_update_timeout`.
+For example, Nav2's controller server waits for a current costmap for `costmap_update_timeout`.
 """
 NEXT_WAIT_S = 0.25
-"""Wall time to wait for a due command after one that did not arrive."""
+"""Maximum wall time to wait for a due command if the one before did not arrive."""
 BEHAVIORS = ("spin", "backup", "wait")
 """Actions of Nav2's behavior server that its behavior trees count as recoveries."""
 CLEARING = "clear_costmap"
+"""Name under which the clearing of a costmap is reported."""
 OUTCOMES = {4: "succeeded", 5: "canceled", 6: "failed"}
-"""GoalStatus.STATUS_…"""
+"""Reported outcomes by action_msgs/msg/GoalStatus.status."""
 FEEDBACK_DELAY_NS = NANOSECONDS
-"""Simulated time after which a counted recovery without a behavior is reported, because the status can arrive later."""
+"""Simulated time to wait for the status of a behavior before a counted recovery is reported as costmap clearing."""
 
 ReportEvent = Callable[..., None]
 """Reports an event: `report("recovery.started", "spin")`."""
 
 
 class OverdueCommand(NamedTuple):
-    """A due command that was not received: the node that must send it, and the action that it executes."""
+    """A due command that has not arrived: the node that must send it, and the action that the node executes."""
 
     node: str
     action: str
@@ -62,7 +63,7 @@ class _Server(NamedTuple):
 
 
 class MotionActions:
-    """Tracks which actions are being executed, by their status topics."""
+    """Tracks which actions that move the robot are executed, and which command is due. All times `now` are in ns."""
 
     def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
         self._graph, self._parameters = graph, NodeParameters(graph, barrier)
@@ -72,9 +73,9 @@ class MotionActions:
         self._missing_since: int | None = None
 
     def subscribe(self) -> None:
-        """Subscribe to the status of the actions that exist in the graph now."""
+        """Subscribe to the status of each action that has a server now."""
         for action, parameter in RATE_PARAMETERS.items():
-            node = self._graph.follow_action(action, partial(self._process_status, action))
+            node = self._graph.subscribe_to_status(action, partial(self._process_status, action))
             rate = 0.0 if node is None else self._parameters.values(node, [parameter]).get(parameter) or 0.0
             if node is not None and rate > 0.0:
                 self._servers[action] = _Server(node, NANOSECONDS / rate)
@@ -83,22 +84,22 @@ class MotionActions:
         self._executing[action] = any(goal.status == EXECUTING for goal in message.status_list)
 
     def record_command(self, now: int) -> None:
-        """Record that a command was received at `now` nanoseconds."""
+        """Record that a command arrived."""
         self._last_command, self._missing_since = now, None
 
     def wait_s(self, limit_s: float) -> float:
-        """Return how long to wait for a due command: `limit_s`, but less after one that did not arrive."""
+        """Return the wall time to wait for a due command: `limit_s`, or less if the one before did not arrive."""
         return limit_s if self._missing_since is None else min(limit_s, NEXT_WAIT_S)
 
     def record_missing(self, now: int) -> OverdueCommand | None:
-        """Record that the due command did not arrive; return it if none has arrived for MISSING_LIMIT_NS."""
+        """Record that the due command did not arrive. Return it if none has arrived for MISSING_LIMIT_NS, or None."""
         overdue = self.overdue_command(now)
         self._missing_since = None if overdue is None else now if self._missing_since is None else self._missing_since
         is_late = self._missing_since is not None and now - self._missing_since >= MISSING_LIMIT_NS
         return overdue if is_late else None
 
     def overdue_command(self, now: int) -> OverdueCommand | None:
-        """Return the command that is due at `now` nanoseconds, or None. Slower control loops are due less often."""
+        """Return the command that is due now, or None. A command is due one period of the server after the last one."""
         for action, server in self._servers.items():
             since = server.period_ns if self._last_command is None else now - self._last_command
             if self._executing.get(action) and since >= server.period_ns:
@@ -106,8 +107,8 @@ class MotionActions:
         return None
 
 
-class Recoveries:
-    """Reports each recovery once."""
+class RecoveryReporter:
+    """Reports the start and the end of each recovery as events."""
 
     def __init__(self, graph: Graph, report: ReportEvent) -> None:
         self._graph, self._report = graph, report
@@ -117,9 +118,9 @@ class Recoveries:
         self._excess_since: int | None = None
 
     def subscribe(self) -> None:
-        """Subscribe to the status of the behaviors that exist in the graph now."""
+        """Subscribe to the status of each of BEHAVIORS that has a server now."""
         for behavior in BEHAVIORS:
-            self._graph.follow_action(behavior, partial(self._process_statuses, behavior))
+            self._graph.subscribe_to_status(behavior, partial(self._process_statuses, behavior))
 
     def _process_statuses(self, behavior: str, message: Any) -> None:
         for goal in message.status_list:
@@ -135,16 +136,16 @@ class Recoveries:
             self._report("recovery.ended", behavior, outcome=OUTCOMES[status])
 
     def update_count(self, number: int) -> None:
-        """Update the count from `number`, the recoveries since the navigation action began as in its feedback."""
+        """Add new recoveries to the count; `number` is that of the feedback since the navigation action began."""
         self._feedback_count += max(0, number - self._last_number)
         self._last_number = number
 
     def begin_goal(self) -> None:
-        """Count from zero, as the feedback of a new navigation action does."""
+        """Expect feedback that counts from zero, because a new navigation action begins."""
         self._last_number = 0
 
     def report_clearing(self, now: int) -> None:
-        """Report counted recoveries without a behavior as costmap clearing; `now` in nanoseconds."""
+        """Report recoveries that the feedback counts, but that were no behaviors, as costmap clearing; `now` in ns."""
         if self._feedback_count <= self._behavior_count:
             self._excess_since = None
             return

@@ -1,6 +1,6 @@
-"""Costmap filters of Nav2: masks with the zones of the scenario, and CostmapFilterInfo that describes them.
+"""Create CostmapFilterInfo messages, which tell Nav2's costmap filters what the masks with the scenario's zones mean.
 
-The topics are those of nav2_bringup (Kilted and later).
+The topics have the names of nav2_bringup (Kilted and later).
 """
 
 from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
@@ -9,31 +9,32 @@ from simscen.ros2.graph import Topic
 from simscen.ros2.messages import find_type
 
 MASKS = {"/keepout_zones": "/keepout_filter_mask", "/speed_zones": "/speed_filter_mask"}
-"""Topics of the protocol and the topics on which the adapter publishes them."""
+"""Topics of masks in the stack protocol, and the topics under which the adapter publishes them."""
 INFO_TYPE = "nav2_msgs/msg/CostmapFilterInfo"
 INFO_TOPICS = {
     "/keepout_filter_mask": "/keepout_costmap_filter_info",
     "/speed_filter_mask": "/speed_costmap_filter_info",
 }
+"""Topics of masks, and the topics of their CostmapFilterInfo."""
 KEEPOUT, SPEED_PERCENT, SPEED_ABSOLUTE = 0, 1, 2
-"""CostmapFilterInfo.type, constants of nav2_costmap_2d/costmap_filters/filter_values.hpp."""
+"""Values of CostmapFilterInfo.type, from nav2_costmap_2d/costmap_filters/filter_values.hpp."""
 
 
 class FilterInfo:
-    """CostmapFilterInfo for each mask; `masks` are the `zone_masks` of HELLO."""
+    """Messages that describe masks. `masks` is the value `zone_masks` of the protocol's HELLO."""
 
     def __init__(self, masks: Sequence[Mapping[str, Any]]) -> None:
         self._masks: Dict[str, Mapping[str, Any]] = {MASKS[mask["topic"]]: mask for mask in masks}
 
     @property
     def topics(self) -> List[Topic]:
-        """The topics to publish; none if nav2_msgs is not installed."""
+        """Topics of the messages; empty if nav2_msgs is not installed."""
         if find_type(INFO_TYPE) is None:
             return []
         return [Topic(INFO_TOPICS[mask], INFO_TYPE) for mask in self._masks]
 
     def messages(self, names: Callable[[str], str]) -> List[Tuple[str, bytes]]:
-        """Return topics and messages; `names` maps topics of the protocol to topics of the graph."""
+        """Return topics and serialized messages. `names` maps topics of the protocol to their names in the graph."""
         from rclpy.serialization import serialize_message
 
         found = []
@@ -49,7 +50,7 @@ class FilterInfo:
         return found
 
     def unused_masks(self, is_subscribed: Callable[[str], bool]) -> List[str]:
-        """Return a warning for each mask that no node receives."""
+        """Return a warning for each mask to which no node subscribes."""
         return [
             f"no node subscribes to {topic}, so the stack does not know the {mask['filter']} zones of the scenario"
             for topic, mask in self._masks.items()

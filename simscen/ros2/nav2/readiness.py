@@ -1,10 +1,10 @@
-"""Checks of Nav2 before a run: nodes that do not exist, and parameters that do not match what simscen publishes."""
+"""Check a running Nav2 before a run: missing nodes, and parameters that do not match what simscen publishes."""
 
 from typing import Any, Dict, List, Optional, Sequence
 
 from simscen.ros2.graph import Graph, Topic, full_name
-from simscen.ros2.messages import ODOMETRY, SCAN
-from simscen.ros2.nav2 import parameters
+from simscen.ros2.messages import ODOMETRY_TYPE, SCAN_TYPE
+from simscen.ros2.nav2 import parameter_rules
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.node_parameters import NodeParameters
 from simscen.ros2.options import Options
@@ -12,52 +12,53 @@ from simscen.ros2.user_transforms import UserTransforms
 
 
 class Nav2Readiness:
-    """Checks the nodes of a running Nav2 and their parameters, and the parameter file if there is one."""
+    """Checks the nodes of a running Nav2, their parameters, and the parameter file if there is one."""
 
     def __init__(
         self, graph: Graph, barrier: NodeBarrier, topics: Sequence[Topic], options: Options, bases: Sequence[str]
     ) -> None:
+        """`topics` are those that simscen publishes. `bases` are the names of the base frame in the graph."""
         self._graph, self._options = graph, options
-        self._known = NodeParameters(graph, barrier)
+        self._node_parameters = NodeParameters(graph, barrier)
         self.user_transforms: Optional[UserTransforms] = None
-        odometry = [graph.names(topic.name) for topic in topics if topic.type == ODOMETRY]
-        self._offer = parameters.Offer(
-            [graph.names(topic.name) for topic in topics if topic.type == SCAN],
+        odometry = [graph.names(topic.name) for topic in topics if topic.type == ODOMETRY_TYPE]
+        self._names = parameter_rules.PublishedNames(
+            [graph.names(topic.name) for topic in topics if topic.type == SCAN_TYPE],
             odometry[0] if odometry else "",
             bases,
             graph.names.namespace,
         )
 
-    def _offered(self) -> parameters.Offer:
-        """Return what simscen and the user's transforms offer to Nav2."""
+    def _published_names(self) -> parameter_rules.PublishedNames:
+        """Return the published names, with frames of the user's transforms as additional base frames."""
         if self.user_transforms is None:
-            return self._offer
-        return self._offer._replace(bases=[*self._offer.bases, *self.user_transforms.robot_frames])
+            return self._names
+        return self._names._replace(bases=[*self._names.bases, *self.user_transforms.robot_frames])
 
     def missing_nodes(self) -> List[str]:
-        """Return the problems of the parameter file, and Nav2's nodes that do not exist."""
-        found = self._findings(self._options.parameters or {}, {}, f"{self._options.parameter_file}: ")
+        """Return the severe problems of the parameter file, and Nav2's nodes that do not exist, one text each."""
+        found = self._severe_problems(self._options.parameters or {}, {}, f"{self._options.parameter_file}: ")
         names = {name for name, _ in self._graph.nodes()}
-        for name in parameters.NODES:
+        for name in parameter_rules.NODES:
             # Another localizer may publish map -> odom.
-            localized = name == "amcl" and self._graph.publishers_of(self._graph.names("/tf"))
-            if name not in names and not localized:
+            is_replaced = name == "amcl" and self._graph.publishers_of(self._graph.names("/tf"))
+            if name not in names and not is_replaced:
                 found.append(f"there is no node {name}")
         return found
 
     def wrong_parameters(self) -> List[str]:
-        """Return parameters of the running nodes that do not match what simscen publishes."""
-        nodes = [node for node in self._graph.nodes() if node[0] in parameters.RULES]
+        """Return the severe problems of the parameters of the running nodes, one text each."""
+        nodes = [node for node in self._graph.nodes() if node[0] in parameter_rules.RULES]
         values = {node[0]: self._parameters(full_name(node), node[0]) for node in nodes}
-        return self._findings(values, {node[0]: self._graph.subscribed_topics(node) for node in nodes}, "")
+        return self._severe_problems(values, {node[0]: self._graph.subscribed_topics(node) for node in nodes}, "")
 
-    def _findings(
-        self, nodes: Dict[str, Dict[str, Any]], subscriptions: parameters.Subscriptions, prefix: str
+    def _severe_problems(
+        self, nodes: Dict[str, Dict[str, Any]], subscriptions: parameter_rules.Subscriptions, prefix: str
     ) -> List[str]:
-        found = parameters.check(nodes, self._offered(), subscriptions)
-        return [f"{prefix}{finding.node}: {finding.message}" for finding in found if finding.severe]
+        found = parameter_rules.check(nodes, self._published_names(), subscriptions)
+        return [f"{prefix}{problem.node}: {problem.message}" for problem in found if problem.is_severe]
 
     def _parameters(self, path: str, name: str) -> Dict[str, Any]:
-        """Return the parameters of a node that the rules use; none if it does not answer."""
-        names = parameters.relevant_parameters(name, self._known.names(path))
-        return self._known.values(path, names)
+        """Return the parameters of a node that the rules use; empty if the node does not answer."""
+        names = parameter_rules.relevant_parameters(name, self._node_parameters.names(path))
+        return self._node_parameters.values(path, names)

@@ -1,4 +1,4 @@
-"""Reports of Nav2 for the log of the run: behavior tree transitions, warnings, and parameters."""
+"""Collect behavior tree transitions, warnings, and parameters of Nav2's nodes for the log of the run."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ BEHAVIOR_TREE_LOG = "/behavior_tree_log"
 ROSOUT = "/rosout"
 INFO, WARNING, ERROR = 20, 30, 40
 """Levels of rcl_interfaces/msg/Log."""
-LISTED_ERRORS = 3
+MAX_LISTED_ERRORS = 3
+"""Maximum number of errors that `errors` returns."""
 ABORTED_BRING_UP = "Aborting bringup"
-"""Part of the error that a lifecycle manager logs before it gives up. It does not try again."""
+"""Part of the error that Nav2's lifecycle manager logs when it gives up starting its nodes."""
 NODES = (
     *("amcl", "map_server", "planner_server", "controller_server", "smoother_server", "behavior_server"),
     *("bt_navigator", "waypoint_follower", "velocity_smoother", "collision_monitor"),
@@ -26,11 +27,11 @@ NODES = (
 )
 """Names of the nodes whose parameters are recorded."""
 OMITTED = ("use_sim_time", "qos_overrides.")
-"""Prefixes of the names of parameters that do not affect navigation."""
+"""Prefixes of parameter names that are not recorded, because they do not affect navigation."""
 
 
-class Line(NamedTuple):
-    """A line for /rosout of the run's log."""
+class LogLine(NamedTuple):
+    """A line for /rosout of the run's log: level, name of the logger, and text."""
 
     level: int
     name: str
@@ -38,20 +39,20 @@ class Line(NamedTuple):
 
 
 class Nav2Report:
-    """Collects lines for the log during the run, and reads the parameters once."""
+    """Collects log lines of Nav2's nodes during the run, and reads their parameters once at its start."""
 
     def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
         self._graph, self._barrier = graph, barrier
-        self._known = NodeParameters(graph, barrier)
-        self._lines: list[Line] = []
+        self._node_parameters = NodeParameters(graph, barrier)
+        self._lines: list[LogLine] = []
         self._follows_log = False
         self.parameters: dict[str, dict[str, Any]] = {}
-        """Values of all parameters by node."""
+        """Recorded values by full name of the node and name of the parameter."""
         self.aborted_bring_up = ""
-        """Name of a lifecycle manager that has given up the bring-up of its nodes, or empty."""
+        """Name of the lifecycle manager that has given up starting its nodes; empty if none has."""
 
     def begin(self) -> None:
-        """Subscribe to the logs of the graph, and read the parameters of Nav2's nodes."""
+        """Discard the lines until now, subscribe to the logs, and read the parameters of Nav2's nodes."""
         self._follow(self._graph.names(BEHAVIOR_TREE_LOG), "nav2_msgs/msg/BehaviorTreeLog", self._take_tree)
         self.follow_log()
         self._lines.clear()
@@ -60,17 +61,17 @@ class Nav2Report:
                 self.parameters[node] = self._read_parameters(node)
 
     def follow_log(self) -> None:
-        """Subscribe to the log of all nodes as soon as a node publishes it."""
+        """Subscribe to /rosout if a node publishes it now. Call repeatedly until one does."""
         if not self._follows_log:
             self._follows_log = self._follow(ROSOUT, "rcl_interfaces/msg/Log", self._take_log)
 
     def errors(self) -> list[str]:
-        """Return the last different errors that nodes have logged since the last lines were taken."""
+        """Return the last distinct errors among the lines that have not been taken."""
         errors = dict.fromkeys(f"{line.name}: {line.text}" for line in self._lines if line.level >= ERROR)
-        return list(errors)[-LISTED_ERRORS:]
+        return list(errors)[-MAX_LISTED_ERRORS:]
 
-    def take_lines(self) -> list[Line]:
-        """Return the lines since the last call, by logger: lines of different nodes arrive in random order."""
+    def take_lines(self) -> list[LogLine]:
+        """Return the lines since the last call, sorted by logger, because the order between nodes is random."""
         lines, self._lines = self._lines, []
         return sorted(lines, key=lambda line: line.name)
 
@@ -85,15 +86,15 @@ class Nav2Report:
     def _take_tree(self, message: Any) -> None:
         for change in message.event_log:
             text = tree_change(change.node_name, change.previous_status, change.current_status)
-            self._lines.append(Line(INFO, BEHAVIOR_TREE_LOGGER, text))
+            self._lines.append(LogLine(INFO, BEHAVIOR_TREE_LOGGER, text))
 
     def _take_log(self, message: Any) -> None:
         if message.level >= WARNING:
-            self._lines.append(Line(message.level, message.name, message.msg))
+            self._lines.append(LogLine(message.level, message.name, message.msg))
         if ABORTED_BRING_UP in message.msg:
             self.aborted_bring_up = message.name
 
     def _read_parameters(self, node: str) -> dict[str, Any]:
         """Return the values of a node's parameters; empty if the node does not answer."""
-        names = [name for name in self._known.names(node) if not name.startswith(OMITTED)]
-        return self._known.values(node, names)
+        names = [name for name in self._node_parameters.names(node) if not name.startswith(OMITTED)]
+        return self._node_parameters.values(node, names)

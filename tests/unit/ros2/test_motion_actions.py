@@ -21,7 +21,7 @@ class FakeGraph:
             destroy_client=lambda client: None,
         )
 
-    def follow_action(self, action: str, keep: Any) -> str | None:
+    def subscribe_to_status(self, action: str, keep: Any) -> str | None:
         self.callbacks[action] = keep
         return self.servers.get(action)
 

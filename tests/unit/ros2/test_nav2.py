@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 from simscen.cli.main import app
 from simscen.core.errors import UsageError
-from simscen.ros2.nav2.parameters import Finding, Offer, check, relevant_parameters
+from simscen.ros2.nav2.parameter_rules import ParameterProblem, PublishedNames, check, relevant_parameters
 
-OFFER = Offer(["/scan", "/rear/scan"], "/odom", ["base_link"])
+PUBLISHED = PublishedNames(["/scan", "/rear/scan"], "/odom", ["base_link"])
 FITS = """\
 amcl:
   ros__parameters:
@@ -46,8 +46,8 @@ collision_monitor:
 """
 
 
-def found(node: str, **parameters: object) -> list[Finding]:
-    return check({node: {key.replace("__", "."): value for key, value in parameters.items()}}, OFFER)
+def found(node: str, **parameters: object) -> list[ParameterProblem]:
+    return check({node: {key.replace("__", "."): value for key, value in parameters.items()}}, PUBLISHED)
 
 
 @pytest.mark.parametrize(
@@ -69,21 +69,21 @@ def found(node: str, **parameters: object) -> list[Finding]:
     ],
 )
 def test_a_wrong_parameter_is_found_in_each_node(node: str, parameters: dict[str, object], message: str) -> None:
-    [finding] = found(node, **parameters)
-    assert (finding.node, finding.severe) == (node, True)
-    assert finding.message.startswith(message)
+    [problem] = found(node, **parameters)
+    assert (problem.node, problem.is_severe) == (node, True)
+    assert problem.message.startswith(message)
 
 
 def test_a_point_cloud_source_is_a_warning_unless_it_is_disabled() -> None:
     source = {"plugins": ["o"], "o__observation_sources": "cloud", "o__cloud__data_type": "PointCloud2"}
-    [finding] = found("local_costmap", **source)
-    assert (finding.parameter, finding.severe) == ("o.cloud.data_type", False)
+    [problem] = found("local_costmap", **source)
+    assert (problem.parameter, problem.is_severe) == ("o.cloud.data_type", False)
     assert found("local_costmap", **source, o__cloud__enabled=False) == []
 
 
 def test_wall_time_is_a_warning_because_a_launch_file_may_set_it() -> None:
-    [finding] = found("planner_server", use_sim_time=False)
-    assert not finding.severe
+    [problem] = found("planner_server", use_sim_time=False)
+    assert not problem.is_severe
 
 
 def test_only_parameters_of_the_rules_are_requested() -> None:
@@ -114,8 +114,8 @@ def called(folder: Path, text: str, *options: str) -> tuple[int, str]:
     ("topic", "is_found"), [("scan", True), ("/robot1/scan", True), ("/scan", False), ("robot1/scan", False)]
 )
 def test_topics_without_a_slash_are_relative_to_the_namespace(topic: str, is_found: bool) -> None:
-    offer = Offer(["/robot1/scan"], "/robot1/odom", ["base_link"], "/robot1")
-    assert bool(check({"amcl": {"scan_topic": topic}}, offer)) is not is_found
+    published = PublishedNames(["/robot1/scan"], "/robot1/odom", ["base_link"], "/robot1")
+    assert bool(check({"amcl": {"scan_topic": topic}}, published)) is not is_found
 
 
 @pytest.mark.parametrize(
@@ -126,8 +126,8 @@ def test_topics_without_a_slash_are_relative_to_the_namespace(topic: str, is_fou
 def test_a_topic_that_a_running_node_has_remapped_is_not_wrong(
     subscriptions: dict[str, set[str]] | None, is_found: bool
 ) -> None:
-    findings = check({"amcl": {"scan_topic": "lidar"}}, OFFER, subscriptions)
-    assert [finding.parameter for finding in findings] == ["scan_topic"] * is_found
+    problems = check({"amcl": {"scan_topic": "lidar"}}, PUBLISHED, subscriptions)
+    assert [problem.parameter for problem in problems] == ["scan_topic"] * is_found
 
 
 def test_a_correct_file_passes(tmp_path: Path) -> None:

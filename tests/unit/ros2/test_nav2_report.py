@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from simscen.ros2.nav2.report import Line, Nav2Report
+from simscen.ros2.nav2.report import LogLine, Nav2Report
 from simscen.ros2.node_parameters import plain_value
 
 
@@ -43,8 +43,8 @@ def test_lines_are_taken_once_and_sorted_by_logger() -> None:
     change = SimpleNamespace(node_name="FollowPath", previous_status="IDLE", current_status="RUNNING")
     report._take_tree(SimpleNamespace(event_log=[change]))
     assert report.take_lines() == [
-        Line(20, "behavior_tree", "FollowPath: IDLE -> RUNNING"),
-        Line(40, "planner_server", "no path"),
+        LogLine(20, "behavior_tree", "FollowPath: IDLE -> RUNNING"),
+        LogLine(40, "planner_server", "no path"),
     ]
     assert report.take_lines() == []
 
@@ -63,8 +63,8 @@ def test_the_last_different_errors_are_listed() -> None:
 def test_a_lifecycle_manager_that_gives_up_is_known_by_name() -> None:
     missing: Any = None
     report = Nav2Report(missing, missing)
-    report._take_log(SimpleNamespace(level=40, name="robot1.manager", msg="Failed to change state for node: amcl"))
+    report._take_log(SimpleNamespace(level=40, name="robot1.manager", msg="GoalFailed to change state for node: amcl"))
     assert not report.aborted_bring_up
-    text = "Failed to bring up all requested nodes. Aborting bringup."
+    text = "GoalFailed to bring up all requested nodes. Aborting bringup."
     report._take_log(SimpleNamespace(level=40, name="robot1.manager", msg=text))
     assert report.aborted_bring_up == "robot1.manager"

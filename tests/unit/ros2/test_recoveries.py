@@ -1,11 +1,11 @@
-"""Recoveries of Nav2 as events."""
+"""RecoveryReporter of Nav2 as events."""
 
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from simscen.ros2.nav2.actions import Recoveries
+from simscen.ros2.nav2.actions import RecoveryReporter
 
 S = 1_000_000_000
 
@@ -16,7 +16,7 @@ class FakeGraph:
     def __init__(self) -> None:
         self.callbacks: dict[str, Any] = {}
 
-    def follow_action(self, action: str, keep: Any) -> str:
+    def subscribe_to_status(self, action: str, keep: Any) -> str:
         self.callbacks[action] = keep
         return "/behavior_server"
 
@@ -40,8 +40,8 @@ def events(graph: FakeGraph) -> list[tuple[str, ...]]:
 
 
 @pytest.fixture
-def followed(graph: FakeGraph, events: list[tuple[str, ...]]) -> Recoveries:
-    made = Recoveries(graph, lambda kind, name, **data: events.append((kind, name, *data.values())))  # type: ignore[arg-type]
+def followed(graph: FakeGraph, events: list[tuple[str, ...]]) -> RecoveryReporter:
+    made = RecoveryReporter(graph, lambda kind, name, **data: events.append((kind, name, *data.values())))  # type: ignore[arg-type]
     made.subscribe()
     return made
 

@@ -1,59 +1,67 @@
-"""Synchronization of one control period: publish sensor data, advance time, and collect the command.
+"""Perform one step of a run with the nodes: publish sensor data, advance ROS time, and collect the command.
 
-**Lockstep.** While the simulation waits, a period with a due command consists of these steps:
+**Lockstep.** The simulation waits while these steps are performed for a control period:
 
-1. Everything measured since the last period is published, message by message. After each message with a subscriber,
-   a round of the node barrier follows, because a node may take two simultaneous messages in any order.
-2. /clock publishes the time of the period.
-3. At least two rounds follow. In the first, the nodes take the new time; in the second, the timers that became due have
-   run. While there is no command, one more round per node follows, so that a command can pass through filters.
-4. If there is still no command while driving to a goal, wait a short wall time for nodes that take /clock in a separate
-   thread, as those of rclcpp do.
-5. If a server of Nav2 executes an action that moves the robot, and its command is due, wait for it, at most `limit_s`
-   of wall time. Without a command in the simulated second after that, the run ends with an error that names the node.
+1. Publish everything measured since the last period, message by message. After each message with a subscriber, run a
+   round of the node barrier, because a node may process two waiting messages in any order.
+2. Publish the time of the period on /clock.
+3. Run at least two rounds. In the first, the nodes receive the new time. After the second, the timers that became due
+   have run. Up to one more round per node follows until there is a command, so that it can pass through filter nodes.
+4. If there is still no command while the robot drives to a goal, wait for a short wall time, because nodes of rclcpp
+   receive /clock in a separate thread.
+5. If a Nav2 server executes an action that moves the robot, and its command is due, wait for the command, at most
+   `limit_s` of wall time. If it sends no command in the next simulated second either, the run ends with an error.
 
-The command of the period is the last one received. Without one, the robot keeps its command, as a real robot would; the
-adapter counts such periods. Time stands still within a control period: /clock publishes multiples of it only.
+The command of the period is the last one received. Without one, the robot keeps its previous command, as a real robot
+would, and the adapter counts the period. ROS time is always a multiple of the control period.
 
-**Paced.** The simulation does not wait for the stack: a period begins at its wall time, and the newest command counts.
+**Paced.** The simulation does not wait for the nodes: a period begins at its wall time, and the newest command counts.
 """
 
 import time
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from simscen.ros2.frames import transforms_first
-from simscen.ros2.graph import Graph, Received
+from simscen.ros2.graph import Graph, ReceivedMessage
 from simscen.ros2.messages import NANOSECONDS, read_header
 from simscen.ros2.nav2.actions import MotionActions
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError
-from simscen.ros2.readiness import COMMAND, TWIST_STAMPED
+from simscen.ros2.readiness import COMMAND, TWIST_STAMPED_TYPE
 
 Message = Tuple[str, bytes]
-"""Topic of the protocol and CDR."""
+"""Topic of the protocol, and the message in CDR."""
 
 
-class Lockstep:
-    """The simulation waits for the stack."""
+class LockstepSynchronization:
+    """Steps in which the simulation waits for the nodes, as described above."""
 
     def __init__(
         self, graph: Graph, barrier: NodeBarrier, actions: MotionActions, rounds: int, wait_s: float, limit_s: float
     ) -> None:
-        """Take the graph, the barrier, and the limit of additional rounds without a command (0 = one per node)."""
+        """Set the limits of a step.
+
+        Args:
+            rounds: Maximum number of additional rounds without a command; 0 for one per node.
+            wait_s: Wall time to wait for a command in step 4.
+            limit_s: Wall time to wait for a command in step 5.
+        """
         self._graph, self._barrier, self._actions = graph, barrier, actions
         self._extra_rounds, self._wait, self._limit = rounds, wait_s, limit_s
         self.counters: Dict[str, Any] = {"beats": 0, "without_command": 0, "late_commands": 0}
 
-    def step(self, now: int, messages: Sequence[Message], due: bool, driving: bool) -> List[Received]:
-        """Return the messages of the stack since the last step; `now` in nanoseconds, `driving` to a goal.
+    def step(
+        self, now: int, messages: Sequence[Message], is_command_due: bool, is_driving: bool
+    ) -> List[ReceivedMessage]:
+        """Publish `messages`, and return the messages of the nodes since the last step. `now` is in ns.
 
-        Raises AdapterError that names a node whose command is overdue.
+        Raises AdapterError, with the name of the node, if a command is missing.
         """
         graph, barrier = self._graph, self._barrier
         for topic, data in transforms_first(messages):
             if graph.publish(topic, data):
                 barrier.round()
-        if not due:
+        if not is_command_due:
             return _take_inbox(graph)
         start = len(graph.inbox)
         graph.publish_clock(now)
@@ -61,7 +69,7 @@ class Lockstep:
             barrier.round()
             if number and _last_command(graph.inbox[start:]) is not None:
                 break
-        if driving:
+        if is_driving:
             graph.spin_until(lambda: _last_command(graph.inbox[start:]) is not None, self._wait)
             self._wait_for_due_command(now, start)
         self._count(now, _last_command(graph.inbox[start:]))
@@ -81,46 +89,48 @@ class Lockstep:
                     f"{self._limit:g} s of wall time, and none in the simulated second after that"
                 )
 
-    def _count(self, now: int, command: Optional[Received]) -> None:
+    def _count(self, now: int, command: Optional[ReceivedMessage]) -> None:
         self.counters["beats"] += 1
         if command is None:
             self.counters["without_command"] += 1
             return
         self._actions.record_command(now)
-        if command.type == TWIST_STAMPED and read_header(command.data)[0] < now:
+        if command.type == TWIST_STAMPED_TYPE and read_header(command.data)[0] < now:
             self.counters["late_commands"] += 1
 
 
-class Paced:
-    """The simulation runs at `factor` times real time and waits for nothing."""
+class PacedSynchronization:
+    """Steps in which the simulation runs at `factor` times real time, and does not wait for the nodes."""
 
     def __init__(self, graph: Graph, factor: float) -> None:
         self._graph, self._factor = graph, factor
         self._start: Optional[float] = None
         self.counters: Dict[str, Any] = {"beats": 0, "without_command": 0}
 
-    def step(self, now: int, messages: Sequence[Message], due: bool, driving: bool) -> List[Received]:
-        """Return the messages of the stack since the last step; `now` in nanoseconds."""
+    def step(
+        self, now: int, messages: Sequence[Message], is_command_due: bool, is_driving: bool
+    ) -> List[ReceivedMessage]:
+        """Wait for the wall time of the step, publish `messages`, and return those of the nodes. `now` is in ns."""
         elapsed = now / NANOSECONDS / self._factor
         start = time.monotonic() - elapsed
-        # After a delay the rest of the run keeps its pace instead of catching up.
+        # After a delay, the rest of the run keeps its pace instead of catching up.
         self._start = start if self._start is None else max(self._start, start)
         due_at = self._start + elapsed
         self._graph.spin_until(lambda: time.monotonic() >= due_at, max(0.0, due_at - time.monotonic()))
         self._graph.publish_clock(now)
         for topic, data in transforms_first(messages):
             self._graph.publish(topic, data)
-        self._graph.take_all()
-        if due:
+        self._graph.receive_all()
+        if is_command_due:
             self.counters["beats"] += 1
             self.counters["without_command"] += _last_command(self._graph.inbox) is None
         return _take_inbox(self._graph)
 
 
-def _last_command(received: Sequence[Received]) -> Optional[Received]:
+def _last_command(received: Sequence[ReceivedMessage]) -> Optional[ReceivedMessage]:
     return next((message for message in reversed(received) if message.topic == COMMAND), None)
 
 
-def _take_inbox(graph: Graph) -> List[Received]:
+def _take_inbox(graph: Graph) -> List[ReceivedMessage]:
     received, graph.inbox[:] = list(graph.inbox), []
     return received

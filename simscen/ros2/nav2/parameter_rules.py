@@ -1,0 +1,180 @@
+"""Check whether parameters of Nav2's nodes match the topics and frames that simscen publishes.
+
+The same rules apply to parameter files and to running nodes. Names of parameters are those of Nav2's configuration
+guide (https://docs.nav2.org/configuration/).
+"""
+
+from typing import Any, Collection, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+
+MAP, ODOM = "map", "odom"
+
+
+class ParameterProblem(NamedTuple):
+    """A wrong parameter of a node, and the reason. A severe problem prevents Nav2 from working."""
+
+    node: str
+    parameter: str
+    message: str
+    is_severe: bool = True
+
+
+class PublishedNames(NamedTuple):
+    """Topics on which simscen publishes scans and odometry in the user's graph, and names of the robot's base frame.
+
+    A parameter with a relative topic name is resolved in the robot's `namespace`, such as `/robot1`.
+    """
+
+    scans: Sequence[str]
+    odometry: str
+    bases: Sequence[str]
+    namespace: str = ""
+
+
+Parameters = Mapping[str, Any]
+"""Parameters of one node by dotted name, e.g. `obstacle_layer.scan.topic`."""
+COSTMAPS = {"local_costmap": ODOM, "global_costmap": MAP}
+"""Nodes of Nav2's costmaps, and their usual global frames."""
+Subscriptions = Mapping[str, Collection[str]]
+"""Topics to which each node subscribes, by name of the node."""
+
+
+def check(
+    nodes: Mapping[str, Parameters], published: PublishedNames, subscriptions: Optional[Subscriptions] = None
+) -> List[ParameterProblem]:
+    """Return all problems in the parameters of Nav2's nodes.
+
+    Keys of `nodes` and `subscriptions` are node names without namespace. `subscriptions` is None for a parameter file.
+    If it is given, a wrong topic name is only a problem if the node subscribes to this topic. Otherwise, the topic has
+    been remapped.
+    """
+    problems: List[ParameterProblem] = []
+    for name in sorted(nodes):
+        subscribed = None if subscriptions is None else subscriptions.get(name, ())
+        node = _Node(name, nodes[name], published, subscribed, problems)
+        if node.get("use_sim_time") is False:
+            node.add_problem("use_sim_time", "is false: the node would use wall time", is_severe=False)
+        if name in RULES:
+            RULES[name](node)
+    return problems
+
+
+def relevant_parameters(node: str, names: Iterable[str]) -> List[str]:
+    """Return those of the parameter `names` of a node that the rules use."""
+    if node in COSTMAPS:
+        ends: Tuple[str, ...] = (".observation_sources", ".topic", ".data_type", ".enabled")
+        return [name for name in names if name in _CHECKED or name == "plugins" or name.endswith(ends)]
+    ends = (".topic", ".type", ".enabled")
+    return [name for name in names if name in _CHECKED or (node == "collision_monitor" and name.endswith(ends))]
+
+
+_CHECKED = frozenset(
+    (
+        *("use_sim_time", "robot_base_frame", "base_frame_id", "odom_frame_id", "global_frame", "global_frame_id"),
+        *("local_frame", "odom_topic", "scan_topic", "observation_sources"),
+    )
+)
+
+
+class _Node:
+    """The parameters of one node, with methods that check them and add problems."""
+
+    def __init__(
+        self,
+        name: str,
+        parameters: Parameters,
+        published: PublishedNames,
+        subscribed: Optional[Collection[str]],
+        problems: List[ParameterProblem],
+    ) -> None:
+        self.name, self.published, self._subscribed = name, published, subscribed
+        self._parameters, self._problems = parameters, problems
+
+    def get(self, key: str) -> Optional[Any]:
+        return self._parameters.get(key)
+
+    def add_problem(self, key: str, message: str, is_severe: bool = True) -> None:
+        self._problems.append(ParameterProblem(self.name, key, f"{key} {message}", is_severe))
+
+    def check_base(self, key: str) -> None:
+        value = self.get(key)
+        if value is not None and value not in self.published.bases:
+            hint = f"--base-frame {value} also gives it that name"
+            self.add_problem(key, f"is {value!r}; simscen's base frame is {self.published.bases[0]!r}: {hint}")
+
+    def check_frame(self, key: str, *frames: str) -> None:
+        value = self.get(key)
+        if value is not None and value not in frames:
+            self.add_problem(key, f"is {value!r}; expected {' or '.join(map(repr, frames))}")
+
+    def check_topic(self, key: str, topics: Sequence[str], kind: str) -> None:
+        value = self.get(key)
+        if not isinstance(value, str):
+            return
+        absolute = value if value.startswith("/") else f"{self.published.namespace}/{value}"
+        if absolute not in topics and (self._subscribed is None or absolute in self._subscribed):
+            available = ", ".join(topics) or "none"
+            self.add_problem(key, f"is {value!r}, which no node publishes; simscen's {kind}: {available}")
+
+
+def _amcl(node: _Node) -> None:
+    node.check_base("base_frame_id")
+    node.check_frame("odom_frame_id", ODOM)
+    node.check_frame("global_frame_id", MAP)
+    node.check_topic("scan_topic", node.published.scans, "scans")
+
+
+def _costmap(node: _Node) -> None:
+    node.check_base("robot_base_frame")
+    node.check_frame("global_frame", MAP, ODOM)
+    for layer in node.get("plugins") or ():
+        sources = node.get(f"{layer}.observation_sources")
+        for source in sources.split() if isinstance(sources, str) else ():
+            _source(node, f"{layer}.{source}")
+
+
+def _source(node: _Node, source: str) -> None:
+    """Check an observation source of a costmap layer or of the collision monitor."""
+    kind = node.get(f"{source}.data_type") or node.get(f"{source}.type") or "LaserScan"
+    if kind in ("LaserScan", "scan"):
+        node.check_topic(f"{source}.topic", node.published.scans, "scans")
+    elif node.get(f"{source}.enabled") is not False:
+        key = f"{source}.data_type" if node.get(f"{source}.data_type") else f"{source}.type"
+        node.add_problem(key, f"is {kind!r}: simscen publishes scans only", is_severe=False)
+
+
+def _navigator(node: _Node) -> None:
+    node.check_base("robot_base_frame")
+    node.check_frame("global_frame", MAP)
+    node.check_topic("odom_topic", [node.published.odometry], "odometry")
+
+
+def _with_odometry(node: _Node) -> None:
+    node.check_topic("odom_topic", [node.published.odometry], "odometry")
+
+
+def _behaviors(node: _Node) -> None:
+    node.check_base("robot_base_frame")
+    node.check_frame("local_frame", ODOM)
+    node.check_frame("global_frame", MAP, ODOM)
+
+
+def _monitor(node: _Node) -> None:
+    node.check_base("base_frame_id")
+    node.check_frame("odom_frame_id", ODOM)
+    for source in node.get("observation_sources") or ():
+        _source(node, str(source))
+
+
+RULES: Dict[str, Any] = {
+    "amcl": _amcl,
+    "local_costmap": _costmap,
+    "global_costmap": _costmap,
+    "bt_navigator": _navigator,
+    "controller_server": _with_odometry,
+    "velocity_smoother": _with_odometry,
+    "behavior_server": _behaviors,
+    "collision_monitor": _monitor,
+}
+"""Functions that check the parameters of a node, by name of the node."""
+NODES = ("amcl", "bt_navigator", "controller_server", "planner_server", "behavior_server", *sorted(COSTMAPS))
+"""Nodes that a run needs. Another localizer that publishes map -> odom may replace `amcl`."""
