@@ -169,7 +169,7 @@ class AdapterRun:
                 self._process_frame(kind, wire.from_json(body), now)
 
     def _step(self, step: ReceivedStep, make_adapter: Callable[[str], Any]) -> List[Tuple[str, bytes]]:
-        """Return the messages of the nodes in a step. If Nav2 aborts its bring-up, restart it once, and repeat all steps.
+        """Return the messages of the nodes in a step. If Nav2 aborts its bring-up, restart it and repeat all steps.
 
         On a busy machine, Nav2's lifecycle manager gives up when a single response is lost.
         """
