@@ -42,10 +42,7 @@ MAX_WAIT_FRACTION = 0.8
 
 
 class Adapter:
-    """The stack of one run. Call `prepare` first, then `step` repeatedly, and `end` at the end.
-
-    `mode` is the action by which the scenario sends goals.
-    """
+    """The stack of one run: call `prepare` first, then `step` repeatedly, and `end`. `mode` is one of main.MODES."""
 
     def __init__(
         self,
@@ -172,7 +169,7 @@ class Adapter:
         self._goals.cancel(everything)
 
     def step(self, now: int, messages: Sequence[Message], is_command_due: bool, limit_s: float) -> List[Message]:
-        """Simulate one step for the nodes: publish `messages`, and return the messages of the nodes.
+        """Perform one step of the run: publish `messages`, and return the messages of the nodes.
 
         `now` is the time of the run in ns. `is_command_due` means that the robot needs a command now. The answer may
         take `limit_s` of wall time, and at most `answer_limit_s` once the nodes are ready; the first steps wait until

@@ -1,9 +1,9 @@
 """Wait until all nodes of the stack are ready, and publish sensor data meanwhile if they need it.
 
 Nodes such as Nav2's become active only while time advances and sensor data arrive: a costmap waits for
-odom -> base_link, a planner for the pose on the map. So `BringUp.prepare` first waits without sensor data. If nodes are
-still missing or inactive, `BringUp.wait` publishes the readings of the first step again and again. ROS time advances
-meanwhile, but the time of the run does not (`Graph.offset_ns` is the difference).
+odom -> base_link, a planner for the pose on the map. `BringUp.prepare` first waits without sensor data, which is enough
+for other nodes. If nodes are missing or inactive afterwards, `BringUp.wait` publishes the readings of the first step
+repeatedly. ROS time advances meanwhile, but the time of the run does not (`Graph.offset_ns` is the difference).
 """
 
 import math
@@ -43,10 +43,7 @@ class BringUp:
         unavailable: Sequence[Topic],
         report: Optional[Nav2Report],
     ) -> None:
-        """`period_s` is the control period. `unavailable` are topics whose message type this Python does not have.
-
-        `report` has the log of the nodes; None unless the stack is Nav2.
-        """
+        """`period_s` is the control period, `unavailable` topics without installed type; `report` is for Nav2 only."""
         self._graph, self._readiness, self._options, self._period = graph, readiness, options, period_s
         self._unavailable, self._report = list(unavailable), report
         self._started_at = time.monotonic()

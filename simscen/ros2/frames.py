@@ -35,10 +35,7 @@ class FrameNames:
         """The names of the base frame in the user's graph."""
 
     def apply(self, topic: str, message_type: Any, data: bytes) -> bytes:
-        """Return the serialized message `data` of a topic with the frame names of the user's graph.
-
-        On /tf_static, add the transform to the second name of the base frame.
-        """
+        """Return a serialized message with the user's frame names; to /tf_static, add the second base frame."""
         has_second_base = topic == TF_STATIC and len(self.bases) > 1
         if not has_second_base and not any(frame.encode() in data for frame in self._names):
             return data

@@ -27,11 +27,11 @@ SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 
 
 class GoalReached(NamedTuple):
-    """The first goal without an outcome, of those that were sent, is reached."""
+    """The oldest sent goal without an outcome is reached."""
 
 
 class GoalFailed(NamedTuple):
-    """The first goal without an outcome, of those that were sent, has failed with this error code of Nav2."""
+    """The oldest sent goal without an outcome has failed, with an error code of Nav2."""
 
     code: int
     message: str
@@ -134,10 +134,7 @@ class ActionSender:
         return [f"no node takes goals: no action server {self.name} ({self.type})"]
 
     def send(self, goals: Sequence[Goal], now: int, barrier: NodeBarrier) -> Optional[GoalFailed]:
-        """Send the goals (or the first one), and wait for the answer; return GoalFailed if they are rejected, or None.
-
-        Raises AdapterError if the server does not answer in time.
-        """
+        """Send goals; return GoalFailed if they are rejected. Raises AdapterError if the server does not answer."""
         request = self._type.Goal()
         poses = [pose_stamped(goal, now + self._graph.offset_ns) for goal in goals]
         if self.takes_single_goals:

@@ -62,10 +62,7 @@ STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 
 
 class Graph:
-    """simscen's node in one ROS domain, with its publishers and subscriptions.
-
-    A parameter `topic` is a topic of the protocol; `name` is the name of a topic in the graph.
-    """
+    """simscen's node in one ROS domain. A `topic` is one of the protocol; a `name` is that of a topic in the graph."""
 
     def __init__(self, names: TopicNames, check_alive: Callable[[], None]) -> None:
         """`check_alive` is called repeatedly while waiting, and may raise an exception to end the wait."""
@@ -120,10 +117,7 @@ class Graph:
         self._subscriptions[topic] = (type_name, subscription)
 
     def subscribe_to_status(self, action: str, callback: Callable[[Any], None]) -> Optional[str]:
-        """Call `callback` with each GoalStatusArray of an action, and return the full name of its server.
-
-        Return None, without a subscription, if there is no server or more than one.
-        """
+        """Call `callback` with each GoalStatusArray of an action; return its server, None unless there is one."""
         status_type, topic = find_type(STATUS_TYPE), self.names(f"/{action}/_action/status")
         servers = self.publishers_of(topic)
         if status_type is None or len(servers) != 1:
@@ -223,10 +217,7 @@ def publisher_qos(topic: str) -> QoSProfile:
 
 
 def subscription_qos(publishers: Sequence[Any]) -> QoSProfile:
-    """Return a QoS profile that matches all publishers: reliable, or transient local, only if all of them are.
-
-    `publishers` are objects of rclpy's TopicEndpointInfo.
-    """
+    """Return a QoS profile that matches all publishers: reliable or transient local only if all of them are."""
     profiles = [publisher.qos_profile for publisher in publishers]
     reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in profiles)
     latched = bool(profiles) and all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in profiles)

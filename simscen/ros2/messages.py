@@ -1,7 +1,4 @@
-"""Find installed ROS message types, read and write a few messages as CDR bytes, and compute with 2D poses.
-
-Clocks, commands, and stamps are read and written without deserializing whole messages.
-"""
+"""Find installed message types, read and write a few messages as CDR bytes, and compute with 2D poses."""
 
 import functools
 import importlib

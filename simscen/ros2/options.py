@@ -83,16 +83,15 @@ DOMAINS = range(1, 102)
 """ROS domains for runs. 0 is the default of all ROS users, and above 101, ports may be ephemeral ports of Linux."""
 
 
-class Domain:
+class Domain(NamedTuple):
     """A ROS domain that is reserved for this run until `release` or the end of the process."""
 
-    def __init__(self, number: int, lock: IO[str]) -> None:
-        self.number = number
-        self._lock = lock
+    number: int
+    lock: IO[str]
 
     def release(self) -> None:
         """Allow other runs to use the domain."""
-        self._lock.close()
+        self.lock.close()
 
 
 def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Domain:

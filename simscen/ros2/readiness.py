@@ -138,10 +138,7 @@ class Readiness:
         ]
 
     def _unused_sensors(self) -> List[str]:
-        """Return sensors without a subscriber, if a node waits for the same type under another name.
-
-        Also return a problem if no sensor has a subscriber.
-        """
+        """Return sensors without a subscriber if a node waits for the type on another topic, or if all have none."""
         found = []
         sensors = [topic for topic in self._topics if topic.type.startswith(("sensor_msgs/", ODOMETRY_TYPE))]
         for topic in sensors:
@@ -160,10 +157,7 @@ class Readiness:
         return found
 
     def _on_other_topics(self, types: Iterable[str], endpoints_of: Any) -> List[Tuple[str, Endpoint]]:
-        """Return topic names and endpoints of these types, for topics that are not simscen's.
-
-        `endpoints_of` is Graph.publishers_of or Graph.subscribers_of.
-        """
+        """Return topic names and endpoints of these types, for topics that are not simscen's."""
         own = {self._graph.names(topic.name) for topic in self._topics} | {self._graph.names(COMMAND)}
         found = []
         for name, existing in sorted(self._graph.topics().items()):

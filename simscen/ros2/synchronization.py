@@ -39,13 +39,7 @@ class LockstepSynchronization:
     def __init__(
         self, graph: Graph, barrier: NodeBarrier, actions: MotionActions, rounds: int, wait_s: float, limit_s: float
     ) -> None:
-        """Set the limits of a step.
-
-        Args:
-            rounds: Maximum number of additional rounds without a command; 0 for one per node.
-            wait_s: Wall time to wait for a command in step 4.
-            limit_s: Wall time to wait for a command in step 5.
-        """
+        """Limit extra rounds (step 3) to `rounds` (0 = one per node), step 4 to `wait_s`, and step 5 to `limit_s`."""
         self._graph, self._barrier, self._actions = graph, barrier, actions
         self._extra_rounds, self._wait, self._limit = rounds, wait_s, limit_s
         self.counters: Dict[str, Any] = {"beats": 0, "without_command": 0, "late_commands": 0}

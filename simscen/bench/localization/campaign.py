@@ -162,10 +162,7 @@ def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
 
 
 def _time_found(times: Array, distance: Array) -> float | None:
-    """Return the first time (not negative) with an error below FOUND_M after the last error above LOST_M, or None.
-
-    `times` (n,) are in s since the robot was lost. `distance` (n,) is the error in m.
-    """
+    """Return the first of `times` from 0 s on with an error below FOUND_M and none above LOST_M later, or None."""
     lost = np.flatnonzero((distance > LOST_M) & (times >= 0))
     begin = int(lost[-1]) + 1 if len(lost) else int(np.searchsorted(times, 0.0))
     near = np.flatnonzero(distance[begin:] < FOUND_M)
@@ -190,10 +187,10 @@ def summarize(name: str, trials: Sequence[Trial]) -> ParameterSetResults:
 def _consistency(trials: Sequence[Trial]) -> Consistency:
     values = [value for trial in trials for value in trial.nees]
     return Consistency(
-        anees=anees(values),
-        bounds=grouped_anees_bounds(_means_by_building(trials, [anees(trial.nees) for trial in trials])),
-        inside=share_in_ellipsoid(values),
-        moments=[anees([trial.nees[k] for trial in trials]) for k in range(len(CHECK_TIMES_S))],
+        anees=float(np.mean(values)),
+        bounds=grouped_anees_bounds(_means_by_building(trials, [float(np.mean(trial.nees)) for trial in trials])),
+        inside=fraction_in_ellipsoid(values),
+        moments=np.mean([trial.nees for trial in trials], axis=0).tolist(),
         moment_bounds=anees_bounds(len(trials)),
     )
 
@@ -234,25 +231,18 @@ def nees_at(trace: Trace, seconds: float) -> float | None:
     return float(samples.at(np.array([tick]))[0, 0])
 
 
-def anees(values: Sequence[float]) -> float:
-    """Return the average of NEES values, which is 3 for a consistent localizer in the plane."""
-    return float(np.mean(values))
+def fraction_in_ellipsoid(values: Sequence[float]) -> float:
+    """Return the fraction of NEES `values` within the ellipsoid that contains a normal error with 95 % probability."""
+    return float(np.mean(np.asarray(values) <= chi2_quantile(0.95, DIMENSIONS)))
 
 
-def share_in_ellipsoid(values: Sequence[float], dimensions: int = DIMENSIONS, probability: float = 0.95) -> float:
-    """Return the fraction of NEES `values` within the ellipsoid that contains a normal error with this probability."""
-    return float(np.mean(np.asarray(values) <= chi2_quantile(probability, dimensions)))
+def anees_bounds(runs: int) -> tuple[float, float]:
+    """Return bounds that contain the ANEES of a consistent localizer over independent `runs` with 95 % probability."""
+    return nees_mean_bounds(runs, DIMENSIONS, 0.95)
 
 
-def anees_bounds(runs: int, dimensions: int = DIMENSIONS, probability: float = 0.95) -> tuple[float, float]:
-    """Return bounds that contain the ANEES of a consistent localizer over independent `runs` with this probability."""
-    return nees_mean_bounds(runs, dimensions, probability)
-
-
-def grouped_anees_bounds(
-    groups: Sequence[float], dimensions: int = DIMENSIONS, probability: float = 0.95
-) -> tuple[float, float] | None:
-    """Return bounds that contain the mean of `groups` with this probability if the covariance is right on average.
+def grouped_anees_bounds(groups: Sequence[float]) -> Interval:
+    """Return bounds that contain the mean of `groups` with 95 % probability if the covariance is right on average.
 
     Each of `groups` is the ANEES of one building, over equally many values. Values of one building may depend on each
     other and have any distribution. So the uncertainty of the mean is estimated from the variation between buildings.
@@ -265,5 +255,5 @@ def grouped_anees_bounds(
     from scipy.special import stdtrit
 
     error = float(np.std(groups, ddof=1)) / mean / math.sqrt(count)
-    factor = math.exp(float(stdtrit(count - 1, (1.0 + probability) / 2.0)) * error)
-    return dimensions / factor, dimensions * factor
+    factor = math.exp(float(stdtrit(count - 1, 0.975)) * error)
+    return DIMENSIONS / factor, DIMENSIONS * factor

@@ -36,12 +36,8 @@ def drive_between_rooms(
     With `alternate`, the drive starts in the left half of the floor, and each goal is in the other half. Raises
     EnclosedStart.
     """
-    paths = ShortestPaths(
-        extruded_mesh(floor.walls, floor.glass, furniture),
-        (0.0, 0.0, *floor.size),
-        CLEARANCE_M,
-        min_resolution=SEARCH_CELL_M,
-    )
+    mesh = extruded_mesh(floor.walls, floor.glass, furniture)
+    paths = ShortestPaths(mesh, (0.0, 0.0, *floor.size), CLEARANCE_M, min_resolution=SEARCH_CELL_M)
     waypoints = _waypoints(floor, paths, rng, alternate)
     start, goal = next(waypoints), next(waypoints)
     x, y = start.tolist()
@@ -79,10 +75,7 @@ def _waypoints(floor: Building, paths: ShortestPaths, rng: np.random.Generator, 
 
 
 def mapping_tour(floor: Building) -> Array:
-    """Return poses (k, 3) with yaw 0, 0.5 m apart, on paths through all reachable rooms of a floor without furniture.
-
-    A map is drawn from scans over 360° at these poses.
-    """
+    """Return poses (k, 3) with yaw 0, 0.5 m apart, on paths through all reachable rooms of an unfurnished floor."""
     mesh = extruded_mesh(floor.walls, floor.glass)
     paths = ShortestPaths(mesh, (0.0, 0.0, *floor.size), CLEARANCE_M, min_resolution=SEARCH_CELL_M)
     order = floor.rooms[np.argsort(floor.rooms[:, 0], kind="stable")]
@@ -128,17 +121,10 @@ RANDOM_ERRORS_ONLY = OdometryErrors(0.0, 0.0, 0.0, False)
 def simulate_odometry(
     truth: Array, seconds: float, errors: OdometryErrors, spec: WheelOdometry, rng: np.random.Generator
 ) -> Array:
-    """Return poses (k, 3) in the odom frame, as wheel odometry measures them for true poses (k, 3) `seconds` apart.
-
-    `spec` has the parameters of the random errors.
-    """
+    """Return poses (k, 3) in the odom frame as measured by wheels for true poses (k, 3) that are `seconds` apart."""
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(Pose2(*row) for row in truth))])
     distance = np.hypot(steps[:, 0], steps[:, 1])
-    scale, turn, bend = (
-        1 + rng.normal(0, errors.scale),
-        1 + rng.normal(0, errors.turn),
-        rng.normal(0, errors.bend),
-    )
+    scale, turn, bend = 1 + rng.normal(0, errors.scale), 1 + rng.normal(0, errors.turn), rng.normal(0, errors.bend)
     translation_draws, rotation_draws = rng.standard_normal((2, len(steps)))
     stretch = scale * _slip_factors(len(steps), seconds, errors.slips, rng)
     moving = distance > 0
@@ -204,10 +190,7 @@ GLASS_TRANSMISSION = 0.8
 
 
 class PartlyTransparentScene:
-    """Ray caster for a building in which most beams pass through glass.
-
-    Casts each beam twice: in the mesh of `opaque` boxes only, and in the mesh of `everything`, including glass.
-    """
+    """Ray caster for a building with glass. Most beams pass through the glass, which only `everything` contains."""
 
     def __init__(self, opaque: TriangleMesh, everything: TriangleMesh) -> None:
         self._opaque, self._everything = RayScene(opaque), RayScene(everything)
@@ -217,9 +200,8 @@ class PartlyTransparentScene:
         heading = (poses[:, 2:] + angles).ravel()
         origins = np.column_stack((np.repeat(poses[:, :2], len(angles), axis=0), np.full(len(heading), HEIGHT_M / 2)))
         directions = np.column_stack((np.cos(heading), np.sin(heading), np.zeros(len(heading))))
-        with_glass, without_glass = (
-            scene.cast(origins, directions, max_range) for scene in (self._everything, self._opaque)
-        )
+        with_glass = self._everything.cast(origins, directions, max_range)
+        without_glass = self._opaque.cast(origins, directions, max_range)
         transmitted = rng.random(len(heading)) < GLASS_TRANSMISSION
         distances: Array = np.where(transmitted, without_glass, with_glass).reshape(len(poses), len(angles))
         return distances
@@ -234,10 +216,7 @@ def beam_angles(spec: Lidar) -> Array:
 
 
 def occlude_by_people(people: Array, poses: Array, angles: Array, ranges: Array) -> Array:
-    """Return `ranges` (n, b) in m, shortened where legs block the beam.
-
-    Beams start at lidar `poses` (n, 3) along `angles` (b,) in rad. `people` (n, p, 3) are the poses at the same times.
-    """
+    """Return the ranges (n, b) shortened where the legs of `people` (n, p, 3) block beams from `poses` (n, 3)."""
     offset = np.stack((-np.sin(people[..., 2]), np.cos(people[..., 2])), axis=-1) * LEG_OFFSET_M
     legs = np.concatenate((people[..., :2] + offset, people[..., :2] - offset), axis=1) - poses[:, None, :2]
     heading = poses[:, 2:] + angles
@@ -256,9 +235,8 @@ def occlude_by_people(people: Array, poses: Array, angles: Array, ranges: Array)
 
 def add_lidar_noise(distances: Array, spec: Lidar, rng: np.random.Generator) -> Array:
     """Return measured ranges for true `distances` in m: inf above and -inf below the range limits of the lidar."""
-    ranges: Array = (
-        np.round((distances + rng.normal(0, spec.noise, distances.shape)) / spec.resolution) * spec.resolution
-    )
+    noisy = distances + rng.normal(0, spec.noise, distances.shape)
+    ranges: Array = np.round(noisy / spec.resolution) * spec.resolution
     ranges[ranges > spec.max_range] = np.inf
     ranges[ranges < spec.min_range] = -np.inf
     return ranges

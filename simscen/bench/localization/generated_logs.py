@@ -114,10 +114,7 @@ class Log:
 
 
 def generate_log(building: int, number: int, circumstance: str, seconds: float = LOG_DURATION_S) -> Log:
-    """Return the log of drive `number` through a building under one of CIRCUMSTANCES.
-
-    The result depends on the arguments only.
-    """
+    """Return the log of drive `number` under one of CIRCUMSTANCES. The result depends on the arguments only."""
     rng = Streams(building).generator(f"{circumstance} {number}")
     beams, rate = LIDARS[number % len(LIDARS)]
     lidar = Lidar(
@@ -163,10 +160,7 @@ def generate_log(building: int, number: int, circumstance: str, seconds: float =
 def _drive(
     floor: Building, circumstance: str, seconds: float, rng: np.random.Generator, furniture: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return the true poses (k, 3) of a drive, and the furniture (n, 4): `furniture` if given, or that of the log.
-
-    If the furniture encloses the start, another start is drawn, and unless `furniture` is given, other furniture.
-    """
+    """Return true poses (k, 3) and furniture (n, 4), which is rearranged, if not given, until the robot can leave."""
     while True:
         current = furniture
         if current is None:

@@ -123,13 +123,8 @@ def compare_with_reference(localized: Localized, log: LocalizationLog, lost_dist
     x, y, heading = (np.interp(times, known_times, values) for values in (*log.truth[:, :2].T, yaw))
     poses = localized.poses[inside]
     distance = np.hypot(poses[:, 0] - x, poses[:, 1] - y)
-    return Errors(
-        times,
-        distance,
-        wrap_array(poses[:, 2] - heading),
-        lost_intervals(times, distance > lost_distance),
-        len(times) / len(localized.times),
-    )
+    lost = lost_intervals(times, distance > lost_distance)
+    return Errors(times, distance, wrap_array(poses[:, 2] - heading), lost, len(times) / len(localized.times))
 
 
 def lost_intervals(times: Array, lost: Array) -> list[LostInterval]:

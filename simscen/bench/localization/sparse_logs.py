@@ -57,10 +57,7 @@ KINDS: Mapping[str, tuple[str, bool]] = {
 
 @dataclass(frozen=True)
 class SparseTrial:
-    """Result of one localizer and seed on one log: median and last position error in m.
-
-    `lost` means that the error exceeded LOST_M at some time.
-    """
+    """Result of one localizer and seed on one log: median and last position error in m; `lost` if above LOST_M."""
 
     kind: str
     localizer: str

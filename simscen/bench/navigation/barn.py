@@ -141,10 +141,7 @@ Cells = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class ObstacleField:
-    """Centers (n, 2) of the cylinders in m.
-
-    `shortest` is the length in m of the shortest path from START to GOAL of a disc with the crossing radius.
-    """
+    """Centers (n, 2) of the cylinders, and the length in m of the `shortest` path of a disc from START to GOAL."""
 
     number: int
     centers: Array
@@ -311,9 +308,7 @@ def _path(rng: np.random.Generator) -> Array:
         if length_at[-1] < MIN_PATH_LENGTH_M:
             continue
         lengths = np.linspace(0.0, length_at[-1], round(length_at[-1] / KEYFRAME_DISTANCE_M) + 1)
-        points = np.column_stack(
-            (np.interp(lengths, length_at, curve[:, 0]), np.interp(lengths, length_at, curve[:, 1]))
-        )
+        points = np.column_stack([np.interp(lengths, length_at, axis) for axis in curve.T])
         points = points[:, ::-1] if rng.integers(2) else points
         return points[::-1] if rng.integers(2) else points
     raise RuntimeError(f"none of {MAX_ATTEMPTS} polynomials stays within the arena for {MIN_PATH_LENGTH_M:g} m")

@@ -1,7 +1,7 @@
 """Experiments of `simscen bench nav`, each a list of scenario files with seeds.
 
-The functions `write_…` generate the scenarios as files in `folder`, so that each run can be repeated with
-`simscen run`. Generated fields and drives have a `number`, from which all of their random values are derived.
+The functions `write_…` generate scenarios as files in `folder`, so that each run can be repeated with `simscen run`.
+All random values of a generated field or drive are derived from its number.
 """
 
 import json
@@ -108,6 +108,7 @@ def _field_drive(folder: Path, field: ObstacleField) -> Drive:
 def write_dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
     """Write one experiment for each of barn.SPEEDS_M_S, with generated fields of moving cylinders."""
     experiments = []
+    start, goal, stack = barn.DYNABARN_START, barn.DYNABARN_GOAL, barn.TUNED_STACK_FOR_MOVING_WORLDS
     for speed in barn.SPEEDS_M_S:
         drives = []
         for number in numbers:
@@ -115,15 +116,9 @@ def write_dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experimen
             world = write_text(
                 folder / f"{stem}.world.yaml", _moving_world_text(barn.generate_dynamic_field(number, speed))
             )
-            text = barn.scenario_text(
-                f"dynamic field {number}",
-                world.name,
-                barn.DYNABARN_START,
-                barn.DYNABARN_GOAL,
-                barn.TUNED_STACK_FOR_MOVING_WORLDS,
-            )
-            length = barn.DYNABARN_START.distance(barn.DYNABARN_GOAL)
-            drives.append(Drive(write_text(folder / f"{stem}.scenario.yaml", text), [number], length))
+            text = barn.scenario_text(f"dynamic field {number}", world.name, start, goal, stack)
+            file = write_text(folder / f"{stem}.scenario.yaml", text)
+            drives.append(Drive(file, [number], start.distance(goal)))
         experiments.append(Experiment(dynamic_fields_name(speed), tuple(drives), folder, mapless=True))
     return experiments
 
@@ -134,24 +129,12 @@ def dynamic_fields_name(speed: float) -> str:
 
 
 def write_sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
-    """Write the drive of Nav2's system test, without and with a box that is not on the map.
-
-    `nav2` is the folder with the data of nav2_minimal_turtlebot_simulation.
-    """
-    return [
-        Experiment(
-            name,
-            (
-                Drive(
-                    write_text(folder / f"nav2/{stem}.scenario.yaml", sandbox_scenario(name, box)),
-                    seeds,
-                ),
-            ),
-            folder,
-            (nav2, nav2 / "models"),
-        )
-        for name, stem, box in (("tb3_sandbox", "plain", False), ("tb3_sandbox, unmapped box", "with_box", True))
-    ]
+    """Write the drive of Nav2's system test, whose data is in `nav2`, without and with a box that is not on the map."""
+    experiments = []
+    for name, stem, has_box in (("tb3_sandbox", "plain", False), ("tb3_sandbox, unmapped box", "with_box", True)):
+        file = write_text(folder / f"nav2/{stem}.scenario.yaml", sandbox_scenario(name, has_box))
+        experiments.append(Experiment(name, (Drive(file, seeds),), folder, (nav2, nav2 / "models")))
+    return experiments
 
 
 def corner_cases(scenarios: Path, root: Path, seeds: Sequence[int]) -> list[Experiment]:

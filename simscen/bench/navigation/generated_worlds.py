@@ -133,10 +133,7 @@ def write_two_robots(folder: Path, numbers: Iterable[int]) -> Experiment:
 
 
 def write_ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Write one hall for each number, in which a robot drives up a ramp, over a platform, and down another ramp.
-
-    Slopes, heights, and starts are random.
-    """
+    """Write one hall for each number, with a random ramp up, a platform, and a ramp down on the robot's way."""
     return _numbered_experiment("ramps", folder / "ramp", numbers, _ramp_scenario)
 
 

@@ -79,10 +79,7 @@ FIRST_FAULTY_DRIVE = 1_000_000
 
 
 def scenario_text(name: str, world: str, drive: RandomDrive, faults: Sequence[str] = ()) -> str:
-    """Return the YAML of a scenario in which the default robot must make this drive without a collision.
-
-    `world` is the value of `world:`, and each of `faults` an item of `faults:`.
-    """
+    """Return the YAML of a drive of the default robot, which must not collide. `faults` are items of `faults:`."""
     fault_lines = "".join(["faults:\n", *(f"  - {fault}\n" for fault in faults)]) if faults else ""
     limit = drive.length / MIN_AVERAGE_SPEED_M_S + 30.0
     return (
@@ -95,10 +92,7 @@ def scenario_text(name: str, world: str, drive: RandomDrive, faults: Sequence[st
 def write_random_goals(
     name: str, folder: Path, worlds: Mapping[str, BuiltWorld], numbers: Sequence[int], world_path: tuple[Path, ...] = ()
 ) -> Experiment:
-    """Write an experiment with the random drives of these numbers in each world.
-
-    The keys of `worlds` are the values of `world:` in the scenarios, relative to a folder of `world_path`.
-    """
+    """Write the random drives with these numbers in each world. Scenarios refer to the keys of `worlds`."""
     drives = []
     for world, built in worlds.items():
         for drive in random_drives(built, ROBOT_RADIUS_M, numbers):

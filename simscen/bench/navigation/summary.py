@@ -130,10 +130,7 @@ def summarize(experiment: str, trials: Sequence[Trial]) -> ExperimentSummary:
 
 
 def success_interval(trials: Sequence[Trial]) -> Interval | None:
-    """Return the interval of the success rate by resampling worlds, or None with fewer than five worlds.
-
-    Resampling runs would give a too small interval, because runs in the same world are not independent.
-    """
+    """Return the interval of the success rate, or None with fewer than five worlds."""
     return ClusteredMean.from_pairs(
         (trial.world, float(trial.drive_outcome is DriveOutcome.SUCCESS)) for trial in trials
     ).rate_interval()

@@ -105,10 +105,7 @@ def measure_patrol(rounds: int, report_progress: ProgressCallback = no_progress)
 
 
 def _measure_parts(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
-    """Return the CPU time in s of each part of a run.
-
-    They are wall times of the stopwatch, scaled by the ratio of `cpu` (CPU time without a stopwatch) to the wall time.
-    """
+    """Return the CPU time in s of each part: its wall time, scaled to the CPU time `cpu` of a run without stopwatch."""
     watch = Stopwatch()
     _, _, whole = time_run(prepared, watch)
     parts = {name: seconds * cpu / whole for name, seconds in watch.seconds.items()}

@@ -11,6 +11,7 @@ import re
 import resource
 import statistics
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise, product
@@ -89,21 +90,14 @@ def write_scaled_patrol(folder: Path, quantity: str, count: int) -> Path:
 
 
 def _crates(count: int, extra_keys: str) -> str:
-    """Return the YAML of `count` crates, each with `extra_keys`.
-
-    In `extra_keys`, {end_x} is replaced by the crate's x + 0.2 m, and {y} by its y.
-    """
-    return "".join(
-        f"    - {{name: crate {n}, box: [0.3, 0.3, 0.4], pose: {{x: {x}, y: {y}}}"
-        f"{extra_keys.format(end_x=round(x + 0.2, 2), y=y)}}}\n"
-        for n, x, y in _crate_positions(count)
-    )
-
-
-def _crate_positions(count: int) -> Iterator[tuple[int, float, float]]:
+    """Return the YAML of crates. In `extra_keys`, {end_x} stands for x + 0.2 m of the crate, and {y} for its y."""
+    lines = []
     for number in range(count):
         row, column = divmod(number, OBJECTS_PER_ROW)
-        yield number, round(0.5 + 0.6 * column, 2), round(11.0 + 0.6 * row, 2)
+        x, y = round(0.5 + 0.6 * column, 2), round(11.0 + 0.6 * row, 2)
+        keys = extra_keys.format(end_x=round(x + 0.2, 2), y=y)
+        lines.append(f"    - {{name: crate {number}, box: [0.3, 0.3, 0.4], pose: {{x: {x}, y: {y}}}{keys}}}\n")
+    return "".join(lines)
 
 
 def _robots(count: int) -> str:
@@ -172,8 +166,6 @@ def measure_worlds(rounds: int) -> Iterator[WorldCost]:
 
 
 def _measure_world(name: str, file: Path, rounds: int) -> WorldCost:
-    import time
-
     gc.collect()  # the memory of the previous world must not count
     start = time.process_time()
     prepared = prepare(load_scenario(file, file.parent))
@@ -258,16 +250,11 @@ def write_warehouse(folder: Path) -> Path:
     rng = np.random.default_rng(12)
     columns = [*np.arange(4.0, 46.0, 0.75).tolist(), *np.arange(54.5, 96.5, 0.75).tolist()]
     bays = list(product(columns, (row + side for row in range(4, 97, 4) for side in (-0.4, 0.4))))
+    chosen = rng.permutation(len(bays))[:STATIC_COUNT].tolist()
     stock = [
         f"  - {{name: unit {n}, {_box_or_drum(n)},"
         f" pose: {{x: {bays[bay][0]:.2f}, y: {bays[bay][1]:.2f}, yaw: {turn:.2f}}}}}"
-        for n, (bay, turn) in enumerate(
-            zip(
-                rng.permutation(len(bays))[:STATIC_COUNT].tolist(),
-                rng.uniform(-0.2, 0.2, STATIC_COUNT),
-                strict=True,
-            )
-        )
+        for n, (bay, turn) in enumerate(zip(chosen, rng.uniform(-0.2, 0.2, STATIC_COUNT), strict=True))
     ]
     carts = [
         f"  - {{name: cart {n}, box: [0.9, 0.6, 0.9], pose: {{x: {x}, y: {y + 0.8:.1f}}},"
@@ -304,13 +291,10 @@ def write_arena(folder: Path) -> Path:
 
 
 def _scenario(folder: Path, world: str, waypoints: tuple[tuple[float, float], ...]) -> Path:
-    goals = ", ".join(f"{{pose: {{x: {x}, y: {y}, yaw: {yaw:.4f}}}}}" for x, y, yaw in _with_arrival_yaw(waypoints))
+    goals = ", ".join(
+        f"{{pose: {{x: {bx}, y: {by}, yaw: {math.atan2(by - ay, bx - ax):.4f}}}}}"
+        for (ax, ay), (bx, by) in pairwise(waypoints)
+    )
     file = folder / f"{folder.name}.scenario.yaml"
     file.write_text(SCENARIO.format(world=world, start=waypoints[0], goals=goals))
     return file
-
-
-def _with_arrival_yaw(waypoints: tuple[tuple[float, float], ...]) -> Iterator[tuple[float, float, float]]:
-    """Yield the waypoints after the first, with the yaw of arrival."""
-    for (ax, ay), (bx, by) in pairwise(waypoints):
-        yield bx, by, math.atan2(by - ay, bx - ax)

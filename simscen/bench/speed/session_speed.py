@@ -39,9 +39,7 @@ MILLISECONDS, MEGABYTES = "ms", "MB"
 
 @dataclass(frozen=True)
 class Overhead:
-    """Overhead of runs in several rounds. The names of the fields are keys of the JSON output.
-
-    All values are CPU times in ms, except `wall` and `memory`.
+    """Overhead of runs in several rounds, mostly CPU times in ms. The names of the fields are keys of the JSON output.
 
     run:        a run of SHORT_RUN_S in this process
     outside:    the part of `run` before the first and after the last beat: setup, start and end of the log, verdicts
@@ -77,17 +75,19 @@ class Overhead:
         }
 
 
-class _SimulationTimer:
-    """Listener that measures the CPU time from the end of the setup of a run to its last beat."""
+class _BeatTimer:
+    """Listener that counts the beats of a run, and measures the CPU time from the end of its setup to the last beat."""
 
     def attach(self, setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
         """Start the timer, and return it as a listener of the run."""
         self.start = self.end = time.process_time()
+        self.count = 0
         return (self,)
 
     def append(self, moment: Moment) -> None:
-        """Take the time of the latest beat."""
+        """Record the beat at which the moment was recorded."""
         self.end = time.process_time()
+        self.count += 1
 
     @property
     def duration(self) -> float:
@@ -104,7 +104,7 @@ def measure_overhead(rounds: int, entry: Sequence[str], report_progress: Progres
         prepared = prepare(loaded)
         log = Path(folder, "run.mcap")
 
-        timer = _SimulationTimer()
+        timer = _BeatTimer()
 
         def run() -> object:
             log.unlink(missing_ok=True)
@@ -267,22 +267,11 @@ def measure_external(rounds: int) -> ExternalStackCost:
 
 def _wait_per_cycle(prepared: PreparedScenario) -> tuple[int, float]:
     """Return the number of beats of a run, and the mean wall time in µs that it waits for the stack in each beat."""
-    watch, counter = Stopwatch(), _BeatCounter()
+    watch, timer = Stopwatch(), _BeatTimer()
 
-    def attach(setup: RunSetup, _: Sequence[MomentSink]) -> Sequence[MomentSink]:
+    def attach(setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
         watch.watch("stack", setup.robots[0].stack, "decide")
-        return (counter,)
+        return timer.attach(setup, listeners)
 
     simulate(prepared, SEED, attach=attach)
-    return counter.count, 1e6 * watch.seconds["stack"] / counter.count
-
-
-class _BeatCounter:
-    """Listener that counts the beats of a run."""
-
-    def __init__(self) -> None:
-        self.count = 0
-
-    def append(self, moment: Moment) -> None:
-        """Count the beat at which the moment was recorded."""
-        self.count += 1
+    return timer.count, 1e6 * watch.seconds["stack"] / timer.count

@@ -31,7 +31,7 @@ RATE_PARAMETERS = {
 }
 """Actions that move the robot, each with the parameter of its server that is the rate of commands in Hz."""
 MISSING_LIMIT_NS = NANOSECONDS
-"""Simulated time without a due command after which the run fails. The server may wait for simulated time itself.
+"""Simulated time without a due command after which the run fails, because a server may wait for simulated time.
 
 For example, Nav2's controller server waits for a current costmap for `costmap_update_timeout`.
 """

@@ -75,25 +75,20 @@ _CHECKED = frozenset(
 )
 
 
-class _Node:
-    """The parameters of one node, with methods that check them and add problems."""
+class _Node(NamedTuple):
+    """The parameters of one node, with methods that check them and add problems to a list."""
 
-    def __init__(
-        self,
-        name: str,
-        parameters: Parameters,
-        published: PublishedNames,
-        subscribed: Optional[Collection[str]],
-        problems: List[ParameterProblem],
-    ) -> None:
-        self.name, self.published, self._subscribed = name, published, subscribed
-        self._parameters, self._problems = parameters, problems
+    name: str
+    parameters: Parameters
+    published: PublishedNames
+    subscribed: Optional[Collection[str]]
+    problems: List[ParameterProblem]
 
     def get(self, key: str) -> Optional[Any]:
-        return self._parameters.get(key)
+        return self.parameters.get(key)
 
     def add_problem(self, key: str, message: str, is_severe: bool = True) -> None:
-        self._problems.append(ParameterProblem(self.name, key, f"{key} {message}", is_severe))
+        self.problems.append(ParameterProblem(self.name, key, f"{key} {message}", is_severe))
 
     def check_base(self, key: str) -> None:
         value = self.get(key)
@@ -111,7 +106,7 @@ class _Node:
         if not isinstance(value, str):
             return
         absolute = value if value.startswith("/") else f"{self.published.namespace}/{value}"
-        if absolute not in topics and (self._subscribed is None or absolute in self._subscribed):
+        if absolute not in topics and (self.subscribed is None or absolute in self.subscribed):
             available = ", ".join(topics) or "none"
             self.add_problem(key, f"is {value!r}, which no node publishes; simscen's {kind}: {available}")
 

@@ -58,7 +58,8 @@ class Nav2Report:
         self._lines.clear()
         for node in self._barrier.nodes:
             if node.rpartition("/")[2] in NODES:
-                self.parameters[node] = self._read_parameters(node)
+                names = [name for name in self._node_parameters.names(node) if not name.startswith(OMITTED)]
+                self.parameters[node] = self._node_parameters.values(node, names)
 
     def follow_log(self) -> None:
         """Subscribe to /rosout if a node publishes it now. Call repeatedly until one does."""
@@ -93,8 +94,3 @@ class Nav2Report:
             self._lines.append(LogLine(message.level, message.name, message.msg))
         if ABORTED_BRING_UP in message.msg:
             self.aborted_bring_up = message.name
-
-    def _read_parameters(self, node: str) -> dict[str, Any]:
-        """Return the values of a node's parameters; empty if the node does not answer."""
-        names = [name for name in self._node_parameters.names(node) if not name.startswith(OMITTED)]
-        return self._node_parameters.values(node, names)
