@@ -1,4 +1,4 @@
-"""Mutants of a Python module: one small change each, of the kinds that turn a right verdict into a wrong one."""
+"""Create mutants of a Python module: copies with one small change each, such as `<=` instead of `<`."""
 
 import ast
 import copy
@@ -33,51 +33,54 @@ SWAPS = (
     ("at_most", "at_least"), ("sin", "cos"),
 )  # fmt: skip
 SWAPPED = {**dict(SWAPS), **{b: a for a, b in SWAPS}}
+"""Names that are replaced by other names."""
 DROPPED = {"wrap", "wrap_array", "unwrap", "abs", "sorted", "isfinite"}
-WORDS = {"left": "right", "right": "left"}
+"""Functions whose call is replaced by the first argument."""
+TEXTS = {"left": "right", "right": "left"}
+"""String constants that are replaced by others."""
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A change at `line`: `was` became `now`, inside `scope`. `tree` is the module with the change."""
+    """The module `tree` with one change: at `line` in the function or class `scope`, `before` becomes `after`."""
 
     line: int
     scope: str
-    was: str
-    now: str
+    before: str
+    after: str
     tree: ast.Module
 
     @property
     def change(self) -> str:
-        """What names it, whatever lines are put in above."""
-        return f"{self.scope}: {self.was}  =>  {self.now}"
+        """Description that identifies the mutant in its module. It does not contain the line, which changes often."""
+        return f"{self.scope}: {self.before}  =>  {self.after}"
 
 
 def mutants(file: Path) -> list[Mutant]:
-    """Every mutant of a module, in the order of its lines; equal changes of one scope get a number."""
+    """Return all mutants of a module in the order of lines. Equal changes in one scope are numbered."""
     tree = ast.parse(file.read_text(encoding="utf-8"))
-    found, seen = [], {}
-    for scope, statement, node in _places(tree):
-        for new in _changes(node):
-            mutant = _made(tree, scope, statement, node, new)
-            seen[mutant.change] = times = seen.get(mutant.change, 0) + 1
-            if times > 1:
-                mutant = Mutant(mutant.line, mutant.scope, mutant.was, f"{mutant.now}  #{times}", mutant.tree)
+    found, counts = [], {}
+    for scope, statement, node in _mutable_nodes(tree):
+        for new in _replacements(node):
+            mutant = _mutant(tree, scope, statement, node, new)
+            counts[mutant.change] = count = counts.get(mutant.change, 0) + 1
+            if count > 1:
+                mutant = Mutant(mutant.line, mutant.scope, mutant.before, f"{mutant.after}  #{count}", mutant.tree)
             found.append(mutant)
     return found
 
 
-def _made(tree: ast.Module, scope: str, statement: ast.AST, node: ast.AST, new: ast.AST) -> Mutant:
-    """A copy of the tree in which `new` stands for `node`."""
-    shown = _shown(statement)
+def _mutant(tree: ast.Module, scope: str, statement: ast.AST, node: ast.AST, new: ast.AST) -> Mutant:
+    """Return the mutant in which `new` replaces `node`."""
+    before = _as_line(statement)
     memo = {id(node): ast.copy_location(new, node)}
     changed = ast.fix_missing_locations(copy.deepcopy(tree, memo))
-    after = _shown(copy.deepcopy(statement, {id(node): new}))
-    return Mutant(node.lineno, scope, shown, after, changed)
+    after = _as_line(copy.deepcopy(statement, {id(node): new}))
+    return Mutant(node.lineno, scope, before, after, changed)
 
 
-def _shown(statement: ast.AST) -> str:
-    """A statement in one line, without what is below it."""
+def _as_line(statement: ast.AST) -> str:
+    """Return the code of a statement in one line, without the statements in its body."""
     bare = copy.copy(statement)
     if hasattr(bare, "body") and isinstance(bare.body, list):
         bare.body = [ast.Expr(ast.Constant(...))]
@@ -86,8 +89,8 @@ def _shown(statement: ast.AST) -> str:
     return " ".join(ast.unparse(bare).split())
 
 
-def _places(tree: ast.Module) -> Iterator[tuple[str, ast.AST, ast.AST]]:
-    """Every node that runs, with its scope and statement: no annotations, docstrings, decorators or texts."""
+def _mutable_nodes(tree: ast.Module) -> Iterator[tuple[str, ast.AST, ast.AST]]:
+    """Yield scope, statement, and node for each node whose change can have an effect at run time."""
 
     def walk(node: ast.AST, scope: str, statement: ast.AST) -> Iterator[tuple[str, ast.AST, ast.AST]]:
         if isinstance(node, ast.stmt):
@@ -98,7 +101,7 @@ def _places(tree: ast.Module) -> Iterator[tuple[str, ast.AST, ast.AST]]:
                         "format_spec", "bases", "keywords" if isinstance(node, ast.ClassDef) else ""):  # fmt: skip
                 continue
             for child in value if isinstance(value, list) else [value]:
-                if not isinstance(child, ast.AST) or _idle(child):
+                if not isinstance(child, ast.AST) or _has_no_effect(child):
                     continue
                 named = isinstance(child, ast.FunctionDef | ast.ClassDef)
                 yield from walk(child, f"{scope}.{child.name}".lstrip(".") if named else scope, statement)
@@ -106,8 +109,8 @@ def _places(tree: ast.Module) -> Iterator[tuple[str, ast.AST, ast.AST]]:
     yield from walk(tree, "", tree)
 
 
-def _idle(node: ast.AST) -> bool:
-    """What does nothing: docstrings, imports, assertions for the type checker, texts of errors."""
+def _has_no_effect(node: ast.AST) -> bool:
+    """Return whether a node is not mutated: docstrings, imports, assertions for the type checker, raised errors."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return True
     if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
@@ -115,8 +118,8 @@ def _idle(node: ast.AST) -> bool:
     return isinstance(node, ast.Import | ast.ImportFrom | ast.Assert | ast.Raise)
 
 
-def _changes(node: ast.AST) -> Iterator[ast.AST]:
-    """What might stand in the place of a node."""
+def _replacements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the nodes that replace a node in mutants."""
     match node:
         case ast.Compare(left, ops, comparators):
             for k, operator in enumerate(ops):
@@ -142,8 +145,8 @@ def _changes(node: ast.AST) -> Iterator[ast.AST]:
             yield ast.Constant(value + 1)
         case ast.Constant(float() as value):
             yield ast.Constant(value * 1.25 if value else 0.125)
-        case ast.Constant(str() as value) if value in WORDS:
-            yield ast.Constant(WORDS[value])
+        case ast.Constant(str() as value) if value in TEXTS:
+            yield ast.Constant(TEXTS[value])
         case ast.If(test, body, orelse) if not isinstance(test, ast.Compare | ast.UnaryOp | ast.BoolOp):
             yield ast.If(ast.UnaryOp(ast.Not(), test), body, orelse)
         case ast.IfExp(test, body, orelse) if not isinstance(test, ast.Compare | ast.UnaryOp | ast.BoolOp):

@@ -1,8 +1,8 @@
-"""Mutation check of what decides verdicts: `make mutation`, or with names of modules for those alone.
+"""Check that tests detect small changes (mutants) of the modules that decide verdicts (`make mutation`).
 
-Every mutant is killed by a test, or listed in equivalent.yaml with the reason why it cannot be. The run fails when one
-that is not listed survives, and when one that is listed is killed or gone. `--write` puts what came of it into the
-table in the docs.
+Arguments are names of modules; without any, all modules are checked. Each mutant must be killed by a test, or be listed
+in equivalent.yaml with the reason why it cannot be killed. The check fails if a mutant survives that is not listed, or
+if a listed mutant is killed or does not exist. `--write` updates the table in the docs.
 """
 
 import ast
@@ -14,20 +14,22 @@ from pathlib import Path
 import yaml
 from mutants import Mutant, mutants
 from targets import ROOT, module_name, modules, tests_of
-from trial import survives, tried
+from trial import run_tests, survives
 
 EQUIVALENT = Path(__file__).with_name("equivalent.yaml")
 TABLE = ROOT / "docs/design/mutation.md"
 BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
-WARM = ("numpy", "pydantic", "hypothesis", "shapely", "shapely.affinity", "yaml", "_pytest.assertion.rewrite",
-        "evo.core.metrics", "evo.core.trajectory", "filterpy.stats", "_hypothesis_pytestplugin",
-        "simscen.core.records.trace", "simscen.core.records.case", "simscen.core.geometry.polygons")  # fmt: skip
-"""What every trial would import again."""
+PRELOADED_MODULES = (
+    *("numpy", "pydantic", "hypothesis", "shapely", "shapely.affinity", "yaml", "_pytest.assertion.rewrite"),
+    *("evo.core.metrics", "evo.core.trajectory", "filterpy.stats", "_hypothesis_pytestplugin"),
+    *("simscen.core.records.trace", "simscen.core.records.case", "simscen.core.geometry.polygons"),
+)
+"""Modules that are imported once here, so that the forked process of each trial need not import them."""
 
 
 @dataclass
 class Tally:
-    """What became of a module's mutants; `stale` are listed ones that are not there or not alive."""
+    """Results of the mutants of a module. `stale` are messages about listed mutants that are killed or do not exist."""
 
     total: int = 0
     killed: int = 0
@@ -37,10 +39,13 @@ class Tally:
 
 
 def check(file: Path, listed: dict[str, str]) -> Tally:
-    """Try every mutant of a module. `listed` maps changes to the reason why they change nothing."""
+    """Test each mutant of a module. `listed` has the reason why a mutant is equivalent, by Mutant.change.
+
+    Exits with a message if the tests fail without a mutant.
+    """
     name, stages, tally = module_name(file), [], Tally()
     for tests in tests_of(file):
-        passed, limit = tried(name, file, ast.parse(file.read_text(encoding="utf-8")), tests)
+        passed, limit = run_tests(name, file, ast.parse(file.read_text(encoding="utf-8")), tests)
         if not passed:
             raise SystemExit(f"{name}: its tests fail without any mutant: {' '.join(tests)}")
         stages.append((tests, limit))
@@ -61,8 +66,8 @@ def check(file: Path, listed: dict[str, str]) -> Tally:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the check; 1 when a mutant survives that should not."""
-    for module in WARM:
+    """Run the check; return 0, or 1 if it fails."""
+    for module in PRELOADED_MODULES:
         importlib.import_module(module)
     wanted = [argument for argument in arguments if not argument.startswith("--")]
     listed = yaml.safe_load(EQUIVALENT.read_text(encoding="utf-8")) if EQUIVALENT.exists() else {}
@@ -78,14 +83,17 @@ def main(arguments: list[str]) -> int:
             print(f"  STALE {line}", flush=True)
         failed |= bool(tally.alive or tally.stale)
     if "--write" in arguments:
-        write(rows)
+        update_table(rows)
     sums = [sum(row[k] for row in rows) for k in range(1, 5)]
     print(f"{sums[0]} mutants: {sums[1]} killed, {sums[2]} equivalent with a reason, {sums[3]} survived")
     return int(failed)
 
 
-def write(rows: list[tuple[str, int, int, int, int]]) -> None:
-    """Put these rows into the table of docs/design/mutation.md; those of other modules that are still there stay."""
+def update_table(rows: list[tuple[str, int, int, int, int]]) -> None:
+    """Update these rows in the table of docs/design/mutation.md: module, mutants, killed, equivalent, survived.
+
+    Rows of other modules are kept if the module exists.
+    """
     before, rest = TABLE.read_text(encoding="utf-8").split(BEGIN)
     old, after = rest.split(END)
     known = {row[0]: row for row in (_row(line) for line in old.splitlines()[2:-1])} | {row[0]: row for row in rows}

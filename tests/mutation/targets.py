@@ -1,4 +1,4 @@
-"""The modules that are mutated, and the tests of each."""
+"""List the modules that are mutated, and the tests that check each of them."""
 
 from pathlib import Path
 

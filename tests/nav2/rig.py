@@ -34,26 +34,26 @@ def main() -> int:
     folder = parser.parse_args().folder.absolute()
     folder.mkdir(parents=True, exist_ok=True)
     try:
-        described = installed(folder) or built(folder)
+        description = find_installed(folder) or build(folder)
     except Unavailable as reason:
         (folder / "rig.json").unlink(missing_ok=True)
         print(f"Nav2: tests/nav2 are skipped: {reason}")
         return 1
-    (folder / "rig.json").write_text(json.dumps(described, indent=2) + "\n")
-    print(f"Nav2: {described['distribution']}, {described['origin']}")
+    (folder / "rig.json").write_text(json.dumps(description, indent=2) + "\n")
+    print(f"Nav2: {description['distribution']}, {description['origin']}")
     return 0
 
 
-def installed(folder: Path) -> dict | None:
-    """Return the description of an installed Nav2, or None."""
+def find_installed(folder: Path) -> dict | None:
+    """Return the description of an installed Nav2, or None; write its script env.sh to `folder`."""
     for prefix in prefixes():
         params = prefix / "share/nav2_bringup/params/nav2_params.yaml"
         setup = prefix / "setup.bash"
         if setup.is_file() and params.is_file() and (prefix / "share" / LAST_PACKAGE).is_dir():
             env = folder / "env.sh"
             env.write_text(f'source {setup}\nnode() {{ exec "{prefix}/lib/$1/$2" "${{@:3}}"; }}\n')
-            about = {"distribution": prefix.name, "origin": f"installed in {prefix}"}
-            return {**about, "env": str(env), "params": str(params), "python": "/usr/bin/python3"}
+            names = {"distribution": prefix.name, "origin": f"installed in {prefix}"}
+            return {**names, "env": str(env), "params": str(params), "python": "/usr/bin/python3"}
     return None
 
 
@@ -64,8 +64,8 @@ def prefixes() -> Iterator[Path]:
     yield from sorted(Path("/opt/ros").glob("*"), reverse=True)
 
 
-def built(folder: Path) -> dict:
-    """Build Nav2 from source unless that is done; return its description."""
+def build(folder: Path) -> dict:
+    """Build Nav2 from source, unless an up-to-date build exists, and return its description."""
     env, stamp = folder / "env.sh", folder / "recipe"
     recipe = hashlib.sha256(b"".join(file.read_bytes() for file in RECIPE)).hexdigest()[:16]
     if not (env.is_file() and stamp.is_file() and stamp.read_text() == recipe):
@@ -78,9 +78,9 @@ def built(folder: Path) -> dict:
             raise Unavailable("the build failed")
         stamp.write_text(recipe)
         print(f"Nav2: built in {time.monotonic() - started:.0f} s, {size_gb(folder):.1f} GB", flush=True)
-    about = {"distribution": "jazzy", "origin": f"built from source in {folder}"}
+    names = {"distribution": "jazzy", "origin": f"built from source in {folder}"}
     python = str(folder / "venv/bin/python")
-    return {**about, "env": str(env), "params": str(folder / "nav2_params.yaml"), "python": python}
+    return {**names, "env": str(env), "params": str(folder / "nav2_params.yaml"), "python": python}
 
 
 def size_gb(folder: Path) -> float:

@@ -1,11 +1,11 @@
-"""`make planners`: every planner on the same ways; the figures go into docs/reference/planners.md."""
+"""Compare all planners on the same queries, and write the table into docs/reference/planners.md (`make planners`)."""
 
 import time
 from itertools import pairwise
 from pathlib import Path as File
 
 import numpy as np
-from grounds import ROBOT, cheapest, forest, maze, pair, rooms, view_of
+from generated_worlds import ROBOT, cheapest_cost, costmap_of, forest, maze, random_query, rooms
 from scipy.spatial import cKDTree
 
 from simscen.advanced.planners.medial_axis_planner import medial_axis_planner
@@ -40,32 +40,32 @@ PLANNERS: dict[str, PlannerSpec] = {
 }
 
 
-class Way:
-    """A way on a ground, with what the cheapest one costs."""
+class Query:
+    """A random start and goal on a costmap, with the cost of the cheapest path and the length of the shortest one."""
 
     def __init__(self, view: CostmapView, rng: np.random.Generator) -> None:
         self.view, self.rates = view, TraversalCosts(view, ROBOT, 2.0, True)
         free = np.argwhere(self.rates.free & (view.distance < 0.6))
         inside = Pose2(*((free[len(free) // 2][::-1] + 0.5) * view.resolution + view.origin).tolist())
         reachable = find_endpoints(self.rates, inside, inside, 0.5).reachable
-        self.start, self.goal = pair(self.rates, reachable, rng)
-        self.cost = cheapest(self.rates, self.start, self.goal)
+        self.start, self.goal = random_query(self.rates, reachable, rng)
+        self.cost = cheapest_cost(self.rates, self.start, self.goal)
         shortest = TraversalCosts(view, ROBOT, 0.0, True)
-        self.length = cheapest(shortest, self.start, self.goal)
+        self.length = cheapest_cost(shortest, self.start, self.goal)
 
-    def price(self, points: Array) -> float:
-        """What a path costs; where it cuts the corner of a blocked cell by a hair, as much as beside it."""
+    def path_cost(self, points: Array) -> float:
+        """Return the cost of a path (n, 2). A point that just touches a blocked cell costs as much as one beside it."""
         steps = np.hypot(*np.diff(points, axis=0).T)
         return float((steps * np.minimum(self.rates.at((points[:-1] + points[1:]) / 2), 3.0)).sum())
 
-    def room(self, points: Array) -> float:
-        """The least distance beyond the radius on a path."""
+    def min_clearance(self, points: Array) -> float:
+        """Return the minimum distance of the robot's edge from obstacles on a path (n, 3), in m."""
         columns, rows = ((points[:, i] - self.view.origin[i]) / self.view.resolution for i in (0, 1))
         return float(self.view.distance[rows.astype(int), columns.astype(int)].min()) - ROBOT.inscribed_radius
 
 
-def built(spec: PlannerSpec) -> Planner:
-    """The planner of a specification."""
+def build_planner(spec: PlannerSpec) -> Planner:
+    """Return the planner of a specification."""
     if isinstance(spec, OmplPlanner):
         return ompl_planner.ompl_planner(spec, setting(ROBOT))
     if isinstance(spec, Navfn):
@@ -76,39 +76,39 @@ def built(spec: PlannerSpec) -> Planner:
     return grid_planner.smac_2d(spec, setting(ROBOT))
 
 
-def row(name: str, spec: PlannerSpec, ways: list[Way]) -> str:
-    """The line of one planner."""
-    cost, length, room, apart, seconds = [], [], [], [], []
-    for way in ways:
+def table_row(name: str, spec: PlannerSpec, queries: list[Query]) -> str:
+    """Plan each query with each of SEEDS, and return the planner's row of the table."""
+    cost, length, clearance, spread, seconds = [], [], [], [], []
+    for query in queries:
         paths: list[Path] = []
         for seed in SEEDS:
-            planner, begin = built(spec), time.process_time()
+            planner, begin = build_planner(spec), time.process_time()
             try:
-                paths.append(planner.plan(way.view, way.start, way.goal, seed))
+                paths.append(planner.plan(query.view, query.start, query.goal, seed))
             except NavigationFailure:
                 continue
             finally:
                 seconds.append(time.process_time() - begin)
-            cost.append(way.price(paths[-1].points[:, :2]) / way.cost)
-            length.append(paths[-1].length() / way.length)
-            room.append(way.room(paths[-1].points))
+            cost.append(query.path_cost(paths[-1].points[:, :2]) / query.cost)
+            length.append(paths[-1].length() / query.length)
+            clearance.append(query.min_clearance(paths[-1].points))
         for one, other in pairwise(paths):
-            apart.append(float(cKDTree(one.points[:, :2]).query(other.points[:, :2])[0].mean()))
+            spread.append(float(cKDTree(one.points[:, :2]).query(other.points[:, :2])[0].mean()))
     ms = 1000 * np.array(seconds)
     return (
         f"| {name} | {len(cost)} of {len(ms)} | {np.mean(cost):.3f}, {max(cost):.2f} | {np.mean(length):.3f} "
-        f"| {np.mean(room):.2f} | {np.mean(apart):.2f} | {np.median(ms):.0f}, {ms.max():.0f} |\n"
+        f"| {np.mean(clearance):.2f} | {np.mean(spread):.2f} | {np.median(ms):.0f}, {ms.max():.0f} |\n"
     )
 
 
 def main() -> None:
-    """Compare, and write the page."""
-    ways = []
-    for ground in (rooms, forest, maze):
+    """Compare the planners, and write the table."""
+    queries = []
+    for world in (rooms, forest, maze):
         for number in range(6):
             rng = np.random.default_rng((number, 20))
-            ways.append(Way(view_of(*ground(rng)), rng))
-    table = HEAD + "".join(row(name, spec, ways) for name, spec in PLANNERS.items())
+            queries.append(Query(costmap_of(*world(rng)), rng))
+    table = HEAD + "".join(table_row(name, spec, queries) for name, spec in PLANNERS.items())
     print(table)
     before, rest = PAGE.read_text().split(BEGIN)
     PAGE.write_text(before + BEGIN + table + END + rest.split(END)[1])

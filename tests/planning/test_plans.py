@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from grounds import ROBOT, cheapest, forest, large_maze, maze, pair, rooms, view_of
+from generated_worlds import ROBOT, cheapest_cost, costmap_of, forest, large_maze, maze, random_query, rooms
 
 from simscen.advanced.planners import informed_set, medial_axis_planner, search_regions
 from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner, costly_distance, refined
@@ -20,7 +20,7 @@ from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView, Planner, Surroundings
 from simscen.testing.flatland import RATE, Flatland
 
-GROUNDS = {"rooms": rooms, "forest": forest, "maze": maze}
+WORLDS = {"rooms": rooms, "forest": forest, "maze": maze}
 
 
 def ompl(**options: object) -> OmplPlanner:
@@ -33,7 +33,7 @@ def medial_axis(**options: object) -> MedialAxisPlanner:
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize("multiplier", [2.0, 5.0])
-@pytest.mark.parametrize("kind", GROUNDS)
+@pytest.mark.parametrize("kind", WORLDS)
 @pytest.mark.parametrize(
     ("planner", "mean", "most"),
     [(ompl, 1.15, 1.35), (medial_axis, 1.02, 1.05)],
@@ -45,23 +45,23 @@ def test_a_plan_costs_little_more_than_the_optimum(
     ratios = []
     for seed in range(3):
         rng = np.random.default_rng((seed, len(kind)))
-        view = view_of(*GROUNDS[kind](rng))
+        view = costmap_of(*WORLDS[kind](rng))
         rates = TraversalCosts(view, ROBOT, multiplier, True)
         middle = np.argwhere(rates.free)[len(np.argwhere(rates.free)) // 2][::-1] * view.resolution + view.origin
         inside = Pose2(*middle.tolist())
-        start, goal = pair(rates, find_endpoints(rates, inside, inside, 0.5).reachable, rng)
+        start, goal = random_query(rates, find_endpoints(rates, inside, inside, 0.5).reachable, rng)
         points = planner(cost_travel_multiplier=multiplier).plan(view, start, goal, 1 + seed).points
         assert np.isfinite(rates.at(points[:, :2])).all()
-        ratios.append(rates.along(points[:, :2]) / cheapest(rates, start, goal))
+        ratios.append(rates.along(points[:, :2]) / cheapest_cost(rates, start, goal))
     assert np.mean(ratios) < mean
     assert max(ratios) < most
 
 
 def test_plan_around_expensive_spots_is_near_optimal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As with people about: the way past what is dear is searched for, and joined with the straight one."""
-    rng, everywhere, dear = np.random.default_rng(3), list[int](), 0
+    """As among people: often, only the path around expensive cells is searched for, and joined with a straight line."""
+    rng, full_searches, expensive = np.random.default_rng(3), list[int](), 0
     monkeypatch.setattr(
-        medial_axis_planner, "plan_in_windows", lambda plan, *asked: everywhere.append(1) or plan(*asked)
+        medial_axis_planner, "plan_in_windows", lambda plan, *args: full_searches.append(1) or plan(*args)
     )
     start, goal = Pose2(0.55, 1.55), Pose2(11.55, 1.75)
     for seed in range(20):
@@ -71,22 +71,22 @@ def test_plan_around_expensive_spots_is_near_optimal(monkeypatch: pytest.MonkeyP
         view = CostmapView(costs, np.ones(costs.shape, dtype=np.float32), 0.1, (0.0, 0.0))
         rates = TraversalCosts(view, ROBOT, 2.0, True)
         points = medial_axis().plan(view, start, goal, seed).points
-        assert rates.along(points[:, :2]) < 1.02 * cheapest(rates, start, goal)
-        dear += costly_distance(view, start, goal, ROBOT.circumscribed_radius) > 0.0
-    assert 4 <= len(everywhere) <= dear - 4
+        assert rates.along(points[:, :2]) < 1.02 * cheapest_cost(rates, start, goal)
+        expensive += costly_distance(view, start, goal, ROBOT.circumscribed_radius) > 0.0
+    assert 4 <= len(full_searches) <= expensive - 4
 
 
 @pytest.mark.parametrize(("kind", "number", "seed"), [("rooms", 4, 2), ("forest", 3, 2), ("forest", 5, 1)])
 def test_plan_takes_the_cheaper_of_two_similar_paths(kind: str, number: int, seed: int) -> None:
     """Regression: the other path was taken, because a gap of one or two cells was not sampled."""
     rng = np.random.default_rng((number, 77, len(kind)))
-    view = view_of(*GROUNDS[kind](rng))
+    view = costmap_of(*WORLDS[kind](rng))
     rates = TraversalCosts(view, ROBOT, 2.0, True)
     free = np.argwhere(rates.free & (view.distance < 0.6))
     inside = Pose2(*((free[len(free) // 2][::-1] + 0.5) * view.resolution + view.origin).tolist())
-    start, goal = pair(rates, find_endpoints(rates, inside, inside, 0.5).reachable, rng)
+    start, goal = random_query(rates, find_endpoints(rates, inside, inside, 0.5).reachable, rng)
     points = medial_axis().plan(view, start, goal, seed).points
-    assert rates.along(points[:, :2]) < 1.045 * cheapest(rates, start, goal)
+    assert rates.along(points[:, :2]) < 1.045 * cheapest_cost(rates, start, goal)
 
 
 @pytest.mark.slow
@@ -103,19 +103,19 @@ def test_path_through_a_50_m_maze_is_found() -> None:
 def test_first_search_in_a_maze_of_large_blocks_finds_the_cheapest_path(
     number: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One of a hundred meters has them: places on the way over its blocks lay too far apart to be joined, and the
-    corridor was searched instead, for seconds. This one has fifteen meters, and may have few blocks and samples.
+    """Regression: in a maze of 100 m, the samples along the path of blocks were too far apart to be connected, and the
+    whole corridor was searched for seconds. This maze has 15 m, and limits the numbers of blocks and samples instead.
     """
     monkeypatch.setattr(informed_set, "MAX_COST_BLOCKS", 2500)
     monkeypatch.setattr(search_regions, "MAX_SAMPLES", 300)
     view = LayeredCostmap(CostmapSpec(), Surroundings(ROBOT, large_maze(number, 11, 27), RATE)).view
     rates, start, goal = TraversalCosts(view, ROBOT, 2.0, True), Pose2(0.7, 0.7), Pose2(14.15, 14.15)
-    least = cheapest(rates, start, goal)
+    optimum = cheapest_cost(rates, start, goal)
     for seed in range(3):
         (first,) = next(search_regions.searches(rates, find_endpoints(rates, start, goal, 0.5), seed))
         points = first.search(seed, 20_000).solve(simplify=False)
         assert points is not None
-        assert rates.along(refined(rates, np.array(points))) < 1.05 * least
+        assert rates.along(refined(rates, np.array(points))) < 1.05 * optimum
 
 
 def corridor_with_a_corner() -> Flatland:
@@ -124,39 +124,39 @@ def corridor_with_a_corner() -> Flatland:
     return world
 
 
-def least_room(points: np.ndarray) -> float:
-    view = view_of(corridor_with_a_corner(), 8, 8, inflation_radius=3.0, cost_scaling_factor=0.1)
+def min_clearance(points: np.ndarray) -> float:
+    view = costmap_of(corridor_with_a_corner(), 8, 8, inflation_radius=3.0, cost_scaling_factor=0.1)
     columns, rows = ((points[:, i] - view.origin[i]) / view.resolution for i in (0, 1))
     return float(view.distance[rows.astype(int), columns.astype(int)].min())
 
 
 def plan(**costmap: float) -> np.ndarray:
-    view = view_of(corridor_with_a_corner(), 8, 8, **costmap)
+    view = costmap_of(corridor_with_a_corner(), 8, 8, **costmap)
     return OmplPlanner(Spec(), ROBOT).plan(view, Pose2(1, 6.5), Pose2(6.5, 1), 1).points
 
 
 def test_cost_scaling_factor_and_inflation_radius_shape_the_path() -> None:
     """Costs that decay slowly or reach far give more clearance around a corner."""
-    hardly = least_room(plan(cost_scaling_factor=100.0))
-    some = least_room(plan(cost_scaling_factor=3.0))
-    most = least_room(plan(cost_scaling_factor=1.0, inflation_radius=2.0))
-    assert hardly < 0.3 < some - 0.1
-    assert some + 0.1 < most
-    assert least_room(plan(inflation_radius=0.3)) < 0.35
+    small = min_clearance(plan(cost_scaling_factor=100.0))
+    medium = min_clearance(plan(cost_scaling_factor=3.0))
+    large = min_clearance(plan(cost_scaling_factor=1.0, inflation_radius=2.0))
+    assert small < 0.3 < medium - 0.1
+    assert medium + 0.1 < large
+    assert min_clearance(plan(inflation_radius=0.3)) < 0.35
 
 
 def test_higher_cost_multiplier_gives_more_clearance() -> None:
-    view = view_of(corridor_with_a_corner(), 8, 8)
+    view = costmap_of(corridor_with_a_corner(), 8, 8)
     ends = Pose2(1, 6.5), Pose2(6.5, 1)
-    rooms_left = [
-        least_room(OmplPlanner(Spec(cost_travel_multiplier=factor), ROBOT).plan(view, *ends, 1).points)
+    clearances = [
+        min_clearance(OmplPlanner(Spec(cost_travel_multiplier=factor), ROBOT).plan(view, *ends, 1).points)
         for factor in (0.0, 0.5, 5.0)
     ]
-    assert rooms_left[0] + 0.1 < rooms_left[1] < rooms_left[2]
+    assert clearances[0] + 0.1 < clearances[1] < clearances[2]
 
 
 def test_allow_unknown_controls_paths_through_unknown_space() -> None:
-    view = view_of(Flatland().room(8, 8), 8, 8)
+    view = costmap_of(Flatland().room(8, 8), 8, 8)
     view.costs[0:130, 80:120] = 255  # up to 2 m below the upper wall
     ends = Pose2(1, 2), Pose2(7, 2)
     across = OmplPlanner(Spec(cost_travel_multiplier=0.5), ROBOT).plan(view, *ends, 1)
@@ -168,9 +168,11 @@ def test_allow_unknown_controls_paths_through_unknown_space() -> None:
 
 
 def test_without_simplify_the_path_is_as_the_planner_found_it() -> None:
-    view = view_of(*rooms(np.random.default_rng(3)))
+    view = costmap_of(*rooms(np.random.default_rng(3)))
     rates = TraversalCosts(view, ROBOT, 2.0, True)
-    ends = pair(rates, find_endpoints(rates, Pose2(1.5, 1.5), Pose2(1.5, 1.5), 1.0).reachable, np.random.default_rng(4))
+    ends = random_query(
+        rates, find_endpoints(rates, Pose2(1.5, 1.5), Pose2(1.5, 1.5), 1.0).reachable, np.random.default_rng(4)
+    )
     raw = OmplPlanner(Spec(simplify=False), ROBOT).plan(view, *ends, 1).points
     refined = OmplPlanner(Spec(), ROBOT).plan(view, *ends, 1).points
     turns = np.abs(np.diff(np.unwrap(raw[:-1, 2])))
@@ -181,13 +183,13 @@ def test_without_simplify_the_path_is_as_the_planner_found_it() -> None:
 @pytest.mark.parametrize("resolution", [0.1, 0.25])
 def test_plans_on_coarse_maps_are_found(resolution: float) -> None:
     world, width, height = rooms(np.random.default_rng(11))
-    view = view_of(world, width, height, resolution=resolution)
+    view = costmap_of(world, width, height, resolution=resolution)
     rates = TraversalCosts(view, ROBOT, 2.0, True)
     reachable = find_endpoints(rates, Pose2(1.5, 1.5), Pose2(1.5, 1.5), 1.0).reachable
-    start, goal = pair(rates, reachable, np.random.default_rng(5))
+    start, goal = random_query(rates, reachable, np.random.default_rng(5))
     points = OmplPlanner(Spec(), ROBOT).plan(view, start, goal, 1).points
     assert np.isfinite(rates.at(points[:, :2])).all()
-    assert rates.along(points[:, :2]) < 1.06 * cheapest(rates, start, goal)
+    assert rates.along(points[:, :2]) < 1.06 * cheapest_cost(rates, start, goal)
 
 
 @pytest.mark.sample(1)
@@ -195,7 +197,7 @@ def test_plans_on_coarse_maps_are_found(resolution: float) -> None:
 def test_a_passage_of_a_single_row_of_cells_is_found(planner: Callable[..., Planner]) -> None:
     world = Flatland().room(16, 12)
     world.boxes += [(8.0, 0.0, 8.6, 7.0), (8.0, 7.0 + 2 * ROBOT.inscribed_radius + 0.06, 8.6, 12.0)]
-    view = view_of(world, 16, 12)
+    view = costmap_of(world, 16, 12)
     for seed in range(1, 6):
         points = planner().plan(view, Pose2(1, 1), Pose2(15, 1), seed).points
         assert math.hypot(points[-1, 0] - 15, points[-1, 1] - 1) < 0.1

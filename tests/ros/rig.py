@@ -1,9 +1,10 @@
-"""Makes .venv-ros: a real rclpy on Fast DDS from wheels, with tf2_msgs and what is needed of nav2_msgs built beside it.
+"""Create the virtual environment .venv-ros for tests/ros, or print in one line why that is impossible.
 
     python tests/ros/rig.py .venv-ros
 
-Says what it did, or in one line why it could not; exit code 1 then. What is there already is kept. Only the standard
-library is used: any Python runs this. `rig.json` in the folder says what was made, for the tests to read.
+The environment contains rclpy on Fast DDS from wheels. tf2_msgs and parts of nav2_msgs are built from source. It is
+kept between calls. `rig.json` in the folder describes it for the tests. The exit code is 1 if there is no
+environment. Only the standard library is used, so that any Python can run this program.
 """
 
 import argparse
@@ -20,7 +21,7 @@ WHEELS = [
     "ros-rclpy[fastrtps]",
     *(f"ros-{name}-msgs" for name in ("nav", "sensor", "std", "geometry", "lifecycle")),
 ]
-# What the generators of messages are run with. empy 4 breaks rosidl's templates.
+# Wheels that are needed to build messages. rosidl's templates do not work with empy 4.
 BUILD_WHEELS = [
     *[
         "ros-ament-cmake",
@@ -46,47 +47,48 @@ BUILD_WHEELS = [
     "empy==3.3.4",
 ]
 INTERFACES = ("tf2_msgs", "nav2_msgs")
-# The wheels were built for this Python; their rclpy is Kilted's.
+# The wheels, which contain rclpy of ROS 2 Kilted, require this Python.
 PYTHON = "3.11"
-# Folders of the machine where the wheels were built, which their CMake files still name.
+# Folders of the machine on which the wheels were built. Their CMake files still contain these paths.
 FOREIGN_HEADERS = re.compile(r"/opt/python/cp\d+-cp\d+/include/python3\.\d+")
 FOREIGN_NUMPY = re.compile(r"/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site-packages/numpy/_core/include")
 
 
 class Unavailable(Exception):
-    """Why there is no such environment on this machine."""
+    """The reason why the environment cannot be created on this machine."""
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--python", help=f"a Python {PYTHON} to make it with (default: the first that is found)")
+    parser.add_argument("--python", help=f"Python {PYTHON} for the environment (default: the first that is found)")
     options = parser.parse_args()
     folder = options.folder.absolute()
-    made = read(folder)
-    if made is None:
+    description = read_description(folder)
+    if description is None:
         try:
-            made = make(folder, options.python or find_python())
+            description = create(folder, options.python or find_python())
         except Unavailable as reason:
             shutil.rmtree(folder, ignore_errors=True)
             print(f"ROS 2: tests/ros are skipped: {reason}")
             return 1
-    without = "" if made["interfaces"] is True else f", without tf2_msgs and nav2_msgs: {made['interfaces']}"
-    print(f"ROS 2: rclpy {made['rclpy']} in {options.folder}{without}")
+    interfaces = description["interfaces"]
+    without = "" if interfaces is True else f", without tf2_msgs and nav2_msgs: {interfaces}"
+    print(f"ROS 2: rclpy {description['rclpy']} in {options.folder}{without}")
     return 0
 
 
-def read(folder: Path) -> dict | None:
-    """What was made by this very script, or None."""
+def read_description(folder: Path) -> dict | None:
+    """Return the content of rig.json; None if the environment does not exist or is out of date."""
     try:
-        made = json.loads((folder / "rig.json").read_text())
+        description = json.loads((folder / "rig.json").read_text())
     except (OSError, ValueError):
         return None
-    return made if made["recipe"] == recipe() else None
+    return description if description["recipe"] == recipe() else None
 
 
 def recipe() -> str:
-    """Changes when the environment must be made anew."""
+    """Return a hash of the files that determine the content of the environment."""
     sources = [Path(__file__), *sorted(path for path in (HERE / "interfaces").rglob("*") if path.is_file())]
     import hashlib
 
@@ -99,16 +101,17 @@ def find_python() -> str:
     candidates += map(str, sorted(Path.home().glob(f".local/share/uv/python/cpython-{PYTHON}.*/bin/python3")))
     for candidate in candidates:
         try:
-            said = run([candidate, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"], 20)
+            found = run([candidate, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"], 20)
         except Unavailable:
             continue
-        if said.strip() == PYTHON:
+        if found.strip() == PYTHON:
             return candidate
     raise Unavailable(f"rclpy's wheels are for Python {PYTHON}, and none was found")
 
 
-def make(folder: Path, python: str) -> dict:
-    print(f"ROS 2: making {folder.name} with {python} …", flush=True)
+def create(folder: Path, python: str) -> dict:
+    """Create the environment, and return its description, which is also written to rig.json."""
+    print(f"ROS 2: creating {folder.name} with {python} …", flush=True)
     shutil.rmtree(folder, ignore_errors=True)
     run([python, "-m", "venv", str(folder)], 60)
     install(folder, WHEELS)
@@ -119,26 +122,26 @@ def make(folder: Path, python: str) -> dict:
         interfaces = str(reason)
     rclpy = run([str(folder / "bin/pip"), "list", "--format=json"], 60)
     version = next(row["version"] for row in json.loads(rclpy) if row["name"] == "ros-rclpy")
-    made = {"recipe": recipe(), "rclpy": version, "interfaces": interfaces}
-    (folder / "rig.json").write_text(json.dumps(made, indent=2) + "\n")
-    return made
+    description = {"recipe": recipe(), "rclpy": version, "interfaces": interfaces}
+    (folder / "rig.json").write_text(json.dumps(description, indent=2) + "\n")
+    return description
 
 
 def install(folder: Path, packages: list[str]) -> None:
-    """Fails within seconds where there is no network."""
+    """Install packages with pip. Without a network, this fails within seconds."""
     pip = [str(folder / "bin/pip"), "install", "--quiet", "--disable-pip-version-check"]
     run([*pip, "--retries", "0", "--timeout", "8", *packages], 240)
 
 
 def build(folder: Path) -> None:
-    """tf2_msgs and nav2_msgs have no wheels."""
+    """Build and install INTERFACES, for which there are no wheels."""
     for tool in ("cc", "c++", "cmake"):
         if shutil.which(tool) is None:
             raise Unavailable(f"{tool} is not installed")
     install(folder, BUILD_WHEELS)
     python = str(folder / "bin/python")
-    where = "import sysconfig, numpy; print(sysconfig.get_paths()['include']); print(numpy.get_include())"
-    headers, numpy = run([python, "-c", where], 60).split()
+    code = "import sysconfig, numpy; print(sysconfig.get_paths()['include']); print(numpy.get_include())"
+    headers, numpy = run([python, "-c", code], 60).split()
     if not Path(headers, "Python.h").is_file():
         raise Unavailable(f"no Python.h in {headers}: the headers of Python {PYTHON} are not installed")
     for config in folder.glob("share/*/cmake/*.cmake"):
@@ -162,9 +165,9 @@ def build(folder: Path) -> None:
 
 
 def run(command: list[str], seconds: int, environment: dict | None = None) -> str:
-    """What it printed. Unavailable with its last lines when it fails or takes longer."""
+    """Run a command, and return its output. Raises Unavailable if it fails or takes longer than `seconds`."""
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             command,
             env=environment,
             timeout=seconds,
@@ -176,11 +179,11 @@ def run(command: list[str], seconds: int, environment: dict | None = None) -> st
         raise Unavailable(f"there is no {command[0]}") from None
     except subprocess.TimeoutExpired:
         raise Unavailable(f"`{' '.join(command[:3])} …` took longer than {seconds} s") from None
-    if done.returncode:
-        said = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
-        last = next((line for line in reversed(said) if "error" in line.lower()), said[-1] if said else "")
+    if process.returncode:
+        lines = [line for line in (process.stderr or process.stdout).splitlines() if line.strip()]
+        last = next((line for line in reversed(lines) if "error" in line.lower()), lines[-1] if lines else "")
         raise Unavailable(f"`{' '.join(command[:3])} …` failed: {last.strip()}")
-    return done.stdout
+    return process.stdout
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Every shipped scenario over twenty seeds: `make library` runs them and writes what came of it into the docs.
+"""Run each shipped scenario with twenty seeds, and write the results into docs/reference/scenarios.md (`make library`).
 
-`--from FOLDER` writes the page from the results of a session that was run before.
+With `--from FOLDER`, use the results of an earlier session in this folder.
 """
 
 import json
@@ -23,8 +23,8 @@ SEEDS = 20
 Run = dict[str, Any]
 
 
-def shipped() -> list[str]:
-    """The ids of what ships, seen from scenarios/."""
+def shipped_scenarios() -> list[str]:
+    """Return the paths of the shipped scenarios in scenarios/, without the suffix, sorted."""
     folder = ROOT / "scenarios"
     return sorted(
         file.relative_to(folder).as_posix().removesuffix(".scenario.yaml") for file in folder.rglob("*.scenario.yaml")
@@ -32,12 +32,12 @@ def shipped() -> list[str]:
 
 
 def table(runs: Iterable[Run]) -> str:
-    """A section for each theme, a row for each scenario: why it is there, and what came of its runs."""
+    """Return the Markdown of the results: a section for each theme, with a table row for each scenario."""
     by_scenario: dict[str, list[Run]] = defaultdict(list)
     for run in runs:
         by_scenario[run["scenario"].removeprefix("scenarios/")].append(run)
     themes: dict[str, list[str]] = defaultdict(list)
-    for name in shipped():
+    for name in shipped_scenarios():
         themes[name.split("/")[0]].append(_row(name, by_scenario[name]))
     return "".join(
         f"\n## {theme.replace('_', ' ').capitalize()}\n\n"
@@ -49,16 +49,17 @@ def table(runs: Iterable[Run]) -> str:
 
 def _row(name: str, runs: list[Run]) -> str:
     file = f"scenarios/{name}.scenario.yaml"
-    about = yaml.load((ROOT / file).read_text(encoding="utf-8"), yaml.BaseLoader)
-    why = " ".join(about["description"].split())
+    scenario = yaml.load((ROOT / file).read_text(encoding="utf-8"), yaml.BaseLoader)
+    description = " ".join(scenario["description"].split())
     passed = sum(run["outcome"] == "passed" for run in runs)
     seconds = statistics.median(run["simulated_seconds"] for run in runs)
-    cells = [f"[{about['name']}](../../{file})", why, f"{passed} of {len(runs)}", f"{seconds:.0f} s", _failed(runs)]
+    link, causes = f"[{scenario['name']}](../../{file})", _failure_causes(runs)
+    cells = [link, description, f"{passed} of {len(runs)}", f"{seconds:.0f} s", causes]
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
 
 
-def _failed(runs: list[Run]) -> str:
-    """Which verdicts did not hold, and how often; a run that could not be completed by its error."""
+def _failure_causes(runs: list[Run]) -> str:
+    """Return the failed criteria and the errors of runs, with the number of runs that have each."""
     causes = Counter(
         cause
         for run in runs
@@ -73,17 +74,17 @@ def _failed(runs: list[Run]) -> str:
 
 
 def run_all(folder: Path) -> Path:
-    """Run them; that some fail is what the page is for."""
+    """Run all shipped scenarios, and return the folder of the session. Exits with a message if simscen fails."""
     out = folder / "out"
     command = [sys.executable, "-m", "simscen", "run", "scenarios/", "--repeat", str(SEEDS), "--out", str(out)]
     done = subprocess.run(command, cwd=ROOT, check=False)
-    if done.returncode not in (0, 1):
+    if done.returncode not in (0, 1):  # 1: some runs have failed, which the table shows
         sys.exit(f"simscen ended with {done.returncode}")
     return out
 
 
 def main() -> None:
-    """Write the page."""
+    """Write the results into the page."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(sys.argv[2]) if sys.argv[1:2] == ["--from"] else run_all(Path(folder))
         runs = json.loads((out / "results.json").read_text(encoding="utf-8"))["runs"]

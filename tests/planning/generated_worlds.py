@@ -1,4 +1,4 @@
-"""Generated places to plan in, and what the cheapest way through them costs: brute force on a fine grid."""
+"""Generate worlds for tests of planners, and compute the cost of the cheapest path with Dijkstra on a grid."""
 
 import math
 
@@ -16,11 +16,11 @@ from simscen.testing.flatland import RATE, Flatland, round_robot
 
 ROBOT = round_robot()
 MOVES = [(a, b) for a in range(4) for b in range(-3, 4) if math.gcd(a, b) == 1 and (a > 0 or b > 0)]
-"""In 32 directions: at most 1.3 % longer than straight on."""
+"""Moves (rows, columns) between cells, and their opposites: 32 directions, so that a path is at most 1.3 % too long."""
 
 
 def rooms(rng: np.random.Generator) -> tuple[Flatland, float, float]:
-    """Two to four rooms each way, every one with a door, and things that stand about."""
+    """Return a world of 2 x 2 to 4 x 4 rooms with doors and random obstacles, and its width and height in m."""
     columns, rows = rng.integers(2, 5, 2).tolist()
     width, height = rng.uniform(3.5, 5.0, 2).tolist()
     world = Flatland().room(columns * width, rows * height)
@@ -37,84 +37,88 @@ def rooms(rng: np.random.Generator) -> tuple[Flatland, float, float]:
 
 
 def _wall(
-    world: Flatland, rng: np.random.Generator, upright: bool, at: float, low: float, size: float, door: bool
+    world: Flatland, rng: np.random.Generator, along_y: bool, at: float, low: float, size: float, has_door: bool
 ) -> None:
+    """Add a wall of length `size` along y at x = `at`, or along x at y = `at`, that starts at `low`."""
     gap = rng.uniform(0.8, 1.2)
     begin = rng.uniform(0.3, size - gap - 0.3)
-    for a, b in ((low, low + begin), (low + begin + gap, low + size)) if door else ((low, low + size),):
-        world.boxes.append((at, a, at + 0.12, b) if upright else (a, at, b, at + 0.12))
+    for a, b in ((low, low + begin), (low + begin + gap, low + size)) if has_door else ((low, low + size),):
+        world.boxes.append((at, a, at + 0.12, b) if along_y else (a, at, b, at + 0.12))
 
 
 def forest(rng: np.random.Generator) -> tuple[Flatland, float, float]:
-    """Trunks anywhere."""
+    """Return a world with round obstacles at random positions, and its width and height in m."""
     width, height = rng.uniform(8, 14, 2).tolist()
     world = Flatland().room(width, height)
-    places = rng.uniform((0.5, 0.5), (width - 0.5, height - 0.5), (int(width * height * rng.uniform(0.2, 0.5)), 2))
-    world.discs = [(x, y, rng.uniform(0.08, 0.4)) for x, y in places.tolist()]
+    positions = rng.uniform((0.5, 0.5), (width - 0.5, height - 0.5), (int(width * height * rng.uniform(0.2, 0.5)), 2))
+    world.discs = [(x, y, rng.uniform(0.08, 0.4)) for x, y in positions.tolist()]
     return world, width, height
 
 
 def maze(rng: np.random.Generator) -> tuple[Flatland, float, float]:
-    """A perfect maze with a few walls taken out."""
+    """Return a maze of which some walls are removed, and its width and height in m."""
     columns, rows = rng.integers(4, 7, 2).tolist()
     size = rng.uniform(1.0, 1.6)
     world = Flatland().room(columns * size, rows * size)
-    seen, stack, open_ = {(0, 0)}, [(0, 0)], set()
+    visited, stack, passages = {(0, 0)}, [(0, 0)], set()
     while stack:
         x, y = stack[-1]
-        beside = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
-        fresh = [c for c in beside if 0 <= c[0] < columns and 0 <= c[1] < rows and c not in seen]
-        if not fresh:
+        neighbors = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
+        unvisited = [c for c in neighbors if 0 <= c[0] < columns and 0 <= c[1] < rows and c not in visited]
+        if not unvisited:
             stack.pop()
             continue
-        cell = fresh[rng.integers(len(fresh))]
-        seen.add(cell)
+        cell = unvisited[rng.integers(len(unvisited))]
+        visited.add(cell)
         stack.append(cell)
-        open_.add(frozenset(((x, y), cell)))
+        passages.add(frozenset(((x, y), cell)))
     for x in range(columns):
         for y in range(rows):
             right, up = (x + 1) * size, (y + 1) * size
-            if x + 1 < columns and frozenset(((x, y), (x + 1, y))) not in open_ and rng.random() > 0.1:
+            if x + 1 < columns and frozenset(((x, y), (x + 1, y))) not in passages and rng.random() > 0.1:
                 world.boxes.append((right - 0.05, y * size, right + 0.05, up))
-            if y + 1 < rows and frozenset(((x, y), (x, y + 1))) not in open_ and rng.random() > 0.1:
+            if y + 1 < rows and frozenset(((x, y), (x, y + 1))) not in passages and rng.random() > 0.1:
                 world.boxes.append((x * size, up - 0.05, right, up + 0.05))
     return world, columns * size, rows * size
 
 
 def large_maze(number: int, rooms: int, edge: int) -> OccupancyGrid:
-    """A perfect maze of so many rooms each way, drawn on cells of 5 cm: `edge` of them a room, two of them a wall."""
-    rng, shut = np.random.default_rng(number), [(0, 0)]
+    """Return the map of a maze of `rooms` x `rooms` rooms without loops.
+
+    Cells have 5 cm. `edge` is the number of cells from the start of a room to that of the next, with a wall of two.
+    """
+    rng, stack = np.random.default_rng(number), [(0, 0)]
     size = rooms * edge + 2
     cells = np.zeros((size, size), dtype=np.int8)
     for wall in range(0, size, edge):
         cells[wall : wall + 2] = cells[:, wall : wall + 2] = 100
-    seen = {(0, 0)}
-    while shut:
-        x, y = shut[-1]
-        beside = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
-        fresh = [c for c in beside if min(c) >= 0 and max(c) < rooms and c not in seen]
-        if not fresh:
-            shut.pop()
+    visited = {(0, 0)}
+    while stack:
+        x, y = stack[-1]
+        neighbors = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
+        unvisited = [c for c in neighbors if min(c) >= 0 and max(c) < rooms and c not in visited]
+        if not unvisited:
+            stack.pop()
             continue
-        u, v = fresh[rng.integers(len(fresh))]
-        seen.add((u, v))
-        shut.append((u, v))
+        u, v = unvisited[rng.integers(len(unvisited))]
+        visited.add((u, v))
+        stack.append((u, v))
         low, left = min(y, v) * edge + 2, min(x, u) * edge + 2
         cells[low : (max(y, v) + 1) * edge, left : (max(x, u) + 1) * edge] = 0
     return OccupancyGrid(cells, 0.05, Pose2(0.0, 0.0))
 
 
-def view_of(
+def costmap_of(
     world: Flatland, width: float, height: float, robot: RobotModel = ROBOT, resolution: float = 0.05, **options: object
 ) -> CostmapView:
-    """The costmap of a world between (0, 0) and (width, height)."""
+    """Return the costmap of a world between (0, 0) and (width, height); `options` are those of its specification."""
     bounds = (-0.5, -0.5, math.ceil(width) + 0.5, math.ceil(height) + 0.5)
     spec = CostmapSpec(resolution=resolution, **options)
     return LayeredCostmap(spec, Surroundings(robot, world.grid(bounds, resolution), RATE)).view
 
 
-def pair(rates: TraversalCosts, reachable: Array, rng: np.random.Generator) -> tuple[Pose2, Pose2]:
-    """Two places that a way joins, at least 3 m apart."""
+def random_query(rates: TraversalCosts, reachable: Array, rng: np.random.Generator) -> tuple[Pose2, Pose2]:
+    """Return a random start and goal in `reachable` cells, at least 3 m apart."""
     cells = np.argwhere(reachable)
     while True:
         ends = (cells[rng.integers(len(cells), size=2)][:, ::-1] + 0.5) * rates.resolution + rates.origin
@@ -122,30 +126,33 @@ def pair(rates: TraversalCosts, reachable: Array, rng: np.random.Generator) -> t
             return Pose2(*ends[0].tolist()), Pose2(*ends[1].tolist())
 
 
-def cheapest(rates: TraversalCosts, start: Pose2, goal: Pose2) -> float:
-    """The cost of the cheapest way over the cells of a costmap: at most 1.3 % too high, seldom a cut corner too low."""
-    prices = rates.rates.astype(np.float64)
-    free, number = np.isfinite(prices), np.arange(prices.size).reshape(prices.shape)
-    prices = np.where(free, prices, 0.0)
-    height, width = prices.shape
+def cheapest_cost(rates: TraversalCosts, start: Pose2, goal: Pose2) -> float:
+    """Return the cost of the cheapest path over the cells of a costmap.
+
+    It is at most 1.3 % too high, and rarely slightly too low if the path cuts a corner.
+    """
+    costs = rates.rates.astype(np.float64)
+    free, number = np.isfinite(costs), np.arange(costs.size).reshape(costs.shape)
+    costs = np.where(free, costs, 0.0)
+    height, width = costs.shape
     a, b, w = [], [], []
     for rows, columns in MOVES:
         left = max(0, -columns)
         tall, wide = height - rows, width - abs(columns)
 
-        def seen(row: int, column: int, left: int = left, tall: int = tall, wide: int = wide) -> tuple[slice, slice]:
+        def window(row: int, column: int, left: int = left, tall: int = tall, wide: int = wide) -> tuple[slice, slice]:
             return slice(row, row + tall), slice(left + column, left + column + wide)
 
         steps = 2 * max(rows, abs(columns))
-        possible, price = np.ones((tall, wide), dtype=bool), np.zeros((tall, wide))
-        for k in range(steps):  # looked at in the middle of each half cell
+        is_free, cost = np.ones((tall, wide), dtype=bool), np.zeros((tall, wide))
+        for k in range(steps):  # sample the move in the middle of each half cell
             part = (k + 0.5) / steps
-            cell = seen(math.floor(rows * part + 0.5), math.floor(columns * part + 0.5))
-            possible &= free[cell]
-            price += prices[cell] / steps
-        a.append(number[seen(0, 0)][possible])
-        b.append(number[seen(rows, columns)][possible])
-        w.append(price[possible] * math.hypot(rows, columns) * rates.resolution)
+            cell = window(math.floor(rows * part + 0.5), math.floor(columns * part + 0.5))
+            is_free &= free[cell]
+            cost += costs[cell] / steps
+        a.append(number[window(0, 0)][is_free])
+        b.append(number[window(rows, columns)][is_free])
+        w.append(cost[is_free] * math.hypot(rows, columns) * rates.resolution)
     graph = csr_matrix((np.concatenate(w), (np.concatenate(a), np.concatenate(b))), shape=(number.size,) * 2)
     cells = [
         number[int((p.y - rates.origin[1]) / rates.resolution), int((p.x - rates.origin[0]) / rates.resolution)]
