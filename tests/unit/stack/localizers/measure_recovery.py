@@ -42,7 +42,7 @@ def main() -> None:
     for model in ("likelihood_field", "likelihood_field_prob"):
         sets = {name: drives(name, model, range(11, 15)) for name in ("kidnapped", "unknown", "crowded")}
         for threshold in THRESHOLDS:
-            with mock.patch.object(resampling, "KNOWS_NOTHING", threshold):
+            with mock.patch.object(resampling, "MIN_BETTER_SHARE", threshold):
                 found = {
                     name: sum(bool((off(one)[-LAST:] < FOUND_WITHIN).all()) for one in sets[name])
                     for name in ("kidnapped", "unknown")
