@@ -1,4 +1,4 @@
-"""Lets the tests of this folder share `hard_drives`, whatever pytest's import mode."""
+"""Make the modules of this folder importable in its tests, whatever import mode pytest uses."""
 
 import sys
 from pathlib import Path

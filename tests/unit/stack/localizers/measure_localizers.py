@@ -1,4 +1,7 @@
-"""Measures what docs/reference/localizers.md reports: `python tests/unit/stack/localizers/measure_localizers.py`."""
+"""Measure the accuracy of localizers for the tables of docs/reference/localizers.md.
+
+Call it as `python tests/unit/stack/localizers/measure_localizers.py`. All drives are in the synthetic room.
+"""
 
 import sys
 import time
@@ -31,16 +34,19 @@ RECOVERING = Amcl(
 )
 RECOVERING_PROB = RECOVERING.model_copy(update={"laser_model_type": "likelihood_field_prob"})
 EXACT_EKF = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
-# Motion noise near that of our wheels, and hits as exact as the cells of the map: what a well-tuned filter would use.
+# Noise parameters of a well-tuned filter: motion noise near that of the wheels, and hits as exact as the map's cells.
 TUNED = PROB.model_copy(update={"alpha1": 1e-3, "alpha2": 1e-3, "alpha3": 1e-3, "alpha4": 1e-3, "sigma_hit": 0.05})
-FOUND_WITHIN = (0.25, 0.25)
-STD = np.array([0.1, 0.1, 0.05])
+FOUND_M, FOUND_RAD = 0.25, 0.25
+"""Errors of position and heading below which a robot is found."""
+START_STD = np.array([0.1, 0.1, 0.05])
+"""Standard deviations of the initial estimate (m, m, rad)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Tracked:
-    """Of n runs: `rmse` (n,) of the translation in m, `yaw` (n,) of the heading in rad, `anees` (25,) over the runs
-    at each of 25 times.
+class TrackingErrors:
+    """Errors of n runs: RMSE of the position in m (n,) and of the heading in rad (n,).
+
+    `anees` (25,) is the NEES averaged over the runs, at each of 25 times.
     """
 
     rmse: Array
@@ -50,101 +56,109 @@ class Tracked:
 
 def tracking(
     spec: Spec, seeds: Iterable[int], seconds: float, noise: Noise = DEFAULT_NOISE, imu: bool = False
-) -> Tracked:
-    """Drives from an estimate that is as good as it says; the 25 times are spread over the last three quarters."""
-    squares, consistency, way = [], [], drive(seconds)
+) -> TrackingErrors:
+    """Run a localizer on a drive with a known start. The times of the NEES are in the last three quarters of the drive.
+
+    The errors of the initial estimates have the standard deviations START_STD, which the localizer knows.
+    """
+    squares, consistency, path = [], [], drive(seconds)
     for seed in seeds:
-        start = Pose2(*(way.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
-        beliefs = run(localizer(spec, Estimate(start, tuple(STD)), seed), way, seed, noise, imu=imu)
-        error = errors(beliefs, way.truth)
+        start = Pose2(*(path.truth[0] + np.random.default_rng((seed, 3)).normal(0, START_STD)))
+        beliefs = run(localizer(spec, Estimate(start, tuple(START_STD)), seed), path, seed, noise, imu=imu)
+        error = errors(beliefs, path.truth)
         times = np.linspace(0.25, 1, 25) * (len(error) - 1)
         squares.append((np.mean(error[:, 0] ** 2 + error[:, 1] ** 2), np.mean(error[:, 2] ** 2)))
         consistency.append([nees(beliefs[k], error[k]) for k in times.astype(int)])
     rmse, yaw = np.sqrt(squares).T
-    return Tracked(rmse, yaw, np.mean(consistency, axis=0))
+    return TrackingErrors(rmse, yaw, np.mean(consistency, axis=0))
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
-    """Whether each run ended (its last second) within 0.25 m and 0.25 rad, and how many seconds that took."""
+class Relocalization:
+    """For n runs: whether the robot was found and stayed so for the last second, and the time in s until then."""
 
     found: "np.ndarray[tuple[int, ...], np.dtype[np.bool_]]"
     seconds: Array
 
 
-def search(spec: Spec, seeds: Iterable[int], way: "dict[int, tuple[Drive, Estimate]]", begin: float = 0.0) -> Search:
-    """Runs each seed on its own drive from its own estimate."""
+def relocalization(
+    spec: Spec, seeds: Iterable[int], drives: "dict[int, tuple[Drive, Estimate]]", begin: float = 0.0
+) -> Relocalization:
+    """Run a localizer with each seed on the drive, and from the initial estimate, of this seed.
+
+    Times are measured from `begin` (s).
+    """
     rows = []
     for seed in seeds:
-        path, estimate = way[seed]
+        path, estimate = drives[seed]
         error = np.abs(errors(run(localizer(spec, estimate, seed), path, seed), path.truth))
-        lost = np.flatnonzero((np.hypot(error[:, 0], error[:, 1]) > FOUND_WITHIN[0]) | (error[:, 2] > FOUND_WITHIN[1]))
+        lost = np.flatnonzero((np.hypot(error[:, 0], error[:, 1]) > FOUND_M) | (error[:, 2] > FOUND_RAD))
         last = lost[-1] + 1 if len(lost) else 0
         rows.append((last <= len(error) - 40, last / 40 - begin))
     found, seconds = np.array(rows).T
-    return Search(found.astype(np.bool_), seconds)
+    return Relocalization(found.astype(np.bool_), seconds)
 
 
 def among_people(spec: Spec, seeds: Iterable[int], seconds: float = 60.0) -> Array:
-    """RMSE and largest error (n, 2) in m of drives that the map and the wheels are wrong about, the start known."""
+    """Return RMSE and largest error (n, 2) in m for drives with people, moved furniture, slip, and a known start."""
     rows = []
     for seed in seeds:
-        way = crowded(drive(seconds, seed % 12), seed)
-        start = Estimate(Pose2(*way.truth[0]), tuple(STD))
-        off = np.hypot(*errors(run(localizer(spec, start, seed), way, seed), way.truth)[:, :2].T)
-        rows.append((np.sqrt(np.mean(off**2)), off.max()))
+        path = crowded(drive(seconds, seed % 12), seed)
+        start = Estimate(Pose2(*path.truth[0]), tuple(START_STD))
+        distance = np.hypot(*errors(run(localizer(spec, start, seed), path, seed), path.truth)[:, :2].T)
+        rows.append((np.sqrt(np.mean(distance**2)), distance.max()))
     return np.array(rows)
 
 
-def wrong_start(spec: Spec, seeds: Iterable[int]) -> Search:
-    """The estimate is 0.5 m off in a random direction and 20° to either side."""
-    ways = {}
+def wrong_start(spec: Spec, seeds: Iterable[int]) -> Relocalization:
+    """Return the results for initial estimates that are wrong by 0.5 m in a random direction, and by 20°."""
+    drives = {}
     for seed in seeds:
         rng, path = np.random.default_rng((seed, 4)), drive(20.0, seed % 12)
         x, y, yaw = path.truth[0]
-        away, side = rng.uniform(-np.pi, np.pi), rng.choice([-1, 1])
-        guess = Pose2(x + 0.5 * np.cos(away), y + 0.5 * np.sin(away), yaw + side * np.deg2rad(20))
-        ways[seed] = (path, Estimate(guess))
-    return search(spec, seeds, ways)
+        direction, side = rng.uniform(-np.pi, np.pi), rng.choice([-1, 1])
+        guess = Pose2(x + 0.5 * np.cos(direction), y + 0.5 * np.sin(direction), yaw + side * np.deg2rad(20))
+        drives[seed] = (path, Estimate(guess))
+    return relocalization(spec, seeds, drives)
 
 
-def global_start(spec: Spec, seeds: Iterable[int]) -> Search:
-    """Nothing is known."""
-    return search(spec, seeds, {seed: (drive(40.0, seed % 12), Estimate(None)) for seed in seeds})
+def global_start(spec: Spec, seeds: Iterable[int]) -> Relocalization:
+    """Return the results without an initial estimate."""
+    return relocalization(spec, seeds, {seed: (drive(40.0, seed % 12), Estimate(None)) for seed in seeds})
 
 
-def kidnapping(spec: Spec, seeds: Iterable[int]) -> Search:
-    """After 10 s of driving the robot is carried to another place of the room and drives on for 60 s."""
-    ways = {}
+def kidnapping(spec: Spec, seeds: Iterable[int]) -> Relocalization:
+    """Return the results for a robot that is moved elsewhere in the room after 10 s, and drives for another 60 s."""
+    drives = {}
     for seed in seeds:
         path = kidnapped(drive(10.0, seed % 12), drive(60.0, (seed + 5) % 12))
-        ways[seed] = (path, Estimate(Pose2(*path.truth[0])))
-    return search(spec, seeds, ways, begin=10.0)
+        drives[seed] = (path, Estimate(Pose2(*path.truth[0])))
+    return relocalization(spec, seeds, drives, begin=10.0)
 
 
 def update_cost(spec: Amcl, particles: int) -> float:
-    """Milliseconds that one correction by a scan takes with this many particles: the median of 100."""
-    way = drive(20.0)
+    """Return the wall time in ms of one update by a scan with this number of particles, as median of 100."""
+    path = drive(20.0)
     fixed = spec.model_copy(update={"min_particles": particles, "max_particles": particles})
-    subject, costs = localizer(fixed, Estimate(Pose2(*way.truth[0])), 1), []
+    subject, costs = localizer(fixed, Estimate(Pose2(*path.truth[0])), 1), []
     for tick in range(100):
         subject.on_odometry(Odometry("odom", tick, Pose2(0.0, 0.0, 0.25 * (tick % 2)), Twist()))
-        began = time.perf_counter()
-        subject.on_scan(scan(way.ranges[0], tick))
-        costs.append(time.perf_counter() - began)
+        start = time.perf_counter()
+        subject.on_scan(scan(path.ranges[0], tick))
+        costs.append(time.perf_counter() - start)
     return float(np.median(costs)) * 1e3
 
 
 def main() -> None:
-    """Prints the tables, fifty seeds each."""
+    """Print all results, with fifty seeds each, and ten among people."""
     print_costs()
     print_tracking(range(1, 51))
-    print_searches(range(1, 51))
+    print_relocalization(range(1, 51))
     print_among_people(range(1, 11))
 
 
 def print_among_people(seeds: Iterable[int]) -> None:
-    """How well recovery leaves a robot alone that knows where it is, though neither map nor wheels are right."""
+    """Print the errors of robots that are not lost, with and without recovery, if map and odometry are wrong."""
     many = PROB.model_copy(update={"max_particles": 5000})
     for name, spec in (("amcl", MANY), ("recovery", RECOVERING), ("prob", many), ("prob, recovery", RECOVERING_PROB)):
         rmse, most = among_people(spec, seeds).T
@@ -153,15 +167,15 @@ def print_among_people(seeds: Iterable[int]) -> None:
 
 
 def print_costs() -> None:
-    """How long one correction takes."""
+    """Print how long one update takes."""
     for spec in (SUM, PROB, BEAM):
         cost = " and ".join(f"{update_cost(spec, n):.2f} ms with {n}" for n in (500, 2000))
         print(f"an update, {spec.laser_model_type}, 60 beams: {cost} particles", flush=True)
 
 
 def print_tracking(seeds: Iterable[int]) -> None:
-    """How well each localizer knows where it is on the way round the room."""
-    tracked: list[tuple[str, Spec, Noise, bool]] = [
+    """Print the errors of each localizer on a drive around the room."""
+    cases: list[tuple[str, Spec, Noise, bool]] = [
         ("amcl", SUM, DEFAULT_NOISE, False),
         ("amcl, recovery", RECOVERING, DEFAULT_NOISE, False),
         ("amcl, prob", PROB, DEFAULT_NOISE, False),
@@ -172,7 +186,7 @@ def print_tracking(seeds: Iterable[int]) -> None:
         ("ekf, with gyroscope, noise as specified", EXACT_EKF, Noise(drift=0.01, gyro_bias=0.002), True),
         ("ekf, defaults", Ekf(type="ekf"), DEFAULT_NOISE, True),
     ]
-    for name, spec, noise, imu in tracked:
+    for name, spec, noise, imu in cases:
         result = tracking(spec, seeds, 60.0, noise, imu)
         rmse, yaw, below = result.rmse, np.rad2deg(result.yaw.mean()), np.sum(result.rmse <= 0.05)
         print(f"{name}: RMSE {rmse.mean():.4f} m (worst {rmse.max():.4f}, {below} of {len(rmse)} at most 0.05), "
@@ -180,9 +194,9 @@ def print_tracking(seeds: Iterable[int]) -> None:
               flush=True)  # fmt: skip
 
 
-def print_searches(seeds: Iterable[int]) -> None:
-    """How often a robot that is lost finds itself."""
-    searches: list[tuple[str, Callable[[Spec, Iterable[int]], Search], Spec]] = [
+def print_relocalization(seeds: Iterable[int]) -> None:
+    """Print how many lost robots are found."""
+    searches: list[tuple[str, Callable[[Spec, Iterable[int]], Relocalization], Spec]] = [
         ("wrong start, amcl", wrong_start, SUM),
         ("wrong start, prob", wrong_start, PROB),
         ("global, amcl, 2000", global_start, SUM),

@@ -4,7 +4,7 @@ import measure_localizers as measure
 import numpy as np
 import pytest
 from estimate_drives import case
-from measure_recovery import drives, off
+from measure_recovery import drives, position_errors
 
 from simscen.model.localizers import Amcl
 
@@ -13,7 +13,7 @@ SEEDS_AMONG_PEOPLE = (5, 7)
 
 
 @pytest.mark.parametrize("spec", [measure.SUM, measure.PROB, measure.BEAM], ids=lambda spec: spec.laser_model_type)
-def test_the_way_round_the_room_is_tracked_to_five_centimeters(spec: Amcl) -> None:
+def test_a_drive_around_the_room_is_tracked_to_five_centimeters(spec: Amcl) -> None:
     seconds = 15.0 if spec is measure.BEAM else 30.0
     assert measure.tracking(spec, SEEDS[:2], seconds).rmse.max() <= 0.05
 
@@ -27,7 +27,7 @@ def test_a_robot_that_knows_its_start_is_not_believed_a_meter_off_where_the_best
     world: str, circumstance: str, seed: int
 ) -> None:
     """1.45, 1.51 and 2.32 m with the mean of the particles near the best one, for a beat or two each time."""
-    wrong = off(case(world, circumstance, "likelihood_field", seed))
+    wrong = position_errors(case(world, circumstance, "likelihood_field", seed))
     assert wrong.max() < 0.6
     assert np.sqrt(np.mean(wrong**2)) < 0.2
 
@@ -61,7 +61,7 @@ def test_recovery_does_not_take_a_good_cloud_apart_with_what_it_puts_anywhere(wo
     the former when a twentieth did, and went on straying: 80 % of the particles after ten seconds.
     """
     (drive,) = (one for one in drives("crowded", "likelihood_field", [12], [world]))
-    assert off(drive).max() < 1.0
+    assert position_errors(drive).max() < 1.0
 
 
 def test_a_kidnapped_robot_finds_itself_with_recovery_and_not_without(is_quick: bool) -> None:
