@@ -57,7 +57,7 @@ KINDS: Mapping[str, tuple[str, bool]] = {
 
 @dataclass(frozen=True)
 class SparseTrial:
-    """Result of one localizer and seed on one log: median and last position error in m; `lost` if above LOST_M."""
+    """Result of one localizer and seed on one log: median and last error in m; `lost` if any error exceeded LOST_M."""
 
     kind: str
     localizer: str

@@ -51,7 +51,7 @@ class Experiment:
 
 
 NARROW_MARGINS_M = (0.30, 0.20, 0.10)
-"""Minimum width of the widest path through a narrow field, minus the width of the robot; it is at most 0.1 m more."""
+"""Widths of the widest path through a narrow field, minus the width of the robot. Fields are up to 0.1 m wider."""
 ROBOT_WIDTH_M = 0.42
 """Width of the Jackal across its wheels."""
 LOCALIZATIONS = ("tour", "start 0.5 m and 20° off", "start unknown", "kidnapped")

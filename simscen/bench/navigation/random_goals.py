@@ -92,7 +92,7 @@ def scenario_text(name: str, world: str, drive: RandomDrive, faults: Sequence[st
 def write_random_goals(
     name: str, folder: Path, worlds: Mapping[str, BuiltWorld], numbers: Sequence[int], world_path: tuple[Path, ...] = ()
 ) -> Experiment:
-    """Write the random drives with these numbers in each world. Scenarios refer to the keys of `worlds`."""
+    """Write the random drives with these numbers in each world. Keys of `worlds` are values of `world:`."""
     drives = []
     for world, built in worlds.items():
         for drive in random_drives(built, ROBOT_RADIUS_M, numbers):

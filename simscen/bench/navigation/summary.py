@@ -150,7 +150,7 @@ def mean(values: Sequence[float | None]) -> float | None:
 class ClusteredMean:
     """Mean of the values of trials, with a confidence interval by bootstrap over worlds (cluster bootstrap).
 
-    Each trial has the same weight.
+    Each trial has the same weight. Worlds are resampled, because trials in the same world are not independent.
     """
 
     values_by_world: tuple[tuple[float, ...], ...]
@@ -211,7 +211,7 @@ Pair = tuple[Trial, Trial]
 
 @dataclass(frozen=True)
 class Difference:
-    """Mean of the other stack's value minus the reference's, with its interval; None with fewer than five worlds."""
+    """Mean of the other stack's value minus the reference's, and its interval (None with fewer than five worlds)."""
 
     mean: float
     interval: Interval | None
