@@ -106,8 +106,7 @@ def write_degraded_sensing(
 ) -> list[Experiment]:
     """Write one experiment for each of STRENGTHS with the same drives: one for each of `worlds` and FAULTS.
 
-    `worlds` and `world_path` are as in `write_random_goals`. The drives are derived from `first`, which is also the
-    seed.
+    `worlds` and `world_path` are as in `write_random_goals`. `first` is the seed, and determines the drives.
     """
     faults = dict(enumerate(FAULTS, start=FIRST_FAULTY_DRIVE + first * len(FAULTS)))
     drives_by_world = {world: list(random_drives(built, ROBOT_RADIUS_M, faults)) for world, built in worlds.items()}
