@@ -1,4 +1,4 @@
-"""Lets the tests of this folder share `finishedruns.py`."""
+"""Make `finishedruns.py` importable in the tests of this folder."""
 
 import sys
 from pathlib import Path

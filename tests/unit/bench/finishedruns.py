@@ -1,4 +1,4 @@
-"""Runs that have come to an end, in each way."""
+"""Finished runs with each outcome."""
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.session_events import RunFinished

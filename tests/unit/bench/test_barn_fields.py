@@ -22,7 +22,7 @@ def test_disc_can_pass_according_to_an_independent_library(number: int) -> None:
     assert pieces and pieces[0].contains(Point(GOAL.x, GOAL.y))
 
 
-def test_the_shortest_way_is_no_shorter_than_the_straight_one() -> None:
+def test_the_shortest_path_is_no_shorter_than_the_straight_line() -> None:
     assert 10.0 <= generate_obstacle_field(1).shortest < 20.0
 
 

@@ -30,7 +30,7 @@ def test_there_are_5_to_24_cylinders_and_both_ends_occur() -> None:
     assert MOVER_COUNT_RANGE[0] <= min(counts) < 8 and 21 < max(counts) <= MOVER_COUNT_RANGE[1]
 
 
-def test_cylinders_keep_to_the_arena_and_begin_at_different_places_of_their_ways() -> None:
+def test_cylinders_stay_in_the_arena_and_start_at_different_points_of_their_paths() -> None:
     for field in FIELDS:
         for mover in field.movers:
             assert np.abs(mover.points).max() <= ARENA_HALF_WIDTH_M + 1e-9
@@ -38,7 +38,7 @@ def test_cylinders_keep_to_the_arena_and_begin_at_different_places_of_their_ways
 
 
 @pytest.mark.parametrize("speed", SPEEDS_M_S)
-def test_the_mean_speed_is_the_one_asked_for_and_no_piece_is_much_faster_or_slower(speed: float) -> None:
+def test_the_mean_speed_is_as_requested_and_no_segment_is_much_faster_or_slower(speed: float) -> None:
     means = []
     for field in of(speed):
         for mover in field.movers:

@@ -64,7 +64,7 @@ def test_half_map_is_unknown_right_of_the_center() -> None:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("circumstance", ["tracked", "unknown"])
 @pytest.mark.parametrize("parameters", ["default", "consistent"])
-def test_a_robot_is_tracked_on_raw_odometry_and_found_on_a_floor_of_forty_meters(
+def test_a_robot_is_tracked_with_raw_odometry_and_found_on_a_floor_of_forty_meters(
     circumstance: str, parameters: str
 ) -> None:
     made = short(circumstance)
@@ -76,7 +76,7 @@ def test_a_robot_is_tracked_on_raw_odometry_and_found_on_a_floor_of_forty_meters
     assert circumstance == "unknown" or not errors.lost
 
 
-def test_a_row_counts_what_was_tracked_and_what_was_found_in_time() -> None:
+def test_summary_counts_robots_that_were_tracked_or_found_in_time() -> None:
     def one(number: int, circumstance: str, tracked: bool, found: float | None) -> Trial:
         return Trial(number, 0, circumstance, tracked, 0.05 * number, 1.0, found, (3.0,) * len(CHECK_TIMES_S), 1.0, 2.0)
 

@@ -14,7 +14,7 @@ def test_nees_is_that_of_filterpy() -> None:
     assert nees(error, covariance) == pytest.approx(expected)
 
 
-def test_a_belief_without_doubt_is_overconfident() -> None:
+def test_nees_is_infinite_for_a_singular_covariance() -> None:
     assert nees(np.array([0.1, 0.0, 0.0]), np.diag([0.0, 1.0, 1.0])) == float("inf")
 
 
@@ -34,10 +34,11 @@ def test_a_consistent_estimator_lies_within_the_bounds() -> None:
 
 
 def filtered(rng: np.random.Generator, campaigns: int, buildings: int, shared: float) -> Array:
-    """NEES (campaigns, buildings, 25) of a Kalman filter that follows a random walk: five logs, each at five moments.
+    """Return the NEES (campaigns, buildings, 25) of a Kalman filter of a random walk, in five logs at five times each.
 
-    Each measurement errs on its own (variance 4) and as all do in its building (variance `shared`); the filter knows of
-    both. Moments are four steps apart, so that the errors of a log hang together, too.
+    A measurement has an independent error (variance 4), and an error that all measurements in its building share
+    (variance `shared`). The filter knows both variances. The times are four steps apart, so that errors in a log are
+    correlated, too.
     """
     walk, noise = 0.25, 4.0
     before = (walk + np.sqrt(walk**2 + 4 * walk * noise)) / 2  # the Riccati equation's steady state, of one coordinate
@@ -56,7 +57,7 @@ def filtered(rng: np.random.Generator, campaigns: int, buildings: int, shared: f
 
 @pytest.mark.parametrize("shared", [0.0, 0.3])
 def test_bounds_over_buildings_cover_a_consistent_filter_and_no_other(shared: float) -> None:
-    """No other: 1.5 times as sure, or as unsure, as it may be, in standard deviations."""
+    """An inconsistent filter, whose standard deviations are 1.5 times too small or too large, is outside the bounds."""
     values = filtered(np.random.default_rng(3), 400, 8, shared)
 
     def kept(times: float) -> float:

@@ -28,7 +28,7 @@ from simscen.worlds.built_world import build_world_and_map
 
 
 def two_rooms() -> BuiltWorld:
-    """10 x 6 m, parted at x = 5 by a wall without a door; something that may move at (2, 3)."""
+    """Return a world of 10 x 6 m with a wall without a door at x = 5, and a movable object at (2, 3)."""
     solids = [Solid(Box((10.2, 0.1, 1.0)), Pose3(5.0, y, 0.5), "wall") for y in (0.0, 6.0)] + [
         Solid(Box((0.1, 6.0, 1.0)), Pose3(x, 3.0, 0.5), "wall") for x in (0.0, 5.0, 10.0)
     ]

@@ -32,6 +32,6 @@ def test_a_sparse_reference_is_compared_at_its_own_times():
     assert set(np.round(found.times / 5.0)) == set(range(13)), "each of its poses"
 
 
-def test_a_gap_is_left_out_of_the_share():
+def test_beliefs_in_a_gap_are_not_compared():
     found = errors(np.concatenate([np.arange(0.0, 20.0, 0.1), np.arange(40.0, 60.1, 0.1)]))
     assert found.compared == pytest.approx(2 / 3, abs=0.01)

@@ -23,7 +23,7 @@ def test_run_has_exactly_one_outcome(finished: RunFinished, drive_outcome: Drive
     assert Trial(finished).drive_outcome is drive_outcome
 
 
-def test_rates_are_of_all_runs_and_times_of_the_good_ones() -> None:
+def test_rates_are_over_all_runs_and_times_over_successful_runs() -> None:
     row = summarize("BARN", [Trial(r, 10.0) for r in (ARRIVED, ARRIVED, HIT, LATE)])
     assert (row.runs, row.success, row.collisions, row.timeouts, row.failed) == (4, 0.5, 0.25, 0.25, 0.0)
     assert row.seconds == 8.0
@@ -38,7 +38,7 @@ def test_a_case_without_reference_has_no_score() -> None:
     assert summarize("doorway", [Trial(ARRIVED)]).score is None
 
 
-def test_success_is_weighted_by_how_long_the_shortest_way_takes_at_top_speed() -> None:
+def test_success_is_weighted_by_the_time_of_the_shortest_path_at_top_speed() -> None:
     # 10 m at 2 m/s is 5 s; it took 8 s. Whoever fails has none of it, and nobody more than all.
     assert summarize("BARN", [Trial(ARRIVED, top_speed=2.0), Trial(HIT, top_speed=2.0)]).sct == pytest.approx(5 / 8 / 2)
     assert summarize("BARN", [Trial(ARRIVED, top_speed=1.0)]).sct == 1.0

@@ -1,4 +1,4 @@
-"""RecoveryReporter of Nav2 as events."""
+"""Recoveries of Nav2 as events."""
 
 from types import SimpleNamespace
 from typing import Any
