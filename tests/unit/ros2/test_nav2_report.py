@@ -63,8 +63,8 @@ def test_the_last_different_errors_are_listed() -> None:
 def test_a_lifecycle_manager_that_gives_up_is_known_by_name() -> None:
     missing: Any = None
     report = Nav2Report(missing, missing)
-    report._take_log(SimpleNamespace(level=40, name="robot1.manager", msg="GoalFailed to change state for node: amcl"))
+    report._take_log(SimpleNamespace(level=40, name="robot1.manager", msg="Failed to change state for node: amcl"))
     assert not report.aborted_bring_up
-    text = "GoalFailed to bring up all requested nodes. Aborting bringup."
+    text = "Failed to bring up all requested nodes. Aborting bringup."
     report._take_log(SimpleNamespace(level=40, name="robot1.manager", msg=text))
     assert report.aborted_bring_up == "robot1.manager"

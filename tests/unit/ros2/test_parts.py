@@ -105,12 +105,12 @@ def test_a_stamped_twist_is_read_for_any_length_of_its_frame() -> None:
         text = frame.encode() + b"\0"
         body = struct.pack("<iII", 12, 500_000_000, len(text)) + text
         stamped = messages.LITTLE_ENDIAN + body + b"\0" * (-len(body) % 8) + struct.pack("<6d", *numbers)
-        assert messages.read_twist(stamped, stamped=True) == numbers
+        assert messages.read_twist(stamped, is_stamped=True) == numbers
         assert messages.read_header(stamped) == (12_500_000_000, frame)
 
 
 def test_a_big_endian_twist_is_read() -> None:
-    assert messages.read_twist(b"\0\0\0\0" + struct.pack(">6d", 1, 2, 3, 4, 5, 6), stamped=False) == (1, 2, 3, 4, 5, 6)
+    assert messages.read_twist(b"\0\0\0\0" + struct.pack(">6d", 1, 2, 3, 4, 5, 6), is_stamped=False) == (1, 2, 3, 4, 5, 6)
 
 
 def test_a_twist_has_the_same_bytes_as_in_the_log() -> None:
