@@ -110,7 +110,8 @@ def test_a_stamped_twist_is_read_for_any_length_of_its_frame() -> None:
 
 
 def test_a_big_endian_twist_is_read() -> None:
-    assert messages.read_twist(b"\0\0\0\0" + struct.pack(">6d", 1, 2, 3, 4, 5, 6), is_stamped=False) == (1, 2, 3, 4, 5, 6)
+    message = b"\0\0\0\0" + struct.pack(">6d", 1, 2, 3, 4, 5, 6)
+    assert messages.read_twist(message, is_stamped=False) == (1, 2, 3, 4, 5, 6)
 
 
 def test_a_twist_has_the_same_bytes_as_in_the_log() -> None:
