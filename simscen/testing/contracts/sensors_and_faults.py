@@ -17,7 +17,7 @@ from simscen.core.messages import sensor_data
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
 from simscen.core.records.events import BELIEF, COMMAND, FAULT_TARGET_KINDS, MAP, WHEELS
-from simscen.faults.base import Disturbance, Fault, FaultSetting
+from simscen.faults.base import Fault, FaultEffect, FaultSetting
 from simscen.sensors.sensor import Sensor, SensorSetting
 from simscen.testing.contracts.base import Contract, call_component, promise, require
 from simscen.testing.fakes import DRIVE, FakeSensorView, SquareRoomRays
@@ -33,11 +33,11 @@ FAULT_READING_COUNT = 40
 GRID = OccupancyGrid(np.where(np.eye(20, dtype=bool), OCCUPIED, FREE).astype(np.int8), 0.25)
 
 
-class FakeSight:
-    """Fake view from a displaced sensor: longer distances and another image."""
+class FakeSensorSimulator:
+    """Fake of faults.base.SensorSimulator."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return constant distances, which depend on the arguments."""
+        """Return 2 m for the actual sensor and objects, otherwise 4 m."""
         return np.full(len(scan.ranges), 2.0 if error is None and not without else 4.0)
 
     def image(self, error: Pose3) -> Image:
@@ -53,31 +53,31 @@ class FaultContract(Contract):
     spec: Any
     subject: str = ""
 
-    def start(self, kind: str, now: Callable[[], int] = lambda: 0) -> Disturbance:
+    def start(self, kind: str, now: Callable[[], int] = lambda: 0) -> FaultEffect:
         """Start a new fault on a kind of target, always with the same generator."""
         fault: Fault = self.spec
-        setting = FaultSetting(0.3, now=now, kind=kind, sight=FakeSight() if kind in ("Scan", "Image") else None)
+        setting = FaultSetting(
+            0.3, now=now, kind=kind, simulator=FakeSensorSimulator() if kind in ("Scan", "Image") else None
+        )
         return call_component("begins", fault.begin, np.random.default_rng(5), setting)
 
     def outputs(self, kind: str) -> list[Any]:
         """Return the outputs for readings or commands of a kind, including delayed ones."""
         tick = 0
         outputs: list[Any] = []
-        disturbance = self.start(kind, lambda: tick)
+        effect = self.start(kind, lambda: tick)
         for k in range(FAULT_READING_COUNT):
             tick = 24 * k
             if kind in (COMMAND, WHEELS):
-                outputs.append(call_component("returns delayed commands", disturbance.arriving_command))
-                outputs.append(
-                    call_component("receives a command", disturbance.command, Twist(0.4, 0.0, 0.1 * (k % 5)))
-                )
+                outputs.append(call_component("returns delayed commands", effect.arriving_command))
+                outputs.append(call_component("receives a command", effect.command, Twist(0.4, 0.0, 0.1 * (k % 5))))
             elif kind == BELIEF:
-                outputs.append(call_component("receives a belief", disturbance.belief, _belief(k)))
+                outputs.append(call_component("receives a belief", effect.belief, _belief(k)))
             elif kind == MAP:
-                outputs.append(call_component("receives a map", disturbance.map, GRID))
+                outputs.append(call_component("receives a map", effect.map, GRID))
             else:
-                outputs += call_component("returns delayed readings", disturbance.arriving)
-                outputs.append(call_component(f"receives a {kind}", disturbance.reading, READINGS[kind](k)))
+                outputs += call_component("returns delayed readings", effect.arriving_readings)
+                outputs.append(call_component(f"receives a {kind}", effect.reading, READINGS[kind](k)))
         return outputs
 
     @promise
@@ -118,19 +118,19 @@ class FaultContract(Contract):
     def a_reading_is_never_changed(self) -> None:
         """Given a reading then it is not changed, because the log contains it."""
         for kind in sorted(set(self.spec.affects) & set(READINGS)):
-            disturbance = self.start(kind)
+            effect = self.start(kind)
             for k in range(FAULT_READING_COUNT):
                 reading = READINGS[kind](k)
                 before = copy.deepcopy(reading)
-                call_component(f"receives a {kind}", disturbance.reading, reading)
+                call_component(f"receives a {kind}", effect.reading, reading)
                 require(equal(reading, before), f"changes the {kind} that it receives")
 
     @promise
-    def its_end_leaves_a_disturbance_or_nothing(self) -> None:
-        """Given the end of a fault then the remaining disturbance is a Disturbance or None."""
+    def its_end_leaves_an_effect_or_nothing(self) -> None:
+        """Given the end of a fault then what remains is a FaultEffect or None."""
         for kind in sorted(self.spec.affects):
             remaining = call_component("ends", self.start(kind).end)
-            require(remaining is None or isinstance(remaining, Disturbance), f"leaves {remaining!r}")
+            require(remaining is None or isinstance(remaining, FaultEffect), f"leaves {remaining!r}")
 
 
 def equal(one: Any, other: Any) -> bool:
