@@ -29,7 +29,7 @@ class SensorSimulator(Protocol):
     """Simulates what the lidar or camera of a fault would measure from another pose or without some objects."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return the true distances (n,) in meters along the beams of the current scan; inf beyond its range.
+        """Return the true distances (n,) in meters along the beams of the current scan; inf beyond twice its range.
 
         `error` is the true pose of the lidar in the frame of its nominal pose; beams that point down end at the floor.
         Beams pass through the objects named in `without`.

@@ -1,4 +1,4 @@
-"""Specification of worlds (`*.world.yaml`)."""
+"""Specifications of worlds (`*.world.yaml`) and of ROS maps."""
 
 from typing import Annotated, Literal
 
@@ -82,7 +82,7 @@ class Door(Spec):
     name: Name
     """Name for the actions `open` and `close`."""
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=2)]
-    """The two door posts as [x, y] or names of places. A door swings about the first post, and slides past it."""
+    """The two door posts as [x, y] or names of places. A door swings about the first post, or slides past it."""
     motion: Literal["swing", "slide"] = "swing"
     """`swing`: by 90° counterclockwise about the hinge. `slide`: along its own line, as into a pocket of the wall."""
     travel: PositiveLength | None = None
@@ -156,7 +156,7 @@ class RosMapSpec(Spec):
     negate: Literal[0, 1] | bool = 0
     """Whether black is free and white is occupied."""
     occupied_thresh: Probability = 0.65
-    """Minimum darkness of occupied pixels."""
+    """Minimum darkness of occupied pixels, from 0 (white) to 1 (black)."""
     free_thresh: Annotated[Probability, Field(validate_default=True)] = 0.25
     """Maximum darkness of free pixels."""
     mode: Literal["trinary", "scale", "raw"] = "trinary"

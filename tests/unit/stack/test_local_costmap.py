@@ -107,8 +107,8 @@ def test_a_robot_that_is_faster_sees_as_far_as_it_looks_ahead() -> None:
 def test_local_costmap_inherits_unset_parameters() -> None:
     shared = Costmap(inflation_radius=0.3, obstacle_max_range=1.0)
     with_own_default = shared.model_copy(update={"publish_frequency": 1.0})
-    assert LocalCostmap(track_unknown_space=True).completed(shared) == with_own_default
-    own = LocalCostmap(inflation_radius=0.5, update_frequency=10.0).completed(shared)
+    assert LocalCostmap(track_unknown_space=True).with_defaults_from(shared) == with_own_default
+    own = LocalCostmap(inflation_radius=0.5, update_frequency=10.0).with_defaults_from(shared)
     assert (own.inflation_radius, own.obstacle_max_range, own.update_frequency) == (0.5, 1.0, 10.0)
 
 
