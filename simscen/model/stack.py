@@ -126,18 +126,11 @@ def merge_parameters(defaults: Mapping[str, Any], parameters: Mapping[str, Any])
     return merged
 
 
-FailureTolerance = Annotated[float, Field(ge=-1, le=86400), Quantity("duration")]
-
-
 ParameterFile = Annotated[str, Field(min_length=1, max_length=4096)]
-
-
 _LatencyOrRobot = Annotated[
     Annotated[Literal["robot"], Tag("a name")] | Annotated[Latency, Tag("durations")],
     Discriminator(lambda value: "a name" if isinstance(value, str) else "durations"),
 ]
-
-
 REFERENCE_BUILDER = "simscen.stack.build:StackBuilder"
 ADVANCED_BUILDER = "simscen.advanced.stack:AdvancedStackBuilder"
 
@@ -168,7 +161,7 @@ class StackSpec(InProcessStack):
     """Planner of the global path."""
     controller: Controller = by_default()
     """Controller that follows the path."""
-    failure_tolerance: FailureTolerance = 0.3
+    failure_tolerance: Annotated[float, Field(ge=-1, le=86400), Quantity("duration")] = 0.3
     """Time without a valid command after which the controller fails with PATIENCE_EXCEEDED; 0: it fails immediately
     with NO_VALID_CONTROL; -1: it never fails."""
     goal_checker: GoalChecker = by_default()

@@ -1,10 +1,10 @@
-"""Contracts of sensors and faults."""
+"""Contracts of sensors and faults: checks that each of them must pass."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ READINGS: dict[str, Callable[[int], Reading]] = {
     "Bump": lambda k: Bump("it", 24 * k, k % 2 == 0),
     "Image": lambda k: Image("it", 24 * k, np.full((4, 6, 3), k % 200, np.uint8), np.full((4, 6), 2.0, np.float32)),
 }
+"""Function that returns the k-th reading of each type, one every 24 ticks."""
 FAULT_READING_COUNT = 40
 GRID = OccupancyGrid(np.where(np.eye(20, dtype=bool), OCCUPIED, FREE).astype(np.int8), 0.25)
 
@@ -45,16 +46,13 @@ class FakeSensorSimulator:
         return Image("it", 0, np.full((4, 6, 3), 90, np.uint8), np.full((4, 6), 3.0, np.float32))
 
 
-@dataclass(frozen=True, eq=False)
 class FaultContract(Contract):
     """Contract of a fault, on forty readings or commands of each affected kind."""
 
     role = "fault"
-    spec: Any
-    subject: str = ""
 
     def start(self, kind: str, now: Callable[[], int] = lambda: 0) -> FaultEffect:
-        """Start a new fault on a kind of target, always with the same generator."""
+        """Start the fault on a kind of target, with a new generator of the same seed; `now` returns the tick."""
         fault: Fault = self.spec
         setting = FaultSetting(
             0.3, now=now, kind=kind, simulator=FakeSensorSimulator() if kind in ("Scan", "Image") else None
@@ -149,21 +147,19 @@ def _belief(number: int) -> Belief:
 
 
 NAME = "it"
+"""Name of the tested sensor."""
 READING_COUNT = 20
 FIELDS_WITH_NAN = ("ranges", "depth")
 """Fields whose values may be infinite or nan, because a beam or pixel has no return."""
 
 
-@dataclass(frozen=True, eq=False)
 class SensorContract(Contract):
     """Contract of a sensor, on a robot with two wheels that drives a circle in a square room."""
 
     role = "sensor"
-    spec: Any
-    subject: str = ""
 
     def readings(self, seed: int = 1) -> list[Reading]:
-        """Return twenty readings of a new sensor."""
+        """Return READING_COUNT readings of a new sensor."""
         return self.measure(*self.build(seed))
 
     def build(self, seed: int = 1) -> tuple[Sensor, FakeSensorView, int]:
@@ -174,7 +170,7 @@ class SensorContract(Contract):
         return call_component("is built", lambda: self.spec.implementation()(self.spec, setting)), view, period
 
     def measure(self, sensor: Sensor, view: FakeSensorView, period: int) -> list[Reading]:
-        """Return the next twenty readings."""
+        """Return the next READING_COUNT readings, with the view at the time of each."""
         readings = []
         for k in range(1, READING_COUNT + 1):
             view.seconds = k * period / 240

@@ -16,7 +16,7 @@ from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.protocols import CostmapView
-from simscen.testing.flatland import CONTROL, RATE, Drive, Flatland, drive, round_robot
+from simscen.testing.flatland import CONTROL_PERIOD, RATE, Drive, Flatland, drive, round_robot
 
 TRUTH = GroundTruth(type="ground_truth")
 CORRIDOR = Flatland().room(14, 1.6)
@@ -62,7 +62,7 @@ def test_a_jump_of_the_localizer_leaves_no_ghost_in_the_local_costmap_and_no_jer
     ghosts = CORRIDOR.distance(lethal(costmaps(d).local_costmap.view))  # here the odom frame is the true one
     assert len(ghosts) > 50
     assert np.abs(ghosts).max() < 0.1
-    robot, period = d.robot, CONTROL / RATE
+    robot, period = d.robot, CONTROL_PERIOD / RATE
     driven = d.commands[RATE * 5 // 2 // 6 :]
     for before, now in pairwise(driven):
         assert abs(now.vx - before.vx) <= max(robot.linear_acceleration, robot.linear_deceleration) * period + 1e-9

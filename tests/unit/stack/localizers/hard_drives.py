@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from simscen.testing.synthetic_room import BEAMS, BOXES, READINGS_PER_SCAN, SCAN_PERIOD, TICK_RATE_HZ, Drive, cast
+from simscen.testing.synthetic_room import BEAMS, BOXES, READINGS_PER_SCAN, SCAN_PERIOD, TICK_RATE_HZ, RoomDrive, cast
 
 
-def kidnapped(before: Drive, after: Drive) -> Drive:
+def kidnapped(before: RoomDrive, after: RoomDrive) -> RoomDrive:
     """The robot is carried from the end of one drive to the start of the next; its wheels do not notice."""
     count = len(before.truth) // READINGS_PER_SCAN * READINGS_PER_SCAN
-    return Drive(
+    return RoomDrive(
         np.concatenate((before.truth[:count], after.truth)),
         np.concatenate((before.steps[:count], after.steps)),
         np.concatenate((before.ranges[: count // READINGS_PER_SCAN], after.ranges)),
@@ -23,7 +23,7 @@ NEW = np.array([
 ])  # fmt: skip
 
 
-def crowded(way: Drive, seed: int, people: int = 8) -> Drive:
+def crowded(way: RoomDrive, seed: int, people: int = 8) -> RoomDrive:
     """The same drive, but with the furniture moved, among people that come and go, and on slipping wheels.
 
     People are 0.6 m wide and walk 0.5 to 3 m from the robot. Slipping wheels turn up to 30 % too far, for seconds.
@@ -46,4 +46,4 @@ def crowded(way: Drive, seed: int, people: int = 8) -> Drive:
         slip[row:end, 0] += rng.choice([0, 0, 0.1, -0.1, 0.3])
         row = end
     slip[:, 2] += (slip[:, 0] - 1) / 6
-    return Drive(way.truth, way.steps * slip, ranges)
+    return RoomDrive(way.truth, way.steps * slip, ranges)

@@ -17,7 +17,17 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry
 from simscen.model.localizers import Amcl, Ekf
 from simscen.model.localizers import Localizer as Spec
-from simscen.testing.synthetic_room import DEFAULT_NOISE, Drive, Noise, drive, errors, localizer, nees, run, scan
+from simscen.testing.synthetic_room import (
+    DEFAULT_NOISE,
+    Noise,
+    RoomDrive,
+    build_localizer,
+    drive,
+    nees,
+    pose_errors,
+    run_localizer,
+    scan,
+)
 
 SUM = Amcl(laser_model_type="likelihood_field")
 PROB = Amcl(laser_model_type="likelihood_field_prob")
@@ -55,8 +65,8 @@ def tracking(
     squares, consistency, way = [], [], drive(seconds)
     for seed in seeds:
         start = Pose2(*(way.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
-        beliefs = run(localizer(spec, Estimate(start, tuple(STD)), seed), way, seed, noise, imu=imu)
-        error = errors(beliefs, way.truth)
+        beliefs = run_localizer(build_localizer(spec, Estimate(start, tuple(STD)), seed), way, seed, noise, imu=imu)
+        error = pose_errors(beliefs, way.truth)
         times = np.linspace(0.25, 1, 25) * (len(error) - 1)
         squares.append((np.mean(error[:, 0] ** 2 + error[:, 1] ** 2), np.mean(error[:, 2] ** 2)))
         consistency.append([nees(beliefs[k], error[k]) for k in times.astype(int)])
@@ -72,12 +82,14 @@ class Search:
     seconds: Array
 
 
-def search(spec: Spec, seeds: Iterable[int], way: "dict[int, tuple[Drive, Estimate]]", begin: float = 0.0) -> Search:
+def search(
+    spec: Spec, seeds: Iterable[int], way: "dict[int, tuple[RoomDrive, Estimate]]", begin: float = 0.0
+) -> Search:
     """Runs each seed on its own drive from its own estimate."""
     rows = []
     for seed in seeds:
         path, estimate = way[seed]
-        error = np.abs(errors(run(localizer(spec, estimate, seed), path, seed), path.truth))
+        error = np.abs(pose_errors(run_localizer(build_localizer(spec, estimate, seed), path, seed), path.truth))
         lost = np.flatnonzero((np.hypot(error[:, 0], error[:, 1]) > FOUND_WITHIN[0]) | (error[:, 2] > FOUND_WITHIN[1]))
         last = lost[-1] + 1 if len(lost) else 0
         rows.append((last <= len(error) - 40, last / 40 - begin))
@@ -91,7 +103,7 @@ def among_people(spec: Spec, seeds: Iterable[int], seconds: float = 60.0) -> Arr
     for seed in seeds:
         way = crowded(drive(seconds, seed % 12), seed)
         start = Estimate(Pose2(*way.truth[0]), tuple(STD))
-        off = np.hypot(*errors(run(localizer(spec, start, seed), way, seed), way.truth)[:, :2].T)
+        off = np.hypot(*pose_errors(run_localizer(build_localizer(spec, start, seed), way, seed), way.truth)[:, :2].T)
         rows.append((np.sqrt(np.mean(off**2)), off.max()))
     return np.array(rows)
 
@@ -126,7 +138,7 @@ def update_cost(spec: Amcl, particles: int) -> float:
     """Milliseconds that one correction by a scan takes with this many particles: the median of 100."""
     way = drive(20.0)
     fixed = spec.model_copy(update={"min_particles": particles, "max_particles": particles})
-    subject, costs = localizer(fixed, Estimate(Pose2(*way.truth[0])), 1), []
+    subject, costs = build_localizer(fixed, Estimate(Pose2(*way.truth[0])), 1), []
     for tick in range(100):
         subject.on_odometry(Odometry("odom", tick, Pose2(0.0, 0.0, 0.25 * (tick % 2)), Twist()))
         began = time.perf_counter()
