@@ -1,4 +1,4 @@
-"""Specifications of controllers, goal checkers, and the progress checker, with Nav2's names and, mostly, defaults."""
+"""Specifications of controllers, goal checkers, and the progress checker; defaults are Nav2's unless noted."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -36,15 +36,15 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
     component: ClassVar[str] = "simscen.stack.controllers.regulated_pure_pursuit:RegulatedPurePursuit"
     type: Literal["regulated_pure_pursuit"] = "regulated_pure_pursuit"
     desired_linear_vel: PositiveSpeed | None = None
-    """Maximum speed; default: 0.5 m/s, or that of the robot if it is lower."""
+    """Maximum speed; default: 0.5 m/s, or the limit of the robot if that is lower."""
     lookahead_dist: PositiveLength = 0.6
-    """Distance to the plan point to follow if it does not scale with speed."""
+    """Lookahead distance, i.e. the distance to the carrot on the plan, if it does not scale with speed."""
     min_lookahead_dist: PositiveLength = 0.3
     """Minimum lookahead distance if it scales with speed."""
     max_lookahead_dist: PositiveLength = 0.9
     """Maximum lookahead distance if it scales with speed."""
     lookahead_time: PositiveDuration = 1.5
-    """Time for which the current speed is multiplied to get the lookahead distance."""
+    """Time by which the current speed is multiplied to get the lookahead distance."""
     use_velocity_scaled_lookahead_dist: bool = True
     """Whether the lookahead distance scales with speed."""
     use_fixed_curvature_lookahead: bool = False
@@ -67,7 +67,7 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
     use_collision_detection: bool = True
     """Whether to stop if the command would lead to a collision."""
     max_allowed_time_to_collision_up_to_carrot: PositiveDuration = 1.0
-    """Time for which commands are checked for collisions, at most up to the carrot (the point that is followed)."""
+    """Time for which commands are checked for collisions, at most up to the carrot."""
     min_slowed_speed: PositiveSpeed = 0.1
     """Speed to which a command that would lead to a collision is slowed down before the controller fails with
     NO_VALID_CONTROL. Nav2 fails at once."""
@@ -99,7 +99,7 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
 
     @property
     def lookahead_s(self) -> float:
-        """Minimum time to collision of commands in seconds."""
+        """Time in seconds for which commands are checked for collisions."""
         return self.max_allowed_time_to_collision_up_to_carrot
 
 
@@ -109,7 +109,7 @@ class DynamicWindow(PathFollowerSpec):
     component: ClassVar[str] = "simscen.stack.controllers.dwb.controller:DynamicWindowController"
     type: Literal["dwb"]
     max_vel_x: PositiveSpeed | None = None
-    """Maximum forward speed; default: 0.5 m/s, or that of the robot if it is lower."""
+    """Maximum forward speed; default: 0.5 m/s, or the limit of the robot if that is lower."""
     min_vel_x: Annotated[Speed, Field(ge=-10, le=0)] = 0.0
     """Maximum backward speed, negative."""
     max_vel_y: NonNegativeSpeed | None = None

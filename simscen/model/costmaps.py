@@ -1,4 +1,4 @@
-"""Specifications of the two costmaps (nav2_costmap_2d)."""
+"""Specifications of the global and the local costmap (nav2_costmap_2d)."""
 
 from typing import Annotated, Literal
 
@@ -54,11 +54,11 @@ class Costmap(Ranged):
     max_obstacle_height: NonNegativeLength = 2.0
     """Maximum height of obstacles in camera data; higher points are ignored."""
     inf_is_valid: bool = True
-    """Whether beams without a hit clear the cells that they pass. In Nav2, they are ignored by default."""
+    """Whether beams without a hit clear the cells that they pass. In Nav2, such beams are ignored by default."""
     denoise_layer: DenoiseLayer = by_default()
     """Removal of small obstacles."""
     track_unknown_space: bool = True
-    """Whether cells that neither the map nor a beam shows are unknown; otherwise they are free."""
+    """Whether cells that neither the map nor a beam shows are unknown; otherwise such cells are free."""
     rolling_size: PositiveLength = 24.0
     """Edge length of the rolling window if the robot has no map."""
 
@@ -72,7 +72,7 @@ class LocalCostmap(Spec):
     width: PositiveLength | None = None
     """Size along x of the odom frame; default: 3 m, or more if the controller looks farther ahead at full speed."""
     height: PositiveLength | None = None
-    """Size along y of the odom frame; default: the width."""
+    """Size along y of the odom frame; the default is that of `width`."""
     resolution: PositiveLength | None = None
     """Edge length of a cell."""
     inflation_radius: NonNegativeLength | None = None

@@ -1,4 +1,4 @@
-"""Specifications of the events and faults of a scenario, and the sequence of steps that the events consist of."""
+"""Specifications of the events of a scenario, with the steps they consist of, and of its faults."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -26,10 +26,10 @@ Actions = Annotated[
 
 
 class StepEntry(Spec):
-    """Step of a sequence, which becomes active when the previous step has happened.
+    """Step of the sequence (`then`) of an event. It becomes active when the previous step has happened.
 
-    Its trigger ignores what happened earlier: `time` and `for` are seconds since the previous step, `travelled` is the
-    distance since the previous step, and only later goals, replans, recoveries, collisions, and events count.
+    The trigger of a step ignores what happened earlier: `time` and `for` are seconds since the previous step,
+    `travelled` is the distance since then, and only later goals, replans, recoveries, collisions, and events count.
     """
 
     name: Name | None = None
@@ -51,8 +51,7 @@ class StepEntry(Spec):
 
 
 class EventEntry(Spec):
-    """Change in the world: its actions (`do`) happen when its trigger (`when`) fires, then the steps of its sequence
-    (`then`)."""
+    """Change in the world: when the trigger (`when`) fires, the actions (`do`) happen, and then the steps of `then`."""
 
     name: Name | None = None
     """Name in reports and other triggers; default: event-1, event-2, …"""

@@ -215,11 +215,11 @@ class Mppi(PathFollowerSpec):
     iteration_count: Annotated[int, Field(ge=1, le=20)] = 1
     """Number of optimization iterations per command."""
     vx_max: PositiveSpeed | None = None
-    """Maximum forward speed; default: 0.5 m/s, or that of the robot if it is lower."""
+    """Maximum forward speed; default: 0.5 m/s, or the limit of the robot if that is lower."""
     vx_min: Annotated[Speed, Field(ge=-10, le=0)] = -0.35
     """Maximum backward speed, negative."""
     vy_max: NonNegativeSpeed | None = None
-    """Maximum sideways speed of the Omni model; default: 0.5 m/s, or that of the robot if it is lower."""
+    """Maximum sideways speed of the Omni model; default: 0.5 m/s, or the limit of the robot if that is lower."""
     wz_max: PositiveAngularSpeed = 1.9
     """Maximum turn rate."""
     ax_max: PositiveAcceleration | None = None

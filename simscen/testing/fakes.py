@@ -165,7 +165,7 @@ class FakeSensorView:
         )
 
     def placements(self) -> int:
-        """Return 0: the robot is never placed elsewhere."""
+        """Return 0, the number of times that the robot was placed elsewhere."""
         return 0
 
     def encoders(self) -> tuple[float, ...]:
@@ -189,7 +189,7 @@ class SquareRoomRays(RayCaster):
     """Ray caster for the four walls of the room."""
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """Return the ranges; see core.geometry.ray_fans.RayCaster."""
+        """Return the ranges (n,) in m, as described in core.geometry.ray_fans.RayCaster."""
         with np.errstate(divide="ignore", invalid="ignore"):
             walls = (np.sign(directions[:, :2]) * ROOM_HALF_WIDTH_M - origins[:, :2]) / directions[:, :2]
         far: Array = np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)

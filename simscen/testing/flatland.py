@@ -1,6 +1,6 @@
 """Planar world of boxes and discs, in which a stack can drive a robot without physics.
 
-Distances and ranges are exact and do not use code of simscen, so tests can compare simscen with them.
+Distances and ranges use closed formulas, independent of the tested code, so that tests can compare both.
 """
 
 import math
@@ -71,7 +71,7 @@ class Flatland:
         return self
 
     def grid(self, bounds: tuple[float, float, float, float], resolution: float = 0.05) -> OccupancyGrid:
-        """Return the map of `bounds` (min x, min y, max x, max y). A cell is occupied if its center is in an obstacle."""
+        """Return the map of `bounds` (min x, min y, max x, max y). Cells with centers in obstacles are occupied."""
         columns, rows = (round((bounds[i + 2] - bounds[i]) / resolution) for i in (0, 1))
         y, x = (np.indices((rows, columns)) + 0.5) * resolution
         distance = self.distance(np.column_stack(((x + bounds[0]).ravel(), (y + bounds[1]).ravel())))

@@ -17,7 +17,9 @@ TICK_RATE_HZ, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
 
 
 def synthetic_trace(description: Mapping[str, Any]) -> Trace:
-    """Return a trace with 240 ticks per second, truth at 40 Hz, scans and belief at 10 Hz. Keys of the description:
+    """Return a trace with 240 ticks per second, truth at 40 Hz, scans and belief at 10 Hz.
+
+    Keys of the description, with times t in seconds:
 
     seconds:    duration
     truth:      waypoints [t, x, y, yaw]; between them, straight lines at constant speed
@@ -114,11 +116,11 @@ def _path_points(points: Sequence[Sequence[float]]) -> Array:
 
 
 def synthetic_case(description: Mapping[str, Any]) -> Case:
-    """Return a case with these keys of the description; the others are fields of Case.
+    """Return a case. Keys of the description are fields of Case, of which these are converted:
 
     start:         [x, y, yaw]
     goals, sent:   list of {name, pose: [x, y, yaw], and other fields of Goal}
-    passages:      list of [goal, [x, y], [x, y], name, name]
+    passages:      list of [goal, end [x, y], end [x, y], name of a solid, name of the other solid]
     masks:         {file: {resolution, origin: [x, y, yaw], blocks: list of [column, row, width, height, value]}}
     disturbances:  list of {name, kind, and other fields of Disturbance}
     """

@@ -16,7 +16,7 @@ from simscen.testing.contracts.base import Contract, call_component, promise, re
 from simscen.testing.fakes import FakeStage
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
-# Descriptions for synthetic_case and synthetic_trace.
+# Descriptions for `synthetic_case` and `synthetic_trace`.
 CASE: dict[str, Any] = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf": 2.5}}
 DRIVE: dict[str, Any] = {
     "seconds": 8,

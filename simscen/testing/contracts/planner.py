@@ -24,6 +24,7 @@ from simscen.testing.flatland import Flatland
 
 START, GOAL = Pose2(1.5, 1.5, 0.3), Pose2(10.0, 5.5, 0.5)
 MAX_POINT_SPACING_M = 0.1
+"""Largest distance between consecutive points of a path."""
 IMPOSSIBLE = (
     (Pose2(-3, 1), GOAL, ErrorCode.START_OUTSIDE_MAP),
     (START, Pose2(30, 1), ErrorCode.GOAL_OUTSIDE_MAP),
