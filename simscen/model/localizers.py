@@ -153,7 +153,7 @@ class Ekf(EkfParameters):
 
 
 class GroundTruth(LocalizerSpec):
-    """The true pose, to separate faults of localization from faults of navigation."""
+    """The true pose as the belief, to separate faults of localization from faults of navigation."""
 
     component: ClassVar[str] = "simscen.stack.localizers.build:ground_truth"
     type: Literal["ground_truth"]
@@ -198,7 +198,7 @@ Variance = Annotated[float, Field(ge=0, le=1e6)]
 
 
 class OdometryFilter(Spec):
-    """Source of the transform from odom to base: an EKF, set up as robot_localization's ekf_node is for Nav2.
+    """Source of the transform from odom to base. The default is an EKF, like robot_localization's ekf_node in Nav2.
 
     The EKF is not used on robots without an IMU, whose wheel odometry is used as it is, nor with the localizers `ekf`
     and `slip_ekf`, which fuse wheel odometry and IMU themselves.

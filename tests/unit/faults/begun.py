@@ -21,8 +21,8 @@ class Hand:
         return self.tick
 
 
-def begun(fault: dict, kind: str, now=lambda: 0, separation=0.3, seed=1, sight=None):
-    setting = FaultSetting(separation, Clock(240), now, kind, sight)
+def begun(fault: dict, kind: str, now=lambda: 0, separation=0.3, seed=1, simulator=None):
+    setting = FaultSetting(separation, Clock(240), now, kind, simulator)
     return AnyFault.model_validate(fault).fault.begin(np.random.default_rng(seed), setting)
 
 
