@@ -12,7 +12,7 @@ from simscen.core.records.verdict import ExpectedFailure as DeclaredFailure
 from simscen.criteria.registry import AnyCriterion
 from simscen.model.navigation import Expectation, Navigation, OnReached, text_or_mapping
 from simscen.model.stack_files import AnyStack
-from simscen.model.world import WorldSpec
+from simscen.model.world import FilePath, WorldSpec
 from simscen.spec.base import LanguageVersion, LazySpec, Spec, by_default
 from simscen.spec.places import (
     Name,
@@ -51,7 +51,6 @@ else:
     Variations = Annotated[Spec, LazySpec("simscen.model.variations", "Variations")]
 
 
-FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 WorldOrFile = Annotated[
     Annotated[FilePath, Tag("text")]
     | Annotated[WorldSpec, LazySpec("simscen.model.world", "WorldSpec"), Tag("mapping")],
@@ -87,7 +86,7 @@ else:
 
 
 class Payload(Spec):
-    """Load on the robot that is unknown to its stack and not included in its robot file."""
+    """Load on the robot that its robot file does not include and that its stack does not know."""
 
     mass: PositiveMass
     """Mass in kg."""

@@ -9,6 +9,8 @@ from simscen.spec.moving_objects import Motion, Shaped
 from simscen.spec.places import Name, PlaceName, PlaceOrPoint, PlaceOrPose, PoseSpec, Ring
 from simscen.spec.quantities import Duration, Friction, Length, Mass, PositiveLength, Probability
 
+FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
+
 
 class Wall(Spec):
     """Wall along a polyline."""
@@ -110,11 +112,11 @@ class WorldSpec(Spec):
     """Name of the world; default: the name of the file."""
     description: Annotated[str, Field(max_length=10_000)] = ""
     """Description for people."""
-    map: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    map: FilePath | None = None
     """ROS map (yaml) whose occupied cells become walls with the height `map_height`."""
     map_height: PositiveLength = 1.0
     """Height of the walls made from `map`."""
-    sdf: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    sdf: FilePath | None = None
     """Gazebo world to which the objects are added."""
     walls: Annotated[list[Wall], Field(max_length=2000)] = []
     """Walls along polylines."""
@@ -147,7 +149,7 @@ class RosMapSpec(Spec):
 
     model_config = ConfigDict(extra="ignore")
 
-    image: Annotated[str, Field(min_length=1, max_length=4096)]
+    image: FilePath
     """Image file (pgm, png, bmp), relative to this file."""
     resolution: PositiveLength
     """Size of a pixel in meters."""
